@@ -1,0 +1,128 @@
+//! What a solver sees of a fitting task: weighted residuals by blocks of rows, and a prior.
+//!
+//! The task is: minimise ½ Σ r_i(x)² + ½ Σ ((x_k − m_k) / s_k)², the second sum over parameters that have a prior.
+//! Residuals come already divided by the standard deviation of their measurement (so that the covariance of the
+//! estimate is the inverse of the normal matrix), unless a problem states otherwise.
+//!
+//! A problem speaks in *rows* (one scalar residual) that come in *observations* of [`Problem::rows_per_observation`]
+//! rows (1 for a cable length, 3 for a position, 6 for a pose). Batch solvers take the normal equations or stack
+//! all rows, filters take one observation at a time, swarms ask for the cost alone.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Prior knowledge of one parameter: a normal distribution. `sigma` infinite means none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Mean, in the unit of the parameter.
+    pub mean: f64,
+    /// Standard deviation, in the unit of the parameter; `f64::INFINITY` for a parameter without a prior.
+    pub sigma: f64,
+}
+
+/// JᵀJ, Jᵀr and ½ rᵀr of a set of rows, priors not included.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalEquations {
+    /// JᵀJ, p × p; only the lower triangle is guaranteed to be filled until [`NormalEquations::mirror`] is called.
+    pub matrix: DMatrix<f64>,
+    /// Jᵀr, p.
+    pub gradient: DVector<f64>,
+    /// ½ Σ r².
+    pub cost: f64,
+}
+
+impl NormalEquations {
+    /// All zero, for `p` parameters.
+    pub fn zeros(p: usize) -> Self {
+        Self { matrix: DMatrix::zeros(p, p), gradient: DVector::zeros(p), cost: 0.0 }
+    }
+
+    /// Adds another set of rows.
+    pub fn add(&mut self, other: &Self) {
+        self.matrix += &other.matrix;
+        self.gradient += &other.gradient;
+        self.cost += other.cost;
+    }
+
+    /// Copies the lower triangle onto the upper one.
+    pub fn mirror(&mut self) {
+        self.matrix.fill_upper_triangle_with_lower_triangle();
+    }
+}
+
+/// A fitting task. See the module page for shapes and weights.
+pub trait Problem: Sync {
+    /// Number of parameters p.
+    fn parameters(&self) -> usize;
+
+    /// Number of scalar residuals n, a multiple of [`Problem::rows_per_observation`].
+    fn rows(&self) -> usize;
+
+    /// Rows that belong to one observation.
+    fn rows_per_observation(&self) -> usize {
+        1
+    }
+
+    /// Writes the residuals of `rows` at `x` into `out` (`out.len() == rows.len()`). `rows` starts and ends at an
+    /// observation's border.
+    fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]);
+
+    /// Writes residuals and their derivatives: `jacobian` is `rows.len()` × p, column-major
+    /// (`jacobian[k * rows.len() + i]` is ∂r_i/∂x_k).
+    fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]);
+
+    /// One prior for each parameter, or an empty slice for no priors at all.
+    fn priors(&self) -> &[Prior] {
+        &[]
+    }
+
+    /// ½ Σ r² over all rows at `x`, without priors.
+    fn row_cost(&self, x: &[f64]) -> f64 {
+        chunks(self)
+            .into_par_iter()
+            .map(|rows| {
+                let mut out = vec![0.0; rows.len()];
+                self.residuals(x, rows, &mut out);
+                0.5 * out.iter().map(|r| r * r).sum::<f64>()
+            })
+            .collect::<Vec<f64>>()
+            .iter()
+            .sum()
+    }
+
+    /// The normal equations of all rows at `x`, without priors. Chunks are summed in order, so the result does not
+    /// depend on the number of threads. A problem with a faster way (rows in SIMD lanes) overrides this.
+    fn normal_equations(&self, x: &[f64]) -> NormalEquations {
+        let p = self.parameters();
+        let parts: Vec<NormalEquations> = chunks(self)
+            .into_par_iter()
+            .map(|rows| {
+                let n = rows.len();
+                let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
+                self.jacobian(x, rows, &mut r, &mut j);
+                let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+                NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.5 * r.norm_squared() }
+            })
+            .collect();
+        let mut total = NormalEquations::zeros(p);
+        parts.iter().for_each(|part| total.add(part));
+        total
+    }
+}
+
+/// ½ Σ ((x − mean)/sigma)² over the parameters that have a prior.
+pub fn prior_cost(priors: &[Prior], x: &[f64]) -> f64 {
+    let term = |(p, x): (&Prior, &f64)| if p.sigma.is_finite() { ((x - p.mean) / p.sigma).powi(2) } else { 0.0 };
+    0.5 * priors.iter().zip(x).map(term).sum::<f64>()
+}
+
+/// Rows in one chunk of parallel work: fixed, so that sums come out the same for any number of threads.
+const CHUNK_ROWS: usize = 1536;
+
+fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
+    let per = problem.rows_per_observation().max(1);
+    let step = (CHUNK_ROWS / per).max(1) * per;
+    (0..problem.rows()).step_by(step).map(|from| from..(from + step).min(problem.rows())).collect()
+}

@@ -1,0 +1,5 @@
+//! Rigid motions, numerical differences and statistics: what every other module stands on.
+
+pub mod se3;
+pub mod difference;
+pub mod statistics;

@@ -1,0 +1,29 @@
+//! The numerical twin of every analytic Jacobian: central differences with Richardson extrapolation.
+
+use nalgebra::DMatrix;
+
+/// Jacobian of `f` at `x` by central differences with steps `h` and `h/2`, extrapolated (error of order h⁴).
+///
+/// Shapes: `x` has n entries, `f` fills m entries, the result is m × n. `steps[k]` is the step of `x[k]` in its own
+/// unit (a length wants some 1e-2 mm, an angle some 1e-4 rad).
+pub fn jacobian(f: impl Fn(&[f64], &mut [f64]), x: &[f64], m: usize, steps: &[f64]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(m, x.len());
+    let (mut at, mut plus, mut minus) = (x.to_vec(), vec![0.0; m], vec![0.0; m]);
+    for k in 0..x.len() {
+        let mut central = |h: f64, scale: f64, column: &mut [f64]| {
+            at[k] = x[k] + h;
+            f(&at, &mut plus);
+            at[k] = x[k] - h;
+            f(&at, &mut minus);
+            at[k] = x[k];
+            for (c, (p, q)) in column.iter_mut().zip(plus.iter().zip(&minus)) {
+                *c += scale * (p - q) / (2.0 * h);
+            }
+        };
+        let mut column = vec![0.0; m];
+        central(steps[k], -1.0 / 3.0, &mut column);
+        central(steps[k] / 2.0, 4.0 / 3.0, &mut column);
+        out.column_mut(k).copy_from_slice(&column);
+    }
+    out
+}

@@ -1,0 +1,47 @@
+//! Rigid motions of space: poses, rotation vectors, and the difference of two poses.
+//!
+//! A pose is `nalgebra::Isometry3<f64>` with the translation in mm. `base_from_flange * flange_from_tool` is
+//! `base_from_tool`: neighbouring names cancel.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
+
+/// A rigid motion: rotation, then translation in mm.
+pub type Pose = Isometry3<f64>;
+
+/// The skew-symmetric matrix with `skew(v) * w == v.cross(&w)`.
+pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+}
+
+/// The twist, in the frame in which both poses are given, that carries `from` to `to`: translation of the origin
+/// [mm] first, then the rotation vector [rad] of `to.rotation * from.rotation⁻¹`.
+pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
+    let translation = to.translation.vector - from.translation.vector;
+    let rotation = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Vector6::new(translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z)
+}
+
+/// The inverse of [`difference`]: moves a pose by a twist given in the frame of its parent.
+pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
+    let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
+    Pose::from_parts(
+        (pose.translation.vector + twist.fixed_rows::<3>(0)).into(),
+        rotation * pose.rotation,
+    )
+}
+
+/// A pose from x, y, z [mm] and a rotation vector [rad].
+pub fn pose_from_vector(v: &[f64; 6]) -> Pose {
+    Pose::new(Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
+}
+
+/// The six numbers of [`pose_from_vector`].
+pub fn vector_from_pose(pose: &Pose) -> [f64; 6] {
+    let (t, r) = (pose.translation.vector, pose.rotation.scaled_axis());
+    [t.x, t.y, t.z, r.x, r.y, r.z]
+}
+
+/// A rotation from its matrix, made exactly orthonormal.
+pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*matrix))
+}

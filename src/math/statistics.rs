@@ -1,0 +1,56 @@
+//! Error statistics as calibration reports state them.
+
+use serde::{Deserialize, Serialize};
+
+/// Summary of the sizes of errors, in the unit of the input (mm everywhere in truegrind).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ErrorSummary {
+    /// Number of values.
+    pub count: usize,
+    /// Root of the mean square.
+    pub rmse: f64,
+    /// Mean of the absolute values. The papers call it "STD" (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28).
+    pub mean_absolute: f64,
+    /// Mean of the signed values.
+    pub mean: f64,
+    /// Standard deviation of the signed values with n − 1; 0 for fewer than two values.
+    pub standard_deviation: f64,
+    /// Largest absolute value.
+    pub max: f64,
+}
+
+impl ErrorSummary {
+    /// Summary of signed errors.
+    pub fn of(errors: impl IntoIterator<Item = f64>) -> Self {
+        let values: Vec<f64> = errors.into_iter().collect();
+        let n = values.len() as f64;
+        if values.is_empty() {
+            return Self::default();
+        }
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values.iter().map(|e| e * e).sum::<f64>();
+        let spread = values.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+        Self {
+            count: values.len(),
+            rmse: (square / n).sqrt(),
+            mean_absolute: values.iter().map(|e| e.abs()).sum::<f64>() / n,
+            mean,
+            standard_deviation: if values.len() > 1 { (spread / (n - 1.0)).sqrt() } else { 0.0 },
+            max: values.iter().fold(0.0, |m, e| e.abs().max(m)),
+        }
+    }
+}
+
+/// Mean and standard deviation (n − 1) of a list, such as one figure over ten splits.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let summary = ErrorSummary::of(values.iter().copied());
+    (summary.mean, summary.standard_deviation)
+}
+
+/// Median; `None` of nothing. Not finite values are sorted last.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    (n > 0).then(|| if n % 2 == 1 { sorted[n / 2] } else { 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]) })
+}
