@@ -1,5 +1,6 @@
 //! Rigid motions, numerical differences and statistics: what every other module stands on.
 
+pub mod lanes;
 pub mod se3;
 pub mod difference;
 pub mod statistics;

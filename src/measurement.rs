@@ -1,1 +1,3 @@
-//! measurement
+//! What was measured: rows of joint angles with a sensor's reading, from files or from a simulated arm.
+
+pub mod dataset;

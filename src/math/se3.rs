@@ -24,10 +24,7 @@ pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
 /// The inverse of [`difference`]: moves a pose by a twist given in the frame of its parent.
 pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
-    Pose::from_parts(
-        (pose.translation.vector + twist.fixed_rows::<3>(0)).into(),
-        rotation * pose.rotation,
-    )
+    Pose::from_parts((pose.translation.vector + twist.fixed_rows::<3>(0)).into(), rotation * pose.rotation)
 }
 
 /// A pose from x, y, z [mm] and a rotation vector [rad].
@@ -44,4 +41,31 @@ pub fn vector_from_pose(pose: &Pose) -> [f64; 6] {
 /// A rotation from its matrix, made exactly orthonormal.
 pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*matrix))
+}
+
+/// Left Jacobian of the rotation group: a change `dφ` of the rotation vector `φ` turns the rotation by
+/// `left_jacobian(φ) · dφ`, seen from the outer frame (Solà et al. 2018, eq. 145).
+pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let square = phi.norm_squared();
+    let k = skew(phi);
+    let (first, second) = if square < 1e-6 {
+        (0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0)
+    } else {
+        let angle = square.sqrt();
+        ((1.0 - angle.cos()) / square, (angle - angle.sin()) / (square * angle))
+    };
+    Matrix3::identity() + k * first + k * k * second
+}
+
+/// Inverse of [`left_jacobian`]; defined for rotations below a full turn (Solà et al. 2018, eq. 146).
+pub fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let square = phi.norm_squared();
+    let k = skew(phi);
+    let second = if square < 1e-6 {
+        1.0 / 12.0 + square / 720.0
+    } else {
+        let angle = square.sqrt();
+        1.0 / square - (1.0 + angle.cos()) / (2.0 * angle * angle.sin())
+    };
+    Matrix3::identity() - k * 0.5 + k * k * second
 }

@@ -1,0 +1,131 @@
+//! The forward kernel: link table in, joint frames out, for one row or for eight in lanes.
+//!
+//! Cost: some 45 operations a link, 270 a pose; no branch but the one on Hayati links, no allocation.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::link::{Link, LinkModel};
+use crate::math::lanes::Real;
+use crate::math::se3::{Pose, rotation_from_matrix};
+
+/// A link with its sines and cosines taken.
+#[derive(Debug, Clone, Copy)]
+pub struct LinkTable {
+    a_mm: f64,
+    d_mm: f64,
+    sin_alpha: f64,
+    cos_alpha: f64,
+    sin_theta: f64,
+    cos_theta: f64,
+    sin_beta: f64,
+    cos_beta: f64,
+    twisted: bool,
+}
+
+impl From<&Link> for LinkTable {
+    fn from(link: &Link) -> Self {
+        let (sin_alpha, cos_alpha) = link.alpha_rad.sin_cos();
+        let (sin_theta, cos_theta) = link.theta_rad.sin_cos();
+        let (sin_beta, cos_beta) = link.beta_rad.sin_cos();
+        let twisted = link.model == LinkModel::Hayati || link.beta_rad != 0.0;
+        let (a_mm, d_mm) = (link.a_mm, link.d_mm);
+        Self { a_mm, d_mm, sin_alpha, cos_alpha, sin_theta, cos_theta, sin_beta, cos_beta, twisted }
+    }
+}
+
+/// The tables of six links.
+pub fn tables(links: &[Link; 6]) -> [LinkTable; 6] {
+    std::array::from_fn(|i| LinkTable::from(&links[i]))
+}
+
+/// All frames of the arm in the base, as columns. Index 0 of `z` and `origin` is the base, i is the end of link i.
+#[derive(Debug, Clone, Copy)]
+pub struct Chain<R> {
+    /// x axis of link i (0-based) after the joint's rotation: the direction of a and the axis of alpha.
+    pub lateral: [[R; 3]; 6],
+    /// y axis of the frame at the end of link i (0-based): the axis of beta.
+    pub y: [[R; 3]; 6],
+    /// z axis of frame i, the axis of joint i+1.
+    pub z: [[R; 3]; 7],
+    /// Origin of frame i [mm].
+    pub origin: [[R; 3]; 7],
+    /// x axis of the last frame.
+    pub x: [R; 3],
+}
+
+/// Cross product.
+#[inline(always)]
+pub fn cross<R: Real>(a: &[R; 3], b: &[R; 3]) -> [R; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Scalar product.
+#[inline(always)]
+pub fn dot<R: Real>(a: &[R; 3], b: &[R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Difference.
+#[inline(always)]
+pub fn minus<R: Real>(a: &[R; 3], b: &[R; 3]) -> [R; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn blend<R: Real>(p: R, a: &[R; 3], q: R, b: &[R; 3]) -> [R; 3] {
+    [p * a[0] + q * b[0], p * a[1] + q * b[1], p * a[2] + q * b[2]]
+}
+
+/// Frames of the chain for joint rotations given by sine and cosine (joint offsets of the links not included).
+#[inline(always)]
+pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Chain<R> {
+    let (zero, one) = (R::splat(0.0), R::splat(1.0));
+    let mut out = Chain {
+        lateral: [[zero; 3]; 6],
+        y: [[zero; 3]; 6],
+        z: [[zero; 3]; 7],
+        origin: [[zero; 3]; 7],
+        x: [one, zero, zero],
+    };
+    let mut x = [one, zero, zero];
+    let mut y = [zero, one, zero];
+    let mut z = [zero, zero, one];
+    let mut o = [zero; 3];
+    out.z[0] = z;
+    for (i, link) in links.iter().enumerate() {
+        // sin and cos of joint angle plus offset
+        let (so, co) = (R::splat(link.sin_theta), R::splat(link.cos_theta));
+        let s = sin[i] * co + cos[i] * so;
+        let c = cos[i] * co - sin[i] * so;
+        let lateral = blend(c, &x, s, &y);
+        let upright = blend(c, &y, -s, &x);
+        let (a, d) = (R::splat(link.a_mm), R::splat(link.d_mm));
+        for k in 0..3 {
+            o[k] += d * z[k] + a * lateral[k];
+        }
+        let (sa, ca) = (R::splat(link.sin_alpha), R::splat(link.cos_alpha));
+        y = blend(ca, &upright, sa, &z);
+        z = blend(ca, &z, -sa, &upright);
+        x = lateral;
+        if link.twisted {
+            let (sb, cb) = (R::splat(link.sin_beta), R::splat(link.cos_beta));
+            x = blend(cb, &lateral, -sb, &z);
+            z = blend(cb, &z, sb, &lateral);
+        }
+        out.lateral[i] = lateral;
+        out.y[i] = y;
+        out.z[i + 1] = z;
+        out.origin[i + 1] = o;
+    }
+    out.x = x;
+    out
+}
+
+impl Chain<f64> {
+    /// Pose of frame `i` in the base for i = 6, the last frame.
+    pub fn last(&self) -> Pose {
+        let column = |v: &[f64; 3]| Vector3::from(*v);
+        let matrix = Matrix3::from_columns(&[column(&self.x), column(&self.y[5]), column(&self.z[6])]);
+        Pose::from_parts(column(&self.origin[6]).into(), rotation_from_matrix(&matrix))
+    }
+}

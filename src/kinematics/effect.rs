@@ -1,0 +1,183 @@
+//! Physical effects beyond rigid links, one file each: what they do to the joints and links of an arm.
+//!
+//! Every joint effect is linear in its parameters: it adds Σ pₖ φₖ(u, condition) to the mapped joint angles u, so one
+//! set of regressors φ serves simulation, identification and compensation. Whether an effect is there is not decided
+//! here.
+
+pub mod compliance;
+pub mod harmonic;
+pub mod ratio;
+pub mod coupling;
+pub mod backlash;
+pub mod thermal;
+
+use nalgebra::{Matrix6, Vector3};
+use serde::{Deserialize, Serialize};
+
+use self::backlash::Backlash;
+use self::compliance::Compliance;
+use self::coupling::Coupling;
+use self::harmonic::Harmonic;
+use self::ratio::Ratio;
+use self::thermal::Thermal;
+use super::chain::{self, LinkTable, cross, dot, minus};
+use super::condition::Condition;
+use super::model::{Body, Joints, Model};
+
+/// One effect with its parameters. The serialised names are those of the diagnosis contract.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "effect", rename_all = "kebab-case")]
+pub enum Effect {
+    /// A joint that yields under the static torque of gravity.
+    JointCompliance(Compliance),
+    /// An eccentric gear: once or twice per joint turn.
+    GearEccentricity(Harmonic),
+    /// A line of the reducer at a higher order.
+    GearTransmission(Harmonic),
+    /// A gear whose ratio is not the nominal one.
+    GearRatio(Ratio),
+    /// A joint that moves along with another.
+    JointCoupling(Coupling),
+    /// Play that depends on the side from which the joint came.
+    Backlash(Backlash),
+    /// Links that grow with time or temperature.
+    ThermalDrift(Thermal),
+}
+
+/// A parameter of an effect as the tables show it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectParameter {
+    /// Name within the effect.
+    pub name: &'static str,
+    /// Unit as printed.
+    pub unit: &'static str,
+    /// Present value.
+    pub value: f64,
+}
+
+macro_rules! each {
+    ($self:expr, $e:ident => $body:expr) => {
+        match $self {
+            Effect::JointCompliance($e) => $body,
+            Effect::GearEccentricity($e) | Effect::GearTransmission($e) => $body,
+            Effect::GearRatio($e) => $body,
+            Effect::JointCoupling($e) => $body,
+            Effect::Backlash($e) => $body,
+            Effect::ThermalDrift($e) => $body,
+        }
+    };
+}
+
+impl Effect {
+    /// The contract name of the effect.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Effect::JointCompliance(_) => "joint-compliance",
+            Effect::GearEccentricity(_) => "gear-eccentricity",
+            Effect::GearTransmission(_) => "gear-transmission",
+            Effect::GearRatio(_) => "gear-ratio",
+            Effect::JointCoupling(_) => "joint-coupling",
+            Effect::Backlash(_) => "backlash",
+            Effect::ThermalDrift(_) => "thermal-drift",
+        }
+    }
+
+    /// The joint (0-based) that the effect acts on; `None` where it acts on the links.
+    pub fn joint(&self) -> Option<usize> {
+        each!(self, e => e.joint())
+    }
+
+    /// Parameters with their present values.
+    pub fn parameters(&self) -> Vec<EffectParameter> {
+        each!(self, e => e.parameters())
+    }
+
+    /// Sets parameter `index` of [`Effect::parameters`].
+    pub fn set(&mut self, index: usize, value: f64) {
+        each!(self, e => e.set(index, value))
+    }
+
+    /// What each parameter adds to the joint rotations, per unit, at mapped joint angles `u` [rad].
+    pub fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
+        each!(self, e => e.regressors(statics, u, condition))
+    }
+
+    /// What the effect adds to the joint rotations [rad].
+    pub fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        each!(self, e => e.rotation(statics, u, condition))
+    }
+
+    /// Derivative of [`Effect::rotation`] with respect to u.
+    pub fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+        each!(self, e => e.slope(statics, u, condition))
+    }
+
+    /// Relative growth of all lengths.
+    pub fn growth(&self, condition: &Condition) -> f64 {
+        match self {
+            Effect::ThermalDrift(thermal) => thermal.growth(condition),
+            _ => 0.0,
+        }
+    }
+
+    /// Derivatives of [`Effect::growth`] with respect to the parameters.
+    pub fn growth_regressors(&self, condition: &Condition) -> Vec<f64> {
+        match self {
+            Effect::ThermalDrift(thermal) => thermal.growth_regressors(condition),
+            other => vec![0.0; other.parameters().len()],
+        }
+    }
+}
+
+/// The static torques of an arm, for effects that need them.
+#[derive(Debug, Clone)]
+pub struct Statics {
+    tables: [LinkTable; 6],
+    bodies: [Body; 6],
+    gravity: Vector3<f64>,
+}
+
+/// Standard gravity [m/s²].
+const GRAVITY: f64 = 9.806_65;
+
+impl Statics {
+    /// Statics of a model: its links as they are, without joint effects (their share in the torque is of second
+    /// order), massless where masses are unknown (only the payload then counts).
+    pub fn of(model: &Model) -> Self {
+        let bodies = model.bodies.unwrap_or([Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6]);
+        Self { tables: chain::tables(&model.links), bodies, gravity: model.gravity }
+    }
+
+    /// Torque of gravity about each joint axis [N m] at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
+    /// symmetric because torque is the gradient of the potential energy.
+    pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
+        let sin: [f64; 6] = std::array::from_fn(|i| u[i].sin());
+        let cos: [f64; 6] = std::array::from_fn(|i| u[i].cos());
+        let frames = chain::chain(&self.tables, &sin, &cos);
+        // Force times lever of everything beyond each joint: Σ m (c − o), and Σ m z × (c − o).
+        let mut weighted = [([0.0; 3], 0.0); 7];
+        for k in (0..6).rev() {
+            let (y, z, o) = (frames.y[k], frames.z[k + 1], frames.origin[k + 1]);
+            let x = cross(&y, &z);
+            let add = |(sum, mass): ([f64; 3], f64), m: f64, c: [f64; 3]| {
+                let at = |i: usize| o[i] + c[0] * x[i] + c[1] * y[i] + c[2] * z[i];
+                ([sum[0] + m * at(0), sum[1] + m * at(1), sum[2] + m * at(2)], mass + m)
+            };
+            let body = self.bodies[k];
+            let mut total = add(weighted[k + 1], body.mass_kg, body.centre_mm);
+            if k == 5 {
+                total = add(total, condition.payload_kg.unwrap_or(0.0), condition.payload_centre_mm);
+            }
+            weighted[k] = total;
+        }
+        let g = [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3);
+        let lever = |j: usize| {
+            let (sum, mass) = weighted[j];
+            minus(&sum, &frames.origin[j].map(|o| o * mass))
+        };
+        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&lever(j), &g)));
+        let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &lever(i)), &g));
+        let slope = Matrix6::from_fn(|j, i| dot(&frames.z[j.min(i)], &turned[j.max(i)]));
+        (torque, slope)
+    }
+}

@@ -1,0 +1,155 @@
+//! Names, units and manufacturing tolerances of everything that identification may move.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::link::{Link, LinkModel};
+use super::model::Model;
+
+/// One coordinate of a link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LinkCoordinate {
+    /// Length a [mm].
+    A,
+    /// Offset d [mm]; a DH link's.
+    D,
+    /// Twist alpha [rad].
+    Alpha,
+    /// Joint offset theta [rad].
+    Theta,
+    /// Second twist beta [rad]; a Hayati link's.
+    Beta,
+}
+
+/// A coordinate of a frame: x, y, z [mm], then the rotation vector [rad].
+pub const FRAME_COORDINATES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
+/// One number that identification may move. Joints, effects and anchors count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parameter {
+    /// Pose of the arm's base in the world, or of the sensor's frame in the base: coordinate 0 to 5.
+    Base(usize),
+    /// A link.
+    Link {
+        /// Link, 0-based.
+        joint: usize,
+        /// Which of its numbers.
+        coordinate: LinkCoordinate,
+    },
+    /// A parameter of an effect.
+    Effect {
+        /// Effect in the model's list.
+        index: usize,
+        /// Parameter of the effect.
+        parameter: usize,
+    },
+    /// The frame (or point) on the flange that the sensor touches: coordinate 0 to 5. It is not the TCP.
+    Tool(usize),
+    /// Outlet of a cable in the base: which cable, coordinate 0 to 2.
+    Outlet {
+        /// Cable.
+        anchor: usize,
+        /// x, y or z.
+        axis: usize,
+    },
+    /// Zero of a cable's length [mm].
+    Zero {
+        /// Cable.
+        anchor: usize,
+    },
+}
+
+impl Parameter {
+    /// The unit in which the number is held.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Parameter::Base(k) | Parameter::Tool(k) => {
+                if *k < 3 {
+                    "mm"
+                } else {
+                    "rad"
+                }
+            }
+            Parameter::Link { coordinate: LinkCoordinate::A | LinkCoordinate::D, .. } => "mm",
+            Parameter::Link { .. } => "rad",
+            Parameter::Effect { .. } => "",
+            Parameter::Outlet { .. } | Parameter::Zero { .. } => "mm",
+        }
+    }
+
+    /// Whether the number belongs to the arm (link or effect), not to how it was measured.
+    pub fn is_of_arm(&self) -> bool {
+        matches!(self, Parameter::Link { .. } | Parameter::Effect { .. })
+    }
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Parameter::Base(k) => write!(f, "base.{}", FRAME_COORDINATES[*k]),
+            Parameter::Tool(k) => write!(f, "tool.{}", FRAME_COORDINATES[*k]),
+            Parameter::Link { joint, coordinate } => {
+                let name = match coordinate {
+                    LinkCoordinate::A => "a",
+                    LinkCoordinate::D => "d",
+                    LinkCoordinate::Alpha => "alpha",
+                    LinkCoordinate::Theta => "theta",
+                    LinkCoordinate::Beta => "beta",
+                };
+                write!(f, "link{}.{name}", joint + 1)
+            }
+            Parameter::Effect { index, parameter } => write!(f, "effect{}.{}", index + 1, parameter + 1),
+            Parameter::Outlet { anchor: 0, axis } => write!(f, "outlet.{}", FRAME_COORDINATES[*axis]),
+            Parameter::Outlet { anchor, axis } => {
+                write!(f, "outlet{}.{}", anchor + 1, FRAME_COORDINATES[*axis])
+            }
+            Parameter::Zero { anchor: 0 } => write!(f, "zero"),
+            Parameter::Zero { anchor } => write!(f, "zero{}", anchor + 1),
+        }
+    }
+}
+
+/// The four coordinates of a link that are free: a, d or beta, alpha, theta.
+pub fn link_coordinates(model: LinkModel) -> [LinkCoordinate; 4] {
+    let second = match model {
+        LinkModel::Dh => LinkCoordinate::D,
+        LinkModel::Hayati => LinkCoordinate::Beta,
+    };
+    [LinkCoordinate::A, second, LinkCoordinate::Alpha, LinkCoordinate::Theta]
+}
+
+/// The 24 link parameters of an arm, link by link.
+pub fn link_parameters(model: &Model) -> Vec<Parameter> {
+    (0..6)
+        .flat_map(|joint| {
+            link_coordinates(model.links[joint].model).map(|coordinate| Parameter::Link { joint, coordinate })
+        })
+        .collect()
+}
+
+impl Link {
+    /// The value of a coordinate [mm or rad].
+    pub fn get(&self, coordinate: LinkCoordinate) -> f64 {
+        match coordinate {
+            LinkCoordinate::A => self.a_mm,
+            LinkCoordinate::D => self.d_mm,
+            LinkCoordinate::Alpha => self.alpha_rad,
+            LinkCoordinate::Theta => self.theta_rad,
+            LinkCoordinate::Beta => self.beta_rad,
+        }
+    }
+
+    /// Sets a coordinate [mm or rad].
+    pub fn set(&mut self, coordinate: LinkCoordinate, value: f64) {
+        let place = match coordinate {
+            LinkCoordinate::A => &mut self.a_mm,
+            LinkCoordinate::D => &mut self.d_mm,
+            LinkCoordinate::Alpha => &mut self.alpha_rad,
+            LinkCoordinate::Theta => &mut self.theta_rad,
+            LinkCoordinate::Beta => &mut self.beta_rad,
+        };
+        *place = value;
+    }
+}
