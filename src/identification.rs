@@ -1,1 +1,4 @@
-//! identification
+//! From measured rows to an estimated arm: the calibration as a [`crate::estimation::problem::Problem`], what the data
+//! can and cannot tell, and the fit with its verdict.
+
+pub mod calibration;

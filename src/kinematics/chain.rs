@@ -79,6 +79,12 @@ fn blend<R: Real>(p: R, a: &[R; 3], q: R, b: &[R; 3]) -> [R; 3] {
 /// Frames of the chain for joint rotations given by sine and cosine (joint offsets of the links not included).
 #[inline(always)]
 pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Chain<R> {
+    scaled_chain(links, sin, cos, R::splat(1.0))
+}
+
+/// Like [`chain`], with all lengths times `scale`, which may differ from row to row (links that grow).
+#[inline(always)]
+pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6], scale: R) -> Chain<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let mut out = Chain {
         lateral: [[zero; 3]; 6],
@@ -99,7 +105,7 @@ pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Cha
         let c = cos[i] * co - sin[i] * so;
         let lateral = blend(c, &x, s, &y);
         let upright = blend(c, &y, -s, &x);
-        let (a, d) = (R::splat(link.a_mm), R::splat(link.d_mm));
+        let (a, d) = (scale * R::splat(link.a_mm), scale * R::splat(link.d_mm));
         for k in 0..3 {
             o[k] += d * z[k] + a * lateral[k];
         }

@@ -90,6 +90,7 @@ pub fn parameter_jacobian(
         let jacobian: Matrix3<f64> = left_jacobian(&phi);
         jacobian.column(k - 3).into_owned()
     };
+    let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
     let columns: Vec<Vector6<f64>> = parameters
         .iter()
         .map(|parameter| match *parameter {
@@ -99,7 +100,10 @@ pub fn parameter_jacobian(
                 let v = w.cross(&(world_from_base.rotation * base_from_tool.translation.vector));
                 Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
             }
-            Parameter::Link { joint, coordinate } => in_world(link_twist(&frames, joint, coordinate, &point)),
+            Parameter::Link { joint, coordinate } => {
+                let scale = if coordinate.is_length() { 1.0 + growth } else { 1.0 };
+                in_world(link_twist(&frames, joint, coordinate, &point) * scale)
+            }
             Parameter::Effect { index, parameter } => {
                 in_world(effect_twist(arm, q, &frames, index, parameter, &point))
             }

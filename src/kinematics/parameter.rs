@@ -23,6 +23,13 @@ pub enum LinkCoordinate {
     Beta,
 }
 
+impl LinkCoordinate {
+    /// Whether the coordinate is a length, which grows with a warm arm.
+    pub fn is_length(self) -> bool {
+        matches!(self, LinkCoordinate::A | LinkCoordinate::D)
+    }
+}
+
 /// A coordinate of a frame: x, y, z [mm], then the rotation vector [rad].
 pub const FRAME_COORDINATES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 

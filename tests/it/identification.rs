@@ -1,1 +1,3 @@
 //! Tests of `identification`.
+
+mod calibration;
