@@ -17,3 +17,6 @@ pub mod model;
 pub mod chain;
 pub mod parameter;
 pub mod jacobian;
+pub mod arm_file;
+pub mod region;
+pub mod estimated;

@@ -1,0 +1,109 @@
+//! Where an arm was measured: joint ranges and a thinned cloud of poses, to tell a program that leaves it.
+
+use serde::{Deserialize, Serialize};
+
+use super::model::Joints;
+
+/// The measured region of an estimated arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Lowest measured joint angles [°].
+    pub min_deg: [f64; 6],
+    /// Highest measured joint angles [°].
+    pub max_deg: [f64; 6],
+    /// Measured joint vectors [°], thinned so that they are far from each other.
+    pub samples_deg: Vec<[f64; 6]>,
+    /// How far a measured pose may lie from its nearest neighbour among the samples [°, Euclidean in joint space].
+    pub spacing_deg: f64,
+    /// Largest predicted standard deviation of the flange's position over the measured poses [mm].
+    pub sigma_mm: f64,
+}
+
+/// How a pose leaves the measured region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outside {
+    /// One joint is outside the range in which it was measured.
+    Joint {
+        /// Joint, 0-based.
+        joint: usize,
+        /// By how much [°].
+        by_deg: f64,
+    },
+    /// All joints are in range, but no measured pose is near.
+    Coverage {
+        /// Distance to the nearest measured pose over the distance that measured poses have, above 1.
+        ratio: f64,
+    },
+}
+
+/// Poses kept in a region.
+const SAMPLES: usize = 200;
+
+/// A joint may leave its measured range by this much without a flag [°]: rounding of logs and programs.
+const SLACK_DEG: f64 = 0.5;
+
+/// A pose may lie this many spacings from its nearest measured neighbour without a flag.
+const SPACINGS: f64 = 2.0;
+
+fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+impl Region {
+    /// The region of measured joint vectors [rad]; `sigma_mm` as in the field. Cost: 200 n distances.
+    pub fn of(joints: &[Joints], sigma_mm: f64) -> Self {
+        let degrees: Vec<[f64; 6]> =
+            joints.iter().map(|q| std::array::from_fn(|i| q[i].to_degrees())).collect();
+        let mut min_deg = [f64::INFINITY; 6];
+        let mut max_deg = [f64::NEG_INFINITY; 6];
+        for q in &degrees {
+            for i in 0..6 {
+                min_deg[i] = min_deg[i].min(q[i]);
+                max_deg[i] = max_deg[i].max(q[i]);
+            }
+        }
+        // Farthest-point thinning: each new sample is the pose farthest from those taken.
+        let mut nearest = vec![f64::INFINITY; degrees.len()];
+        let mut samples_deg: Vec<[f64; 6]> = Vec::new();
+        let mut next = 0;
+        while samples_deg.len() < SAMPLES.min(degrees.len()) {
+            let taken = degrees[next];
+            samples_deg.push(taken);
+            for (d, q) in nearest.iter_mut().zip(&degrees) {
+                *d = d.min(distance(q, &taken));
+            }
+            let far = (0..degrees.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]));
+            match far.filter(|&i| nearest[i] > 0.0) {
+                Some(i) => next = i,
+                None => break,
+            }
+        }
+        // Spacing: how far samples lie from each other (95 % of them), or leftover poses from the samples.
+        let mut gaps: Vec<f64> = samples_deg
+            .iter()
+            .enumerate()
+            .map(|(i, a)| {
+                let others = samples_deg.iter().enumerate().filter(|(j, _)| *j != i);
+                others.map(|(_, b)| distance(a, b)).fold(f64::INFINITY, f64::min)
+            })
+            .filter(|d| d.is_finite())
+            .collect();
+        gaps.sort_by(f64::total_cmp);
+        let spacing_deg = gaps.get((gaps.len() * 95 / 100).min(gaps.len().saturating_sub(1)));
+        Self { min_deg, max_deg, samples_deg, spacing_deg: spacing_deg.copied().unwrap_or(0.0), sigma_mm }
+    }
+
+    /// Whether a joint vector [rad] leaves the region: the joint that leaves its range farthest, else coverage.
+    pub fn outside(&self, q: &Joints) -> Option<Outside> {
+        let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
+        let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);
+        let worst = (0..6).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b))).unwrap_or(0);
+        if beyond(worst) > SLACK_DEG {
+            return Some(Outside::Joint { joint: worst, by_deg: beyond(worst) });
+        }
+        let near = self.samples_deg.iter().map(|s| distance(s, &degrees)).fold(f64::INFINITY, f64::min);
+        let ratio = near / (SPACINGS * self.spacing_deg.max(SLACK_DEG));
+        (ratio > 1.0).then_some(Outside::Coverage { ratio })
+    }
+}
