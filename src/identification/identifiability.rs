@@ -1,0 +1,107 @@
+//! What the data can tell: rank, condition, observability indices, and which parameters it cannot separate.
+//!
+//! Method: the whitened Jacobian with its columns in units of the prior's standard deviation, reduced to its
+//! triangular factor, then singular values. A singular value of 1 means that the data knows as much about that
+//! combination as the prior does.
+//! Observability indices as in Joubair and Bonev 2013 (doi 10.1016/j.mechmachtheory.2013.07.005), for L parameters and
+//! m poses: O1 = (σ₁…σ_L)^(1/L) / √m, O2 = σ_L/σ₁, O3 = σ_L, O4 = σ_L²/σ₁, O5 = 1 / Σ 1/σᵢ.
+
+use nalgebra::DMatrix;
+
+use crate::estimation::least_squares::rank;
+use crate::estimation::least_squares::triangular::triangular_factor;
+use crate::estimation::problem::Problem;
+use crate::identification::calibration::Calibration;
+use crate::kinematics::parameter::Parameter;
+
+/// The report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identifiability {
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Numerical rank of the data alone, without priors.
+    pub rank: usize,
+    /// Largest over smallest singular value; infinite without full rank.
+    pub condition: f64,
+    /// Singular values, falling.
+    pub singular_values: Vec<f64>,
+    /// O1 to O5; zero without full rank.
+    pub observability: [f64; 5],
+    /// Combinations of parameters that the data cannot separate, in units of the priors: each moves no reading.
+    pub combinations: Vec<Vec<(Parameter, f64)>>,
+    /// Directions with a singular value below 1: the prior knows more than the data.
+    pub held_by_priors: usize,
+}
+
+/// Shares smaller than this are left out of a printed combination.
+const SHOWN_SHARE: f64 = 0.05;
+
+/// The report for a calibration at `x`, with `scale[k]` the unit of parameter k (its prior's σ).
+///
+/// `None` when the Jacobian is not finite.
+pub fn identifiability(task: &Calibration, x: &[f64], scale: &[f64]) -> Option<Identifiability> {
+    let factor = triangular_factor(task, x, scale);
+    let analysis = rank::analyse(&factor.r, Some(RANK_TOLERANCE))?;
+    let values = analysis.singular_values.clone();
+    let count = values.len();
+    let full = analysis.rank == count && count > 0;
+    let poses = (task.rows() / task.rows_per_observation()) as f64;
+    let (first, last) =
+        (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
+    let observability = if full {
+        let mean_log = values.iter().map(|v| v.ln()).sum::<f64>() / count as f64;
+        let harmonic = values.iter().map(|v| 1.0 / v).sum::<f64>();
+        [mean_log.exp() / poses.sqrt(), last / first, last, last * last / first, 1.0 / harmonic]
+    } else {
+        [0.0; 5]
+    };
+    let combinations = sparse_basis(analysis.null_space())
+        .into_iter()
+        .map(|vector| {
+            let peak = vector.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            vector
+                .iter()
+                .zip(task.parameters_list())
+                .filter(|(v, _)| v.abs() > SHOWN_SHARE * peak)
+                .map(|(v, p)| (*p, v / peak))
+                .collect()
+        })
+        .collect();
+    Some(Identifiability {
+        parameters: count,
+        rank: analysis.rank,
+        condition: if full { first / last } else { f64::INFINITY },
+        held_by_priors: values.iter().filter(|v| **v < 1.0).count(),
+        singular_values: values,
+        observability,
+        combinations,
+    })
+}
+
+/// Singular values below this share of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// Null vectors by Gauss–Jordan elimination with complete pivoting, so that each names few parameters.
+fn sparse_basis(basis: DMatrix<f64>) -> Vec<Vec<f64>> {
+    let (n, k) = basis.shape();
+    let mut rows: Vec<Vec<f64>> = (0..k).map(|j| basis.column(j).iter().copied().collect()).collect();
+    let mut free: Vec<usize> = (0..n).collect();
+    for i in 0..k {
+        let best = (i..k)
+            .flat_map(|r| free.iter().map(move |&c| (r, c)))
+            .max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs()));
+        let Some((r, c)) = best.filter(|&(r, c)| rows[r][c] != 0.0) else { break };
+        rows.swap(i, r);
+        free.retain(|&column| column != c);
+        let pivot = rows[i][c];
+        rows[i].iter_mut().for_each(|v| *v /= pivot);
+        let pivot_row = rows[i].clone();
+        for (other, row) in rows.iter_mut().enumerate() {
+            let share = row[c];
+            if other != i && share != 0.0 {
+                row.iter_mut().zip(&pivot_row).for_each(|(v, p)| *v -= share * p);
+            }
+        }
+    }
+    rows
+}
