@@ -1,1 +1,39 @@
-//! Least squares.
+//! Batch least squares: all rows at once, linearised about the current parameters.
+//!
+//! | file | method | Jacobian passes per iteration |
+//! |---|---|---|
+//! | [`lm`] | Levenberg–Marquardt, as printed (ltlm-2024 eq. 10) and sound | 1 |
+//! | [`ltlm`] | logistic-tent chaotic Levenberg–Marquardt (ltlm-2024, Algorithm I) | 2, and 2M rows-only passes |
+//! | [`triangular`] | the triangular factor of a Jacobian that is never held whole | 1 |
+//! | [`rank`] | rank, condition and null space from that factor | 0 |
+
+pub mod lm;
+pub mod ltlm;
+pub mod triangular;
+pub mod rank;
+pub(crate) mod damped;
+
+use serde::{Deserialize, Serialize};
+
+/// Whether a method runs as its paper prints it, or as a numerical analyst would set it up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// To the letter of the paper, weaknesses included; the header of each file says which those are.
+    AsPrinted,
+    /// The same idea with scaling, step control and proper stops.
+    #[default]
+    Sound,
+}
+
+/// How the linear system of one step is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Factorisation {
+    /// Cholesky factorisation of the normal equations: one cheap pass over the rows, half of the digits.
+    #[default]
+    Cholesky,
+    /// QR factorisation of the stacked Jacobian: twice the arithmetic, all of the digits. For problems whose scaled
+    /// Jacobian has a condition number beyond some 1e6.
+    Qr,
+}

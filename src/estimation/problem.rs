@@ -122,7 +122,8 @@ pub fn prior_cost(priors: &[Prior], x: &[f64]) -> f64 {
 /// Rows in one chunk of parallel work: fixed, so that sums come out the same for any number of threads.
 const CHUNK_ROWS: usize = 1536;
 
-fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
+/// Ranges of whole observations, of fixed size, that cover all rows in order.
+pub(crate) fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
     let per = problem.rows_per_observation().max(1);
     let step = (CHUNK_ROWS / per).max(1) * per;
     (0..problem.rows()).step_by(step).map(|from| from..(from + step).min(problem.rows())).collect()

@@ -1,1 +1,9 @@
-//! Tests of `estimation`.
+//! Tests of `estimation`: published problems, none of which knows a robot.
+
+mod residuals;
+mod published;
+mod nist;
+mod levenberg_marquardt;
+mod chaotic_search;
+mod chaos;
+mod triangular;

@@ -1,0 +1,63 @@
+//! A problem together with its priors and a tally of what was asked of it: what every solver here works on.
+
+use std::ops::Range;
+
+use crate::estimation::estimate::Evaluations;
+use crate::estimation::problem::{NormalEquations, Prior, Problem, prior_cost};
+
+pub(crate) struct Objective<'a> {
+    pub(crate) problem: &'a dyn Problem,
+    pub(crate) priors: &'a [Prior],
+    pub(crate) evaluations: Evaluations,
+}
+
+impl<'a> Objective<'a> {
+    /// # Panics
+    /// Where `start` does not have one entry for each parameter: an error of the calling code, not of the data.
+    pub(crate) fn new(problem: &'a dyn Problem, start: &[f64], with_priors: bool) -> Self {
+        assert_eq!(start.len(), problem.parameters(), "the start must have one entry for each parameter");
+        let priors = if with_priors { problem.priors() } else { &[] };
+        Self { problem, priors, evaluations: Evaluations::default() }
+    }
+
+    /// Cost with priors: one pass of residuals.
+    pub(crate) fn cost(&mut self, x: &[f64]) -> f64 {
+        self.evaluations.residuals += self.problem.rows() as u64;
+        self.problem.row_cost(x) + prior_cost(self.priors, x)
+    }
+
+    /// Normal equations with priors (lower triangle): one pass of Jacobians.
+    pub(crate) fn normal_equations(&mut self, x: &[f64]) -> NormalEquations {
+        self.evaluations.jacobians += self.problem.rows() as u64;
+        let mut equations = self.problem.normal_equations(x);
+        for (k, (prior, x)) in self.priors.iter().zip(x).enumerate() {
+            if prior.sigma.is_finite() {
+                let weight = 1.0 / (prior.sigma * prior.sigma);
+                equations.matrix[(k, k)] += weight;
+                equations.gradient[k] += weight * (x - prior.mean);
+            }
+        }
+        equations.cost += prior_cost(self.priors, x);
+        equations
+    }
+
+    /// Residuals and derivatives (column-major) of a block of rows.
+    pub(crate) fn jacobian(&mut self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.evaluations.jacobians += rows.len() as u64;
+        self.problem.jacobian(x, rows, residuals, jacobian);
+    }
+
+    /// Residuals of a block of rows.
+    pub(crate) fn residuals(&mut self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
+        self.evaluations.residuals += rows.len() as u64;
+        self.problem.residuals(x, rows, out);
+    }
+}
+
+/// Whether cost and derivatives can be worked with.
+pub(crate) fn is_finite(equations: &NormalEquations) -> bool {
+    equations.cost.is_finite() && equations.gradient.iter().all(|g| g.is_finite()) && {
+        let a = &equations.matrix;
+        (0..a.ncols()).all(|j| (j..a.nrows()).all(|i| a[(i, j)].is_finite()))
+    }
+}
