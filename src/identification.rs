@@ -2,3 +2,9 @@
 //! can and cannot tell, and the fit with its verdict.
 
 pub mod calibration;
+pub mod tolerance;
+pub mod rounding;
+pub mod identifiability;
+pub mod solver;
+pub mod fit;
+pub mod identify;

@@ -42,7 +42,13 @@ impl<'a> Objective<'a> {
     }
 
     /// Residuals and derivatives (column-major) of a block of rows.
-    pub(crate) fn jacobian(&mut self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+    pub(crate) fn jacobian(
+        &mut self,
+        x: &[f64],
+        rows: Range<usize>,
+        residuals: &mut [f64],
+        jacobian: &mut [f64],
+    ) {
         self.evaluations.jacobians += rows.len() as u64;
         self.problem.jacobian(x, rows, residuals, jacobian);
     }

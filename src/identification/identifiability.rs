@@ -46,8 +46,7 @@ pub fn identifiability(task: &Calibration, x: &[f64], scale: &[f64]) -> Option<I
     let count = values.len();
     let full = analysis.rank == count && count > 0;
     let poses = (task.rows() / task.rows_per_observation()) as f64;
-    let (first, last) =
-        (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
+    let (first, last) = (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
     let observability = if full {
         let mean_log = values.iter().map(|v| v.ln()).sum::<f64>() / count as f64;
         let harmonic = values.iter().map(|v| 1.0 / v).sum::<f64>();

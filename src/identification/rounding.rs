@@ -57,7 +57,10 @@ pub enum NotSharpened {
 ///
 /// # Errors
 /// Leaves the rows as they are when there is nothing to use or the read-out contradicts the angles.
-pub fn sharpen(dataset: &mut Dataset, nominal: &Model) -> Result<(Sharpening, AngleCovariance), NotSharpened> {
+pub fn sharpen(
+    dataset: &mut Dataset,
+    nominal: &Model,
+) -> Result<(Sharpening, AngleCovariance), NotSharpened> {
     let (Some(step), true) = (dataset.angle_step_rad, dataset.rows.iter().all(|r| r.readout_mm.is_some()))
     else {
         return Err(NotSharpened::Nothing);
@@ -101,7 +104,7 @@ pub fn sharpen(dataset: &mut Dataset, nominal: &Model) -> Result<(Sharpening, An
     }
     let mut covariances = Vec::with_capacity(dataset.rows.len());
     let (mut after, mut narrowed) = (0.0, 0.0);
-    for (i, row) in dataset.rows.iter_mut().enumerate() {
+    for row in &mut dataset.rows {
         let target = row.readout_mm.unwrap_or_default();
         let logged = row.joints;
         let mut covariance = Matrix6::identity() * angle_variance;
@@ -109,13 +112,13 @@ pub fn sharpen(dataset: &mut Dataset, nominal: &Model) -> Result<(Sharpening, An
             let (at, j) = jacobian(&row.joints);
             let information = Matrix6::identity() / angle_variance + j.transpose() * j / readout_variance;
             let Some(inverse) = information.cholesky().map(|c| c.inverse()) else { break };
-            let pull = j.transpose() * (target - at) / readout_variance + (logged - row.joints) / angle_variance;
+            let pull =
+                j.transpose() * (target - at) / readout_variance + (logged - row.joints) / angle_variance;
             row.joints += inverse * pull;
             covariance = inverse;
         }
         after += (target - jacobian(&row.joints).0).norm_squared() / n;
         narrowed += (covariance.trace() / (6.0 * angle_variance)).sqrt() / n;
-        let _ = i;
         covariances.push(covariance);
     }
     let report =

@@ -123,7 +123,10 @@ impl ArmFile {
             return Err(format!("`gravity`: its norm is {}, expected a unit vector", gravity.norm()));
         }
         if let Some(effect) = self.effect.iter().find(|e| e.joint().is_some_and(|j| j > 5)) {
-            return Err(format!("`effect` {}: its joint is above 5 (joints count from 0 here)", effect.name()));
+            return Err(format!(
+                "`effect` {}: its joint is above 5 (joints count from 0 here)",
+                effect.name()
+            ));
         }
         Ok(Model {
             links,

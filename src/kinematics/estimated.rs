@@ -190,7 +190,9 @@ impl Estimated {
             .covariance
             .order
             .iter()
-            .map(|name| parse_arm_parameter(name).ok_or_else(|| format!("`covariance.order`: unknown {name}")))
+            .map(|name| {
+                parse_arm_parameter(name).ok_or_else(|| format!("`covariance.order`: unknown {name}"))
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let n = order.len();
         if file.covariance.lower.len() != n
@@ -222,7 +224,10 @@ fn parse_arm_parameter(name: &str) -> Option<Parameter> {
     let (part, coordinate) = name.split_once('.')?;
     if let Some(number) = part.strip_prefix("effect") {
         let index = number.parse::<usize>().ok()?.checked_sub(1)?;
-        return Some(Parameter::Effect { index, parameter: coordinate.parse::<usize>().ok()?.checked_sub(1)? });
+        return Some(Parameter::Effect {
+            index,
+            parameter: coordinate.parse::<usize>().ok()?.checked_sub(1)?,
+        });
     }
     let joint = part.strip_prefix("link")?.parse::<usize>().ok()?.checked_sub(1).filter(|j| *j < 6)?;
     let coordinate = match coordinate {

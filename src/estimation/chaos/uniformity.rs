@@ -133,7 +133,8 @@ pub fn study(rs: &[f64], claimed: f64, long_points: usize, options: &Options) ->
     let others = || points.iter().filter(|point| point.r != claimed);
     let near = |p: &&Point| p.short.deviation <= reference.short.deviation + reference.short.spread;
     let better = |p: &&Point| p.long.deviation < reference.long.deviation - reference.long.spread;
-    let (indistinguishable_short, better_long) = (others().filter(near).count(), others().filter(better).count());
+    let (indistinguishable_short, better_long) =
+        (others().filter(near).count(), others().filter(better).count());
     let verdict = Verdict {
         claimed,
         best_short: best(|p| p.short.deviation),

@@ -136,7 +136,8 @@ impl Damping {
 
     /// `gain` is actual over predicted reduction of a step that was taken.
     pub(crate) fn accept(&mut self, gain: f64) {
-        let factor = if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
+        let factor =
+            if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
         self.mu = (self.mu * factor).max(DAMPING_RANGE.0);
         self.growth = 2.0;
     }
@@ -153,12 +154,10 @@ impl Damping {
 
 fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let mut here = Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
-    let mut trace = vec![Iteration {
-        cost: here.at.cost(),
-        evaluations: objective.evaluations,
-        ..Iteration::default()
-    }];
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -256,7 +255,8 @@ fn converged(
 
 fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let mut here = Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
     let mut trace =
         vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
     if !here.at.is_finite() {

@@ -66,5 +66,12 @@ pub fn analyse(r: &DMatrix<f64>, tolerance: Option<f64>) -> Option<RankAnalysis>
     let threshold = tolerance.unwrap_or(p as f64 * f64::EPSILON) * largest;
     let rank = singular_values.iter().filter(|s| **s > threshold).count();
     let condition = if smallest > 0.0 { largest / smallest } else { f64::INFINITY };
-    Some(RankAnalysis { rank, condition, singular_values, right_vectors, pivots: forward.to_vec(), pivot_sizes })
+    Some(RankAnalysis {
+        rank,
+        condition,
+        singular_values,
+        right_vectors,
+        pivots: forward.to_vec(),
+        pivot_sizes,
+    })
 }

@@ -60,9 +60,11 @@ impl TriangularFactor {
         objective.evaluations.jacobians += objective.problem.rows() as u64;
         let rows = triangle_of_rows(objective.problem, x);
         let p = x.len();
-        let with_prior = objective.priors.iter().zip(x).enumerate().filter(|(_, (prior, _))| prior.sigma.is_finite());
-        let prior_rows: Vec<(usize, f64, f64)> =
-            with_prior.map(|(k, (prior, x))| (k, 1.0 / prior.sigma, (x - prior.mean) / prior.sigma)).collect();
+        let with_prior =
+            objective.priors.iter().zip(x).enumerate().filter(|(_, (prior, _))| prior.sigma.is_finite());
+        let prior_rows: Vec<(usize, f64, f64)> = with_prior
+            .map(|(k, (prior, x))| (k, 1.0 / prior.sigma, (x - prior.mean) / prior.sigma))
+            .collect();
         let mut stacked = DMatrix::zeros(rows.nrows() + prior_rows.len(), p + 1);
         stacked.rows_mut(0, rows.nrows()).copy_from(&rows);
         for (i, (k, weight, residual)) in prior_rows.into_iter().enumerate() {

@@ -179,9 +179,13 @@ fn cable(
     let none = Lanes::splat(0.0);
     for (k, parameter) in task.parameters.iter().enumerate() {
         let value = match *parameter {
-            Parameter::Link { joint, coordinate } if coordinate.is_length() => scale * link(joint, coordinate),
+            Parameter::Link { joint, coordinate } if coordinate.is_length() => {
+                scale * link(joint, coordinate)
+            }
             Parameter::Link { joint, coordinate } => link(joint, coordinate),
-            Parameter::Tool(axis) if axis < 3 => dot(&in_base(&frames, &state.flange.column(axis).into()), &u),
+            Parameter::Tool(axis) if axis < 3 => {
+                dot(&in_base(&frames, &state.flange.column(axis).into()), &u)
+            }
             Parameter::Outlet { axis, .. } if single => -u[axis],
             Parameter::Zero { .. } if single => weight,
             Parameter::Outlet { anchor, axis } => {

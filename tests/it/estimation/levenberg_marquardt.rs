@@ -84,7 +84,8 @@ fn cholesky_and_qr_take_the_same_steps() {
 #[test]
 fn the_printed_form_creeps_where_its_damping_is_large_and_stops_nowhere_else() {
     // Residuals in thousandths make μ = 5 overwhelming; the sound form does not notice the unit.
-    let small = rows(2, 2, |x: &[Dual], i| 1e-3 * if i == 0 { 10.0 * (x[1] - x[0] * x[0]) } else { 1.0 - x[0] });
+    let small =
+        rows(2, 2, |x: &[Dual], i| 1e-3 * if i == 0 { 10.0 * (x[1] - x[0] * x[0]) } else { 1.0 - x[0] });
     let printed = solve(&small, &[-1.2, 1.0], &Options { max_iterations: 50, ..Options::as_printed() });
     assert_eq!(printed.termination, Termination::IterationLimit);
     assert!(printed.cost > 0.9 * printed.trace[0].cost);
@@ -135,7 +136,8 @@ fn what_is_not_a_number_ends_in_a_termination() {
         for factorisation in [Factorisation::Cholesky, Factorisation::Qr] {
             let options = Options { form, factorisation, ..Options::default() };
             for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                let problem = rows(2, 4, move |x: &[Dual], i| if i == 2 { Dual::from(bad) } else { x[0] + x[1] * 2.0 });
+                let problem =
+                    rows(2, 4, move |x: &[Dual], i| if i == 2 { Dual::from(bad) } else { x[0] + x[1] * 2.0 });
                 let estimate = solve(&problem, &[1.0, 2.0], &options);
                 assert_eq!(estimate.termination, Termination::NotFinite);
                 assert_eq!(estimate.x, [1.0, 2.0]);

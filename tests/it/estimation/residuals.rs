@@ -97,7 +97,11 @@ pub(crate) struct Rows<F> {
 }
 
 /// Rows without priors.
-pub(crate) fn rows<F: Fn(&[Dual], usize) -> Dual + Sync>(parameters: usize, rows: usize, formula: F) -> Rows<F> {
+pub(crate) fn rows<F: Fn(&[Dual], usize) -> Dual + Sync>(
+    parameters: usize,
+    rows: usize,
+    formula: F,
+) -> Rows<F> {
     Rows { parameters, rows, per_observation: 1, priors: Vec::new(), formula }
 }
 

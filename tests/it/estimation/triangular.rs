@@ -53,7 +53,9 @@ fn names_the_directions_that_no_row_sees() {
     assert_eq!(analysis.rank, 2);
     let null = analysis.null_space();
     assert_eq!(null.shape(), (4, 2));
-    for direction in [DVector::from_vec(vec![2.0, 0.0, -1.0, 0.0]), DVector::from_vec(vec![0.0, 0.0, 0.0, 1.0])] {
+    for direction in
+        [DVector::from_vec(vec![2.0, 0.0, -1.0, 0.0]), DVector::from_vec(vec![0.0, 0.0, 0.0, 1.0])]
+    {
         let inside = &null * null.tr_mul(&direction);
         assert!((inside - &direction).norm() < 1e-10 * direction.norm());
     }
