@@ -68,7 +68,9 @@ pub enum SurfaceError {
         to: f64,
     },
     /// An implicit equation has no zero below any point of its domain.
-    #[error("`{text}` = 0 has no point in the domain, expected a surface; check the sign and the ranges of x, y and z")]
+    #[error(
+        "`{text}` = 0 has no point in the domain, expected a surface; check the sign and the ranges of x, y and z"
+    )]
     Empty {
         /// The equation.
         text: String,
@@ -122,7 +124,9 @@ pub enum SurfaceError {
         z: f64,
     },
     /// A path of too many points.
-    #[error("the path would have more than {limit} points; take a larger step-over, step or chord error, or a smaller domain")]
+    #[error(
+        "the path would have more than {limit} points; take a larger step-over, step or chord error, or a smaller domain"
+    )]
     TooLong {
         /// The largest number of points.
         limit: usize,

@@ -242,7 +242,11 @@ impl<'a> Reader<'a> {
             let written: String = self.characters[self.start..end].iter().collect();
             let value = written.parse::<f64>().ok().filter(|v| v.is_finite());
             let Some(value) = value else {
-                return Err(self.error(self.start, format!("`{written}`"), "a number such as 12, 0.5 or 1e-3"));
+                return Err(self.error(
+                    self.start,
+                    format!("`{written}`"),
+                    "a number such as 12, 0.5 or 1e-3",
+                ));
             };
             self.token = Token::Number(value);
             self.next = end;
@@ -270,7 +274,9 @@ impl<'a> Reader<'a> {
     fn sum(&mut self) -> Result<Part, ExpressionError> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents")));
+            return Err(
+                self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents"))
+            );
         }
         let mut left = self.product()?;
         while let Token::Sign(sign @ ('+' | '-')) = self.token {
@@ -297,7 +303,9 @@ impl<'a> Reader<'a> {
     fn signed(&mut self) -> Result<Part, ExpressionError> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents")));
+            return Err(
+                self.unexpected(&format!("at most {DEEPEST} nested parentheses, signs and exponents"))
+            );
         }
         let part = match self.token {
             Token::Sign('-') => {
