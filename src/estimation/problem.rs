@@ -114,7 +114,8 @@ pub trait Problem: Sync {
 
 /// ½ Σ ((x − mean)/sigma)² over the parameters that have a prior.
 pub fn prior_cost(priors: &[Prior], x: &[f64]) -> f64 {
-    let term = |(p, x): (&Prior, &f64)| if p.sigma.is_finite() { ((x - p.mean) / p.sigma).powi(2) } else { 0.0 };
+    let term =
+        |(p, x): (&Prior, &f64)| if p.sigma.is_finite() { ((x - p.mean) / p.sigma).powi(2) } else { 0.0 };
     0.5 * priors.iter().zip(x).map(term).sum::<f64>()
 }
 

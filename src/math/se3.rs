@@ -24,10 +24,7 @@ pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
 /// The inverse of [`difference`]: moves a pose by a twist given in the frame of its parent.
 pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     let rotation = UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());
-    Pose::from_parts(
-        (pose.translation.vector + twist.fixed_rows::<3>(0)).into(),
-        rotation * pose.rotation,
-    )
+    Pose::from_parts((pose.translation.vector + twist.fixed_rows::<3>(0)).into(), rotation * pose.rotation)
 }
 
 /// A pose from x, y, z [mm] and a rotation vector [rad].
