@@ -28,3 +28,4 @@ pub mod tree;
 pub mod edit;
 pub mod motion;
 pub mod rewrite;
+pub mod rapid;
