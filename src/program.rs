@@ -1,1 +1,31 @@
-//! program
+//! Robot programs as bytes: read without loss, understood as motions, changed by edits. Knows no robot.
+//!
+//! - [`tree`]: a lossless syntax tree over bytes in flat arrays; reading never fails.
+//! - [`edit`]: sorted, disjoint edits; bytes outside them never change.
+//! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
+//! - [`rewrite`]: what shall change, whatever the language, and what became of it.
+//! - `rapid`: ABB's RAPID: front end, evaluation, rewriting, writing.
+//!
+//! ```ignore
+//! use truegrind::program::motion::TargetValue;
+//! use truegrind::program::rapid::Task;
+//! use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};
+//!
+//! let source = b"MODULE M\nPROC main()\n  MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\nENDPROC\nENDMODULE\n";
+//! let task = Task::read(&[("main.mod", &source[..])]);
+//! let motion = &task.listing.motions[0];
+//! assert_eq!((motion.place.line, &*motion.instruction), (3, "MoveL"));
+//! let Ok(TargetValue::Cartesian(target)) = motion.targets[0].value else { panic!() };
+//!
+//! let moved = NewTarget::Cartesian { position_mm: [500.25, 0.0, 300.0], quaternion: target.quaternion, conf: None };
+//! let change = Change { motion: 0, targets: vec![moved], before: vec![] };
+//! let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+//! let text = rewritten.files[0].edits.apply(source).unwrap();
+//! assert!(text.starts_with(b"MODULE M\nPROC main()\n  MoveL [[500.2500,0,300],[0,0,1,0]"));
+//! ```
+
+pub mod tree;
+pub mod edit;
+pub mod motion;
+pub mod rewrite;
+pub mod rapid;

@@ -1,1 +1,3 @@
 //! Tests of `program`.
+
+mod tree;

@@ -1,0 +1,204 @@
+//! The motion instructions of RAPID and what their arguments are.
+//!
+//! Source: RAPID instructions reference (RobotWare 6) and, for process packages, their application manuals; argument
+//! orders of arc, force control, paint, spot and dispense instructions are confirmed by public programs.
+
+use super::token::fold;
+use crate::program::motion::MotionKind;
+
+/// What a required argument is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slot {
+    /// The end point.
+    To,
+    /// The circle point.
+    Via,
+    /// A point that the instruction writes.
+    Output,
+    /// Speed.
+    Speed,
+    /// Zone.
+    Zone,
+    /// Tool.
+    Tool,
+    /// Anything else.
+    Other,
+}
+
+/// What may be put between the start of a motion and its end so that the process goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// A plain MoveL or MoveJ.
+    Plain,
+    /// The same instruction with another target.
+    Same,
+    /// Another instruction of the same process, with the same arguments.
+    Other(&'static str),
+    /// Nothing.
+    Nothing,
+}
+
+/// A motion instruction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instruction {
+    /// Its name in the manual's spelling.
+    pub name: &'static str,
+    /// How the robot goes.
+    pub kind: MotionKind,
+    /// Required arguments: `T` end, `C` circle point, `J` joint target, `O` output, `S` speed, `Z` zone, `t` tool,
+    /// `.` another, `*` any number of others.
+    pattern: &'static str,
+    /// What may be put between.
+    pub between: Between,
+    /// The instruction that does the same with a joint target.
+    pub joint_form: Option<&'static str>,
+    /// Whether a sensor moves the path.
+    pub sensor_guided: bool,
+}
+
+impl Instruction {
+    /// Whether the end is a joint target.
+    pub fn takes_joints(&self) -> bool {
+        self.pattern.contains('J')
+    }
+
+    /// What the required argument at `index` of `count` is; `None` where the count does not fit.
+    pub fn slot(&self, index: usize, count: usize) -> Option<Slot> {
+        let pattern = self.pattern.as_bytes();
+        let letter = match self.pattern.find('*') {
+            None => *pattern.get(index)?,
+            Some(star) => {
+                let tail = pattern.len() - star - 1;
+                if count < star + tail {
+                    *pattern.get(index).filter(|_| index < star)?
+                } else if index < star {
+                    pattern[index]
+                } else if index + tail >= count {
+                    pattern[pattern.len() - (count - index)]
+                } else {
+                    b'.'
+                }
+            }
+        };
+        Some(match letter {
+            b'T' | b'J' => Slot::To,
+            b'C' => Slot::Via,
+            b'O' => Slot::Output,
+            b'S' => Slot::Speed,
+            b'Z' => Slot::Zone,
+            b't' => Slot::Tool,
+            _ => Slot::Other,
+        })
+    }
+
+    /// How many required arguments there are at least.
+    pub fn least(&self) -> usize {
+        self.pattern.bytes().filter(|&letter| letter != b'*').count()
+    }
+}
+
+const fn plain(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { name, kind, pattern, between: Between::Plain, joint_form: None, sensor_guided: false }
+}
+
+const fn same(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { between: Between::Same, ..plain(name, kind, pattern) }
+}
+
+const fn rigid(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { between: Between::Nothing, ..plain(name, kind, pattern) }
+}
+
+const fn within(name: &'static str, between: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { between: Between::Other(between), ..plain(name, kind, pattern) }
+}
+
+const fn with_joints(instruction: Instruction, joint_form: &'static str) -> Instruction {
+    Instruction { joint_form: Some(joint_form), ..instruction }
+}
+
+const fn guided(instruction: Instruction) -> Instruction {
+    Instruction { sensor_guided: true, between: Between::Nothing, ..instruction }
+}
+
+use MotionKind::{AbsoluteJoint, Circular, External, Joint, Linear};
+
+/// The instructions, the most frequent first.
+pub const INSTRUCTIONS: &[Instruction] = &[
+    with_joints(plain("MoveL", Linear, "TSZt"), "MoveAbsJ"),
+    with_joints(plain("MoveJ", Joint, "TSZt"), "MoveAbsJ"),
+    plain("MoveAbsJ", AbsoluteJoint, "JSZt"),
+    rigid("MoveC", Circular, "CTSZt"),
+    rigid("MoveExtJ", External, "JSZ"),
+    with_joints(plain("MoveLDO", Linear, "TSZt.."), "MoveAbsJDO"),
+    with_joints(plain("MoveJDO", Joint, "TSZt.."), "MoveAbsJDO"),
+    rigid("MoveCDO", Circular, "CTSZt.."),
+    plain("MoveAbsJDO", AbsoluteJoint, "JSZt.."),
+    with_joints(plain("MoveLAO", Linear, "TSZt.."), "MoveAbsJAO"),
+    with_joints(plain("MoveJAO", Joint, "TSZt.."), "MoveAbsJAO"),
+    rigid("MoveCAO", Circular, "CTSZt.."),
+    plain("MoveAbsJAO", AbsoluteJoint, "JSZt.."),
+    with_joints(plain("MoveLGO", Linear, "TSZt."), "MoveAbsJGO"),
+    with_joints(plain("MoveJGO", Joint, "TSZt."), "MoveAbsJGO"),
+    rigid("MoveCGO", Circular, "CTSZt."),
+    plain("MoveAbsJGO", AbsoluteJoint, "JSZt."),
+    plain("MoveLSync", Linear, "TSZt."),
+    plain("MoveJSync", Joint, "TSZt."),
+    rigid("MoveCSync", Circular, "CTSZt."),
+    plain("TriggL", Linear, "TS.Zt"),
+    plain("TriggJ", Joint, "TS.Zt"),
+    rigid("TriggC", Circular, "CTS.Zt"),
+    plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"),
+    plain("TriggLIOs", Linear, "TSZt"),
+    plain("TriggJIOs", Joint, "TSZt"),
+    rigid("SearchL", Linear, ".OTSt"),
+    rigid("SearchC", Circular, ".OCTSt"),
+    rigid("SearchExtJ", External, ".OJS"),
+    plain("ArcLStart", Linear, "TS*Zt"),
+    same("ArcL", Linear, "TS*Zt"),
+    within("ArcLEnd", "ArcL", Linear, "TS*Zt"),
+    rigid("ArcCStart", Circular, "CTS*Zt"),
+    rigid("ArcC", Circular, "CTS*Zt"),
+    rigid("ArcCEnd", Circular, "CTS*Zt"),
+    plain("ArcMoveL", Linear, "TSZt"),
+    plain("ArcMoveJ", Joint, "TSZt"),
+    rigid("ArcMoveC", Circular, "CTSZt"),
+    plain("ArcMoveAbsJ", AbsoluteJoint, "JSZt"),
+    plain("FCPress1LStart", Linear, "TS*Zt"),
+    same("FCPressL", Linear, "TS.Zt"),
+    rigid("FCPressC", Circular, "CTS.Zt"),
+    rigid("FCPressEnd", Linear, "TSt"),
+    same("PaintL", Linear, "TSZt"),
+    rigid("PaintC", Circular, "CTSZt"),
+    plain("SpotL", Linear, "TS*t"),
+    plain("SpotJ", Joint, "TS*t"),
+    plain("SpotML", Linear, "TS*t"),
+    plain("SpotMJ", Joint, "TS*t"),
+    plain("NutL", Linear, "TS*t"),
+    plain("NutJ", Joint, "TS*t"),
+    same("DispL", Linear, "TS.Zt"),
+    rigid("DispC", Circular, "CTS.Zt"),
+    plain("LaserLStart", Linear, "TS*Zt"),
+    same("LaserL", Linear, "TS*Zt"),
+    within("LaserLEnd", "LaserL", Linear, "TS*Zt"),
+    rigid("LaserCStart", Circular, "CTS*Zt"),
+    rigid("LaserC", Circular, "CTS*Zt"),
+    rigid("LaserCEnd", Circular, "CTS*Zt"),
+    same("CapL", Linear, "TS*Zt"),
+    rigid("CapC", Circular, "CTS*Zt"),
+    rigid("ContactL", Linear, "TSt"),
+    guided(rigid("EGMMoveL", Linear, ".TSZt")),
+    guided(rigid("EGMMoveC", Circular, ".CTSZt")),
+];
+
+/// The instruction of this name in any case, by its index in [`INSTRUCTIONS`].
+pub fn find(name: &[u8]) -> Option<usize> {
+    // Every name begins with one of these letters; nearly all others are turned away here.
+    if !matches!(
+        name.first().map(|&byte| fold(byte)),
+        Some(b'm' | b't' | b's' | b'a' | b'f' | b'p' | b'n' | b'd' | b'l' | b'c' | b'e')
+    ) {
+        return None;
+    }
+    INSTRUCTIONS.iter().position(|instruction| instruction.name.as_bytes().eq_ignore_ascii_case(name))
+}

@@ -1,0 +1,93 @@
+//! Literal aggregates of plain numbers, read straight from bytes on `nom`: the fast way to the value of a robtarget or
+//! jointtarget and to the place of each of its numbers.
+//!
+//! Signs, white space and comments may stand anywhere between; anything else (a name, arithmetic) makes the answer
+//! `None`, and the evaluator takes the general way.
+
+use nom::character::complete::one_of;
+use nom::combinator::opt;
+use nom::{IResult, Parser};
+
+use super::lexer;
+use super::number;
+
+/// The groups of a robtarget: trans, rot, robconf, extax.
+pub const ROBTARGET: &[usize] = &[3, 4, 4, 6];
+/// The groups of a jointtarget: robax, extax.
+pub const JOINTTARGET: &[usize] = &[6, 6];
+
+/// The numbers of a literal: their values, and where each stands relative to the literal's first byte, sign included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbers {
+    /// Values in order.
+    pub values: [f64; 17],
+    /// First byte and one past the last.
+    pub spans: [(u32, u32); 17],
+}
+
+type Rest<'s, O> = IResult<&'s [u8], O, ()>;
+
+/// Reads an aggregate of aggregates of numbers with the given group lengths. Bytes after it are ignored.
+pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
+    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
+    let mut count = 0;
+    let mut rest = symbol(b'[')(text).ok()?.0;
+    for (index, &length) in shape.iter().enumerate() {
+        if index > 0 {
+            rest = symbol(b',')(rest).ok()?.0;
+        }
+        rest = symbol(b'[')(rest).ok()?.0;
+        for position in 0..length {
+            if position > 0 {
+                rest = symbol(b',')(rest).ok()?.0;
+            }
+            let start = trivia(rest);
+            let (after, value) = signed(start).ok()?;
+            found.values[count] = value;
+            found.spans[count] = ((text.len() - start.len()) as u32, (text.len() - after.len()) as u32);
+            count += 1;
+            rest = after;
+        }
+        rest = symbol(b']')(rest).ok()?.0;
+    }
+    symbol(b']')(rest).ok()?;
+    Some(found)
+}
+
+/// White space and comments.
+#[inline]
+fn trivia(mut input: &[u8]) -> &[u8] {
+    loop {
+        match input.first() {
+            Some(b' ' | b'\t' | b'\r' | b'\n' | 0x0B | 0x0C) => input = &input[1..],
+            Some(b'!') => {
+                let end = input.iter().position(|&byte| byte == b'\n').unwrap_or(input.len());
+                input = &input[end..];
+            }
+            _ => return input,
+        }
+    }
+}
+
+/// A delimiter after trivia.
+#[inline]
+fn symbol(wanted: u8) -> impl Fn(&[u8]) -> Rest<'_, ()> {
+    move |input| match trivia(input) {
+        [first, rest @ ..] if *first == wanted => Ok((rest, ())),
+        _ => Err(nom::Err::Error(())),
+    }
+}
+
+/// A number with an optional sign.
+#[inline]
+fn signed(input: &[u8]) -> Rest<'_, f64> {
+    let (rest, sign) = opt(one_of("+-")).parse(input)?;
+    let (rest, text) = lexer::number(if sign.is_some() { trivia(rest) } else { rest })?;
+    let value = number::value(text).ok_or(nom::Err::Error(()))?;
+    Ok((rest, if sign == Some('-') { -value } else { value }))
+}
+
+/// The decimals that the number in `span` of a literal states.
+pub fn decimals(text: &[u8], span: (u32, u32)) -> u8 {
+    number::decimals(&text[span.0 as usize..span.1 as usize])
+}

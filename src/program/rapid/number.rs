@@ -1,0 +1,132 @@
+//! Numbers: their value, their decimals, and writing them.
+
+/// Powers of ten that are exact in double precision.
+const TEN: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19,
+    1e20, 1e21, 1e22,
+];
+
+/// More decimals than this are never written.
+pub const MOST_DECIMALS: u8 = 12;
+
+/// The value of a number token, correctly rounded; `None` where the bytes are no number.
+///
+/// Up to 15 digits and small exponents are exact in one multiplication or division (Clinger 1990, the fast path);
+/// everything else goes to the standard library.
+pub fn value(text: &[u8]) -> Option<f64> {
+    if text.first() == Some(&b'0') && text.get(1).is_some_and(u8::is_ascii_alphabetic) && text[1] | 32 != b'e' {
+        let radix = match text[1] | 32 {
+            b'x' => 16,
+            b'b' => 2,
+            b'o' => 8,
+            b'd' => 10,
+            _ => return None,
+        };
+        let digits = std::str::from_utf8(&text[2..]).ok()?;
+        return u64::from_str_radix(digits, radix).ok().map(|value| value as f64);
+    }
+    let (mut mantissa, mut digits, mut exponent, mut fraction) = (0_u64, 0, 0_i32, false);
+    let mut index = 0;
+    while let Some(&byte) = text.get(index) {
+        match byte {
+            b'0'..=b'9' => {
+                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
+                digits += i32::from(mantissa != 0);
+                exponent -= i32::from(fraction);
+            }
+            b'.' if !fraction => fraction = true,
+            b'e' | b'E' => {
+                let written: i32 = std::str::from_utf8(&text[index + 1..]).ok()?.parse().ok()?;
+                exponent = exponent.saturating_add(written);
+                break;
+            }
+            _ => return None,
+        }
+        index += 1;
+    }
+    if index == 0 {
+        return None;
+    }
+    if digits <= 15 && exponent.unsigned_abs() <= 22 {
+        let mantissa = mantissa as f64;
+        let power = TEN[exponent.unsigned_abs() as usize];
+        return Some(if exponent < 0 { mantissa / power } else { mantissa * power });
+    }
+    std::str::from_utf8(text).ok()?.parse().ok()
+}
+
+/// How many decimals a number token states: those after the point less the exponent.
+pub fn decimals(text: &[u8]) -> u8 {
+    let split = text.iter().position(|byte| matches!(byte, b'e' | b'E')).unwrap_or(text.len());
+    let (digits, exponent) = text.split_at(split);
+    let after = digits.iter().position(|&byte| byte == b'.').map_or(0, |point| digits.len() - point - 1) as i32;
+    let exponent: i32 = match exponent {
+        [] => 0,
+        [_, rest @ ..] => std::str::from_utf8(rest).ok().and_then(|text| text.parse().ok()).unwrap_or(0),
+    };
+    after.saturating_sub(exponent).clamp(0, i32::from(MOST_DECIMALS)) as u8
+}
+
+/// The value rounded to so many decimals, as a whole number of units of the last one.
+pub fn units(value: f64, decimals: u8) -> f64 {
+    (value * TEN[usize::from(decimals.min(MOST_DECIMALS))]).round()
+}
+
+/// Rounds to so many decimals.
+pub fn rounded(value: f64, decimals: u8) -> f64 {
+    units(value, decimals) / TEN[usize::from(decimals.min(MOST_DECIMALS))]
+}
+
+/// Writes a value with exactly so many decimals, never `-0`.
+pub fn write(out: &mut Vec<u8>, value: f64, decimals: u8) {
+    let decimals = decimals.min(MOST_DECIMALS);
+    let units = units(value, decimals);
+    if units.abs() >= 9e15 || units.is_nan() {
+        // Beyond exact integers; no position of a robot comes here.
+        out.extend_from_slice(format!("{value:.*}", usize::from(decimals)).as_bytes());
+        return;
+    }
+    if units < 0.0 {
+        out.push(b'-');
+    }
+    let mut rest = units.abs() as u64;
+    let mut digits = [b'0'; 20];
+    let mut at = digits.len();
+    let least = digits.len() - usize::from(decimals) - 1;
+    while rest > 0 || at > least {
+        at -= 1;
+        digits[at] = b'0' + (rest % 10) as u8;
+        rest /= 10;
+    }
+    let point = digits.len() - usize::from(decimals);
+    out.extend_from_slice(&digits[at..point]);
+    if decimals > 0 {
+        out.push(b'.');
+        out.extend_from_slice(&digits[point..]);
+    }
+}
+
+/// Writes a value with at most so many decimals and no trailing zeros.
+pub fn write_short(out: &mut Vec<u8>, value: f64, decimals: u8) {
+    let start = out.len();
+    write(out, value, decimals);
+    if out[start..].contains(&b'.') {
+        while out.last() == Some(&b'0') {
+            out.pop();
+        }
+        if out.last() == Some(&b'.') {
+            out.pop();
+        }
+    }
+    if &out[start..] == b"-0" {
+        out.remove(start);
+    }
+}
+
+/// Writes an external axis: the number, or 9E+09 where none is connected.
+pub fn write_external(out: &mut Vec<u8>, value: Option<f64>) {
+    match value {
+        Some(value) => write_short(out, value, 6),
+        None => out.extend_from_slice(b"9E+09"),
+    }
+}
