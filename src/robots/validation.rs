@@ -1,0 +1,407 @@
+//! What must hold before a data sheet becomes a model.
+//!
+//! The frequent faults are caught by name: radians for degrees, metres for millimetres, a table of another arm (the
+//! file's own published poses are then missed), plain DH on parallel axes (allowed, with a warning: d cannot be
+//! determined there, rls-2025).
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::RobotError;
+use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
+use crate::kinematics::link::LinkModel;
+use crate::kinematics::model::Model;
+
+/// Below this sine of the twist two axes count as parallel: 0.5°.
+const PARALLEL: f64 = 0.0087;
+
+/// A value that cannot be right, before file and robot are known.
+#[derive(Debug)]
+pub(super) struct Fault {
+    key: String,
+    found: String,
+    expected: &'static str,
+    remedy: &'static str,
+}
+
+impl Fault {
+    fn new(
+        key: impl Into<String>,
+        found: impl ToString,
+        expected: &'static str,
+        remedy: &'static str,
+    ) -> Self {
+        Self { key: key.into(), found: found.to_string(), expected, remedy }
+    }
+
+    pub(super) fn of(self, file: &str, robot: &str) -> RobotError {
+        RobotError::Invalid {
+            file: file.to_owned(),
+            robot: robot.to_owned(),
+            key: self.key,
+            found: self.found,
+            expected: self.expected.to_owned(),
+            remedy: self.remedy.to_owned(),
+        }
+    }
+}
+
+pub(super) fn link_count(found: usize) -> Fault {
+    Fault::new(
+        "link",
+        format!("{found} links"),
+        "six [[robot.link]]",
+        "truegrind knows arms with six rotary axes",
+    )
+}
+
+/// Checks all but the published poses; gives the warnings.
+pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
+    if sheet.name.trim().is_empty() {
+        return Err(Fault::new("name", "nothing", "a name", "give the arm a name"));
+    }
+    if sheet.link.len() != 6 {
+        return Err(link_count(sheet.link.len()));
+    }
+    finite(sheet)?;
+    units(sheet)?;
+    links(&sheet.link)?;
+    joints(sheet)?;
+    mounting(sheet)?;
+    Ok(warnings(sheet))
+}
+
+fn finite(sheet: &DataSheet) -> Result<(), Fault> {
+    let mut numbers: Vec<(String, f64)> = Vec::new();
+    for (i, link) in sheet.link.iter().enumerate() {
+        for (key, value) in link_numbers(link) {
+            numbers.push((format!("link {} {key}", i + 1), value));
+        }
+    }
+    let joints = &sheet.joints;
+    let mut push = |key: &str, values: &[f64]| numbers.extend(values.iter().map(|&v| (key.to_owned(), v)));
+    for (key, values) in [
+        ("joints.min_deg", &joints.min_deg),
+        ("joints.max_deg", &joints.max_deg),
+        ("joints.speed_deg_s", &joints.speed_deg_s),
+    ] {
+        push(key, values.as_ref().map_or(&[], |v| v.as_slice()));
+    }
+    push("joints.map", joints.map.as_ref().map_or(&[], |rows| rows.as_flattened()));
+    push("mounting.gravity", &sheet.mounting.gravity);
+    push("mounting.plate_mm", &sheet.mounting.plate_mm);
+    if let Some(masses) = &sheet.masses {
+        push("masses.mass_kg", &masses.mass_kg);
+        push("masses.centre_mm", masses.centre_mm.as_flattened());
+    }
+    if let Some(flange) = &sheet.flange {
+        push("flange.position_mm", &flange.position_mm);
+        push("flange.quaternion_wxyz", &flange.quaternion_wxyz);
+    }
+    for (key, value) in [
+        ("payload_kg", sheet.payload_kg),
+        ("reach_mm", sheet.reach_mm),
+        ("repeatability_mm", sheet.repeatability_mm),
+    ] {
+        push(key, value.as_slice());
+        if value.is_some_and(|value| value <= 0.0) {
+            return Err(Fault::new(
+                key,
+                value.unwrap_or_default(),
+                "more than 0",
+                "leave the key out where it is not known",
+            ));
+        }
+    }
+    for pose in &sheet.published {
+        push("published.joints_deg", &pose.joints_deg);
+        push("published.position_mm", pose.position_mm.as_ref().map_or(&[], |v| v.as_slice()));
+        push("published.radius_mm", pose.radius_mm.as_slice());
+        push("published.quaternion_wxyz", pose.quaternion_wxyz.as_ref().map_or(&[], |v| v.as_slice()));
+        push("published.tolerance_mm", &[pose.tolerance_mm]);
+    }
+    match numbers.into_iter().find(|(_, value)| !value.is_finite()) {
+        Some((key, value)) => Err(Fault::new(key, value, "a finite number", "correct the number")),
+        None => Ok(()),
+    }
+}
+
+fn link_numbers(link: &LinkSheet) -> [(&'static str, f64); 5] {
+    [
+        ("a_mm", link.a_mm),
+        ("d_mm", link.d_mm),
+        ("alpha_deg", link.alpha_deg),
+        ("theta_deg", link.theta_deg),
+        ("beta_deg", link.beta_deg),
+    ]
+}
+
+/// Radians for degrees, metres for millimetres.
+fn units(sheet: &DataSheet) -> Result<(), Fault> {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    let quarter = |angle: f64| angle != 0.0 && ((angle / FRAC_PI_2).round() * FRAC_PI_2 - angle).abs() < 0.01;
+    let twists: Vec<f64> = sheet.link.iter().map(|link| link.alpha_deg).collect();
+    if twists.iter().all(|&a| a.abs() < PI + 0.01) && twists.iter().any(|&a| quarter(a)) {
+        return Err(Fault::new(
+            "link alpha_deg",
+            numbers(&twists),
+            "degrees",
+            "this looks like radians: multiply by 57.29578",
+        ));
+    }
+    let lengths: Vec<f64> = sheet.link.iter().flat_map(|link| [link.a_mm, link.d_mm]).collect();
+    if lengths.iter().all(|length| length.abs() < 5.0) {
+        return Err(Fault::new(
+            "link a_mm and d_mm",
+            numbers(&lengths),
+            "millimetres",
+            "this looks like metres: multiply by 1000",
+        ));
+    }
+    for (key, values) in
+        [("joints.min_deg", &sheet.joints.min_deg), ("joints.max_deg", &sheet.joints.max_deg)]
+    {
+        if let Some(values) = values
+            && values.iter().all(|v| v.abs() < 8.0)
+        {
+            return Err(Fault::new(
+                key,
+                numbers(values),
+                "degrees",
+                "this looks like radians: multiply by 57.29578",
+            ));
+        }
+    }
+    if let Some(masses) = &sheet.masses
+        && masses.centre_mm.as_flattened().iter().all(|v| v.abs() < 2.0)
+        && masses.centre_mm.as_flattened().iter().any(|&v| v != 0.0)
+    {
+        return Err(Fault::new(
+            "masses.centre_mm",
+            numbers(masses.centre_mm.as_flattened()),
+            "millimetres",
+            "this looks like metres: multiply by 1000",
+        ));
+    }
+    Ok(())
+}
+
+fn numbers(values: &[f64]) -> String {
+    let text: Vec<String> = values.iter().map(f64::to_string).collect();
+    format!("[{}]", text.join(", "))
+}
+
+fn links(links: &[LinkSheet]) -> Result<(), Fault> {
+    for (i, link) in links.iter().enumerate() {
+        let key = |name: &str| format!("link {} {name}", i + 1);
+        match link.model {
+            LinkModel::Hayati if link.d_mm != 0.0 => {
+                return Err(Fault::new(
+                    key("d_mm"),
+                    link.d_mm,
+                    "0 on a hayati link",
+                    "add it to d of the next link, whose axis is parallel",
+                ));
+            }
+            LinkModel::Hayati if i == 5 => {
+                return Err(Fault::new(
+                    key("model"),
+                    "hayati",
+                    "dh on the last link",
+                    "no axis follows that it could be parallel to",
+                ));
+            }
+            LinkModel::Hayati if link.alpha_deg.to_radians().sin().abs() > 0.5 => {
+                return Err(Fault::new(
+                    key("model"),
+                    format!("hayati with alpha_deg = {}", link.alpha_deg),
+                    "hayati only where the next axis is parallel",
+                    "write model = \"dh\"",
+                ));
+            }
+            LinkModel::Dh if link.beta_deg != 0.0 => {
+                return Err(Fault::new(
+                    key("beta_deg"),
+                    link.beta_deg,
+                    "no beta on a dh link",
+                    "write model = \"hayati\" or take beta out",
+                ));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn joints(sheet: &DataSheet) -> Result<(), Fault> {
+    let joints = &sheet.joints;
+    match (&joints.min_deg, &joints.max_deg) {
+        (Some(min), Some(max)) => {
+            if let Some(i) = (0..6).find(|&i| min[i] >= max[i]) {
+                return Err(Fault::new(
+                    format!("joints.min_deg and max_deg of joint {}", i + 1),
+                    format!("{} and {}", min[i], max[i]),
+                    "min below max",
+                    "swap or correct them",
+                ));
+            }
+        }
+        (None, None) => {}
+        (Some(_), None) => {
+            return Err(Fault::new(
+                "joints.max_deg",
+                "nothing",
+                "max_deg beside min_deg",
+                "give both or none",
+            ));
+        }
+        (None, Some(_)) => {
+            return Err(Fault::new(
+                "joints.min_deg",
+                "nothing",
+                "min_deg beside max_deg",
+                "give both or none",
+            ));
+        }
+    }
+    if let Some(speed) = joints.speed_deg_s.iter().flatten().find(|&&speed| speed <= 0.0) {
+        return Err(Fault::new(
+            "joints.speed_deg_s",
+            speed,
+            "more than 0",
+            "leave the key out where it is not known",
+        ));
+    }
+    if let Some(rows) = &joints.map {
+        let map = Matrix6::from_fn(|row, column| rows[row][column]);
+        if map.determinant().abs() < 1e-6 {
+            return Err(Fault::new(
+                "joints.map",
+                "a matrix that has no inverse",
+                "six independent rows",
+                "each row says which controller angles turn that link, with sign",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn mounting(sheet: &DataSheet) -> Result<(), Fault> {
+    if sheet.mounting.gravity.iter().all(|g| g.abs() < 1e-9) {
+        return Err(Fault::new(
+            "mounting.gravity",
+            numbers(&sheet.mounting.gravity),
+            "a direction",
+            "[0, 0, -1] for an arm that stands, [0, 0, 1] for one that hangs",
+        ));
+    }
+    let flange = sheet.flange.iter().map(|flange| ("flange.quaternion_wxyz", flange.quaternion_wxyz));
+    let poses = sheet.published.iter().filter_map(|pose| pose.quaternion_wxyz);
+    for (key, wxyz) in flange.chain(poses.map(|wxyz| ("published.quaternion_wxyz", wxyz))) {
+        let norm = wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-3 {
+            return Err(Fault::new(
+                key,
+                format!("{} of length {norm:.4}", numbers(&wxyz)),
+                "length 1, in the order w, x, y, z",
+                "correct the quaternion",
+            ));
+        }
+    }
+    if let Some(mass) = sheet.masses.iter().flat_map(|masses| masses.mass_kg).find(|&mass| mass < 0.0) {
+        return Err(Fault::new(
+            "masses.mass_kg",
+            mass,
+            "0 or more",
+            "leave [robot.masses] out where not known",
+        ));
+    }
+    Ok(())
+}
+
+fn warnings(sheet: &DataSheet) -> Vec<String> {
+    let mut out = Vec::new();
+    for (i, link) in sheet.link.iter().enumerate().take(5) {
+        if link.model == LinkModel::Dh && link.alpha_deg.to_radians().sin().abs() < PARALLEL {
+            out.push(format!(
+                "link {}: axes {} and {} are parallel and modelled by dh: its d cannot be identified; write model = \"hayati\"",
+                i + 1,
+                i + 1,
+                i + 2
+            ));
+        }
+    }
+    let sources = &sheet.sources;
+    let performance = sheet.payload_kg.or(sheet.reach_mm).or(sheet.repeatability_mm);
+    for (key, present, source) in [
+        ("links", true, &sources.links),
+        ("limits", sheet.joints.min_deg.is_some(), &sources.limits),
+        ("masses", sheet.masses.is_some(), &sources.masses),
+        ("payload", performance.is_some(), &sources.payload),
+    ] {
+        if present && source.trim().is_empty() {
+            out.push(format!("sources.{key}: no source stated"));
+        }
+    }
+    if sheet.joints.min_deg.is_none() {
+        out.push("joints: no range stated: targets are not checked against one".to_owned());
+    }
+    if sheet.published.is_empty() {
+        out.push(
+            "published: no pose stated: nothing checks the links; one pose of the data sheet will do"
+                .to_owned(),
+        );
+    }
+    out
+}
+
+/// How far a model is from a published pose: of the point [mm], and of the orientation [rad] where one is published.
+pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
+    let q = Vector6::from(pose.joints_deg.map(f64::to_radians));
+    let condition = Default::default();
+    let posed = model.under(&condition);
+    let flange = posed.forward(&q);
+    let point = match pose.point {
+        Point::Flange => flange.translation.vector,
+        Point::WristCentre => posed.frames(&q).origin[5].into(),
+    };
+    let distance = match (pose.position_mm, pose.radius_mm) {
+        (Some(position), _) => (point - nalgebra::Vector3::from(position)).norm(),
+        (None, Some(radius)) => (point.xy().norm() - radius).abs(),
+        (None, None) => 0.0,
+    };
+    let turn = pose.quaternion_wxyz.map(|wxyz| flange.rotation.angle_to(&unit_quaternion(&wxyz)));
+    (distance, turn)
+}
+
+/// The sheet's own published poses must come out.
+pub(super) fn check_published(sheet: &DataSheet, model: &Model) -> Result<(), Fault> {
+    for pose in &sheet.published {
+        let key = || format!("published \"{}\"", pose.what);
+        if pose.position_mm.is_some() == pose.radius_mm.is_some() {
+            return Err(Fault::new(
+                key(),
+                if pose.radius_mm.is_some() { "both" } else { "neither" },
+                "either position_mm or radius_mm",
+                "give exactly one",
+            ));
+        }
+        let (distance, turn) = deviation(pose, model);
+        if distance > pose.tolerance_mm {
+            return Err(Fault::new(
+                key(),
+                format!("the links miss it by {distance:.3} mm"),
+                "a miss within tolerance_mm",
+                "check lengths, signs in joints.map and the offsets theta_deg",
+            ));
+        }
+        if let Some(turn) = turn.filter(|&turn| turn > 1e-4) {
+            return Err(Fault::new(
+                key(),
+                format!("an orientation {:.3}° off", turn.to_degrees()),
+                "the published quaternion_wxyz",
+                "check alpha_deg, theta_deg of link 6 and [robot.flange]",
+            ));
+        }
+    }
+    Ok(())
+}
