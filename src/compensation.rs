@@ -1,6 +1,12 @@
 //! From an estimated arm and a program to a program that the real arm runs right.
 //!
-//! [`deviation`] holds what both rewriting and reporting speak of: the points of a path, how far the arm is off at
-//! each, before and after.
+//! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
+//! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
+//! - [`deviation`]: the points of a path and how far an arm is off at each, before and after.
 
 pub mod deviation;
+pub mod cell;
+pub mod mounting;
+pub mod why;
+pub mod rewrite;
+mod segment;

@@ -141,6 +141,11 @@ impl Estimated {
         product.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
+    /// Predicted standard deviation of the position of a point on the flange [mm]: √trace of its covariance.
+    pub fn position_sigma_mm(&self, arm: &Posed<'_>, q: &Joints, flange_from_tool: &Pose) -> f64 {
+        self.position_covariance(arm, q, flange_from_tool).trace().max(0.0).sqrt()
+    }
+
     /// Derivative of the position of a point on the flange with respect to the arm's parameters: 3 × p, in the base.
     pub fn position_jacobian(&self, arm: &Posed<'_>, q: &Joints, flange_from_tool: &Pose) -> DMatrix<f64> {
         let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(flange_from_tool) };

@@ -1,0 +1,116 @@
+//! Where tools and work objects come from, and what that means under a better model of the arm.
+//!
+//! A frame from *metrology* (CAD, a measuring machine, a tracker) is true as it stands. A frame that was *taught* with
+//! the uncalibrated arm stands where the nominal model put it; the estimated model, given the same joint angles, says
+//! where it truly is. A taught frame without its teaching points cannot be moved: the difference is estimated and
+//! stated instead.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::kinematics::model::{Joints, Posed};
+use crate::math::se3::{Pose, rotation_from_matrix};
+
+/// How a frame was obtained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrameOrigin {
+    /// From CAD or measured by other means: true as it stands.
+    Metrology,
+    /// Taught with the uncalibrated arm.
+    Taught,
+}
+
+/// One tool or work object of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellFrame {
+    /// Name in the program; letters count the same in either case.
+    pub name: String,
+    /// How it was obtained.
+    pub origin: FrameOrigin,
+    /// Controller joint angles [°] of the teaching points. A tool: four or more poses with the TCP at one fixed
+    /// point. A work object: three poses, first and second on its x axis, the third on its y axis, with the tool
+    /// named in `taught_with`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub teaching_deg: Vec<[f64; 6]>,
+    /// The tool with which a work object was taught.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taught_with: Option<String>,
+}
+
+/// The cell file: what is known of the origin of tools and work objects.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Tools.
+    #[serde(default)]
+    pub tool: Vec<CellFrame>,
+    /// Work objects.
+    #[serde(default)]
+    pub wobj: Vec<CellFrame>,
+}
+
+impl Cell {
+    /// Reads a cell file.
+    ///
+    /// # Errors
+    /// A sentence with key and reason.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let cell: Self = toml::from_str(text).map_err(|e| format!("not a cell file: {e}"))?;
+        for (kind, frame, least) in
+            cell.tool.iter().map(|f| ("tool", f, 4)).chain(cell.wobj.iter().map(|f| ("wobj", f, 3)))
+        {
+            let found = frame.teaching_deg.len();
+            if frame.origin == FrameOrigin::Taught && found > 0 && found < least {
+                return Err(format!(
+                    "{kind} \"{}\": {found} teaching points, expected at least {least}",
+                    frame.name
+                ));
+            }
+        }
+        Ok(cell)
+    }
+
+    /// What is known of a tool.
+    pub fn tool(&self, name: &str) -> Option<&CellFrame> {
+        self.tool.iter().find(|f| f.name.eq_ignore_ascii_case(name))
+    }
+
+    /// What is known of a work object.
+    pub fn wobj(&self, name: &str) -> Option<&CellFrame> {
+        self.wobj.iter().find(|f| f.name.eq_ignore_ascii_case(name))
+    }
+}
+
+/// The TCP that stays at one point over all poses, by linear least squares (the n-point method).
+/// `None` for poses that do not fix it (orientations too much alike).
+pub fn taught_tcp(arm: &Posed<'_>, teaching: &[Joints]) -> Option<Vector3<f64>> {
+    // R_i t + p_i = c for all i: unknown t and c.
+    let n = teaching.len();
+    let mut a = DMatrix::zeros(3 * n, 6);
+    let mut b = DVector::zeros(3 * n);
+    for (i, q) in teaching.iter().enumerate() {
+        let flange = arm.forward(q);
+        a.view_mut((3 * i, 0), (3, 3)).copy_from(flange.rotation.to_rotation_matrix().matrix());
+        a.view_mut((3 * i, 3), (3, 3)).copy_from(&-Matrix3::<f64>::identity());
+        b.rows_mut(3 * i, 3).copy_from(&-flange.translation.vector);
+    }
+    let svd = a.svd(true, true);
+    if svd.singular_values.min() < 1e-3 {
+        return None;
+    }
+    let x = svd.solve(&b, 0.0).ok()?;
+    Some(x.fixed_rows::<3>(0).into_owned())
+}
+
+/// The frame through three taught points: the first two on x, the third on y (the origin is its foot on x).
+/// `None` where the points are in line.
+pub fn taught_frame(points: &[Point3<f64>; 3]) -> Option<Pose> {
+    let x = (points[1] - points[0]).try_normalize(1e-9)?;
+    let along = x.dot(&(points[2] - points[0]));
+    let origin = points[0] + x * along;
+    let y = (points[2] - origin).try_normalize(1e-9)?;
+    let rotation = rotation_from_matrix(&Matrix3::from_columns(&[x, y, x.cross(&y)]));
+    Some(Pose::from_parts(origin.coords.into(), rotation))
+}

@@ -1,0 +1,182 @@
+//! The path between two targets: how far the told line bends under the estimated arm, and which targets straighten it.
+
+use nalgebra::{Point3, Vector3};
+
+use super::mounting::Mounted;
+use super::rewrite::{Arms, Emit, Options, extra_of, gap};
+use crate::kinematics::model::Joints;
+use crate::math::se3::Pose;
+use crate::program::rewrite::Extra;
+
+/// A corrected end of a motion.
+pub(super) struct Ends<'a> {
+    pub(super) mounted: &'a Mounted,
+    pub(super) index: usize,
+    /// Intended pose in the work object.
+    pub(super) meant: Pose,
+    /// What the controller is told.
+    pub(super) told: Pose,
+    /// Joints there.
+    pub(super) joints: Joints,
+}
+
+/// Position straight, orientation by the shortest turn: as controllers interpolate a linear motion.
+fn between(from: &Pose, to: &Pose, s: f64) -> Pose {
+    let position = from.translation.vector.lerp(&to.translation.vector, s);
+    let rotation = from.rotation.try_slerp(&to.rotation, s, 1e-9).unwrap_or(from.rotation);
+    Pose::from_parts(position.into(), rotation)
+}
+
+/// How far the tool is from the intended line at share `s` of the way; infinite where the nominal arm cannot go.
+fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, arms: &Arms<'_>, emit: Emit) -> f64 {
+    let joints = from.joints.lerp(&to.joints, s);
+    let joints = match emit {
+        Emit::Joints => joints,
+        Emit::Targets => {
+            let told = between(&from.told, &to.told, s);
+            match arms.nominal.solve_near(&to.mounted.told.flange_for(&told), &joints) {
+                Ok(solution) => solution.joints,
+                Err(_) => return f64::INFINITY,
+            }
+        }
+    };
+    let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&joints));
+    let meant = between(&from.meant, &to.meant, s);
+    // Along the line the tool may be early or late: only what lies beside the line counts, unless it is too short.
+    let off = reached.translation.vector - meant.translation.vector;
+    let along = to.meant.translation.vector - from.meant.translation.vector;
+    match along.try_normalize(1e-6) {
+        Some(direction) => (off - direction * direction.dot(&off)).norm(),
+        None => off.norm(),
+    }
+}
+
+/// Longest piece of a line that is judged by three samples [mm].
+const PIECE_MM: f64 = 100.0;
+
+/// Largest distance from the intended line between two ends [mm]: the middle first, the quarters where the middle is
+/// not clearly straight, and more samples on long lines.
+pub(super) fn straight_bend(from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>, emit: Emit) -> f64 {
+    let length = gap(&from.meant.translation.vector, &to.meant.translation.vector);
+    let turn = from.meant.rotation.angle_to(&to.meant.rotation);
+    let middle = off_at(from, to, 0.5, arms, emit);
+    if length < PIECE_MM && turn < 0.2 && middle < CLEARLY_STRAIGHT_MM {
+        return middle;
+    }
+    let pieces = 4 * ((length / PIECE_MM).ceil() as usize).clamp(1, 25);
+    (1..pieces).map(|k| off_at(from, to, k as f64 / pieces as f64, arms, emit)).fold(middle, f64::max)
+}
+
+/// Below this the middle of a short line tells enough: the bend is a parabola to leading order.
+const CLEARLY_STRAIGHT_MM: f64 = 0.01;
+
+/// Targets that keep the path within tolerance, by bisection, and the bend that is left.
+pub(super) fn insertions(
+    from: &Ends<'_>,
+    to: &Ends<'_>,
+    arms: &Arms<'_>,
+    options: &Options,
+) -> (Vec<Extra>, f64) {
+    let mut extra = Vec::new();
+    let left = split(from, to, arms, options, MAX_DEPTH, &mut extra);
+    (extra, left)
+}
+
+/// 63 targets at most on one line: more means that the line cannot be followed.
+const MAX_DEPTH: usize = 6;
+
+fn split(
+    from: &Ends<'_>,
+    to: &Ends<'_>,
+    arms: &Arms<'_>,
+    options: &Options,
+    depth: usize,
+    extra: &mut Vec<Extra>,
+) -> f64 {
+    let bend = straight_bend(from, to, arms, options.emit);
+    if bend <= options.tolerance_mm || depth == 0 {
+        return bend;
+    }
+    let meant = between(&from.meant, &to.meant, 0.5);
+    let flange = to.mounted.real.flange_for(&meant);
+    let near = from.joints.lerp(&to.joints, 0.5);
+    let Ok(solution) = arms.estimated.solve_near(&flange, &near) else { return bend };
+    let told = to.mounted.told.target_of(&arms.nominal.arm().forward(&solution.joints));
+    let middle = Ends { mounted: to.mounted, index: to.index, meant, told, joints: solution.joints };
+    let first = split(from, &middle, arms, options, depth - 1, extra);
+    extra.push(extra_of(&told, &solution.joints, options.emit));
+    let second = split(&middle, to, arms, options, depth - 1, extra);
+    first.max(second)
+}
+
+/// Largest distance of the tool from the intended circle, both circles through their three points, at seven shares
+/// of the arc; infinite where one of them is no circle.
+pub(super) fn circle_bend(
+    from: &Ends<'_>,
+    via_meant: &Pose,
+    via_told: &Pose,
+    to: &Ends<'_>,
+    arms: &Arms<'_>,
+) -> f64 {
+    let point = |p: &Pose| Point3::from(p.translation.vector);
+    let meant = Arc::through(&point(&from.meant), &point(via_meant), &point(&to.meant));
+    let told = Arc::through(&point(&from.told), &point(via_told), &point(&to.told));
+    let (Some(meant), Some(told)) = (meant, told) else { return f64::INFINITY };
+    (1..8)
+        .map(|k| {
+            let s = f64::from(k) / 8.0;
+            let rotation = between(&from.told, &to.told, s).rotation;
+            let pose = Pose::from_parts(told.at(s).coords.into(), rotation);
+            let near = from.joints.lerp(&to.joints, s);
+            match arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near) {
+                Ok(solution) => {
+                    let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&solution.joints));
+                    meant.distance(&point(&reached))
+                }
+                Err(_) => f64::INFINITY,
+            }
+        })
+        .fold(0.0, f64::max)
+}
+
+/// An arc from its start over a point to its end.
+pub(super) struct Arc {
+    centre: Point3<f64>,
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    radius: f64,
+    sweep: f64,
+}
+
+impl Arc {
+    /// The arc through three points; `None` where they are in line or coincide.
+    pub(super) fn through(start: &Point3<f64>, via: &Point3<f64>, end: &Point3<f64>) -> Option<Self> {
+        let (a, b) = (via - start, end - start);
+        let normal = a.cross(&b);
+        let square = normal.norm_squared();
+        if square < 1e-9 {
+            return None;
+        }
+        let to_centre =
+            (normal.cross(&a) * b.norm_squared() + b.cross(&normal) * a.norm_squared()) / (2.0 * square);
+        let centre = start + to_centre;
+        let radius = to_centre.norm();
+        let x = -to_centre / radius;
+        let y = normal.normalize().cross(&x);
+        let to_end = end - centre;
+        let sweep = to_end.dot(&y).atan2(to_end.dot(&x)).rem_euclid(std::f64::consts::TAU);
+        Some(Self { centre, x, y, radius, sweep })
+    }
+
+    fn at(&self, s: f64) -> Point3<f64> {
+        let (sin, cos) = (self.sweep * s).sin_cos();
+        self.centre + (self.x * cos + self.y * sin) * self.radius
+    }
+
+    fn distance(&self, point: &Point3<f64>) -> f64 {
+        let off = point - self.centre;
+        let height = off.dot(&self.x.cross(&self.y));
+        let (u, v) = (off.dot(&self.x), off.dot(&self.y));
+        (u.hypot(v) - self.radius).hypot(height)
+    }
+}

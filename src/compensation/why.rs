@@ -1,0 +1,96 @@
+//! Why a motion was left, refused or flagged: a closed list.
+
+use std::fmt;
+
+use crate::kinematics::inverse::InverseError;
+use crate::program::motion::Reason;
+
+/// A reason.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Why {
+    /// The program does not say enough, or says what must not be touched.
+    Program(Reason),
+    /// A joint target states joints, not a pose; rewritten only when asked.
+    JointTarget,
+    /// No joints reach the target.
+    Inverse(InverseError),
+    /// A joint would leave its range.
+    OutsideLimits {
+        /// Joint, 0-based.
+        joint: usize,
+    },
+    /// The correction of the position is larger than the stated bound.
+    TooFar {
+        /// The correction [mm].
+        mm: f64,
+    },
+    /// The correction of the orientation is larger than the stated bound.
+    TooMuchTurn {
+        /// The correction [°].
+        deg: f64,
+    },
+    /// Near a singularity small corrections become large joint motions.
+    NearSingularity,
+    /// The corrected target lies in another configuration.
+    OtherBranch,
+    /// The path between two targets leaves the intended one by more than the tolerance.
+    Bend {
+        /// By how much [mm].
+        mm: f64,
+    },
+    /// A joint stands outside the range in which it was measured.
+    JointNotMeasured {
+        /// Joint, 0-based.
+        joint: usize,
+        /// By how much [°].
+        by_deg: f64,
+    },
+    /// No measured pose is near.
+    NotCovered {
+        /// Distance over that of measured poses, above 1.
+        ratio: f64,
+    },
+    /// The model is much less certain here than where the arm was measured.
+    Uncertain {
+        /// Predicted σ [mm].
+        sigma_mm: f64,
+    },
+}
+
+impl Why {
+    /// The reason of an inverse that failed.
+    pub fn of_inverse(error: InverseError) -> Self {
+        match error {
+            InverseError::OutsideLimits { joint, .. } => Why::OutsideLimits { joint },
+            InverseError::NearSingularity { .. } => Why::NearSingularity,
+            other => Why::Inverse(other),
+        }
+    }
+}
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Why::Program(reason) => reason.fmt(f),
+            Why::JointTarget => {
+                f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
+            }
+            Why::Inverse(error) => error.fmt(f),
+            Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
+            Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
+            Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
+            Why::NearSingularity => f.write_str("too close to a singularity"),
+            Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
+            Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
+            Why::JointNotMeasured { joint, by_deg } => {
+                write!(f, "joint {} is {by_deg:.1}° outside the range in which the arm was measured", joint + 1)
+            }
+            Why::NotCovered { ratio } => {
+                write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")
+            }
+            Why::Uncertain { sigma_mm } => {
+                write!(f, "the model is uncertain here: predicted standard deviation {sigma_mm:.3} mm")
+            }
+        }
+    }
+}
