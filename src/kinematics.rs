@@ -20,3 +20,4 @@ pub mod jacobian;
 pub mod arm_file;
 pub mod region;
 pub mod estimated;
+pub mod inverse;

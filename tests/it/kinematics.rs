@@ -1,1 +1,4 @@
 //! Tests of `kinematics`.
+
+mod arms;
+mod inverse;
