@@ -1,3 +1,4 @@
 //! What was measured: rows of joint angles with a sensor's reading, from files or from a simulated arm.
 
 pub mod dataset;
+pub mod import;

@@ -35,6 +35,8 @@ pub enum Reading {
 pub struct Row {
     /// Index of the data row in the file, from 0 at the first row below the header.
     pub number: usize,
+    /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
+    pub line: usize,
     /// Logged joint angles of the controller [rad].
     pub joints: Joints,
     /// What the sensor read.
@@ -47,6 +49,8 @@ pub struct Row {
     pub anchor: usize,
     /// Session label, where logged.
     pub session: Option<String>,
+    /// Cells of [`Dataset::other_columns`], as text.
+    pub other: Vec<String>,
 }
 
 /// A measurement file.
@@ -54,18 +58,24 @@ pub struct Row {
 pub struct Dataset {
     /// Name of the file, as reports print it.
     pub file: String,
+    /// Sheet of a workbook.
+    pub sheet: Option<String>,
     /// SHA-256 of the file's bytes, in hex.
     pub sha256: String,
     /// The one sensor of the file.
     pub sensor: Sensor,
     /// The rows.
     pub rows: Vec<Row>,
+    /// Headers of columns that are kept but not used.
+    pub other_columns: Vec<String>,
     /// What a reader should know: columns skipped, blank rows dropped.
     pub notes: Vec<String>,
     /// Step to which the angles are rounded [rad], where all are multiples of one.
     pub angle_step_rad: Option<f64>,
     /// Step to which the read-out is rounded [mm], where all are multiples of one.
     pub readout_step_mm: Option<f64>,
+    /// Step to which the sensor's lengths are rounded [mm], where all are multiples of one.
+    pub reading_step_mm: Option<f64>,
 }
 
 impl Dataset {

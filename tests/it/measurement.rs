@@ -1,1 +1,4 @@
 //! Tests of `measurement`.
+
+mod import;
+mod real;

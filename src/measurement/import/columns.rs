@@ -1,0 +1,253 @@
+//! Which column of a table is what, by its header.
+
+use std::collections::BTreeMap;
+
+use super::cell::{Line, Table};
+use super::error::{ImportError, Place};
+use crate::measurement::dataset::Sensor;
+
+const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"];
+const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
+
+/// Where the columns are.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Columns {
+    /// Index of the header in the table's rows.
+    pub(super) header: usize,
+    /// Cells of the header up to the last name.
+    pub(super) width: usize,
+    /// q1 to q6.
+    pub(super) joints: [usize; 6],
+    /// The sensor.
+    pub(super) sensor: Sensor,
+    /// Columns of the sensor: L, or x y z, or x y z qw qx qy qz.
+    pub(super) reading: Vec<usize>,
+    /// x, y, z of the controller.
+    pub(super) readout: Option<[usize; 3]>,
+    /// t, temperature, payload.
+    pub(super) time: Option<usize>,
+    pub(super) temperature: Option<usize>,
+    pub(super) payload: Option<usize>,
+    /// session.
+    pub(super) session: Option<usize>,
+    /// approach1 to approach6, each where given.
+    pub(super) approach: [Option<usize>; 6],
+    /// anchor.
+    pub(super) anchor: Option<usize>,
+    /// Columns that are only kept.
+    pub(super) other: Vec<(String, usize)>,
+    /// What a reader should know.
+    pub(super) notes: Vec<String>,
+}
+
+impl Columns {
+    /// Finds the columns, or says which are missing, doubled or too many.
+    pub(super) fn find(file: &str, table: &Table) -> Result<Self, ImportError> {
+        let mut place = Place { sheet: table.sheet.clone(), ..Place::file(file) };
+        let Some(header) = header_row(&table.rows) else {
+            return Err(ImportError::Empty { place });
+        };
+        let line = &table.rows[header];
+        place.row = Some(line.number);
+        let named: Vec<(String, usize)> = line
+            .cells
+            .iter()
+            .enumerate()
+            .filter(|(_, cell)| !cell.is_empty())
+            .map(|(i, cell)| (cell.to_string(), i))
+            .collect();
+        let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
+        let mut by_name = BTreeMap::new();
+        for (name, index) in &named {
+            let doubled = by_name.insert(name.as_str(), *index).is_some();
+            if doubled && is_known(name) {
+                return Err(ImportError::DuplicateColumn {
+                    place: Place { column: Some(name.clone()), ..place },
+                });
+            }
+        }
+        for name in by_name.keys() {
+            if let Some(joint) = joint_number(name).filter(|j| *j > 6) {
+                let place = Place { column: Some((*name).into()), ..place };
+                return Err(ImportError::TooManyJoints { place, joint });
+            }
+        }
+        let get = |name: &str| by_name.get(name).copied();
+        let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_known(n)).collect();
+
+        let missing: Vec<String> = (1..=6)
+            .map(|j| format!("q{j}"))
+            .filter(|name| get(name).is_none())
+            .map(|name| describe_missing(&name, &unused))
+            .collect();
+        if !missing.is_empty() {
+            return Err(ImportError::MissingColumns { place, missing, found });
+        }
+        let joints = std::array::from_fn(|j| get(&format!("q{}", j + 1)).unwrap_or_default());
+
+        let (sensor, reading) = sensor_columns(&get, &place, &unused, &found)?;
+        let mut notes = Vec::new();
+        let readout = match ["x", "y", "z"].map(get) {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            [None, None, None] => None,
+            _ => {
+                notes.push(
+                    "the controller's read-out needs x, y and z; found only part of it and left it out"
+                        .into(),
+                );
+                None
+            }
+        };
+        let approach = std::array::from_fn(|j| get(&format!("approach{}", j + 1)));
+        for name in &unused {
+            if let Some(expected) = OPTIONAL.iter().copied().find(|o| get(o).is_none() && is_near(name, o)) {
+                notes.push(format!("column `{name}` is not used; did you mean {expected}?"));
+            }
+        }
+        let other: Vec<(String, usize)> = named.iter().filter(|(n, _)| !is_known(n)).cloned().collect();
+        if !other.is_empty() {
+            let names: Vec<String> = other.iter().map(|(n, _)| format!("`{n}`")).collect();
+            notes.push(format!("columns kept but not used: {}", names.join(", ")));
+        }
+        let width = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
+        Ok(Self {
+            header,
+            width,
+            joints,
+            sensor,
+            reading,
+            readout,
+            time: get("t"),
+            temperature: get("temperature"),
+            payload: get("payload"),
+            session: get("session"),
+            approach,
+            anchor: get("anchor"),
+            other,
+            notes,
+        })
+    }
+}
+
+/// The first row with a joint's name in it (a title may stand above), else the first row with anything in it.
+fn header_row(rows: &[Line]) -> Option<usize> {
+    let names_a_joint = |line: &Line| line.cells.iter().any(|c| joint_number(&c.to_string()).is_some());
+    rows.iter()
+        .take(20)
+        .position(names_a_joint)
+        .or_else(|| rows.iter().position(|line| line.cells.iter().any(|c| !c.is_empty())))
+}
+
+fn sensor_columns(
+    get: &dyn Fn(&str) -> Option<usize>,
+    place: &Place,
+    unused: &[&str],
+    found: &[String],
+) -> Result<(Sensor, Vec<usize>), ImportError> {
+    let cable = get("L");
+    let tracker: Vec<&str> =
+        POSITION.iter().chain(&QUATERNION).copied().filter(|n| get(n).is_some()).collect();
+    match (cable, tracker.is_empty()) {
+        (Some(_), false) => {
+            Err(ImportError::TwoSensors { place: place.clone(), tracker: tracker.join(", ") })
+        }
+        (Some(l), true) => Ok((Sensor::Cable, vec![l])),
+        (None, true) => {
+            let near = unused
+                .iter()
+                .filter_map(|name| {
+                    let expected =
+                        POSITION.iter().chain(["L", "length"].iter()).find(|e| is_near(name, e))?;
+                    let expected = if *expected == "length" { "L" } else { expected };
+                    Some(((*name).to_owned(), expected.to_owned()))
+                })
+                .collect();
+            Err(ImportError::NoSensor { place: place.clone(), near, found: found.to_vec() })
+        }
+        (None, false) => {
+            let turned = QUATERNION.iter().any(|n| get(n).is_some());
+            let wanted: Vec<&str> =
+                POSITION.iter().chain(QUATERNION.iter().filter(|_| turned)).copied().collect();
+            let missing: Vec<String> =
+                wanted.iter().filter(|n| get(n).is_none()).map(|n| describe_missing(n, unused)).collect();
+            if !missing.is_empty() {
+                let found = found.to_vec();
+                return Err(ImportError::MissingColumns { place: place.clone(), missing, found });
+            }
+            let sensor = if turned { Sensor::Pose } else { Sensor::Position };
+            Ok((sensor, wanted.iter().filter_map(|n| get(n)).collect()))
+        }
+    }
+}
+
+const OPTIONAL: [&str; 12] = [
+    "t",
+    "session",
+    "temperature",
+    "payload",
+    "anchor",
+    "approach1",
+    "approach2",
+    "approach3",
+    "approach4",
+    "approach5",
+    "approach6",
+    "L",
+];
+
+fn is_known(name: &str) -> bool {
+    OPTIONAL.contains(&name)
+        || POSITION.contains(&name)
+        || QUATERNION.contains(&name)
+        || ["x", "y", "z"].contains(&name)
+        || joint_number(name).is_some()
+}
+
+fn joint_number(name: &str) -> Option<usize> {
+    let digits = name.strip_prefix('q')?;
+    (digits.len() <= 2 && digits.bytes().all(|b| b.is_ascii_digit()))
+        .then(|| digits.parse().ok())?
+        .filter(|n| *n > 0)
+}
+
+fn describe_missing(name: &str, unused: &[&str]) -> String {
+    match unused.iter().find(|u| is_near(u, name)) {
+        Some(found) => format!("column {name} is missing: found `{found}`, expected {name}; rename it"),
+        None => format!("column {name} is missing"),
+    }
+}
+
+/// Whether a header is likely a misspelling: the same letters and digits but for case and signs, or one letter off.
+fn is_near(found: &str, expected: &str) -> bool {
+    let plain = |s: &str| s.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
+    let (f, e) = (plain(found), plain(expected));
+    if f == e {
+        return true;
+    }
+    let digits = |s: &str| s.chars().filter(char::is_ascii_digit).collect::<String>();
+    // A joint's number is never the misspelt letter: q5 is not a wrong q6. Units after the name are common.
+    if digits(&f) != digits(&e) {
+        return false;
+    }
+    let with_unit =
+        ["deg", "mm", "h", "c", "kg", "degree", "degrees"].iter().any(|unit| f == format!("{e}{unit}"));
+    let joint_word = expected.starts_with('q')
+        && ["j", "joint", "axis", "a", "theta"].iter().any(|word| f == format!("{word}{}", digits(&e)));
+    with_unit || joint_word || (e.len() > 1 && distance(&f, &e) == 1)
+}
+
+/// Levenshtein distance.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != *cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}

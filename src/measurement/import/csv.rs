@@ -1,0 +1,112 @@
+//! Text tables: comma, semicolon or tab; UTF-8, UTF-16 with a byte order mark, or Latin-1.
+
+use ::csv::{ByteRecord, ReaderBuilder};
+
+use super::cell::{Cell, Line, Table};
+use super::error::{ImportError, Place};
+
+/// The cells of a text table.
+pub fn table(file: &str, bytes: &[u8]) -> Result<Table, ImportError> {
+    let text = text(bytes);
+    if text.contains('\0') {
+        return Err(ImportError::NotATable { place: Place::file(file) });
+    }
+    let delimiter = delimiter(&text);
+    let decimal_comma = delimiter != b',';
+    let mut reader = ReaderBuilder::new()
+        .delimiter(delimiter)
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(text.as_bytes());
+    let mut record = ByteRecord::new();
+    let mut rows = Vec::new();
+    let mut lines = LineCounter { bytes: text.as_bytes(), byte: 0, line: 1 };
+    while reader
+        .read_byte_record(&mut record)
+        .map_err(|e| ImportError::Format { place: Place::file(file), message: e.to_string() })?
+    {
+        let number = record.position().map_or(0, |p| lines.at(p.byte() as usize));
+        let cells = record.iter().map(|field| cell(&String::from_utf8_lossy(field), decimal_comma)).collect();
+        rows.push(Line { number, cells });
+    }
+    let blank_lines = text.lines().filter(|l| l.trim().is_empty()).count();
+    Ok(Table { sheet: None, rows, blank_lines, blank_columns: 0, decimal_comma })
+}
+
+/// Line numbers as an editor counts them; the reader of the format does not count blank lines it skips.
+struct LineCounter<'a> {
+    bytes: &'a [u8],
+    byte: usize,
+    line: usize,
+}
+
+impl LineCounter<'_> {
+    /// Line of the first character at or after `byte` that is no line end. Offsets must not decrease.
+    fn at(&mut self, byte: usize) -> usize {
+        while let Some(&b) = self.bytes.get(self.byte) {
+            if self.byte >= byte && b != b'\n' && b != b'\r' {
+                break;
+            }
+            self.line += usize::from(b == b'\n');
+            self.byte += 1;
+        }
+        self.line
+    }
+}
+
+/// Text of a file in whatever encoding spreadsheets export.
+fn text(bytes: &[u8]) -> String {
+    let wide = |from: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| from([c[0], c[1]])).collect();
+        String::from_utf16_lossy(&units)
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        _ => {
+            let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+            match std::str::from_utf8(bytes) {
+                Ok(text) => text.to_owned(),
+                // Latin-1: every byte is the code point of its character.
+                Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
+            }
+        }
+    }
+}
+
+/// The separator that the first line with text uses most. A semicolon wins a tie with commas: a line such as
+/// `1,5;2,5` has as many.
+fn delimiter(text: &str) -> u8 {
+    let line = text.lines().find(|l| !l.trim().is_empty()).unwrap_or("");
+    let count = |c: char| line.matches(c).count();
+    let (comma, semicolon, tab) = (count(','), count(';'), count('\t'));
+    if semicolon > 0 && semicolon >= comma && semicolon >= tab {
+        b';'
+    } else if tab > comma {
+        b'\t'
+    } else {
+        b','
+    }
+}
+
+fn cell(field: &str, decimal_comma: bool) -> Cell {
+    let field = field.trim();
+    if field.is_empty() {
+        return Cell::Empty;
+    }
+    match number(field, decimal_comma) {
+        Some(value) => Cell::Number { value, as_text: false },
+        None => Cell::Text(field.to_owned()),
+    }
+}
+
+/// A decimal number. `decimal_comma` admits one comma in the place of the point; a point and a comma together are
+/// nobody's number for certain and stay text.
+pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
+    // Spreadsheets write a typographic minus now and then.
+    let text = text.replace('\u{2212}', "-");
+    if decimal_comma && text.matches(',').count() == 1 && !text.contains('.') {
+        return text.replace(',', ".").parse().ok();
+    }
+    text.parse().ok()
+}

@@ -1,0 +1,188 @@
+//! What can be wrong with a measurement file, told so that it can be put right.
+
+use std::fmt;
+
+use thiserror::Error;
+
+/// Where in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// File, as the caller named it.
+    pub file: String,
+    /// Sheet, in a workbook.
+    pub sheet: Option<String>,
+    /// Line of the file or row of the sheet, from 1.
+    pub row: Option<usize>,
+    /// Header of the column.
+    pub column: Option<String>,
+}
+
+impl Place {
+    /// The file as a whole.
+    pub fn file(file: &str) -> Self {
+        Self { file: file.into(), sheet: None, row: None, column: None }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        if let Some(sheet) = &self.sheet {
+            write!(f, ", sheet {sheet}")?;
+        }
+        if let Some(row) = self.row {
+            write!(f, ", row {row}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ", column {column}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A measurement file that cannot be used.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ImportError {
+    /// Neither text nor a workbook.
+    #[error("{place}: this is neither a text table nor a workbook; export the measurements as CSV or XLSX")]
+    NotATable {
+        /// The file.
+        place: Place,
+    },
+    /// The container is broken.
+    #[error("{place}: cannot be read: {message}; export the measurements again as CSV or XLSX")]
+    Format {
+        /// The file.
+        place: Place,
+        /// What the reader of the format says.
+        message: String,
+    },
+    /// Nothing in it.
+    #[error("{place}: found no rows; expected a header line and one row for each measured pose")]
+    Empty {
+        /// The file or sheet.
+        place: Place,
+    },
+    /// A sheet was named that is not there.
+    #[error("{file}: there is no sheet {sheet}; it has {}", sheets.join(", "))]
+    UnknownSheet {
+        /// The file.
+        file: String,
+        /// The sheet that was asked for.
+        sheet: String,
+        /// The sheets that are there.
+        sheets: Vec<String>,
+    },
+    /// A sheet was named, the file is text.
+    #[error(
+        "{file}: sheet {sheet} was asked for, but this is a text table without sheets; leave the sheet out"
+    )]
+    NoSheets {
+        /// The file.
+        file: String,
+        /// The sheet that was asked for.
+        sheet: String,
+    },
+    /// Columns are missing.
+    #[error("{place}: {}; found the columns {}", missing.join("; "), list(found))]
+    MissingColumns {
+        /// The file or sheet, with the row of the header.
+        place: Place,
+        /// What is missing, each with a suggestion where a header comes close.
+        missing: Vec<String>,
+        /// The headers that are there.
+        found: Vec<String>,
+    },
+    /// No sensor.
+    #[error(
+        "{place}: found no sensor's column; expected L (cable length) or measured_x, measured_y, measured_z{}; \
+         found the columns {}",
+        suggestion(near),
+        list(found)
+    )]
+    NoSensor {
+        /// The file or sheet, with the row of the header.
+        place: Place,
+        /// Headers that come close, each with the name that was expected.
+        near: Vec<(String, String)>,
+        /// The headers that are there.
+        found: Vec<String>,
+    },
+    /// Two sensors in one file.
+    #[error(
+        "{place}: found two sensors at once, a cable (L) and a tracker ({tracker}); expected one; \
+         keep each sensor's rows in a file of its own, or rename the columns of the one not to be used"
+    )]
+    TwoSensors {
+        /// The file or sheet, with the row of the header.
+        place: Place,
+        /// The tracker's columns.
+        tracker: String,
+    },
+    /// A header twice.
+    #[error("{place}: found the column twice; expected it once; rename or delete one of the two")]
+    DuplicateColumn {
+        /// The column.
+        place: Place,
+    },
+    /// An arm with more than six joints.
+    #[error(
+        "{place}: found a column for joint {joint}; truegrind works with six-axis arms, q1 to q6; \
+         a track or positioner can be left out only if it stood still while measuring"
+    )]
+    TooManyJoints {
+        /// The column.
+        place: Place,
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// A cell that is not what its column needs.
+    #[error("{place}: found {found}; expected {expected}; {remedy}")]
+    Cell {
+        /// The cell.
+        place: Place,
+        /// What is there.
+        found: String,
+        /// What should be there.
+        expected: &'static str,
+        /// What to do.
+        remedy: String,
+    },
+    /// A row longer than the header.
+    #[error(
+        "{place}: found {found} cells under a header of {expected}; are these decimal commas? \
+         Export with a decimal point, or with semicolons between the columns"
+    )]
+    LongRow {
+        /// The row.
+        place: Place,
+        /// Cells of the row.
+        found: usize,
+        /// Columns of the header.
+        expected: usize,
+    },
+    /// Numbers in the wrong unit.
+    #[error("{place}: {found}; expected {expected}; {remedy}")]
+    Units {
+        /// The columns.
+        place: Place,
+        /// What looks wrong.
+        found: String,
+        /// The unit of the format.
+        expected: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() {
+        return "none".into();
+    }
+    names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+}
+
+fn suggestion(near: &[(String, String)]) -> String {
+    let parts: Vec<String> = near.iter().map(|(f, e)| format!("found `{f}`, did you mean {e}?")).collect();
+    if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(" ")) }
+}
