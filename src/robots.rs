@@ -141,16 +141,16 @@ pub enum RobotError {
     #[error("{file}: robot \"{robot}\": {key}: found {found}, expected {expected}; {remedy}")]
     Invalid {
         /// File.
-        file: String,
+        file: Box<str>,
         /// Robot.
-        robot: String,
+        robot: Box<str>,
         /// Key.
-        key: String,
+        key: Box<str>,
         /// The value.
-        found: String,
+        found: Box<str>,
         /// What it should be.
-        expected: String,
+        expected: &'static str,
         /// What to do.
-        remedy: String,
+        remedy: &'static str,
     },
 }

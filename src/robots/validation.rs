@@ -35,12 +35,12 @@ impl Fault {
 
     pub(super) fn of(self, file: &str, robot: &str) -> RobotError {
         RobotError::Invalid {
-            file: file.to_owned(),
-            robot: robot.to_owned(),
-            key: self.key,
-            found: self.found,
-            expected: self.expected.to_owned(),
-            remedy: self.remedy.to_owned(),
+            file: file.into(),
+            robot: robot.into(),
+            key: self.key.into(),
+            found: self.found.into(),
+            expected: self.expected,
+            remedy: self.remedy,
         }
     }
 }

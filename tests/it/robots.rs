@@ -9,12 +9,12 @@ use truegrind::robots::{Robot, RobotError, catalogue, load, parse};
 const ABB: &str = include_str!("../../src/robots/abb.toml");
 
 fn all() -> Vec<Robot> {
-    catalogue().iter().map(|name| load(name).unwrap()).collect()
+    catalogue().iter().map(|name| load(name).expect("catalogue loads")).collect()
 }
 
 /// The first arm of the ABB file alone: what a user's own file looks like.
 fn own() -> String {
-    let second = ABB.match_indices("[[robot]]").nth(1).unwrap().0;
+    let second = ABB.match_indices("[[robot]]").nth(1).expect("two robots").0;
     ABB[..second].to_owned()
 }
 
@@ -414,9 +414,9 @@ fn bad_files_are_refused_by_key_with_a_remedy() {
 }
 
 fn with_links(edit: impl Fn(&mut LinkSheet)) -> String {
-    let mut sheet = load("abb-irb-120").unwrap().sheet;
+    let mut sheet = load("abb-irb-120").expect("catalogue loads").sheet;
     sheet.link.iter_mut().for_each(edit);
-    toml::to_string(&truegrind::robots::sheet::RobotFile { robot: vec![sheet] }).unwrap()
+    toml::to_string(&truegrind::robots::sheet::RobotFile { robot: vec![sheet] }).expect("a sheet serializes")
 }
 
 #[test]
