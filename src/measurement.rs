@@ -2,3 +2,5 @@
 
 pub mod dataset;
 pub mod import;
+pub mod sensor;
+pub mod registration;
