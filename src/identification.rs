@@ -7,4 +7,6 @@ pub mod rounding;
 pub mod identifiability;
 pub mod solver;
 pub mod fit;
+pub mod start;
 pub mod identify;
+pub mod study;

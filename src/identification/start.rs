@@ -1,0 +1,97 @@
+//! Where a fit starts: sensor frame, outlet and touched point from closed forms under the nominal arm.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use thiserror::Error;
+
+use crate::identification::calibration::Frames;
+use crate::kinematics::condition::Condition;
+use crate::kinematics::model::Model;
+use crate::math::se3::Pose;
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::registration;
+
+/// The rows do not place the sensor.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "{file}: the {rows} rows do not tell where the {what} is: measure at least {needed} poses that are not all in one \
+     line and turn the wrist between them"
+)]
+pub struct NoStart {
+    /// File.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// Outlet or frame.
+    pub what: &'static str,
+    /// Least number of poses.
+    pub needed: usize,
+}
+
+/// Starting frames for a data set, best first: cable lengths seen from one side may leave a second outlet.
+///
+/// # Errors
+/// [`NoStart`] when the rows do not determine them.
+pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart> {
+    let none = |what, needed| NoStart { file: dataset.file.clone(), rows: dataset.rows.len(), what, needed };
+    let posed = nominal.under(&Condition::default());
+    let flanges: Vec<Pose> = dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect();
+    let mut frames = Frames::at_origin(dataset.anchors());
+    match dataset.sensor {
+        Sensor::Cable => {
+            let mut rival: Option<Frames> = None;
+            for anchor in 0..dataset.anchors() {
+                let (mut hooks, mut lengths) = (Vec::new(), Vec::new());
+                for (row, flange) in dataset.rows.iter().zip(&flanges).filter(|(r, _)| r.anchor == anchor) {
+                    if let Reading::Cable(length) = row.reading {
+                        hooks.push(flange.translation.vector);
+                        lengths.push(length);
+                    }
+                }
+                let found = registration::cable(&hooks, &lengths).ok_or_else(|| none("cable outlet", 4))?;
+                frames.outlets_mm[anchor] = found.outlet_mm;
+                frames.zeros_mm[anchor] = found.zero_mm;
+                if let Some((outlet, zero)) = found.rival {
+                    let other = rival.get_or_insert_with(|| frames.clone());
+                    other.outlets_mm[anchor] = outlet;
+                    other.zeros_mm[anchor] = zero;
+                } else if let Some(other) = &mut rival {
+                    other.outlets_mm[anchor] = found.outlet_mm;
+                    other.zeros_mm[anchor] = found.zero_mm;
+                }
+            }
+            Ok(std::iter::once(frames).chain(rival).collect())
+        }
+        Sensor::Position => {
+            let measured: Vec<Vector3<f64>> = positions(dataset);
+            let found =
+                registration::touching_point(&flanges, &measured).ok_or_else(|| none("sensor frame", 4))?;
+            frames.base_from_sensor = found.base_from_sensor;
+            frames.flange_from_target =
+                Pose::from_parts(found.on_flange_mm.into(), UnitQuaternion::identity());
+            Ok(vec![frames])
+        }
+        Sensor::Pose => {
+            let measured: Vec<Pose> = dataset
+                .rows
+                .iter()
+                .filter_map(|r| if let Reading::Pose(p) = r.reading { Some(p) } else { None })
+                .collect();
+            let found = registration::poses(&flanges, &measured).ok_or_else(|| none("sensor frame", 3))?;
+            frames.base_from_sensor = found.base_from_sensor;
+            frames.flange_from_target = found.flange_from_target;
+            Ok(vec![frames])
+        }
+    }
+}
+
+fn positions(dataset: &Dataset) -> Vec<Vector3<f64>> {
+    dataset
+        .rows
+        .iter()
+        .map(|r| match r.reading {
+            Reading::Position(p) => p,
+            Reading::Pose(p) => p.translation.vector,
+            Reading::Cable(_) => Vector3::zeros(),
+        })
+        .collect()
+}
