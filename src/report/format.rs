@@ -1,0 +1,10 @@
+//! Formats: each turns a table, and where it makes sense a whole document, into text.
+//!
+//! For people: [`terminal`], [`markdown`], [`html`], with the digits each column asks for. For programs: [`csv`] and
+//! [`json`], with every digit.
+
+pub mod terminal;
+pub mod markdown;
+pub mod csv;
+pub mod json;
+pub mod html;

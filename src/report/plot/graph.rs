@@ -1,0 +1,348 @@
+//! Graphs: lines, points, bands and error bars over two axes, linear or logarithmic.
+
+use std::collections::BTreeSet;
+
+use super::Axis;
+use super::canvas::{DrawingError, PIXEL};
+use super::frame::{Entry, Frame, Glyph, Inside, picture};
+use super::ink::Ink;
+use super::pen::{BOLD, Marker, Paint, Pen, THIN, dash};
+use super::scale::{Ends, Scale};
+
+/// Size in pixels.
+const SIZE: (u32, u32) = (900, 420);
+
+/// Distance between the markers of a line, in pixels, so that lines with many points stay lines.
+const MARKER_DISTANCE: i32 = 70;
+
+/// Up to this many points each point of a line has its marker.
+const POINTS_WITH_MARKER: usize = 12;
+
+/// Above this many points a line is not dashed: in a noisy line nobody sees dashes.
+const POINTS_WITH_DASH: usize = 400;
+
+/// A graph.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Graph {
+    /// Title inside the picture; may be empty.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// What is shown, the first one drawn first.
+    pub series: Vec<Series>,
+    /// Lines across the graph, such as a noise floor.
+    pub references: Vec<Reference>,
+    /// Shaded stretches of the horizontal axis, such as rows to measure again.
+    pub spans: Vec<Span>,
+}
+
+/// One series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; empty for none.
+    pub name: String,
+    /// The points, x and y. Those not finite leave a gap.
+    pub points: Vec<[f64; 2]>,
+    /// Lower and upper bound at each point: a band around a line, error bars on points. Empty for none.
+    pub bounds: Vec<[f64; 2]>,
+    /// Lines or points.
+    pub mark: Mark,
+    /// Colour; by the order of the series where absent.
+    pub ink: Option<Ink>,
+}
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// A line through the points in their order.
+    Line,
+    /// A marker at each point.
+    Points,
+}
+
+/// A line across the graph.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reference {
+    /// At a y, with its name in the legend.
+    Horizontal(f64, String),
+    /// At an x, with its name in the legend.
+    Vertical(f64, String),
+    /// Through the origin with slope 1, such as "equal" between predicted and measured.
+    Diagonal(String),
+}
+
+/// A shaded stretch of the horizontal axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    /// Its ends.
+    pub range: [f64; 2],
+    /// Name in the legend; spans of the same name share an entry.
+    pub name: String,
+}
+
+impl Series {
+    /// A line.
+    pub fn line(name: impl Into<String>, points: impl Into<Vec<[f64; 2]>>) -> Self {
+        Self { name: name.into(), points: points.into(), bounds: Vec::new(), mark: Mark::Line, ink: None }
+    }
+
+    /// Points.
+    pub fn points(name: impl Into<String>, points: impl Into<Vec<[f64; 2]>>) -> Self {
+        Self { mark: Mark::Points, ..Self::line(name, points) }
+    }
+
+    /// A line through values at 0, 1, 2, …
+    pub fn sequence(name: impl Into<String>, values: &[f64]) -> Self {
+        Self::line(name, values.iter().enumerate().map(|(index, value)| [index as f64, *value]).collect::<Vec<_>>())
+    }
+
+    /// The same in a stated colour.
+    pub fn ink(mut self, ink: Ink) -> Self {
+        self.ink = Some(ink);
+        self
+    }
+
+    /// The same with a band or error bars of so much to both sides of each point.
+    pub fn plus_minus(mut self, sizes: &[f64]) -> Self {
+        self.bounds =
+            self.points.iter().zip(sizes).map(|([_, y], size)| [y - size, y + size]).collect();
+        self
+    }
+}
+
+/// A series with its place in the order of series.
+struct Drawn<'a> {
+    series: &'a Series,
+    ink: Ink,
+    dash: &'static str,
+    marker: Option<Marker>,
+}
+
+impl Graph {
+    /// The picture, 900 × 420 pixels.
+    pub fn svg(&self) -> String {
+        let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
+        picture(SIZE, &name, |pen| self.draw(pen))
+    }
+
+    pub(super) fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let lines = self.series.iter().filter(|series| series.mark == Mark::Line).count();
+        let drawn: Vec<Drawn<'_>> = self
+            .series
+            .iter()
+            .enumerate()
+            .map(|(index, series)| {
+                let line = series.mark == Mark::Line;
+                let marked = !line || lines > 1;
+                Drawn {
+                    series,
+                    ink: series.ink.unwrap_or(Ink::nth(index)),
+                    dash: if line && series.points.len() <= POINTS_WITH_DASH { dash(index) } else { "" },
+                    marker: marked.then_some(Marker::nth(index)),
+                }
+            })
+            .collect();
+        let inside = self.frame(&drawn).draw(pen)?;
+        inside.cut(pen, || {
+            for span in &self.spans {
+                draw_span(&inside, pen, span)?;
+            }
+            for drawn in &drawn {
+                drawn.draw_bounds(&inside, pen)?;
+            }
+            for reference in &self.references {
+                draw_reference(&inside, pen, reference)?;
+            }
+            drawn.iter().try_for_each(|drawn| drawn.draw(&inside, pen))
+        })
+    }
+
+    fn frame(&self, drawn: &[Drawn<'_>]) -> Frame<'_> {
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        let bounds = self.series.iter().flat_map(|series| &series.bounds).flatten().copied();
+        let mut legend: Vec<Entry> = drawn.iter().filter_map(Drawn::entry).collect();
+        let mut levels = Vec::new();
+        let mut places = Vec::new();
+        for reference in &self.references {
+            let name = match reference {
+                Reference::Horizontal(y, name) => {
+                    levels.push(*y);
+                    name
+                }
+                Reference::Vertical(x, name) => {
+                    places.push(*x);
+                    name
+                }
+                Reference::Diagonal(name) => name,
+            };
+            let glyph = Glyph::Line { dash: REFERENCE_DASH, width: THIN, marker: None };
+            legend.push(Entry { name: name.clone(), ink: Ink::Text, glyph });
+        }
+        let mut named = BTreeSet::new();
+        for span in &self.spans {
+            places.extend(span.range);
+            if named.insert(&span.name) {
+                let glyph = Glyph::Area { alpha: SPAN_ALPHA, outlined: false };
+                legend.push(Entry { name: span.name.clone(), ink: SPAN_INK, glyph });
+            }
+        }
+        legend.retain(|entry| !entry.name.is_empty());
+        // A line runs from edge to edge; points keep off it.
+        let loose = self.series.iter().any(|series| series.mark == Mark::Points);
+        let ends = if loose { Ends::Loose } else { Ends::Tight };
+        let x = points().map(|[x, _]| *x).chain(places);
+        let y = points().map(|[_, y]| *y).chain(bounds).chain(levels);
+        Frame {
+            title: &self.title,
+            x: Scale::of(&self.x, x, ends, 9),
+            y: Scale::of(&self.y, y, Ends::Loose, 6),
+            x_text: self.x.text(),
+            y_text: self.y.text(),
+            legend,
+            x_grid: true,
+            y_grid: true,
+            right: 0,
+        }
+    }
+}
+
+const REFERENCE_DASH: &str = "2 3";
+const SPAN_INK: Ink = Ink::Orange;
+const SPAN_ALPHA: f64 = 0.25;
+
+fn draw_span(inside: &Inside, pen: Pen<'_>, span: &Span) -> Result<(), DrawingError> {
+    let [from, to] = span.range.map(|x| inside.across(x));
+    match (from, to) {
+        (Some(from), Some(to)) => {
+            // A single row is still seen.
+            let to = to.max(from + 3 * PIXEL);
+            pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint(SPAN_INK.rgb(), SPAN_ALPHA))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn draw_reference(inside: &Inside, pen: Pen<'_>, reference: &Reference) -> Result<(), DrawingError> {
+    let ends = match reference {
+        Reference::Horizontal(y, _) => inside.down(*y).map(|y| [(inside.x.start, y), (inside.x.end, y)]),
+        Reference::Vertical(x, _) => inside.across(*x).map(|x| [(x, inside.y.start), (x, inside.y.end)]),
+        Reference::Diagonal(_) => inside.diagonal(),
+    };
+    match ends {
+        Some(ends) => pen.line(ends.to_vec(), Paint::text(0.7), THIN, REFERENCE_DASH),
+        None => Ok(()),
+    }
+}
+
+impl Drawn<'_> {
+    fn entry(&self) -> Option<Entry> {
+        let glyph = match (self.series.mark, self.marker) {
+            (Mark::Points, Some(marker)) => Glyph::Point(marker),
+            (_, marker) => Glyph::Line { dash: self.dash, width: BOLD, marker },
+        };
+        Some(Entry { name: self.series.name.clone(), ink: self.ink, glyph }).filter(|entry| !entry.name.is_empty())
+    }
+
+    fn draw(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let places = self.series.points.iter().map(|[x, y]| inside.place(*x, *y));
+        match (self.series.mark, self.marker) {
+            (Mark::Points, Some(marker)) => {
+                let places: Vec<_> = places.flatten().collect();
+                let alpha = if places.len() > 300 { 0.55 } else { 0.85 };
+                // Points that fall on each other within half a pixel are one.
+                let mut seen = BTreeSet::new();
+                for place in places {
+                    if seen.insert((place.0 / (PIXEL / 2), place.1 / (PIXEL / 2))) && inside.holds(place) {
+                        pen.marker(marker, place, Paint(self.ink.rgb(), alpha))?;
+                    }
+                }
+                Ok(())
+            }
+            _ => {
+                for run in runs(places) {
+                    self.draw_run(run, pen)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn draw_run(&self, run: Vec<(i32, i32)>, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let paint = Paint(self.ink.rgb(), 1.0);
+        if let Some(marker) = self.marker {
+            let all = self.series.points.len() <= POINTS_WITH_MARKER;
+            let mut next = i32::MIN;
+            for &place in &run {
+                if all || place.0 >= next {
+                    pen.marker(marker, place, paint)?;
+                    next = place.0 + MARKER_DISTANCE * PIXEL;
+                }
+            }
+        }
+        match run[..] {
+            // A lone point between gaps would leave no trace as a line.
+            [place] if self.marker.is_none() => pen.marker(Marker::Circle, place, paint),
+            _ => pen.line(thinned(run), paint, BOLD, self.dash),
+        }
+    }
+
+    fn draw_bounds(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let bounded = self.series.points.iter().zip(&self.series.bounds);
+        let places =
+            bounded.map(|([x, _], [low, high])| inside.place(*x, *low).zip(inside.place(*x, *high)));
+        let color = self.ink.rgb();
+        if self.series.mark == Mark::Points {
+            for ((x, low), (_, high)) in places.flatten() {
+                let cap = 3 * PIXEL;
+                for ends in [[(x, low), (x, high)], [(x - cap, low), (x + cap, low)], [(x - cap, high), (x + cap, high)]] {
+                    pen.line(ends.to_vec(), Paint(color, 0.8), THIN, "")?;
+                }
+            }
+            return Ok(());
+        }
+        for run in runs(places) {
+            let upper = thinned(run.iter().map(|(_, high)| *high).collect());
+            let lower = thinned(run.iter().map(|(low, _)| *low).collect());
+            pen.polygon(upper.into_iter().chain(lower.into_iter().rev()).collect(), Paint(color, 0.2))?;
+        }
+        Ok(())
+    }
+}
+
+/// Stretches without gaps.
+fn runs<T>(places: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
+    let mut runs = Vec::new();
+    let mut run = Vec::new();
+    for place in places {
+        match place {
+            Some(place) => run.push(place),
+            None if run.is_empty() => {}
+            None => runs.push(std::mem::take(&mut run)),
+        }
+    }
+    if !run.is_empty() {
+        runs.push(run);
+    }
+    runs
+}
+
+/// The same line with at most four points in each column of half a pixel: the first, the lowest, the highest and the
+/// last. Nobody sees the difference, and 100,000 targets make a picture of some hundred kilobytes.
+pub(super) fn thinned(run: Vec<(i32, i32)>) -> Vec<(i32, i32)> {
+    if run.len() < 2_000 {
+        return run;
+    }
+    let mut kept: Vec<(i32, i32)> = Vec::new();
+    for column in run.chunk_by(|a, b| a.0 / (PIXEL / 2) == b.0 / (PIXEL / 2)) {
+        let extreme = |index: usize, better: fn(i32, i32) -> bool| {
+            (0..column.len()).fold(index, |best, i| if better(column[i].1, column[best].1) { i } else { best })
+        };
+        let mut picks = [0, extreme(0, |a, b| a < b), extreme(0, |a, b| a > b), column.len() - 1];
+        picks.sort_unstable();
+        kept.extend(picks.iter().map(|&index| column[index]));
+    }
+    kept.dedup();
+    kept
+}

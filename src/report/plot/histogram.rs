@@ -1,0 +1,176 @@
+//! Histograms of one or several samples over common bins.
+
+use super::Axis;
+use super::canvas::DrawingError;
+use super::frame::{Entry, Frame, Glyph, picture};
+use super::ink::Ink;
+use super::pen::{BOLD, Paint, Pen, dash};
+use super::scale::{Ends, Scale, linear_ticks};
+
+/// More bins than this show noise rather than form.
+const MOST_BINS: usize = 60;
+
+/// A histogram.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Histogram {
+    /// Title inside the picture; may be empty.
+    pub title: String,
+    /// What was counted. A logarithmic axis is not supported and drawn linear.
+    pub x: Axis,
+    /// The samples, drawn over each other.
+    pub samples: Vec<Sample>,
+    /// About how many bins; chosen from the data where absent.
+    pub bins: Option<usize>,
+}
+
+/// One sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Name in the legend.
+    pub name: String,
+    /// Its values; those not finite are not counted.
+    pub values: Vec<f64>,
+    /// Colour; by the order of the samples where absent.
+    pub ink: Option<Ink>,
+}
+
+impl Sample {
+    /// A sample.
+    pub fn new(name: impl Into<String>, values: impl Into<Vec<f64>>) -> Self {
+        Self { name: name.into(), values: values.into(), ink: None }
+    }
+
+    /// The same in a stated colour.
+    pub fn ink(mut self, ink: Ink) -> Self {
+        self.ink = Some(ink);
+        self
+    }
+}
+
+/// Counts of every sample in common bins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bins {
+    /// Ends of the bins, one more than there are bins; empty where there is nothing to count. A bin holds its lower
+    /// end; the last one holds its upper end too.
+    pub edges: Vec<f64>,
+    /// For each sample, its counts.
+    pub counts: Vec<Vec<usize>>,
+}
+
+impl Histogram {
+    /// Counts in bins of a round width. Without a wish for their number the width follows Freedman and Diaconis, twice
+    /// the interquartile range over the cube root of the count, for the sample where it is smallest.
+    pub fn bins(&self) -> Bins {
+        let samples: Vec<Vec<f64>> = self.samples.iter().map(|sample| sorted(&sample.values)).collect();
+        let ends = samples.iter().filter_map(|sample| Some((*sample.first()?, *sample.last()?)));
+        let Some((low, high)) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+            return Bins { edges: Vec::new(), counts: vec![Vec::new(); self.samples.len()] };
+        };
+        let span = high - low;
+        let wanted = self.bins.unwrap_or_else(|| {
+            let width = samples.iter().filter_map(|sample| freedman_diaconis(sample)).fold(span, f64::min);
+            ((span / width).ceil() as usize).clamp(5, MOST_BINS)
+        });
+        let edges = edges(low, high, wanted.max(1));
+        let counts = samples.iter().map(|sample| count(sample, &edges)).collect();
+        Bins { edges, counts }
+    }
+
+    /// The picture, 900 × 340 pixels.
+    pub fn svg(&self) -> String {
+        let name = if self.title.is_empty() { format!("histogram of {}", self.x.text()) } else { self.title.clone() };
+        picture((900, 340), &name, |pen| self.draw(pen))
+    }
+
+    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let bins = self.bins();
+        let ink = |index: usize| self.samples[index].ink.unwrap_or(Ink::nth(index));
+        let axis = Axis { log: false, ..self.x.clone() };
+        let largest = bins.counts.iter().flatten().max().copied().unwrap_or(1) as f64;
+        let legend = (0..self.samples.len()).filter(|&index| !self.samples[index].name.is_empty());
+        let frame = Frame {
+            title: &self.title,
+            x: Scale::of(&axis, bins.edges.iter().copied(), Ends::Loose, 9),
+            y: Scale::of(&Axis::default(), [0.0, largest.max(4.0)].into_iter(), Ends::Loose, 5),
+            x_text: self.x.text(),
+            y_text: "count".to_owned(),
+            legend: legend
+                .map(|index| Entry {
+                    name: self.samples[index].name.clone(),
+                    ink: ink(index),
+                    glyph: Glyph::Area { alpha: ALPHA, outlined: true },
+                })
+                .collect(),
+            x_grid: false,
+            y_grid: true,
+            right: 0,
+        };
+        let inside = frame.draw(pen)?;
+        inside.cut(pen, || {
+            for (index, counts) in bins.counts.iter().enumerate() {
+                let mut outline = Vec::new();
+                for (bin, &count) in counts.iter().enumerate() {
+                    let ends = [inside.place(bins.edges[bin], count as f64), inside.place(bins.edges[bin + 1], count as f64)];
+                    outline.extend(ends.into_iter().flatten());
+                }
+                let (Some(first), Some(last)) = (outline.first().copied(), outline.last().copied()) else { continue };
+                let base = inside.base();
+                outline.insert(0, (first.0, base));
+                outline.push((last.0, base));
+                let color = ink(index).rgb();
+                pen.polygon(outline.clone(), Paint(color, ALPHA))?;
+                pen.line(outline, Paint(color, 1.0), BOLD, dash(index))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+const ALPHA: f64 = 0.28;
+
+fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
+fn freedman_diaconis(sorted: &[f64]) -> Option<f64> {
+    let quartile = |part: usize| sorted.get((sorted.len().checked_sub(1)? * part + 2) / 4).copied();
+    let width = 2.0 * (quartile(3)? - quartile(1)?) / (sorted.len() as f64).cbrt();
+    Some(width).filter(|width| *width > 0.0 && width.is_finite())
+}
+
+/// Round ends that enclose the data.
+fn edges(low: f64, high: f64, wanted: usize) -> Vec<f64> {
+    let span = high - low;
+    let size = low.abs().max(high.abs());
+    if !(span > size * 1e-12) || !span.is_finite() {
+        // A constant has one bin around it.
+        let room = if size == 0.0 { 0.5 } else { size * 0.05 };
+        return vec![low - room, high + room];
+    }
+    let mut edges = linear_ticks(low, high, wanted);
+    let width = match edges[..] {
+        [first, second, ..] => second - first,
+        _ => return vec![low, high],
+    };
+    if edges[0] > low {
+        edges.insert(0, edges[0] - width);
+    }
+    let last = edges[edges.len() - 1];
+    if last < high {
+        edges.push(last + width);
+    }
+    edges
+}
+
+fn count(sorted: &[f64], edges: &[f64]) -> Vec<usize> {
+    let mut counts = vec![0; edges.len().saturating_sub(1)];
+    let Some(last) = counts.len().checked_sub(1) else { return counts };
+    for value in sorted {
+        // Ends are rounded, so a value may lie a rounding error beyond the outermost: it belongs to that bin.
+        let bin = edges.partition_point(|edge| edge <= value).saturating_sub(1).min(last);
+        counts[bin] += 1;
+    }
+    counts
+}

@@ -1,0 +1,105 @@
+//! Colours: of series, and of values.
+
+use plotters::style::RGBColor;
+
+/// Colour of a series, after Okabe and Ito, "Color Universal Design" (2008). Their yellow is left out: on white it is
+/// hardly seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ink {
+    /// Blue. By habit: after compensation.
+    Blue,
+    /// Vermilion. By habit: before compensation.
+    Vermilion,
+    /// Bluish green.
+    Green,
+    /// Reddish purple.
+    Purple,
+    /// Orange.
+    Orange,
+    /// Sky blue.
+    Sky,
+    /// The colour of the text around: black on a light page, white on a dark one.
+    Text,
+}
+
+impl Ink {
+    /// The order in which series get their colours.
+    pub const CYCLE: [Ink; 7] =
+        [Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple, Ink::Orange, Ink::Sky, Ink::Text];
+
+    /// Colour of the nth series, from 0.
+    pub fn nth(index: usize) -> Ink {
+        Self::CYCLE[index % Self::CYCLE.len()]
+    }
+
+    pub(super) fn rgb(self) -> RGBColor {
+        match self {
+            Ink::Blue => RGBColor(0x00, 0x72, 0xb2),
+            Ink::Vermilion => RGBColor(0xd5, 0x5e, 0x00),
+            Ink::Green => RGBColor(0x00, 0x9e, 0x73),
+            Ink::Purple => RGBColor(0xcc, 0x79, 0xa7),
+            Ink::Orange => RGBColor(0xe6, 0x9f, 0x00),
+            Ink::Sky => RGBColor(0x56, 0xb4, 0xe9),
+            Ink::Text => RGBColor(0, 0, 0),
+        }
+    }
+}
+
+/// Colours of values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ColorMap {
+    /// Viridis (Smith and van der Walt, 2015), for sizes: equal steps look equal, in grey and to colour-blind eyes too.
+    #[default]
+    Viridis,
+    /// Blue over grey to red (Moreland, "Diverging color maps for scientific visualization", 2009), for signed values;
+    /// its middle is 0.
+    CoolWarm,
+}
+
+impl ColorMap {
+    fn table(self) -> &'static [[u8; 3]] {
+        match self {
+            ColorMap::Viridis => &[
+                [0x44, 0x01, 0x54],
+                [0x48, 0x28, 0x78],
+                [0x3e, 0x49, 0x89],
+                [0x31, 0x68, 0x8e],
+                [0x26, 0x82, 0x8e],
+                [0x1f, 0x9e, 0x89],
+                [0x35, 0xb7, 0x79],
+                [0x6e, 0xce, 0x58],
+                [0xb5, 0xde, 0x2b],
+                [0xfd, 0xe7, 0x25],
+            ],
+            ColorMap::CoolWarm => &[
+                [59, 76, 192],
+                [98, 130, 234],
+                [141, 176, 254],
+                [184, 208, 249],
+                [221, 221, 221],
+                [245, 196, 173],
+                [244, 154, 123],
+                [222, 96, 77],
+                [180, 4, 38],
+            ],
+        }
+    }
+
+    /// Colour at a fraction of the range, red, green and blue; fractions beyond 0 to 1 get the colour of that end.
+    pub fn at(self, fraction: f64) -> [u8; 3] {
+        let table = self.table();
+        let place = fraction.clamp(0.0, 1.0) * (table.len() - 1) as f64;
+        // NaN becomes 0 here; callers leave such values out.
+        let below = (place as usize).min(table.len() - 2);
+        let part = place - below as f64;
+        std::array::from_fn(|channel| {
+            let [low, high] = [table[below][channel], table[below + 1][channel]].map(f64::from);
+            (low + (high - low) * part).round() as u8
+        })
+    }
+
+    pub(super) fn rgb(self, fraction: f64) -> RGBColor {
+        let [red, green, blue] = self.at(fraction);
+        RGBColor(red, green, blue)
+    }
+}
