@@ -35,7 +35,7 @@ use crate::kinematics::link::{Link, LinkModel};
 use crate::kinematics::model::{Body, Limits, Model};
 use crate::math::se3::Pose;
 
-/// Where no range is published, one turn either way [rad]: how far a search may go, not a limit of the arm.
+/// Where no range is published, one turn either way (rad): how far a search may go, not a limit of the arm.
 pub const ONE_TURN_RAD: f64 = std::f64::consts::TAU;
 
 /// A robot file.
@@ -58,11 +58,11 @@ pub struct DataSheet {
     /// The maker's designation.
     #[serde(default)]
     pub model: String,
-    /// Rated load [kg].
+    /// Rated load (kg).
     pub payload_kg: Option<f64>,
-    /// Reach [mm]; its source says of what.
+    /// Reach (mm); its source says of what.
     pub reach_mm: Option<f64>,
-    /// Pose repeatability RP [mm].
+    /// Pose repeatability RP (mm).
     pub repeatability_mm: Option<f64>,
     /// Language of its programs.
     pub dialect: Option<Dialect>,
@@ -145,15 +145,15 @@ pub enum Orientation {
 pub struct LinkSheet {
     /// Which parameters are free.
     pub model: LinkModel,
-    /// Link length a [mm].
+    /// Link length a (mm).
     pub a_mm: f64,
-    /// Link offset d [mm].
+    /// Link offset d (mm).
     pub d_mm: f64,
-    /// Twist alpha [°].
+    /// Twist alpha (°).
     pub alpha_deg: f64,
-    /// Offset theta [°], added to the mapped joint angle.
+    /// Offset theta (°), added to the mapped joint angle.
     pub theta_deg: f64,
-    /// Second twist beta [°], of a Hayati link only.
+    /// Second twist beta (°), of a Hayati link only.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub beta_deg: f64,
 }
@@ -171,11 +171,11 @@ pub struct JointSheet {
     pub angles: Angles,
     /// DH angle = map · controller angle + theta; the identity where left out.
     pub map: Option<[[f64; 6]; 6]>,
-    /// Lowest angles [°].
+    /// Lowest angles (°).
     pub min_deg: Option<[f64; 6]>,
-    /// Highest angles [°].
+    /// Highest angles (°).
     pub max_deg: Option<[f64; 6]>,
-    /// Highest speeds [°/s].
+    /// Highest speeds (°/s).
     pub speed_deg_s: Option<[f64; 6]>,
 }
 
@@ -194,7 +194,7 @@ pub enum Angles {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlangeSheet {
-    /// Origin [mm].
+    /// Origin (mm).
     #[serde(default)]
     pub position_mm: [f64; 3],
     /// Orientation w, x, y, z.
@@ -213,7 +213,7 @@ pub struct Mounting {
     /// Direction of gravity in the base frame; need not have length 1.
     #[serde(default = "downwards")]
     pub gravity: [f64; 3],
-    /// Where the centre of the mounting face lies in the base frame [mm]: some controllers have their origin higher up.
+    /// Where the centre of the mounting face lies in the base frame (mm): some controllers have their origin higher up.
     #[serde(default)]
     pub plate_mm: [f64; 3],
 }
@@ -232,9 +232,9 @@ fn downwards() -> [f64; 3] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Masses {
-    /// Mass of each link [kg].
+    /// Mass of each link (kg).
     pub mass_kg: [f64; 6],
-    /// Centre of mass of each link in the frame at its end [mm].
+    /// Centre of mass of each link in the frame at its end (mm).
     pub centre_mm: [[f64; 3]; 6],
 }
 
@@ -265,15 +265,15 @@ pub struct Published {
     /// The point that is meant.
     #[serde(default)]
     pub point: Point,
-    /// Joints as the map takes them, without the offsets theta [°].
+    /// Joints as the map takes them, without the offsets theta (°).
     pub joints_deg: [f64; 6],
-    /// Where the point lies in the base [mm].
+    /// Where the point lies in the base (mm).
     pub position_mm: Option<[f64; 3]>,
-    /// Or how far it lies from axis 1 [mm].
+    /// Or how far it lies from axis 1 (mm).
     pub radius_mm: Option<f64>,
     /// Orientation of the flange in the base, w, x, y, z.
     pub quaternion_wxyz: Option<[f64; 4]>,
-    /// How well it must be met [mm]: the rounding of what was published.
+    /// How well it must be met (mm): the rounding of what was published.
     pub tolerance_mm: f64,
     /// Where it was published.
     pub source: String,

@@ -354,7 +354,7 @@ fn warnings(sheet: &DataSheet) -> Vec<String> {
     out
 }
 
-/// How far a model is from a published pose: of the point [mm], and of the orientation [rad] where one is published.
+/// How far a model is from a published pose: of the point (mm), and of the orientation (rad) where one is published.
 pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
     let q = Vector6::from(pose.joints_deg.map(f64::to_radians));
     let condition = Default::default();
