@@ -1,3 +1,4 @@
 //! Tests of `identification`.
 
 mod calibration;
+mod real;

@@ -79,7 +79,17 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
                 Sensor::Pose => Reading::Pose(pose_from_vector(&[2.0, 1.0, -3.0, 0.02, -0.03, 0.01]) * pose),
             };
             let anchor = if sensor == Sensor::Cable { number % 2 } else { 0 };
-            Row { number, joints, reading, readout_mm: None, condition, anchor, session: None }
+            Row {
+                number,
+                line: number + 2,
+                joints,
+                reading,
+                readout_mm: None,
+                condition,
+                anchor,
+                session: None,
+                other: Vec::new(),
+            }
         })
         .collect();
     Dataset {
@@ -90,6 +100,9 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
         notes: Vec::new(),
         angle_step_rad: None,
         readout_step_mm: None,
+        reading_step_mm: None,
+        other_columns: Vec::new(),
+        sheet: None,
     }
 }
 

@@ -1,0 +1,117 @@
+//! Arguments, one file per verb, and the only place that prints or opens files.
+//!
+//! Results go to stdout, talk and progress to stderr. Exit code 0: done; 1: done, but something was refused or
+//! flagged; 2: nothing done.
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod files;
+mod inputs;
+mod outputs;
+mod progress;
+mod robots;
+mod simulate;
+mod identify;
+mod path;
+mod compensate;
+mod deviation;
+mod demo;
+#[cfg(feature = "visual")]
+mod view;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Learns the real robot arm from measured poses and rewrites programs so that it follows them.
+#[derive(Debug, Parser)]
+#[command(name = "truegrind", version, arg_required_else_help = true, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// The whole way on what ships with the project, without any file of yours.
+    Demo(demo::Arguments),
+    /// The catalogue of robots; with a name, one robot and the source of each number.
+    Robots(robots::Arguments),
+    /// Measurements of a stated "actual" arm, effects, noise and rounding included.
+    Simulate(simulate::Arguments),
+    /// Fit the arm to measured poses: a model file, and what the data could tell.
+    Identify(identify::Arguments),
+    /// A surface to a RAPID program.
+    Path(path::Arguments),
+    /// Rewrite programs so that the estimated arm follows them.
+    Compensate(compensate::Arguments),
+    /// How far programs are off under a model; nothing is rewritten.
+    Deviation(deviation::Arguments),
+    /// Show in Rerun what any of the above wrote.
+    #[cfg(feature = "visual")]
+    View(view::Arguments),
+}
+
+/// What every verb that computes takes.
+#[derive(Debug, Clone, Args)]
+struct Common {
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads; the result is the same for any number.
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+/// How a verb ended, short of an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    /// Everything done.
+    Done,
+    /// Done, but something was refused or flagged.
+    Flagged,
+}
+
+/// Runs the command line.
+pub(crate) fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no failure.
+            let code = if error.use_stderr() { 2 } else { 0 };
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    match dispatch(cli.verb) {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Flagged) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
+    match verb {
+        Verb::Demo(arguments) => demo::run(&arguments),
+        Verb::Robots(arguments) => robots::run(&arguments),
+        Verb::Simulate(arguments) => simulate::run(&arguments),
+        Verb::Identify(arguments) => identify::run(&arguments),
+        Verb::Path(arguments) => path::run(&arguments),
+        Verb::Compensate(arguments) => compensate::run(&arguments),
+        Verb::Deviation(arguments) => deviation::run(&arguments),
+        #[cfg(feature = "visual")]
+        Verb::View(arguments) => view::run(&arguments),
+    }
+}
+
+/// Runs `work` on the stated number of threads.
+fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
+    match threads {
+        None => Ok(work()),
+        Some(0) => anyhow::bail!("--threads 0: expected at least 1"),
+        Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
+    }
+}

@@ -1,0 +1,119 @@
+//! Files: read whole, written whole or not at all, inputs never overwritten.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+/// The bytes of a file.
+pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+/// The text of a file.
+pub(super) fn read_text(path: &Path) -> anyhow::Result<String> {
+    let bytes = read(path)?;
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
+        Err(error) => {
+            let at = error.utf8_error().valid_up_to();
+            bail!("{}: byte {at} is not UTF-8 text", path.display())
+        }
+    }
+}
+
+/// The name of a file as reports print it.
+pub(super) fn name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+/// Files to be written together: collected first, then each written to a temporary file beside its place, synced,
+/// and only when all are on disk renamed into place.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    files: Vec<(PathBuf, Vec<u8>)>,
+    inputs: Vec<PathBuf>,
+}
+
+impl Batch {
+    /// A batch that refuses to write over `inputs`.
+    pub(super) fn sparing<P: AsRef<Path>>(inputs: impl IntoIterator<Item = P>) -> Self {
+        Self { files: Vec::new(), inputs: inputs.into_iter().map(|p| p.as_ref().to_path_buf()).collect() }
+    }
+
+    /// Adds a file; `-` prints it to stdout when the batch is written.
+    pub(super) fn add(&mut self, path: impl Into<PathBuf>, bytes: impl Into<Vec<u8>>) {
+        self.files.push((path.into(), bytes.into()));
+    }
+
+    /// Refuses early, before the work, what writing would refuse late.
+    pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> anyhow::Result<()> {
+        for output in outputs.iter().filter(|o| **o != Path::new("-")) {
+            for input in inputs {
+                if same(output, input) {
+                    bail!("{} is an input: an input is never overwritten; name another output", output.display());
+                }
+            }
+            let folder = parent(output);
+            if !folder.is_dir() {
+                bail!("{}: folder {} does not exist", output.display(), folder.display());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes everything or nothing.
+    pub(super) fn write(self) -> anyhow::Result<()> {
+        let mut ready = Vec::new();
+        for (path, bytes) in &self.files {
+            if path == Path::new("-") {
+                continue;
+            }
+            if self.inputs.iter().any(|input| same(path, input)) {
+                bail!("{} is an input: an input is never overwritten; name another output", path.display());
+            }
+            let folder = parent(path);
+            let failed = || format!("{}: cannot be written; nothing was changed", path.display());
+            let mut file = tempfile::NamedTempFile::new_in(&folder).with_context(failed)?;
+            file.write_all(bytes).with_context(failed)?;
+            file.as_file().sync_all().with_context(failed)?;
+            ready.push((file, path));
+        }
+        for (file, path) in ready {
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::PermissionsExt;
+                let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
+                let _ = file.as_file().set_permissions(fs::Permissions::from_mode(mode));
+            }
+            file.persist(path).with_context(|| format!("{}: cannot be put in place", path.display()))?;
+        }
+        for (path, bytes) in &self.files {
+            if path == Path::new("-") {
+                let mut out = std::io::stdout().lock();
+                out.write_all(bytes).and_then(|()| out.flush()).context("stdout cannot be written")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+fn same(a: &Path, b: &Path) -> bool {
+    match (fs::canonicalize(a), fs::canonicalize(b)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    }
+}
+
+/// Makes a folder for outputs.
+pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(path).with_context(|| format!("{}: folder cannot be made", path.display()))
+}

@@ -1,0 +1,231 @@
+//! `truegrind identify DATA --robot R -o MODEL.toml`.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::{Args, ValueEnum};
+use truegrind::identification::calibration::Frames;
+use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
+use truegrind::identification::identify::{Identification, Options, identify, observe};
+use truegrind::identification::solver::{SOLVERS, by_name};
+use truegrind::identification::start::starts;
+use truegrind::identification::study::study;
+use truegrind::identification::tolerance::Tolerance;
+use truegrind::kinematics::estimated::Judgement;
+use truegrind::kinematics::model::Model;
+use truegrind::measurement::dataset::Dataset;
+use truegrind::measurement::{import, plausibility, split};
+use truegrind::report::format;
+use truegrind::report::{identification as view, study as study_view};
+use truegrind::robots::Robot;
+
+use super::files::{self, Batch};
+use super::outputs::{Outputs, width};
+use super::progress::Work;
+use super::{Common, Ending, inputs, on_threads};
+
+/// Whether logged angles are the controller's or already hold the DH offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Angles {
+    /// The controller's.
+    Logged,
+    /// DH angles: the offsets of the link table are in them.
+    Dh,
+}
+
+/// How a measurement file is read.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DataArguments {
+    /// Measurements, CSV or XLSX.
+    pub(super) data: PathBuf,
+    /// Robot: a name of `truegrind robots`, or a TOML file.
+    #[arg(long)]
+    pub(super) robot: String,
+    /// Sheet of a workbook; the first with the columns otherwise.
+    #[arg(long)]
+    pub(super) sheet: Option<String>,
+    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    #[arg(long, value_enum)]
+    pub(super) angles: Option<Angles>,
+    /// Take the units as they are, however odd they look.
+    #[arg(long)]
+    pub(super) allow_odd_units: bool,
+}
+
+/// Arguments of `identify`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    data: DataArguments,
+    /// The model file to write; a failed fit is not written.
+    #[arg(short, long, value_name = "MODEL.toml")]
+    output: Option<PathBuf>,
+    /// Method: lm, ltlm, lm-as-printed or ltlm-as-printed.
+    #[arg(long, default_value = "lm")]
+    method: String,
+    /// Share of rows held out to state the error.
+    #[arg(long, default_value_t = 0.2)]
+    held_out: f64,
+    /// Compare all methods over this many splits (seeds 0, 1, …).
+    #[arg(long, value_name = "SPLITS")]
+    compare_methods: Option<u64>,
+    /// Do not sharpen rounded angles by the controller's read-out.
+    #[arg(long)]
+    raw_columns: bool,
+    /// The fit passes only with a held-out RMSE up to this [mm].
+    #[arg(long, value_name = "MM")]
+    limit_rmse: Option<f64>,
+    /// The fit passes only with a held-out maximum up to this [mm].
+    #[arg(long, value_name = "MM")]
+    limit_max: Option<f64>,
+    /// Tolerance of link lengths [mm], as a prior.
+    #[arg(long, value_name = "MM")]
+    tolerance_length: Option<f64>,
+    /// Tolerance of link angles and joint offsets [°], as a prior.
+    #[arg(long, value_name = "DEG")]
+    tolerance_angle: Option<f64>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let mut targets = arguments.outputs.files();
+    targets.extend(arguments.output.as_deref());
+    Batch::check(&[&arguments.data.data], &targets)?;
+    if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
+        bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
+    }
+    let (robot, dataset) = read(&arguments.data)?;
+    let options = options(arguments)?;
+    let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
+    let name = robot.sheet.name.clone();
+    let found = on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
+    drop(work);
+    for note in &dataset.notes {
+        eprintln!("note: {note}");
+    }
+    arguments.outputs.print(&view::summary(&found));
+    let mut batch = Batch::sparing([&arguments.data.data]);
+    arguments.outputs.add_to(
+        &mut batch,
+        &view::document(&found, &dataset),
+        &view::parameter_table(&found),
+        &view::json(&found, &dataset),
+    )?;
+    #[cfg(feature = "visual")]
+    if let Some(path) = &arguments.outputs.rrd {
+        batch.add(path, super::view::identification(&found, &dataset)?);
+    }
+    if let Some(splits) = arguments.compare_methods {
+        let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));
+        let rows = on_threads(arguments.common.threads, || {
+            let frames = best_start(&dataset, &robot.model, &options)?;
+            let share = arguments.held_out;
+            let split = |d: &Dataset, seed: u64| split_of(d, share, seed);
+            Ok::<_, anyhow::Error>(study(&dataset, &name, &robot.model, &frames, &split, &options, splits)?)
+        })??;
+        drop(work);
+        let text = format::terminal::table(&study_view::table(&rows), width());
+        if arguments.outputs.takes_stdout() { eprint!("{text}") } else { print!("{text}") }
+    }
+    let failed = found.estimated.verdict.status == Judgement::Fail;
+    if let Some(path) = &arguments.output {
+        if failed {
+            batch.write()?;
+            bail!(
+                "{} was not written, because the fit failed: {}",
+                path.display(),
+                found.estimated.verdict.reasons.join("; ")
+            );
+        }
+        let text = found.estimated.to_toml().map_err(anyhow::Error::msg)?;
+        batch.add(path, text);
+    }
+    batch.write()?;
+    Ok(if failed { Ending::Flagged } else { Ending::Done })
+}
+
+fn options(arguments: &Arguments) -> anyhow::Result<Options> {
+    let mut tolerance = Tolerance::default();
+    for (stated, place, scale) in [
+        (arguments.tolerance_length, &mut tolerance.length_mm, 1.0),
+        (arguments.tolerance_angle, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
+    ] {
+        if let Some(value) = stated {
+            if !(value > 0.0 && value.is_finite()) {
+                bail!("a tolerance of {value}: expected a number above 0");
+            }
+            *place = value * scale;
+        }
+    }
+    Ok(Options {
+        tolerance,
+        solver: by_name(&arguments.method).map_err(anyhow::Error::msg)?,
+        held_out: arguments.held_out,
+        seed: arguments.common.seed,
+        sharpen: !arguments.raw_columns,
+        limit_rmse_mm: arguments.limit_rmse,
+        limit_max_mm: arguments.limit_max,
+        stated_frames: None,
+    })
+}
+
+/// Reads robot and measurements, and checks that their units fit each other.
+pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
+    let robot = inputs::robot(&arguments.robot)?;
+    let bytes = files::read(&arguments.data)?;
+    let options =
+        import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
+    let mut dataset = import::read(&files::name(&arguments.data), &bytes, &options)?;
+    let dh = match arguments.angles {
+        Some(angles) => angles == Angles::Dh,
+        None => robot.sheet.joints.angles == truegrind::robots::sheet::Angles::Dh,
+    };
+    if dh {
+        plausibility::from_dh_angles(&mut dataset, &robot.model);
+    }
+    if !arguments.allow_odd_units {
+        let suspicions = plausibility::plausibility(&dataset, &robot.model);
+        if let Some(first) = suspicions.first() {
+            bail!("{first}");
+        }
+    }
+    Ok((robot, dataset))
+}
+
+/// The rows to fit and to hold out; repeated poses stay together.
+pub(super) fn split_of(dataset: &Dataset, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
+    split::random(dataset, share, seed)
+}
+
+/// Where several outlets explain the rows, the one with which registered frames fit best.
+pub(super) fn best_start(dataset: &Dataset, nominal: &Model, options: &Options) -> anyhow::Result<Frames> {
+    let candidates = starts(dataset, nominal)?;
+    if candidates.len() == 1 {
+        return Ok(candidates.into_iter().next().unwrap_or_else(|| Frames::at_origin(1)));
+    }
+    let (observed, _) = observe(dataset, nominal, options.sharpen);
+    let sensing = frame_parameters(dataset);
+    let rmse = |frames: &Frames| {
+        let start = Start { model: nominal, frames };
+        let fitted = fit(&observed, start, &sensing, &options.tolerance, &SOLVERS[0], 0);
+        summary_on(&observed, &fitted.model, &fitted.frames).rmse
+    };
+    let best = candidates.into_iter().map(|f| (rmse(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, f)| f).ok_or_else(|| anyhow::anyhow!("no starting frames"))
+}
+
+/// The whole identification, starting frames included.
+pub(super) fn identified(
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    options: &Options,
+) -> anyhow::Result<Identification> {
+    let frames = best_start(dataset, nominal, options)?;
+    let share = options.held_out;
+    let split = |d: &Dataset| split_of(d, share, options.seed);
+    Ok(identify(dataset, robot, nominal, &frames, &split, options)?)
+}

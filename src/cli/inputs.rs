@@ -1,0 +1,105 @@
+//! Inputs that several verbs share: robots, models, measurements, programs.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail};
+use sha2::{Digest, Sha256};
+use truegrind::kinematics::estimated::{Estimated, Judgement};
+use truegrind::kinematics::model::Model;
+use truegrind::robots::{self, Robot};
+
+use super::files;
+
+/// A robot by catalogue name or from a TOML file.
+pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
+    let path = Path::new(name);
+    let is_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || name.contains('/');
+    if is_file || path.is_file() {
+        Ok(robots::parse(&files::read_text(path)?, name)?)
+    } else {
+        Ok(robots::load(name)?)
+    }
+}
+
+/// A model as the command line names it.
+#[derive(Debug, Clone)]
+pub(super) enum NamedModel {
+    /// The word `nominal`: nothing is corrected.
+    Nominal,
+    /// An estimated arm from a file.
+    Estimated {
+        /// Name for reports.
+        name: String,
+        /// Short hash of the file.
+        hash: String,
+        /// The arm.
+        arm: Box<Estimated>,
+    },
+}
+
+impl NamedModel {
+    /// Name for reports.
+    pub(super) fn name(&self) -> &str {
+        match self {
+            NamedModel::Nominal => "nominal",
+            NamedModel::Estimated { name, .. } => name,
+        }
+    }
+}
+
+/// Reads `nominal` or a model file.
+pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
+    if argument.eq_ignore_ascii_case("nominal") {
+        return Ok(NamedModel::Nominal);
+    }
+    let path = Path::new(argument);
+    let text = files::read_text(path)?;
+    let arm = Estimated::from_toml(&text)
+        .map_err(|e| anyhow!("{argument}: {e}; a model file is what `truegrind identify -o` writes"))?;
+    if arm.verdict.status == Judgement::Fail {
+        bail!("{argument}: the fit behind this model failed ({}); it is not used", arm.verdict.reasons.join("; "));
+    }
+    let hash = hash(text.as_bytes());
+    Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
+}
+
+/// First twelve hex digits of the SHA-256.
+pub(super) fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
+}
+
+/// The robot that a model and `--robot` agree on: the nominal arm of programs.
+pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::Result<(String, Model)> {
+    match (model, robot_name) {
+        (NamedModel::Nominal, None) => bail!("--model nominal: --robot says which arm"),
+        (NamedModel::Nominal, Some(name)) => {
+            let robot = robot(name)?;
+            Ok((robot.sheet.name.clone(), robot.model))
+        }
+        (NamedModel::Estimated { name, arm, .. }, stated) => {
+            if let Some(stated) = stated {
+                let robot = robot(stated)?;
+                if !robot.sheet.name.eq_ignore_ascii_case(&arm.robot) {
+                    bail!(
+                        "--robot is {}, but model {name} was identified for {}: give the robot that the model belongs \
+                         to, or leave --robot out",
+                        robot.sheet.name,
+                        arm.robot
+                    );
+                }
+            }
+            Ok((arm.robot.clone(), arm.nominal.clone()))
+        }
+    }
+}
+
+/// Where `path`'s own relative names are looked up.
+pub(super) fn beside(path: &Path, name: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// Reads a file named in another file.
+pub(super) fn read_beside(path: &Path, name: &str) -> anyhow::Result<Vec<u8>> {
+    let place = beside(path, name);
+    files::read(&place).with_context(|| format!("named in {}", path.display()))
+}

@@ -1,0 +1,79 @@
+//! The outputs that every verb offers: --json, --csv, --md, --html, --rrd.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use truegrind::report::document::Document;
+use truegrind::report::format;
+use truegrind::report::table::Table;
+
+use super::files::Batch;
+
+/// Where results go beside the terminal. Without a file name a result goes to stdout.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct Outputs {
+    /// JSON.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub(super) json: Option<PathBuf>,
+    /// CSV table.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub(super) csv: Option<PathBuf>,
+    /// Markdown page.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub(super) md: Option<PathBuf>,
+    /// Self-contained HTML page with plots.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub(super) html: Option<PathBuf>,
+    /// Rerun recording.
+    #[arg(long, value_name = "FILE")]
+    pub(super) rrd: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// All files named.
+    pub(super) fn files(&self) -> Vec<&Path> {
+        [&self.json, &self.csv, &self.md, &self.html, &self.rrd]
+            .into_iter()
+            .filter_map(|p| p.as_deref())
+            .collect()
+    }
+
+    /// Whether stdout is taken by one of the outputs, so that the summary goes to stderr.
+    pub(super) fn takes_stdout(&self) -> bool {
+        self.files().contains(&Path::new("-"))
+    }
+
+    /// Adds what was asked for.
+    pub(super) fn add_to(
+        &self,
+        batch: &mut Batch,
+        page: &Document,
+        table: &Table,
+        json: &serde_json::Value,
+    ) -> anyhow::Result<()> {
+        if let Some(path) = &self.json {
+            batch.add(path, format::json::text(json)? + "\n");
+        }
+        if let Some(path) = &self.csv {
+            batch.add(path, format::csv::table(table));
+        }
+        if let Some(path) = &self.md {
+            batch.add(path, format::markdown::document(page));
+        }
+        if let Some(path) = &self.html {
+            batch.add(path, format::html::document(page));
+        }
+        Ok(())
+    }
+
+    /// Prints the summary, to stdout unless a result goes there.
+    pub(super) fn print(&self, page: &Document) {
+        let text = format::terminal::document(page, width());
+        if self.takes_stdout() { eprint!("{text}") } else { print!("{text}") }
+    }
+}
+
+/// Columns of the terminal, 100 where there is none.
+pub(super) fn width() -> usize {
+    std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok()).unwrap_or(100)
+}

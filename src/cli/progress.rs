@@ -1,0 +1,27 @@
+//! Talk on stderr: what is being done, with a spinner where a terminal shows it.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// A piece of work that takes a while. Nothing is shown where stderr is no terminal.
+pub(super) struct Work(ProgressBar);
+
+impl Work {
+    /// Starts a spinner with a message.
+    pub(super) fn start(message: impl Into<String>) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
+            bar.set_style(style);
+        }
+        bar.set_message(message.into());
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Self(bar)
+    }
+}
+
+impl Drop for Work {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
