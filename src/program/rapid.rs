@@ -14,6 +14,7 @@ pub mod modal;
 mod flow;
 pub mod mark;
 mod task;
+pub mod task_list;
 
 pub use task::Task;
 mod print;

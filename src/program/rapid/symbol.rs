@@ -332,7 +332,16 @@ impl Symbols {
     }
 
     /// The symbols that a statement or function call may change by itself (not by what the called routine does).
+    /// Constants never change.
     pub fn changed_by(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> Vec<u32> {
+        let mut changed = self.given_by(tree, scope, node);
+        changed.retain(|&symbol| {
+            !matches!(&self.symbols[symbol as usize].what, What::Data(data) if data.storage == Token::Const)
+        });
+        changed
+    }
+
+    fn given_by(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> Vec<u32> {
         match tree.nodes[node as usize].kind {
             Syntax::Assignment => {
                 let place = parts(tree, node).next();
@@ -399,13 +408,7 @@ impl Symbols {
                 .collect();
         }
         // Not known here: it may change what it is given.
-        arguments(tree, node)
-            .filter_map(|argument| self.root(tree, scope, argument.value?))
-            .filter(|&symbol| match &self.symbols[symbol as usize].what {
-                What::Data(data) => data.storage != Token::Const,
-                _ => false,
-            })
-            .collect()
+        arguments(tree, node).filter_map(|argument| self.root(tree, scope, argument.value?)).collect()
     }
 
     /// The symbol that a name or place begins with.

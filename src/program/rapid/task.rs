@@ -11,7 +11,7 @@ use super::mark;
 use super::modal::States;
 use super::parser::parse;
 use super::symbol::{Symbols, Unit, What, only_reads};
-use super::syntax::{Argument, RapidTree, Syntax, arguments, text_of, tokens_of};
+use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
 use super::value::Value;
 use crate::program::motion::{
@@ -412,7 +412,10 @@ impl<'a, 's> Lister<'a, 's> {
     fn other(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings) -> Option<Motion> {
         let tree = &self.trees[unit.file as usize];
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-        let name = tree.text(tree.nodes[node as usize].first);
+        let name = match parts(tree, node).nth(1).filter(|_| late) {
+            Some(expression) => text_of(tree, expression),
+            None => tree.text(tree.nodes[node as usize].first),
+        };
         let routine = if late { None } else { self.symbols.routine(unit.scope, name) };
         let mut found: Vec<(Child, bool)> = Vec::new();
         if let Some(routine) = routine {
