@@ -4,9 +4,9 @@
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change.
 //! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
-//! - `rapid`: ABB's RAPID: front end, evaluation, rewriting, writing.
+//! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
 //!
-//! ```ignore
+//! ```
 //! use truegrind::program::motion::TargetValue;
 //! use truegrind::program::rapid::Task;
 //! use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};

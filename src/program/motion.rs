@@ -1,6 +1,6 @@
 //! What a program tells the robot to do, whatever language it is written in.
 //!
-//! A dialect (RAPID in `program::rapid`) reads bytes and hands back one [`Listing`]: every motion
+//! A dialect (RAPID in [`crate::program::rapid`]) reads bytes and hands back one [`Listing`]: every motion
 //! instruction with its targets, speed, zone, tool and work object, where each number stands, and for everything
 //! that cannot be known from the text alone the [`Reason`]. Nothing is ever guessed.
 //!

@@ -36,6 +36,8 @@ pub struct Extra {
     pub kind: MotionKind,
     /// The target; `conf: None` takes that of the instruction.
     pub target: NewTarget,
+    /// External axes; `None` takes those of the instruction.
+    pub external: Option<[Option<f64>; 6]>,
 }
 
 /// What shall change at one motion.

@@ -1,3 +1,5 @@
 //! Tests of `program`.
 
 mod tree;
+mod samples;
+mod rewriting;

@@ -109,7 +109,12 @@ const fn rigid(name: &'static str, kind: MotionKind, pattern: &'static str) -> I
     Instruction { between: Between::Nothing, ..plain(name, kind, pattern) }
 }
 
-const fn within(name: &'static str, between: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+const fn within(
+    name: &'static str,
+    between: &'static str,
+    kind: MotionKind,
+    pattern: &'static str,
+) -> Instruction {
     Instruction { between: Between::Other(between), ..plain(name, kind, pattern) }
 }
 

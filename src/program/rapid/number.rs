@@ -2,8 +2,8 @@
 
 /// Powers of ten that are exact in double precision.
 const TEN: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19,
-    1e20, 1e21, 1e22,
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
+    1e19, 1e20, 1e21, 1e22,
 ];
 
 /// More decimals than this are never written.
@@ -14,7 +14,8 @@ pub const MOST_DECIMALS: u8 = 12;
 /// Up to 15 digits and small exponents are exact in one multiplication or division (Clinger 1990, the fast path);
 /// everything else goes to the standard library.
 pub fn value(text: &[u8]) -> Option<f64> {
-    if text.first() == Some(&b'0') && text.get(1).is_some_and(u8::is_ascii_alphabetic) && text[1] | 32 != b'e' {
+    if text.first() == Some(&b'0') && text.get(1).is_some_and(u8::is_ascii_alphabetic) && text[1] | 32 != b'e'
+    {
         let radix = match text[1] | 32 {
             b'x' => 16,
             b'b' => 2,
@@ -59,7 +60,8 @@ pub fn value(text: &[u8]) -> Option<f64> {
 pub fn decimals(text: &[u8]) -> u8 {
     let split = text.iter().position(|byte| matches!(byte, b'e' | b'E')).unwrap_or(text.len());
     let (digits, exponent) = text.split_at(split);
-    let after = digits.iter().position(|&byte| byte == b'.').map_or(0, |point| digits.len() - point - 1) as i32;
+    let after =
+        digits.iter().position(|&byte| byte == b'.').map_or(0, |point| digits.len() - point - 1) as i32;
     let exponent: i32 = match exponent {
         [] => 0,
         [_, rest @ ..] => std::str::from_utf8(rest).ok().and_then(|text| text.parse().ok()).unwrap_or(0),

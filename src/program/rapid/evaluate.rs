@@ -1,0 +1,703 @@
+//! What an expression is worth, as far as the text tells it.
+//!
+//! Method: constants are folded in double precision; data that nothing in the given files changes has its initial
+//! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]). Target functions
+//! follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along the
+//! axes of the target's tool frame and then turns about its x, the new y and the new z. Everything else is
+//! [`Value::Unknown`] with its reason.
+//!
+//! Departure: a controller computes `num` in single precision.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::literal;
+use super::number;
+use super::symbol::{Symbols, What};
+use super::syntax::{
+    RapidTree, Syntax, arguments, expressions, node_kind, parts, text_of, token_kind, tokens_of,
+};
+use super::token::{Token, fold, folded, same_name};
+use super::value::{Value, built_in, cartesian_target, components, joint_target};
+use crate::math::se3::{Pose, rotation_from_matrix};
+use crate::program::motion::{Frame, Reason, Span, TargetValue};
+use crate::program::tree::Child;
+
+/// What the statements so far gave to data that the program assigns.
+pub type Known = BTreeMap<u32, Value>;
+
+/// How deeply constants may refer to constants.
+const REFERENCE_DEPTH: u32 = 32;
+
+/// Where an expression stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Context<'k> {
+    /// The file.
+    pub file: u32,
+    /// The scope.
+    pub scope: u32,
+    /// What is known of assigned data.
+    pub known: &'k Known,
+    depth: u32,
+}
+
+impl<'k> Context<'k> {
+    /// An expression in a file and scope.
+    pub fn new(file: u32, scope: u32, known: &'k Known) -> Self {
+        Context { file, scope, known, depth: 0 }
+    }
+}
+
+/// Where a target's numbers come from, before declarations have their place in the listing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The literal in the instruction.
+    Inline,
+    /// A declared name.
+    Symbol(u32),
+    /// One element of a declared array.
+    Element(u32, Span),
+    /// Computed from the text.
+    Computed,
+    /// Not known.
+    Unknown,
+}
+
+/// Evaluates expressions of one task.
+#[derive(Debug)]
+pub struct Evaluator<'a, 's> {
+    /// The files.
+    pub trees: &'a [RapidTree<'s>],
+    /// Their names.
+    pub symbols: &'a Symbols,
+    elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
+}
+
+impl<'a, 's> Evaluator<'a, 's> {
+    /// For the files of one task.
+    pub fn new(trees: &'a [RapidTree<'s>], symbols: &'a Symbols) -> Self {
+        Evaluator { trees, symbols, elements: RefCell::default() }
+    }
+
+    fn tree(&self, file: u32) -> &'a RapidTree<'s> {
+        &self.trees[file as usize]
+    }
+
+    /// A target argument: its value and where its numbers stand.
+    pub fn target(
+        &self,
+        context: Context<'_>,
+        argument: Child,
+        joints: bool,
+    ) -> (Result<TargetValue, Reason>, Source) {
+        let tree = self.tree(context.file);
+        match argument {
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+                if let Some(value) = literal_target(tree.node_text(node), joints) {
+                    let source = if value.is_ok() { Source::Inline } else { Source::Unknown };
+                    return (value, source);
+                }
+            }
+            Child::Token(token) => match tree.kind(token) {
+                Some(Token::Ident) => return self.named_target(context, tree.text(token), joints),
+                Some(Token::Placeholder | Token::Star) => {
+                    return (Err(Reason::Placeholder), Source::Unknown);
+                }
+                _ => {}
+            },
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Place => {
+                if let Some(found) = self.element_target(context, node, joints) {
+                    return found;
+                }
+            }
+            Child::Node(_) => {}
+        }
+        let value = self.value(context, argument).target(joints);
+        let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+        (value, source)
+    }
+
+    fn named_target(
+        &self,
+        context: Context<'_>,
+        name: &[u8],
+        joints: bool,
+    ) -> (Result<TargetValue, Reason>, Source) {
+        let unknown = |reason| (Err(reason), Source::Unknown);
+        let Some(id) = self.symbols.find(context.scope, name) else {
+            return unknown(Reason::Undeclared);
+        };
+        let symbol = &self.symbols.symbols[id as usize];
+        let data = match &symbol.what {
+            What::Data(data) => data,
+            What::Parameter => return unknown(Reason::Parameter),
+            _ => return unknown(Reason::WrongShape),
+        };
+        let wanted: &[u8] = if joints { b"jointtarget" } else { b"robtarget" };
+        if self.symbols.resolved_type(symbol.scope, &symbol.type_name) != wanted || data.dimensions.is_some()
+        {
+            return unknown(Reason::WrongShape);
+        }
+        if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+            return unknown(Reason::Ambiguous);
+        }
+        if symbol.assigned || context.known.contains_key(&id) {
+            let value = self.symbol_value(context, id).target(joints);
+            let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+            return (value, source);
+        }
+        let Some(initial) = data.value else { return unknown(Reason::Uninitialised) };
+        let value = match literal_target(text_of(self.tree(symbol.file), initial), joints) {
+            Some(value) => value,
+            None => self.symbol_value(context, id).target(joints),
+        };
+        let source = if value.is_ok() { Source::Symbol(id) } else { Source::Unknown };
+        (value, source)
+    }
+
+    fn module_scope(&self, scope: u32) -> u32 {
+        let mut scope = scope;
+        while let Some(parent) = self.symbols.scopes[scope as usize].parent {
+            if parent == 0 {
+                break;
+            }
+            scope = parent;
+        }
+        scope
+    }
+
+    /// `name{i, …}` of an array that nothing assigns.
+    fn element_target(
+        &self,
+        context: Context<'_>,
+        node: u32,
+        joints: bool,
+    ) -> Option<(Result<TargetValue, Reason>, Source)> {
+        let tree = self.tree(context.file);
+        let mut parts = parts(tree, node);
+        let root = self.symbols.root(tree, context.scope, parts.next()?)?;
+        let index = parts.next().filter(|&part| node_kind(tree, part) == Some(Syntax::Index))?;
+        if parts.next().is_some() {
+            return None;
+        }
+        let symbol = &self.symbols.symbols[root as usize];
+        if symbol.assigned || symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+            return None;
+        }
+        let Child::Node(index) = index else { return None };
+        let (file, element) = match self.element(context, root, index) {
+            Ok(found) => found,
+            Err(reason) => return Some((Err(reason), Source::Unknown)),
+        };
+        let text = text_of(self.tree(file), element);
+        let (first, end) = tokens_of(self.tree(file), element);
+        let value = match literal_target(text, joints) {
+            Some(value) => value,
+            None => self.value(self.at(context, symbol.scope, file), element).target(joints),
+        };
+        let source = match value {
+            Ok(_) => Source::Element(root, self.tree(file).span(first, end)),
+            Err(_) => Source::Unknown,
+        };
+        Some((value, source))
+    }
+
+    /// The expression of an array element.
+    fn element(&self, context: Context<'_>, root: u32, index: u32) -> Result<(u32, Child), Reason> {
+        let symbol = &self.symbols.symbols[root as usize];
+        let What::Data(data) = &symbol.what else { return Err(Reason::WrongShape) };
+        let mut at = data.value.ok_or(Reason::Uninitialised)?;
+        let tree = self.tree(symbol.file);
+        for position in expressions(self.tree(context.file), index) {
+            let position = match self.value(context, position).number() {
+                Ok(position) => position.round(),
+                Err(_) => return Err(Reason::RunTimeIndex),
+            };
+            let Child::Node(list) = at else { return Err(Reason::WrongShape) };
+            if tree.nodes[list as usize].kind != Syntax::Aggregate {
+                return Err(Reason::WrongShape);
+            }
+            let mut cache = self.elements.borrow_mut();
+            let items = cache.entry((symbol.file, list)).or_insert_with(|| expressions(tree, list).collect());
+            if position < 1.0 {
+                return Err(Reason::IndexOutOfRange);
+            }
+            at = *items.get(position as usize - 1).ok_or(Reason::IndexOutOfRange)?;
+        }
+        Ok((symbol.file, at))
+    }
+
+    /// The same context at a declaration elsewhere: nothing assigned is known there.
+    fn at<'k>(&self, context: Context<'k>, scope: u32, file: u32) -> Context<'k> {
+        Context { file, scope, known: context.known, depth: context.depth + 1 }
+    }
+
+    /// What data or a parameter is worth.
+    pub fn symbol_value(&self, context: Context<'_>, id: u32) -> Value {
+        if let Some(value) = context.known.get(&id) {
+            return value.clone();
+        }
+        let symbol = &self.symbols.symbols[id as usize];
+        match &symbol.what {
+            What::Data(_) if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) => {
+                Value::Unknown(Reason::Ambiguous)
+            }
+            What::Data(data) if !symbol.assigned => match data.value {
+                Some(initial) if context.depth < REFERENCE_DEPTH => {
+                    self.value(self.at(context, symbol.scope, symbol.file), initial)
+                }
+                Some(_) => Value::Unknown(Reason::WrongShape),
+                None => Value::Unknown(Reason::Uninitialised),
+            },
+            What::Data(_) | What::Loop => Value::Unknown(Reason::Assigned),
+            What::Parameter => Value::Unknown(Reason::Parameter),
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    /// The value of the initial expression of data, whatever becomes of it later.
+    pub fn initial_value(&self, context: Context<'_>, id: u32) -> Option<Value> {
+        let symbol = &self.symbols.symbols[id as usize];
+        match &symbol.what {
+            What::Data(data) => {
+                data.value.map(|value| self.value(self.at(context, symbol.scope, symbol.file), value))
+            }
+            _ => None,
+        }
+    }
+
+    /// The value of an expression.
+    pub fn value(&self, context: Context<'_>, expression: Child) -> Value {
+        let tree = self.tree(context.file);
+        match expression {
+            Child::Token(token) => self.operand(context, tree, token),
+            Child::Node(node) => match tree.nodes[node as usize].kind {
+                Syntax::Aggregate => {
+                    Value::List(expressions(tree, node).map(|part| self.value(context, part)).collect())
+                }
+                Syntax::Paren => match expressions(tree, node).next() {
+                    Some(inner) => self.value(context, inner),
+                    None => Value::Unknown(Reason::WrongShape),
+                },
+                Syntax::Unary => self.unary(context, tree, node),
+                Syntax::Binary => self.binary(context, tree, node),
+                Syntax::Function => self.function(context, tree, node),
+                Syntax::Place => self.place(context, tree, node),
+                _ => Value::Unknown(Reason::WrongShape),
+            },
+        }
+    }
+
+    fn operand(&self, context: Context<'_>, tree: &RapidTree<'s>, token: u32) -> Value {
+        let text = tree.text(token);
+        match tree.kind(token) {
+            Some(Token::Number) => {
+                number::value(text).map_or(Value::Unknown(Reason::WrongShape), Value::Number)
+            }
+            Some(Token::True) => Value::Bool(true),
+            Some(Token::False) => Value::Bool(false),
+            Some(Token::String) => Value::Text(unquoted(text)),
+            Some(Token::Ident) => match self.symbols.find(context.scope, text) {
+                Some(id) => self.symbol_value(context, id),
+                None => built_in(&folded(text)).unwrap_or(Value::Unknown(Reason::Undeclared)),
+            },
+            Some(Token::Placeholder | Token::Star) => Value::Unknown(Reason::Placeholder),
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    fn unary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut parts = parts(tree, node);
+        let operator = parts.next().and_then(|part| token_kind(tree, part));
+        let Some(operand) = parts.next() else { return Value::Unknown(Reason::WrongShape) };
+        match (operator, self.value(context, operand)) {
+            (_, unknown @ Value::Unknown(_)) => unknown,
+            (Some(Token::Minus), Value::Number(value)) => Value::Number(-value),
+            (Some(Token::Plus), Value::Number(value)) => Value::Number(value),
+            (Some(Token::Not), Value::Bool(value)) => Value::Bool(!value),
+            (Some(Token::Minus), list @ Value::List(_)) => match list.numbers::<3>() {
+                Ok(vector) => Value::from_numbers(&vector.map(|value| -value)),
+                Err(reason) => Value::Unknown(reason),
+            },
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    fn binary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut left: Option<Value> = None;
+        let mut operator = None;
+        for part in parts(tree, node) {
+            match token_kind(tree, part) {
+                Some(kind) if !is_value(kind) => operator = Some(kind),
+                _ => {
+                    let right = self.value(context, part);
+                    left = Some(match (left, operator) {
+                        (Some(left), Some(operator)) => combined(&left, operator, &right),
+                        _ => right,
+                    });
+                }
+            }
+        }
+        left.unwrap_or(Value::Unknown(Reason::WrongShape))
+    }
+
+    fn place(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let Some(root) = parts(tree, node).next() else { return Value::Unknown(Reason::WrongShape) };
+        let (mut value, mut type_name, mut rest) = match self.symbols.root(tree, context.scope, root) {
+            Some(id) => {
+                let symbol = &self.symbols.symbols[id as usize];
+                let type_name = symbol.type_name.clone();
+                // An element of an array that nothing assigns, without building the array.
+                let index = parts(tree, node).nth(1);
+                match index {
+                    Some(Child::Node(index))
+                        if !symbol.assigned && matches!(symbol.what, What::Data(_)) && !symbol.ambiguous =>
+                    {
+                        match self.element(context, id, index) {
+                            Ok((file, element)) => {
+                                let at = self.at(context, symbol.scope, file);
+                                (self.value(at, element), type_name, parts(tree, node).skip(2))
+                            }
+                            Err(reason) => return Value::Unknown(reason),
+                        }
+                    }
+                    _ => (self.symbol_value(context, id), type_name, parts(tree, node).skip(1)),
+                }
+            }
+            None => {
+                let name = match root {
+                    Child::Token(token) => folded(tree.text(token)),
+                    Child::Node(_) => Vec::new(),
+                };
+                let type_name: &[u8] = match &*name {
+                    b"tool0" => b"tooldata",
+                    b"wobj0" => b"wobjdata",
+                    [b'v', ..] => b"speeddata",
+                    _ => b"zonedata",
+                };
+                (self.value(context, root), type_name.to_vec(), parts(tree, node).skip(1))
+            }
+        };
+        for part in rest.by_ref() {
+            match part {
+                Child::Node(index) if tree.nodes[index as usize].kind == Syntax::Index => {
+                    for position in expressions(tree, index) {
+                        let Ok(position) = self.value(context, position).number() else {
+                            return Value::Unknown(Reason::RunTimeIndex);
+                        };
+                        value = match value {
+                            Value::List(mut list) if position >= 1.0 && position as usize <= list.len() => {
+                                list.swap_remove(position as usize - 1)
+                            }
+                            Value::List(_) => return Value::Unknown(Reason::IndexOutOfRange),
+                            unknown @ Value::Unknown(_) => return unknown,
+                            _ => return Value::Unknown(Reason::WrongShape),
+                        };
+                    }
+                }
+                Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {
+                    let Some((index, component_type)) =
+                        self.component(context.scope, &type_name, tree.text(token))
+                    else {
+                        return Value::Unknown(Reason::WrongShape);
+                    };
+                    value = match value {
+                        Value::List(mut list) if index < list.len() => list.swap_remove(index),
+                        unknown @ Value::Unknown(_) => return unknown,
+                        _ => return Value::Unknown(Reason::WrongShape),
+                    };
+                    type_name = component_type;
+                }
+                _ => {}
+            }
+        }
+        value
+    }
+
+    /// The position and type of a component of a record type.
+    pub fn component(&self, scope: u32, type_name: &[u8], name: &[u8]) -> Option<(usize, Vec<u8>)> {
+        let type_name = self.symbols.resolved_type(scope, type_name);
+        if let Some(list) = components(type_name) {
+            let index = list.iter().position(|(component, _)| same_name(component.as_bytes(), name))?;
+            return Some((index, list[index].1.as_bytes().to_vec()));
+        }
+        let symbol = &self.symbols.symbols[self.symbols.find(scope, type_name)? as usize];
+        let What::Record(list) = &symbol.what else { return None };
+        let index = list.iter().position(|(component, _)| same_name(component, name))?;
+        Some((index, list[index].1.clone()))
+    }
+
+    /// How many components a record type has.
+    pub fn component_count(&self, scope: u32, type_name: &[u8]) -> Option<usize> {
+        let type_name = self.symbols.resolved_type(scope, type_name);
+        if let Some(list) = components(type_name) {
+            return Some(list.len());
+        }
+        match &self.symbols.symbols[self.symbols.find(scope, type_name)? as usize].what {
+            What::Record(list) => Some(list.len()),
+            _ => None,
+        }
+    }
+
+    fn function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let name = folded(tree.text(tree.nodes[node as usize].first));
+        if self.symbols.find(context.scope, &name).is_some() {
+            return Value::Unknown(Reason::RunTimeFunction);
+        }
+        let mut required = Vec::new();
+        let mut options: [Option<Value>; 3] = [None, None, None];
+        for argument in arguments(tree, node) {
+            let Some(value) = argument.value else { continue };
+            match argument.name {
+                None => required.push(self.value(context, value)),
+                Some(option) => {
+                    let option: Vec<u8> = tree.text(option).iter().map(|&byte| fold(byte)).collect();
+                    let slot = match &*option {
+                        b"rx" => 0,
+                        b"ry" => 1,
+                        b"rz" => 2,
+                        _ => return Value::Unknown(Reason::RunTimeFunction),
+                    };
+                    options[slot] = Some(self.value(context, value));
+                }
+            }
+        }
+        match call(&name, &required, &options) {
+            Ok(value) => value,
+            Err(reason) => Value::Unknown(reason),
+        }
+    }
+}
+
+fn is_value(kind: Token) -> bool {
+    matches!(
+        kind,
+        Token::Ident
+            | Token::Number
+            | Token::String
+            | Token::True
+            | Token::False
+            | Token::Placeholder
+            | Token::Star
+    )
+}
+
+/// The target that a literal of plain numbers is; `None` where it is no such literal.
+fn literal_target(text: &[u8], joints: bool) -> Option<Result<TargetValue, Reason>> {
+    if joints {
+        let found = literal::numbers(text, literal::JOINTTARGET)?;
+        let [robot @ .., _, _, _, _, _] = found.values;
+        let (mut angles, mut axes) = ([0.0; 6], [0.0; 6]);
+        angles.copy_from_slice(&robot[..6]);
+        axes.copy_from_slice(&found.values[6..12]);
+        return Some(joint_target(angles, axes));
+    }
+    let values = literal::numbers(text, literal::ROBTARGET)?.values;
+    let [x, y, z, q1, q2, q3, q4, c1, c2, c3, c4, e1, e2, e3, e4, e5, e6] = values;
+    Some(cartesian_target([x, y, z], [q1, q2, q3, q4], [c1, c2, c3, c4], [e1, e2, e3, e4, e5, e6]))
+}
+
+/// The content of a string token.
+fn unquoted(text: &[u8]) -> Vec<u8> {
+    let inner = text.get(1..text.len().saturating_sub(1)).unwrap_or_default();
+    let mut out = Vec::with_capacity(inner.len());
+    let mut rest = inner;
+    while let Some((&byte, after)) = rest.split_first() {
+        rest = after;
+        match (byte, after) {
+            (b'"', [b'"', after @ ..]) | (b'\\', [b'\\', after @ ..]) => {
+                out.push(byte);
+                rest = after;
+            }
+            (b'\\', [high, low, after @ ..]) if high.is_ascii_hexdigit() && low.is_ascii_hexdigit() => {
+                let digit = |byte: u8| char::from(byte).to_digit(16).unwrap_or(0) as u8;
+                out.push(digit(*high) * 16 + digit(*low));
+                rest = after;
+            }
+            _ => out.push(byte),
+        }
+    }
+    out
+}
+
+fn combined(left: &Value, operator: Token, right: &Value) -> Value {
+    match (left, right) {
+        (Value::Unknown(reason), _) | (_, Value::Unknown(reason)) => Value::Unknown(*reason),
+        (&Value::Number(a), &Value::Number(b)) => match operator {
+            Token::Plus => Value::Number(a + b),
+            Token::Minus => Value::Number(a - b),
+            Token::Star => Value::Number(a * b),
+            Token::Slash if b != 0.0 => Value::Number(a / b),
+            Token::Div if b.round() != 0.0 => Value::Number((a.round() / b.round()).trunc()),
+            Token::Mod if b.round() != 0.0 => Value::Number(a.round().rem_euclid(b.round().abs())),
+            Token::Equal => Value::Bool(a == b),
+            Token::NotEqual => Value::Bool(a != b),
+            Token::Less => Value::Bool(a < b),
+            Token::LessEqual => Value::Bool(a <= b),
+            Token::Greater => Value::Bool(a > b),
+            Token::GreaterEqual => Value::Bool(a >= b),
+            _ => Value::Unknown(Reason::WrongShape),
+        },
+        (&Value::Bool(a), &Value::Bool(b)) => match operator {
+            Token::And => Value::Bool(a && b),
+            Token::Or => Value::Bool(a || b),
+            Token::Xor | Token::NotEqual => Value::Bool(a != b),
+            Token::Equal => Value::Bool(a == b),
+            _ => Value::Unknown(Reason::WrongShape),
+        },
+        (Value::Text(a), Value::Text(b)) if operator == Token::Plus => Value::Text([&**a, &**b].concat()),
+        (Value::List(_), Value::List(_)) => match (left.numbers::<3>(), right.numbers::<3>(), operator) {
+            (Ok(a), Ok(b), Token::Plus) => Value::from_numbers(&[a[0] + b[0], a[1] + b[1], a[2] + b[2]]),
+            (Ok(a), Ok(b), Token::Minus) => Value::from_numbers(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]),
+            (Ok(a), Ok(b), Token::Star) => {
+                let cross = Vector3::from(a).cross(&Vector3::from(b));
+                Value::from_numbers(&[cross.x, cross.y, cross.z])
+            }
+            _ => match (left.numbers::<4>(), right.numbers::<4>(), operator) {
+                (Ok(a), Ok(b), Token::Star) => {
+                    let turn = |q: [f64; 4]| nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]);
+                    let product = turn(a) * turn(b);
+                    Value::from_numbers(&[product.w, product.i, product.j, product.k])
+                }
+                (Err(reason), _, _) | (_, Err(reason), _) if reason != Reason::WrongShape => {
+                    Value::Unknown(reason)
+                }
+                _ => Value::Unknown(Reason::WrongShape),
+            },
+        },
+        (Value::List(_), &Value::Number(factor)) | (&Value::Number(factor), Value::List(_)) => {
+            let list = if matches!(left, Value::List(_)) { left } else { right };
+            match (list.numbers::<3>(), operator) {
+                (Ok(vector), Token::Star) => Value::from_numbers(&vector.map(|value| value * factor)),
+                (Ok(vector), Token::Slash) if matches!(left, Value::List(_)) && factor != 0.0 => {
+                    Value::from_numbers(&vector.map(|value| value / factor))
+                }
+                (Err(reason), _) => Value::Unknown(reason),
+                _ => Value::Unknown(Reason::WrongShape),
+            }
+        }
+        _ => Value::Unknown(Reason::WrongShape),
+    }
+}
+
+/// A rotation from Euler angles z, y, x [degrees] as `OrientZYX`: about z, the new y, the new x.
+fn orient_zyx(z_deg: f64, y_deg: f64, x_deg: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), z_deg.to_radians())
+        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), y_deg.to_radians())
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), x_deg.to_radians())
+}
+
+/// A predefined function of values.
+fn call(name: &[u8], required: &[Value], options: &[Option<Value>; 3]) -> Result<Value, Reason> {
+    let number = |index: usize| required.get(index).ok_or(Reason::MissingArgument)?.number();
+    // An unknown offset is another reason than an unknown base.
+    let offset = |value: &Value| value.number().map_err(|_| Reason::RunTimeOffset);
+    let one = |function: fn(f64) -> f64| Ok(Value::Number(function(number(0)?)));
+    match name {
+        b"offs" => {
+            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
+            let shift = [offset(x)?, offset(y)?, offset(z)?];
+            edited(target, |frame| {
+                for (position, shift) in frame.position_mm.iter_mut().zip(shift) {
+                    *position += shift;
+                }
+            })
+        }
+        b"reltool" => {
+            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
+            let shift = Vector3::new(offset(x)?, offset(y)?, offset(z)?);
+            let mut angles = [0.0; 3];
+            for (angle, option) in angles.iter_mut().zip(options) {
+                if let Some(value) = option {
+                    *angle = offset(value)?;
+                }
+            }
+            let [rx, ry, rz] = angles.map(f64::to_radians);
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), rx)
+                * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), ry)
+                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rz);
+            edited(target, |frame| {
+                let moved = frame.pose() * Pose::from_parts(Translation3::from(shift), turn);
+                let quaternion = frame.quaternion;
+                *frame = Frame::from_pose(&moved);
+                if angles == [0.0; 3] {
+                    frame.quaternion = quaternion;
+                }
+            })
+        }
+        b"posemult" => {
+            let [a, b] = required else { return Err(Reason::MissingArgument) };
+            Ok(Value::from_frame(&Frame::from_pose(&(a.frame()?.pose() * b.frame()?.pose()))))
+        }
+        b"poseinv" => {
+            let [pose] = required else { return Err(Reason::MissingArgument) };
+            Ok(Value::from_frame(&Frame::from_pose(&pose.frame()?.pose().inverse())))
+        }
+        b"posevect" => {
+            let [pose, vector] = required else { return Err(Reason::MissingArgument) };
+            let vector = pose.frame()?.pose() * nalgebra::Point3::from(vector.numbers::<3>()?);
+            Ok(Value::from_numbers(&[vector.x, vector.y, vector.z]))
+        }
+        b"orientzyx" => {
+            let turn = orient_zyx(number(0)?, number(1)?, number(2)?);
+            Ok(Value::from_numbers(&[turn.w, turn.i, turn.j, turn.k]))
+        }
+        b"norient" => {
+            let q = required.first().ok_or(Reason::MissingArgument)?.numbers::<4>()?;
+            let length = q.iter().map(|q| q * q).sum::<f64>().sqrt();
+            if length == 0.0 {
+                return Err(Reason::BadQuaternion);
+            }
+            Ok(Value::from_numbers(&q.map(|q| q / length)))
+        }
+        b"defframe" => {
+            let [origin, x, xy] = required else { return Err(Reason::MissingArgument) };
+            let point = |value: &Value| -> Result<Vector3<f64>, Reason> {
+                match value.target(false)? {
+                    TargetValue::Cartesian(target) => Ok(Vector3::from(target.position_mm)),
+                    TargetValue::Joint(_) => Err(Reason::WrongShape),
+                }
+            };
+            let (origin, x, xy) = (point(origin)?, point(x)?, point(xy)?);
+            let normal = (x - origin).cross(&(xy - origin));
+            if normal.norm() < 1e-9 {
+                return Err(Reason::WrongShape);
+            }
+            let (e1, e3) = ((x - origin).normalize(), normal.normalize());
+            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[e1, e3.cross(&e1), e3]));
+            let pose = Pose::from_parts(origin.into(), rotation_from_matrix(rotation.matrix()));
+            Ok(Value::from_frame(&Frame::from_pose(&pose)))
+        }
+        b"abs" => one(f64::abs),
+        b"sqrt" => one(f64::sqrt),
+        b"exp" => one(f64::exp),
+        b"sin" => one(|x| x.to_radians().sin()),
+        b"cos" => one(|x| x.to_radians().cos()),
+        b"tan" => one(|x| x.to_radians().tan()),
+        b"asin" => one(|x| x.asin().to_degrees()),
+        b"acos" => one(|x| x.acos().to_degrees()),
+        b"atan" => one(|x| x.atan().to_degrees()),
+        b"round" => one(f64::round),
+        b"trunc" => one(f64::trunc),
+        b"atan2" => Ok(Value::Number(number(0)?.atan2(number(1)?).to_degrees())),
+        b"pow" => Ok(Value::Number(number(0)?.powf(number(1)?))),
+        _ => Err(Reason::RunTimeFunction),
+    }
+}
+
+/// A robtarget with another pose; conf and external axes stay.
+fn edited(target: &Value, edit: impl FnOnce(&mut Frame)) -> Result<Value, Reason> {
+    let parts = match target {
+        Value::List(parts) if parts.len() == 4 => parts,
+        Value::Unknown(reason) => return Err(*reason),
+        _ => return Err(Reason::WrongShape),
+    };
+    let mut frame = Frame { position_mm: parts[0].numbers()?, quaternion: parts[1].numbers()? };
+    super::value::usable(&frame.quaternion)?;
+    edit(&mut frame);
+    let position = Value::from_numbers(&frame.position_mm);
+    let rotation = Value::from_numbers(&frame.quaternion);
+    Ok(Value::List(vec![position, rotation, parts[2].clone(), parts[3].clone()]))
+}

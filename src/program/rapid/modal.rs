@@ -1,0 +1,159 @@
+//! Switches that act in execution order: configuration monitoring, displacement, offsets and the like.
+//!
+//! Method: for each switch the set of states it may have. Within a routine the set is followed statement by statement,
+//! with "as at the entry of the routine" as one of its members, so that each routine is walked once; calls insert the
+//! set with which the called routine ends. What the entries really are is then propagated along the calls from main
+//! (which starts with the controller's defaults) until nothing changes. Sets only grow where ways join, so a switch
+//! is never called off when it may be on.
+
+use super::syntax::{RapidTree, arguments};
+use super::token::same_name;
+use crate::program::motion::{Modal, Switch};
+
+/// The sets of states of all switches: three bits each, off, on, as at the entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct States(u32);
+
+/// The switches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Which {
+    /// ConfL.
+    ConfLinear,
+    /// ConfJ.
+    ConfJoint,
+    /// PDispOn, PDispSet, PDispOff.
+    Displacement,
+    /// EOffsOn, EOffsSet, EOffsOff.
+    ExternalOffset,
+    /// SingArea.
+    Wrist,
+    /// CirPathMode.
+    CirclePoint,
+    /// SyncMoveOn, SyncMoveOff.
+    Synchronised,
+    /// CorrCon, CorrDiscon.
+    Correction,
+    /// SoftAct, SoftDeact.
+    Soft,
+}
+
+const COUNT: u32 = 9;
+const OFF: u32 = 1;
+const ON: u32 = 2;
+const ENTRY: u32 = 4;
+
+const fn all(bits: u32) -> u32 {
+    let (mut out, mut index) = (0, 0);
+    while index < COUNT {
+        out |= bits << (3 * index);
+        index += 1;
+    }
+    out
+}
+
+impl States {
+    /// As at the entry of the routine.
+    pub const ENTRY: States = States(all(ENTRY));
+    /// Nothing: no way leads here.
+    pub const NONE: States = States(0);
+    /// After a start from main: configurations monitored, everything else off.
+    pub const START: States = States(all(OFF) & !(0o77) | ON | ON << 3);
+
+    /// On or off.
+    pub const ANY: States = States(all(OFF | ON));
+
+    /// Either.
+    pub fn or(self, other: States) -> States {
+        States(self.0 | other.0)
+    }
+
+    /// One switch set.
+    pub fn set(self, which: Which, on: bool) -> States {
+        let shift = 3 * which as u32;
+        States(self.0 & !(7 << shift) | if on { ON } else { OFF } << shift)
+    }
+
+    /// With "as at the entry" replaced by what the entry is.
+    pub fn entered(self, entry: States) -> States {
+        let mut out = 0;
+        for shift in (0..COUNT).map(|index| 3 * index) {
+            let mut bits = self.0 >> shift & 7;
+            if bits & ENTRY != 0 {
+                bits = bits & !ENTRY | entry.0 >> shift & 7;
+            }
+            out |= bits << shift;
+        }
+        States(out)
+    }
+
+    fn switch(self, which: Which) -> Switch {
+        match self.0 >> (3 * which as u32) & 3 {
+            OFF => Switch::Off,
+            ON => Switch::On,
+            _ => Switch::Either,
+        }
+    }
+
+    /// As the listing tells it.
+    pub fn modal(self) -> Modal {
+        let both = |a: Switch, b: Switch| match (a, b) {
+            (Switch::Off, Switch::Off) => Switch::Off,
+            (Switch::On, _) | (_, Switch::On) => Switch::On,
+            _ => Switch::Either,
+        };
+        Modal {
+            conf_linear: self.switch(Which::ConfLinear),
+            conf_joint: self.switch(Which::ConfJoint),
+            displacement: both(self.switch(Which::Displacement), self.switch(Which::ExternalOffset)),
+            wrist_interpolation: self.switch(Which::Wrist),
+            circle_point_orientation: self.switch(Which::CirclePoint),
+            synchronised: self.switch(Which::Synchronised),
+            sensor_guided: both(self.switch(Which::Correction), self.switch(Which::Soft)),
+        }
+    }
+}
+
+/// What an instruction sets.
+pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, bool)> {
+    if !matches!(name.first().map(|byte| byte | 32), Some(b'c' | b'p' | b'e' | b's')) {
+        return None;
+    }
+    let is = |text: &str| same_name(text.as_bytes(), name);
+    let option = |wanted: &[&str]| {
+        arguments(tree, call)
+            .filter_map(|argument| argument.name)
+            .any(|token| wanted.iter().any(|wanted| same_name(wanted.as_bytes(), tree.text(token))))
+    };
+    Some(if is("ConfL") {
+        (Which::ConfLinear, !option(&["Off"]))
+    } else if is("ConfJ") {
+        (Which::ConfJoint, !option(&["Off"]))
+    } else if is("PDispOn") || is("PDispSet") {
+        (Which::Displacement, true)
+    } else if is("PDispOff") {
+        (Which::Displacement, false)
+    } else if is("EOffsOn") || is("EOffsSet") {
+        (Which::ExternalOffset, true)
+    } else if is("EOffsOff") {
+        (Which::ExternalOffset, false)
+    } else if is("SingArea") {
+        (Which::Wrist, option(&["Wrist", "LockAxis4"]))
+    } else if is("CirPathMode") {
+        (Which::CirclePoint, option(&["CirPointOri"]))
+    } else if is("SyncMoveOn") {
+        (Which::Synchronised, true)
+    } else if is("SyncMoveOff") {
+        (Which::Synchronised, false)
+    } else if is("CorrCon") {
+        (Which::Correction, true)
+    } else if is("CorrDiscon") || is("CorrClear") {
+        (Which::Correction, false)
+    } else if is("SoftAct") {
+        (Which::Soft, true)
+    } else if is("SoftDeact") {
+        (Which::Soft, false)
+    } else {
+        return None;
+    })
+}

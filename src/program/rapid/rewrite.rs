@@ -1,0 +1,582 @@
+//! New values to edits of RAPID text.
+//!
+//! Where a target's numbers stand decides how it changes: a literal in the instruction in place; a declaration in
+//! place where every use agrees on the new value and nothing else reads it, else a clone beside it under a new name;
+//! an array element in place or as a literal in the instruction; a computed target as a literal in the instruction.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
+use super::mark;
+use super::print::{self, Fresh};
+use super::syntax::{RapidTree, arguments, tokens_of};
+use super::task::Task;
+use super::token::{Token, folded, keyword, same_name};
+use crate::program::edit::{EditError, Edits};
+use crate::program::motion::{Motion, MotionKind, Origin, Reason, Role, Span, TargetValue};
+use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+use crate::program::tree::Child;
+
+/// Names of data have at most so many characters.
+const NAME_LENGTH: usize = 32;
+
+impl Task<'_> {
+    /// The edits that make the changes. Per file they are sorted and disjoint; [`Edits::apply`] makes the new bytes.
+    ///
+    /// A change of a motion that must be left ([`Motion::reason`]) is refused with that reason; two changes of one
+    /// motion would overlap and are an error.
+    pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
+        let mut rewriter = Rewriter {
+            task: self,
+            options,
+            edits: vec![Edits::new(); self.trees.len()],
+            names: None,
+            moved_bases: HashSet::new(),
+        };
+        let outcomes = rewriter.all(changes);
+        let mut files = Vec::with_capacity(self.trees.len());
+        for (edits, tree) in rewriter.edits.into_iter().zip(&self.trees) {
+            let mut file = FileEdits { edits, unmarked: false };
+            if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
+                let comment = mark::text(mark);
+                if let Some(old) = mark::token(tree) {
+                    file.edits.replace(tree.range(old, old + 1), comment.as_bytes());
+                } else if let Some(place) = mark::place(tree) {
+                    let line = [comment.as_bytes(), mark::line_end(tree.source())].concat();
+                    file.edits.insert(place, &line);
+                } else {
+                    file.unmarked = true;
+                }
+            }
+            file.edits.sort()?;
+            files.push(file);
+        }
+        Ok(Rewritten { files, outcomes })
+    }
+}
+
+/// One wish for a declared target: which change, which motion and target, which value.
+#[derive(Clone, Copy)]
+struct Wish {
+    change: usize,
+    motion: u32,
+    target: u32,
+    fresh: Fresh,
+}
+
+struct Rewriter<'r, 's> {
+    task: &'r Task<'s>,
+    options: &'r RewriteOptions,
+    edits: Vec<Edits>,
+    /// Every name in use, lower case, once a new one is needed.
+    names: Option<HashSet<Vec<u8>>>,
+    /// Declarations (with the first byte of the literal) that were edited in place.
+    moved_bases: HashSet<u32>,
+}
+
+impl Rewriter<'_, '_> {
+    fn all(&mut self, changes: &[Change]) -> Vec<Outcome> {
+        let task = self.task;
+        let mut outcomes: Vec<Outcome> = Vec::with_capacity(changes.len());
+        let mut wishes: BTreeMap<(u32, u32), Vec<Wish>> = BTreeMap::new();
+        let mut computed: Vec<Wish> = Vec::new();
+        for (index, change) in changes.iter().enumerate() {
+            let outcome = match task.listing.motions.get(change.motion as usize) {
+                None => Outcome::Refused(Reason::MissingArgument),
+                Some(motion) => match self.refusal(motion, change) {
+                    Some(reason) => Outcome::Refused(reason),
+                    None => self.one(index, motion, change, &mut wishes, &mut computed),
+                },
+            };
+            outcomes.push(outcome);
+        }
+        let replaced: HashSet<(u32, u32)> = computed.iter().map(|wish| (wish.motion, wish.target)).collect();
+        for ((declaration, _), wishes) in wishes {
+            self.declared(declaration, &wishes, &replaced, &mut outcomes);
+        }
+        self.computed(&computed, &mut outcomes);
+        for (change, outcome) in changes.iter().zip(&mut outcomes) {
+            if !change.before.is_empty() && !matches!(outcome, Outcome::Refused(_)) {
+                self.extras(change);
+                if *outcome == Outcome::Unchanged {
+                    *outcome = Outcome::InPlace;
+                }
+            }
+        }
+        outcomes
+    }
+
+    /// Why a change cannot be made.
+    fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
+        if let Some(reason) = motion.reason() {
+            return Some(reason);
+        }
+        let instruction = self.instruction(motion);
+        for (target, new) in motion.targets.iter().zip(&change.targets) {
+            let Ok(value) = &target.value else { continue };
+            match (new, value) {
+                (NewTarget::Cartesian { .. }, TargetValue::Joint(_)) => return Some(Reason::WrongKind),
+                (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
+                    if instruction.is_none_or(|instruction| instruction.joint_form.is_none()) =>
+                {
+                    return Some(Reason::NoJointForm);
+                }
+                _ => {}
+            }
+        }
+        if change.before.is_empty() {
+            return None;
+        }
+        let guarded = self.task.statements[change.motion as usize].guarded;
+        let between = instruction.map_or(Between::Nothing, |instruction| instruction.between);
+        if guarded || motion.timed || between == Between::Nothing {
+            return Some(Reason::NoInsertion);
+        }
+        for extra in &change.before {
+            match (extra.kind, &extra.target) {
+                (MotionKind::Linear | MotionKind::Joint, NewTarget::Cartesian { .. }) => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if between == Between::Plain => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) => return Some(Reason::NoJointForm),
+                _ => return Some(Reason::WrongKind),
+            }
+        }
+        None
+    }
+
+    fn instruction(&self, motion: &Motion) -> Option<&'static Instruction> {
+        instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
+    }
+
+    /// The targets of one motion: what stands in the instruction at once, the rest for later.
+    fn one(
+        &mut self,
+        index: usize,
+        motion: &Motion,
+        change: &Change,
+        wishes: &mut BTreeMap<(u32, u32), Vec<Wish>>,
+        computed: &mut Vec<Wish>,
+    ) -> Outcome {
+        let mut outcome = Outcome::Unchanged;
+        for (position, (target, new)) in motion.targets.iter().zip(&change.targets).enumerate() {
+            let Some(fresh) = fresh(new) else { continue };
+            let Ok(old) = target.value else { continue };
+            let (motion_index, position) = (change.motion, position as u32);
+            let wish = Wish { change: index, motion: motion_index, target: position, fresh };
+            if matches!((&fresh, &old), (Fresh::Joint { .. }, TargetValue::Cartesian(_))) {
+                self.to_joints(motion, target.argument, &old, &fresh);
+                outcome = worse(outcome, Outcome::Inlined);
+                continue;
+            }
+            match target.origin {
+                Origin::Inline => {
+                    if self.literal(motion.place.file, target.argument, &old, &fresh) {
+                        outcome = worse(outcome, Outcome::InPlace);
+                    }
+                }
+                Origin::Declared(declaration) => {
+                    wishes.entry((declaration, 0)).or_default().push(wish);
+                }
+                Origin::Element { declaration, literal } => {
+                    wishes.entry((declaration, literal.start)).or_default().push(wish);
+                }
+                Origin::Computed => computed.push(wish),
+                Origin::Unknown => {}
+            }
+        }
+        outcome
+    }
+
+    /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers.
+    fn literal(&mut self, file: u32, span: Span, old: &TargetValue, fresh: &Fresh) -> bool {
+        let text = &self.task.trees[file as usize].source()[span.range()];
+        let edits = &mut self.edits[file as usize];
+        match print::replace_numbers(text, span.start as usize, fresh, self.options, edits) {
+            Some(changed) => changed,
+            None if print::changes(old, fresh, self.options) => {
+                let value = print::merged(old, fresh);
+                edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn inline(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+        let value = print::merged(old, fresh);
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+    }
+
+    /// The instruction becomes the one that takes joints.
+    fn to_joints(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+        let Some(name) = self.instruction(motion).and_then(|instruction| instruction.joint_form) else {
+            return;
+        };
+        let start = motion.statement.start as usize;
+        self.edits[motion.place.file as usize]
+            .replace(start..start + motion.instruction.len(), name.as_bytes());
+        self.inline(motion, span, old, fresh);
+    }
+
+    // ---- declarations ----
+
+    /// The wishes for one declared target or array element.
+    fn declared(
+        &mut self,
+        index: u32,
+        wishes: &[Wish],
+        replaced: &HashSet<(u32, u32)>,
+        outcomes: &mut [Outcome],
+    ) {
+        let task = self.task;
+        let declaration = &task.listing.declarations[index as usize];
+        let target = |wish: &Wish| &task.listing.motions[wish.motion as usize].targets[wish.target as usize];
+        let Some(first) = wishes.first() else { return };
+        let Ok(old) = target(first).value else { return };
+        let literal = match target(first).origin {
+            Origin::Element { literal, .. } => literal,
+            _ => declaration.literal.unwrap_or_default(),
+        };
+        // Wishes that come to the same text.
+        let mut groups: Vec<(Vec<u8>, Vec<&Wish>)> = Vec::new();
+        let mut group_of: HashMap<Vec<u8>, usize> = HashMap::new();
+        let source = task.trees[declaration.place.file as usize].source();
+        let original = source[literal.range()].to_vec();
+        for wish in wishes {
+            let text = self.written(&original, &old, &wish.fresh);
+            let group = *group_of.entry(text.clone()).or_insert_with(|| {
+                groups.push((text, Vec::new()));
+                groups.len() - 1
+            });
+            groups[group].1.push(wish);
+        }
+        // Whoever else needs the old value.
+        let wished: HashSet<(u32, u32)> = wishes.iter().map(|wish| (wish.motion, wish.target)).collect();
+        let others_hold = declaration.uses.iter().any(|user| {
+            let same = match task.listing.motions[user.0 as usize].targets[user.1 as usize].origin {
+                Origin::Element { literal: other, .. } => other == literal,
+                _ => true,
+            };
+            same && !wished.contains(user)
+        }) || declaration
+            .other_uses
+            .iter()
+            .any(|other| other.motion.is_none_or(|user| !replaced.contains(&user)))
+            || groups.iter().any(|(text, _)| *text == original);
+        let mut free = !others_hold;
+        for (text, group) in groups {
+            if text == original {
+                continue;
+            }
+            let outcome = if free {
+                free = false;
+                self.literal(declaration.place.file, literal, &old, &group[0].fresh);
+                self.moved_bases.insert(index);
+                Outcome::InPlace
+            } else if declaration.array {
+                for wish in &group {
+                    let motion = &task.listing.motions[wish.motion as usize];
+                    self.inline(motion, target(wish).argument, &old, &wish.fresh);
+                }
+                Outcome::Inlined
+            } else {
+                let name = self.clone_of(index, &text);
+                for wish in &group {
+                    let motion = &task.listing.motions[wish.motion as usize];
+                    let edits = &mut self.edits[motion.place.file as usize];
+                    edits.replace(target(wish).argument.range(), name.as_bytes());
+                }
+                Outcome::Split(name)
+            };
+            for wish in group {
+                let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
+                outcomes[wish.change] = worse(was, outcome.clone());
+            }
+        }
+    }
+
+    /// The text of a literal with new values.
+    fn written(&self, text: &[u8], old: &TargetValue, fresh: &Fresh) -> Vec<u8> {
+        let mut edits = Edits::new();
+        match print::replace_numbers(text, 0, fresh, self.options, &mut edits) {
+            Some(_) => edits.apply(text).unwrap_or_else(|_| text.to_vec()),
+            None if print::changes(old, fresh, self.options) => {
+                let mut out = Vec::new();
+                print::literal(&mut out, &print::merged(old, fresh), self.options);
+                out
+            }
+            None => text.to_vec(),
+        }
+    }
+
+    /// Declares a constant with this value beside a declaration; answers its name.
+    fn clone_of(&mut self, index: u32, literal: &[u8]) -> String {
+        let declaration = &self.task.listing.declarations[index as usize];
+        let file = declaration.place.file as usize;
+        let tree = &self.task.trees[file];
+        let source = tree.source();
+        let name = self.new_name(&declaration.name);
+        let statement = &source[declaration.statement.range()];
+        let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
+        let joints = matches!(super::literal::numbers(literal, super::literal::ROBTARGET), None);
+        // After the declaration, and after a comment that stands behind it on its line.
+        let end = declaration.statement.end as usize;
+        let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);
+        let rest = source[end..line].trim_ascii();
+        let at = if rest.is_empty() || rest[0] == b'!' {
+            end + source[end..line].trim_ascii_end().len()
+        } else {
+            end
+        };
+        let mut text = mark::line_end(source).to_vec();
+        text.extend_from_slice(indent(source, declaration.statement.start as usize));
+        text.extend_from_slice(if local { b"LOCAL CONST " } else { b"CONST " });
+        text.extend_from_slice(if joints { b"jointtarget " } else { b"robtarget " });
+        text.extend_from_slice(name.as_bytes());
+        text.extend_from_slice(b":=");
+        text.extend_from_slice(literal);
+        text.push(b';');
+        self.edits[file].insert(at, &text);
+        name
+    }
+
+    /// `p10` to `p10_2`, `p10_3`, …: of at most 32 characters, and like no other name of the task.
+    fn new_name(&mut self, like: &str) -> String {
+        let task = self.task;
+        let names = self.names.get_or_insert_with(|| {
+            let mut names: HashSet<Vec<u8>> = task.symbols.names().map(<[u8]>::to_vec).collect();
+            for tree in &task.trees {
+                for token in 0..tree.len() as u32 {
+                    if tree.kind(token) == Some(Token::Ident) {
+                        names.insert(folded(tree.text(token)));
+                    }
+                }
+            }
+            names
+        });
+        // New text is ASCII, whatever encoding the file has.
+        let stem: String = like.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let stem =
+            if stem.starts_with(|c: char| c.is_ascii_alphabetic()) { stem } else { format!("p{stem}") };
+        let mut number = 2_u64;
+        loop {
+            let tail = format!("_{number}");
+            let head = &stem[..stem.len().min(NAME_LENGTH - tail.len())];
+            let name = format!("{head}{tail}");
+            if keyword(name.as_bytes()).is_none() && names.insert(folded(name.as_bytes())) {
+                return name;
+            }
+            number += 1;
+        }
+    }
+
+    // ---- computed targets ----
+
+    fn computed(&mut self, wishes: &[Wish], outcomes: &mut [Outcome]) {
+        let task = self.task;
+        // A target computed from a declaration that has moved must be written out even where it itself stays.
+        let mut forced: HashSet<(u32, u32)> = HashSet::new();
+        for (index, declaration) in task.listing.declarations.iter().enumerate() {
+            if self.moved_bases.contains(&(index as u32)) {
+                forced.extend(declaration.other_uses.iter().filter_map(|other| other.motion));
+            }
+        }
+        for wish in wishes {
+            let motion = &task.listing.motions[wish.motion as usize];
+            let target = &motion.targets[wish.target as usize];
+            let Ok(old) = target.value else { continue };
+            if !print::changes(&old, &wish.fresh, self.options)
+                && !forced.contains(&(wish.motion, wish.target))
+            {
+                continue;
+            }
+            self.inline(motion, target.argument, &old, &wish.fresh);
+            let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
+            outcomes[wish.change] = worse(was, Outcome::Inlined);
+        }
+    }
+
+    // ---- extra motions ----
+
+    fn extras(&mut self, change: &Change) {
+        let motion = &self.task.listing.motions[change.motion as usize];
+        let Some(instruction) = self.instruction(motion) else { return };
+        let tree = &self.task.trees[motion.place.file as usize];
+        let source = tree.source();
+        let start = motion.statement.start as usize;
+        let parts = Parts::of(tree, self.task.statements[change.motion as usize].node, instruction);
+        let mut text = Vec::new();
+        for extra in &change.before {
+            self.extra(&mut text, motion, instruction, tree, &parts, extra);
+            text.extend_from_slice(mark::line_end(source));
+            text.extend_from_slice(indent(source, start));
+        }
+        self.edits[motion.place.file as usize].insert(start, &text);
+    }
+
+    fn extra(
+        &self,
+        out: &mut Vec<u8>,
+        motion: &Motion,
+        instruction: &Instruction,
+        tree: &RapidTree<'_>,
+        parts: &Parts,
+        extra: &Extra,
+    ) {
+        let (Some(fresh), Some(Ok(old))) = (fresh(&extra.target), motion.to().map(|target| target.value))
+        else {
+            return;
+        };
+        let mut value = print::merged(&old, &fresh);
+        if let Some(external) = extra.external {
+            match &mut value {
+                TargetValue::Cartesian(target) => target.external = external,
+                TargetValue::Joint(target) => target.external = external,
+            }
+        }
+        let source = tree.source();
+        let mut target = Vec::new();
+        print::literal(&mut target, &value, self.options);
+        let same = match instruction.between {
+            Between::Same => Some(instruction.name),
+            Between::Other(name) => Some(name),
+            Between::Plain | Between::Nothing => None,
+        };
+        let Some(name) = same else {
+            let name: &[u8] = match extra.kind {
+                MotionKind::Joint => b"MoveJ",
+                MotionKind::AbsoluteJoint => b"MoveAbsJ",
+                _ => b"MoveL",
+            };
+            out.extend_from_slice(name);
+            out.push(b' ');
+            out.extend_from_slice(&target);
+            out.push(b',');
+            for (index, part) in [&parts.speed, &parts.zone, &parts.tool].into_iter().enumerate() {
+                if index == 1 {
+                    out.extend_from_slice(self.options.extra_zone.as_bytes());
+                    out.push(b',');
+                } else if let Some(span) = part {
+                    out.extend_from_slice(&source[span.range()]);
+                    if index == 0 {
+                        for option in &parts.speed_options {
+                            out.extend_from_slice(&source[option.range()]);
+                        }
+                        out.push(b',');
+                    }
+                }
+            }
+            for option in &parts.tool_options {
+                out.extend_from_slice(&source[option.range()]);
+            }
+            out.push(b';');
+            return;
+        };
+        // The same instruction, with another target and a fly-by zone.
+        let statement = &source[motion.statement.range()];
+        let base = motion.statement.start as usize;
+        let mut edits = Edits::new();
+        edits.replace(0..motion.instruction.len(), name.as_bytes());
+        if let Some(to) = motion.targets.iter().find(|target| target.role == Role::To) {
+            let range = to.argument.range();
+            edits.replace(range.start - base..range.end - base, &target);
+        }
+        if let Some(zone) = parts.zone {
+            let range = zone.range();
+            edits.replace(range.start - base..range.end - base, self.options.extra_zone.as_bytes());
+        }
+        for option in &parts.stop_options {
+            let range = option.range();
+            edits.replace(range.start - base..range.end - base, b"");
+        }
+        if let Ok(copy) = edits.apply(statement) {
+            out.extend_from_slice(&copy);
+        }
+    }
+}
+
+/// The arguments of an instruction that extra motions take over.
+#[derive(Default)]
+struct Parts {
+    speed: Option<Span>,
+    zone: Option<Span>,
+    tool: Option<Span>,
+    /// `\V`.
+    speed_options: Vec<Span>,
+    /// `\WObj`, `\TLoad`.
+    tool_options: Vec<Span>,
+    /// `\Inpos`, `\Z`: belong to the stop at the end.
+    stop_options: Vec<Span>,
+}
+
+impl Parts {
+    fn of(tree: &RapidTree<'_>, node: u32, instruction: &Instruction) -> Parts {
+        let mut parts = Parts::default();
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let span = |child: Child| {
+            let (first, end) = tokens_of(tree, child);
+            tree.span(first, end)
+        };
+        let mut index = 0;
+        for argument in arguments(tree, node) {
+            if argument.optional {
+                let Some(name) = argument.name else { continue };
+                let end = argument.value.map_or(name + 1, |value| tokens_of(tree, value).1);
+                // From the backslash before the name.
+                let mut first = name;
+                while first > 0 && tree.kind(first) != Some(Token::Backslash) {
+                    first -= 1;
+                }
+                let option = tree.span(first, end);
+                let is = |wanted: &[u8]| same_name(tree.text(name), wanted);
+                if is(b"V") {
+                    parts.speed_options.push(option);
+                } else if is(b"WObj") || is(b"TLoad") {
+                    parts.tool_options.push(option);
+                } else if is(b"Inpos") || is(b"Z") {
+                    parts.stop_options.push(option);
+                }
+                continue;
+            }
+            let slot = instruction.slot(index, count);
+            index += 1;
+            let Some(value) = argument.value else { continue };
+            match slot {
+                Some(Slot::Speed) => parts.speed = Some(span(value)),
+                Some(Slot::Zone) => parts.zone = Some(span(value)),
+                Some(Slot::Tool) => parts.tool = Some(span(value)),
+                _ => {}
+            }
+        }
+        parts
+    }
+}
+
+fn fresh(new: &NewTarget) -> Option<Fresh> {
+    match *new {
+        NewTarget::Keep => None,
+        NewTarget::Cartesian { position_mm, quaternion, conf } => {
+            Some(Fresh::Cartesian { position_mm, quaternion, conf })
+        }
+        NewTarget::Joint { robot_deg } => Some(Fresh::Joint { robot_deg }),
+    }
+}
+
+/// The outcome that says more.
+fn worse(a: Outcome, b: Outcome) -> Outcome {
+    let rank = |outcome: &Outcome| match outcome {
+        Outcome::Unchanged => 0,
+        Outcome::InPlace => 1,
+        Outcome::Split(_) => 2,
+        Outcome::Inlined => 3,
+        Outcome::Refused(_) => 4,
+    };
+    if rank(&b) > rank(&a) { b } else { a }
+}
+
+/// The white space before a statement on its line.
+fn indent(source: &[u8], statement: usize) -> &[u8] {
+    let line = source[..statement].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+    let blank = source[line..statement].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+    &source[line..line + blank]
+}

@@ -1,0 +1,799 @@
+//! From files to the listing: every motion with its targets, speed, zone, tool and work object.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::evaluate::{Context, Evaluator, Source};
+use super::flow::{CallSite, State, Surroundings, Visitor, walk};
+use super::instruction::{self, INSTRUCTIONS, Instruction, Slot};
+use super::literal;
+use super::mark;
+use super::modal::States;
+use super::parser::parse;
+use super::symbol::{Symbols, Unit, What, only_reads};
+use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
+use super::token::{Token, display, folded, same_name};
+use super::value::Value;
+use crate::program::motion::{
+    Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, OtherUse, Place, Reason,
+    Role, Routine, Speed, Switch, Tool, WorkObject, Zone,
+};
+use crate::program::tree::Child;
+
+/// The RAPID modules of one task, read together.
+#[derive(Debug)]
+pub struct Task<'s> {
+    /// The names of the files, as given.
+    pub names: Vec<String>,
+    /// The files, as trees.
+    pub trees: Vec<RapidTree<'s>>,
+    /// Their names.
+    pub symbols: Symbols,
+    /// What they tell the robot to do.
+    pub listing: Listing,
+    /// The statement of each motion.
+    pub(super) statements: Vec<Statement>,
+}
+
+/// Where a motion stands in the tree.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Statement {
+    /// Its node.
+    pub(super) node: u32,
+    /// Whether a compact IF guards it alone.
+    pub(super) guarded: bool,
+}
+
+impl<'s> Task<'s> {
+    /// Reads files, given by name and bytes, as one task. Never fails: what cannot be read is listed.
+    pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
+        let trees: Vec<_> = files.iter().map(|(_, bytes)| parse(bytes)).collect();
+        let symbols = Symbols::gather(&trees);
+        let (listing, statements) = Lister::new(&trees, &symbols).listing();
+        let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
+        Task { names, trees, symbols, listing, statements }
+    }
+}
+
+/// What is looked up by name again and again.
+#[derive(Debug, Default)]
+struct Cached<'s> {
+    last: Option<(u32, &'s [u8], u32)>,
+    all: HashMap<(u32, &'s [u8]), u32>,
+}
+
+impl<'s> Cached<'s> {
+    fn get(&mut self, scope: u32, text: &'s [u8]) -> Option<u32> {
+        if let Some((last_scope, last_text, index)) = self.last
+            && last_scope == scope
+            && last_text == text
+        {
+            return Some(index);
+        }
+        let index = *self.all.get(&(scope, text))?;
+        self.last = Some((scope, text, index));
+        Some(index)
+    }
+
+    fn put(&mut self, scope: u32, text: &'s [u8], index: u32) {
+        self.all.insert((scope, text), index);
+        self.last = Some((scope, text, index));
+    }
+}
+
+struct Lister<'a, 's> {
+    trees: &'a [RapidTree<'s>],
+    symbols: &'a Symbols,
+    evaluator: Evaluator<'a, 's>,
+    listing: Listing,
+    statements: Vec<Statement>,
+    /// The switches at each motion, "as at the entry" included.
+    modal: Vec<States>,
+    /// The unit of each motion.
+    units: Vec<u32>,
+    unit: u32,
+    sites: Vec<(u32, CallSite)>,
+    exits: Vec<Option<States>>,
+    depth: u32,
+    /// While only the exit of a routine is asked for.
+    silent: bool,
+    names: Vec<Option<Arc<str>>>,
+    routines: HashMap<u32, u32>,
+    declarations: HashMap<u32, u32>,
+    speeds: Cached<'s>,
+    zones: Cached<'s>,
+    tools: Cached<'s>,
+    work_objects: Cached<'s>,
+    late_calls: bool,
+}
+
+/// How deeply exits of routines are followed through calls; beyond, anything may be set.
+const CALL_DEPTH: u32 = 12;
+
+impl<'a, 's> Lister<'a, 's> {
+    fn new(trees: &'a [RapidTree<'s>], symbols: &'a Symbols) -> Self {
+        Lister {
+            trees,
+            symbols,
+            evaluator: Evaluator::new(trees, symbols),
+            listing: Listing::default(),
+            statements: Vec::new(),
+            modal: Vec::new(),
+            units: Vec::new(),
+            unit: 0,
+            sites: Vec::new(),
+            exits: vec![None; symbols.routines.len()],
+            depth: 0,
+            silent: false,
+            names: vec![None; INSTRUCTIONS.len()],
+            routines: HashMap::new(),
+            declarations: HashMap::new(),
+            speeds: Cached::default(),
+            zones: Cached::default(),
+            tools: Cached::default(),
+            work_objects: Cached::default(),
+            late_calls: false,
+        }
+    }
+
+    fn place(&self, file: u32, token: u32) -> Place {
+        let tree = &self.trees[file as usize];
+        let (line, column) = tree.line_column(tree.start(token));
+        Place { file, line, column }
+    }
+
+    fn listing(mut self) -> (Listing, Vec<Statement>) {
+        for (file, tree) in self.trees.iter().enumerate() {
+            self.listing.marks.push(mark::find(tree));
+            for opaque in &tree.opaque {
+                self.listing.opaque.push(OpaqueRegion {
+                    place: self.place(file as u32, opaque.at.min(tree.len() as u32)),
+                    span: tree.span(opaque.first, opaque.end),
+                    reason: opaque.reason,
+                });
+            }
+        }
+        let units = self.symbols.units.clone();
+        for (index, unit) in units.iter().enumerate() {
+            self.unit = index as u32;
+            let evaluator = Evaluator::new(self.trees, self.symbols);
+            let exit = walk(&evaluator, *unit, &mut self);
+            if let Some(routine) = unit.routine {
+                self.exits[routine as usize] = Some(exit);
+            }
+        }
+        self.settle_modal();
+        self.other_uses();
+        (self.listing, self.statements)
+    }
+
+    // ---- switches ----
+
+    /// Replaces "as at the entry" by what the entries are.
+    fn settle_modal(&mut self) {
+        let units = &self.symbols.units;
+        let seen = self
+            .modal
+            .iter()
+            .chain(self.sites.iter().map(|(_, site)| &site.modal))
+            .chain(self.exits.iter().flatten())
+            .fold(States::NONE, |all, states| all.or(*states))
+            .entered(States::NONE);
+        let unit_of: HashMap<u32, u32> = units
+            .iter()
+            .enumerate()
+            .filter_map(|(index, unit)| unit.routine.map(|routine| (routine, index as u32)))
+            .collect();
+        let mut called = vec![false; units.len()];
+        for (_, site) in &self.sites {
+            if let Some(&unit) = unit_of.get(&site.routine) {
+                called[unit as usize] = true;
+            }
+        }
+        let mut entries: Vec<States> = units
+            .iter()
+            .zip(&called)
+            .map(|(unit, &called)| {
+                let main = unit.routine.is_none_or(|routine| {
+                    let routine = &self.symbols.routines[routine as usize];
+                    let tree = &self.trees[routine.file as usize];
+                    same_name(tree.text(routine.head.name), b"main")
+                });
+                let trap = unit
+                    .routine
+                    .is_some_and(|routine| self.symbols.routines[routine as usize].head.kind == Syntax::Trap);
+                match (main, called && !self.late_calls && !trap) {
+                    (true, _) => States::START,
+                    (false, true) => States::NONE,
+                    // Nothing in these files calls it: it may start in any state that they can bring about.
+                    (false, false) => States::START.or(seen),
+                }
+            })
+            .collect();
+        loop {
+            let mut changed = false;
+            for (unit, site) in &self.sites {
+                let Some(&callee) = unit_of.get(&site.routine) else { continue };
+                let arriving = site.modal.entered(entries[*unit as usize]);
+                let joined = entries[callee as usize].or(arriving);
+                changed |= joined != entries[callee as usize];
+                entries[callee as usize] = joined;
+            }
+            if !changed {
+                break;
+            }
+        }
+        for ((motion, modal), unit) in self.listing.motions.iter_mut().zip(&self.modal).zip(&self.units) {
+            motion.modal = modal.entered(entries[*unit as usize]).modal();
+            if motion.left.is_none() {
+                motion.left = left_by_modal(motion);
+            }
+        }
+    }
+
+    // ---- motions ----
+
+    fn name_of(&mut self, known: usize) -> Arc<str> {
+        self.names[known].get_or_insert_with(|| INSTRUCTIONS[known].name.into()).clone()
+    }
+
+    fn routine_of(&mut self, unit: Unit) -> Option<u32> {
+        let routine = unit.routine?;
+        if let Some(&index) = self.routines.get(&routine) {
+            return Some(index);
+        }
+        let scope = &self.symbols.routines[routine as usize];
+        let tree = &self.trees[scope.file as usize];
+        self.listing.routines.push(Routine {
+            name: display(tree.text(scope.head.name)),
+            module: scope.module.clone(),
+            place: self.place(scope.file, scope.head.name),
+        });
+        let index = self.listing.routines.len() as u32 - 1;
+        self.routines.insert(routine, index);
+        Some(index)
+    }
+
+    fn motion(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings) -> Motion {
+        let tree = &self.trees[unit.file as usize];
+        Motion {
+            place: self.place(unit.file, tree.nodes[node as usize].first),
+            statement: tree.node_span(node),
+            instruction: "".into(),
+            kind: MotionKind::Unknown,
+            targets: Vec::new(),
+            speed: None,
+            zone: None,
+            tool: None,
+            work_object: None,
+            timed: false,
+            modal: crate::program::motion::Modal::START,
+            in_loop: around.in_loop,
+            conditional: around.conditional,
+            previous: state.previous,
+            routine: self.routine_of(unit),
+            left: None,
+        }
+    }
+
+    fn target(
+        &mut self,
+        unit: Unit,
+        state: &State,
+        argument: Child,
+        joints: bool,
+        role: Role,
+    ) -> MotionTarget {
+        let tree = &self.trees[unit.file as usize];
+        let context = Context::new(unit.file, unit.scope, &state.known);
+        let (value, source) = self.evaluator.target(context, argument, joints);
+        let (first, end) = tokens_of(tree, argument);
+        let origin = match source {
+            Source::Inline => Origin::Inline,
+            Source::Computed => Origin::Computed,
+            Source::Unknown => Origin::Unknown,
+            Source::Symbol(symbol) => Origin::Declared(self.declaration(symbol)),
+            Source::Element(symbol, literal) => {
+                Origin::Element { declaration: self.declaration(symbol), literal }
+            }
+        };
+        MotionTarget { role, value, origin, argument: tree.span(first, end) }
+    }
+
+    fn declaration(&mut self, symbol: u32) -> u32 {
+        if let Some(&index) = self.declarations.get(&symbol) {
+            return index;
+        }
+        let found = &self.symbols.symbols[symbol as usize];
+        let tree = &self.trees[found.file as usize];
+        let data = match &found.what {
+            What::Data(data) => Some(data),
+            _ => None,
+        };
+        self.listing.declarations.push(Declaration {
+            name: display(tree.text(found.name)),
+            place: self.place(found.file, found.name),
+            statement: data.map(|data| tree.node_span(data.node)).unwrap_or_default(),
+            literal: data.and_then(|data| data.value).map(|value| {
+                let (first, end) = tokens_of(tree, value);
+                tree.span(first, end)
+            }),
+            array: data.is_some_and(|data| data.dimensions.is_some()),
+            uses: Vec::new(),
+            other_uses: Vec::new(),
+        });
+        let index = self.listing.declarations.len() as u32 - 1;
+        self.declarations.insert(symbol, index);
+        index
+    }
+
+    /// A motion instruction of the table.
+    fn known(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings, known: usize) -> Motion {
+        let tree = &self.trees[unit.file as usize];
+        let instruction: &Instruction = &INSTRUCTIONS[known];
+        let mut motion = self.motion(unit, node, state, around);
+        motion.instruction = self.name_of(known);
+        motion.kind = instruction.kind;
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let (mut index, mut work_object, mut has_tool) = (0, None, false);
+        let mut options = Options::default();
+        for argument in arguments(tree, node) {
+            if argument.optional {
+                options.note(tree, argument);
+                if argument.name.is_some_and(|name| same_name(tree.text(name), b"WObj")) {
+                    work_object = argument.value;
+                }
+                continue;
+            }
+            let slot = match argument.name.map(|name| tree.text(name)) {
+                None => instruction.slot(index, count),
+                Some(name) if same_name(name, b"ToPoint") || same_name(name, b"ToJointPos") => Some(Slot::To),
+                Some(name) if same_name(name, b"CirPoint") => Some(Slot::Via),
+                Some(name) if same_name(name, b"Speed") => Some(Slot::Speed),
+                Some(name) if same_name(name, b"Zone") => Some(Slot::Zone),
+                Some(name) if same_name(name, b"Tool") => Some(Slot::Tool),
+                Some(_) => None,
+            };
+            index += 1;
+            let Some(value) = argument.value else { continue };
+            match slot {
+                Some(Slot::To) => {
+                    let target = self.target(unit, state, value, instruction.takes_joints(), Role::To);
+                    motion.targets.push(target);
+                }
+                Some(Slot::Via) => motion.targets.push(self.target(unit, state, value, false, Role::Via)),
+                Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),
+                Some(Slot::Zone) => motion.zone = Some(self.zone(unit, state, value)),
+                Some(Slot::Tool) => {
+                    has_tool = true;
+                    motion.tool = Some(self.tool(unit, state, value));
+                }
+                _ => {}
+            }
+        }
+        motion.timed = options.timed;
+        if has_tool {
+            motion.work_object = Some(self.work_object(unit, state, work_object));
+        }
+        let to = motion.targets.iter().any(|target| target.role == Role::To);
+        let via = instruction.kind != MotionKind::Circular
+            || motion.targets.iter().any(|target| target.role == Role::Via);
+        motion.left = if instruction.kind == MotionKind::External {
+            Some(Reason::ExternalOnly)
+        } else if !to || !via || count < instruction.least() {
+            Some(Reason::MissingArgument)
+        } else if instruction.sensor_guided || options.corrected {
+            Some(Reason::SensorGuided)
+        } else if options.synchronised {
+            Some(Reason::Synchronised)
+        } else if instruction.kind == MotionKind::AbsoluteJoint {
+            None
+        } else {
+            self.left_by_frames(&motion)
+        };
+        motion
+    }
+
+    fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
+        let tool = match self.listing.tool(motion).map(|tool| &tool.value) {
+            Some(Ok(tool)) => tool,
+            Some(Err(_)) => return Some(Reason::ToolUnknown),
+            None => return Some(Reason::MissingArgument),
+        };
+        match self.listing.work_object(motion).map(|work_object| &work_object.value) {
+            Some(Ok(work_object)) if !work_object.fixed => Some(Reason::MovingWorkObject),
+            Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
+            Some(Ok(_)) => None,
+            _ => Some(Reason::WorkObjectUnknown),
+        }
+    }
+
+    /// A call that is no motion instruction of the table but takes a target.
+    fn other(&mut self, unit: Unit, node: u32, state: &State, around: Surroundings) -> Option<Motion> {
+        let tree = &self.trees[unit.file as usize];
+        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        let name = match parts(tree, node).nth(1).filter(|_| late) {
+            Some(expression) => text_of(tree, expression),
+            None => tree.text(tree.nodes[node as usize].first),
+        };
+        let routine = if late { None } else { self.symbols.routine(unit.scope, name) };
+        let mut found: Vec<(Child, bool)> = Vec::new();
+        if let Some(routine) = routine {
+            let routine = &self.symbols.routines[routine as usize];
+            let home = &self.trees[routine.file as usize];
+            let mut required = routine.head.parameters.iter().filter(|parameter| !parameter.optional);
+            for argument in arguments(tree, node) {
+                let parameter = match argument.name {
+                    None => required.next(),
+                    Some(option) => routine
+                        .head
+                        .parameters
+                        .iter()
+                        .find(|parameter| same_name(home.text(parameter.name), tree.text(option))),
+                };
+                let (Some(parameter), Some(value)) = (parameter, argument.value) else { continue };
+                if parameter.by_reference || parameter.array {
+                    continue;
+                }
+                let type_name = folded(home.text(parameter.type_name));
+                match self.symbols.resolved_type(routine.scope, &type_name) {
+                    b"robtarget" => found.push((value, false)),
+                    b"jointtarget" => found.push((value, true)),
+                    _ => {}
+                }
+            }
+        } else if !only_reads(name) || late {
+            for argument in arguments(tree, node) {
+                let Some(value) = argument.value else { continue };
+                if let Some(joints) = self.looks_like_target(unit, value) {
+                    found.push((value, joints));
+                }
+            }
+        }
+        if found.is_empty() {
+            return None;
+        }
+        let mut motion = self.motion(unit, node, state, around);
+        motion.instruction = display(name).into();
+        for (value, joints) in found {
+            let mut target = self.target(unit, state, value, joints, Role::To);
+            // Never rewritten here, so no declaration counts it as a motion's own use.
+            if let Origin::Declared(_) | Origin::Element { .. } = target.origin {
+                target.origin = Origin::Computed;
+            }
+            motion.targets.push(target);
+        }
+        motion.left = Some(match (late, routine) {
+            (true, _) => Reason::LateBinding,
+            (false, Some(_)) => Reason::OwnRoutine,
+            (false, None) => Reason::UnknownInstruction,
+        });
+        Some(motion)
+    }
+
+    /// Whether an argument is a target by its declared type or as a literal; says whether it is one of joints.
+    fn looks_like_target(&self, unit: Unit, value: Child) -> Option<bool> {
+        let tree = &self.trees[unit.file as usize];
+        match value {
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+                literal::numbers(tree.node_text(node), literal::ROBTARGET).map(|_| false)
+            }
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Function => {
+                let name = tree.text(tree.nodes[node as usize].first);
+                (same_name(name, b"Offs") || same_name(name, b"RelTool")).then_some(false)
+            }
+            Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {
+                let symbol = &self.symbols.symbols[self.symbols.root(tree, unit.scope, value)? as usize];
+                if matches!(&symbol.what, What::Data(data) if data.dimensions.is_some()) {
+                    return None;
+                }
+                match self.symbols.resolved_type(symbol.scope, &symbol.type_name) {
+                    b"robtarget" => Some(false),
+                    b"jointtarget" => Some(true),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
+
+    // ---- speed, zone, tool, work object ----
+
+    /// Whether a name or expression may have another value at another motion.
+    fn varies(&self, unit: Unit, value: Child) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        let (first, end) = tokens_of(tree, value);
+        (first..end).any(|token| {
+            tree.kind(token) == Some(Token::Ident)
+                && self
+                    .symbols
+                    .find(unit.scope, tree.text(token))
+                    .is_some_and(|symbol| self.symbols.symbols[symbol as usize].assigned)
+        })
+    }
+
+    fn evaluated(&self, unit: Unit, state: &State, value: Child) -> Value {
+        self.evaluator.value(Context::new(unit.file, unit.scope, &state.known), value)
+    }
+
+    fn speed(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.speeds.get(unit.scope, text) {
+            return index;
+        }
+        let speed = Speed { text: display(text), value: self.evaluated(unit, state, value).speed() };
+        let index = intern(&mut self.listing.speeds, speed);
+        if !self.varies(unit, value) {
+            self.speeds.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    fn zone(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.zones.get(unit.scope, text) {
+            return index;
+        }
+        let zone = Zone { text: display(text), value: self.evaluated(unit, state, value).zone() };
+        let index = intern(&mut self.listing.zones, zone);
+        if !self.varies(unit, value) {
+            self.zones.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    fn declared_at(&self, unit: Unit, value: Child) -> Option<Place> {
+        let tree = &self.trees[unit.file as usize];
+        let symbol = &self.symbols.symbols[self.symbols.root(tree, unit.scope, value)? as usize];
+        Some(self.place(symbol.file, symbol.name))
+    }
+
+    fn tool(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.tools.get(unit.scope, text) {
+            return index;
+        }
+        let tool = Tool {
+            name: display(text),
+            value: self.evaluated(unit, state, value).tool(),
+            place: self.declared_at(unit, value),
+        };
+        let index = intern(&mut self.listing.tools, tool);
+        if !self.varies(unit, value) {
+            self.tools.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
+        let text: &'s [u8] = match value {
+            Some(value) => text_of(&self.trees[unit.file as usize], value),
+            None => b"wobj0",
+        };
+        // Without an argument it is wobj0 in every scope, whatever a scope calls by that name.
+        let scope = if value.is_some() { unit.scope } else { u32::MAX };
+        if let Some(index) = self.work_objects.get(scope, text) {
+            return index;
+        }
+        let work_object = WorkObject {
+            name: display(text),
+            value: match value {
+                Some(value) => self.evaluated(unit, state, value).work_object(),
+                None => super::value::built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
+            },
+            place: value.and_then(|value| self.declared_at(unit, value)),
+        };
+        let index = intern(&mut self.listing.work_objects, work_object);
+        if value.is_none_or(|value| !self.varies(unit, value)) {
+            self.work_objects.put(scope, text, index);
+        }
+        index
+    }
+
+    // ---- uses ----
+
+    /// Finds every use of the declared targets in the listing that is no motion's own target argument.
+    fn other_uses(&mut self) {
+        for (index, motion) in self.listing.motions.iter().enumerate() {
+            for (target_index, target) in motion.targets.iter().enumerate() {
+                if let Origin::Declared(declaration) | Origin::Element { declaration, .. } = target.origin {
+                    let uses = &mut self.listing.declarations[declaration as usize].uses;
+                    uses.push((index as u32, target_index as u32));
+                }
+            }
+        }
+        if self.declarations.is_empty() {
+            return;
+        }
+        // Names seldom begin and end as a target's does: most are turned away by one look.
+        let mut likely = vec![false; 1 << 16];
+        let hash = |text: &[u8]| {
+            let ends = [text[0], text[text.len() - 1]].map(|byte| usize::from(super::token::fold(byte)));
+            (ends[0] << 8 | ends[1]) ^ text.len() << 4 & 0xFFFF
+        };
+        for &symbol in self.declarations.keys().collect::<std::collections::BTreeSet<_>>() {
+            let symbol = &self.symbols.symbols[symbol as usize];
+            likely[hash(self.trees[symbol.file as usize].text(symbol.name))] = true;
+        }
+        // Own uses by the first byte of the argument; whatever else lies within a motion's argument is a base.
+        for (unit_index, unit) in self.symbols.units.iter().enumerate() {
+            let tree = &self.trees[unit.file as usize];
+            let motions: Vec<u32> = (0..self.listing.motions.len() as u32)
+                .filter(|&motion| self.units[motion as usize] == unit_index as u32)
+                .collect();
+            self.uses_in(*unit, tree, &motions, &likely, &hash);
+        }
+        self.uses_in_declarations(&likely, &hash);
+    }
+
+    fn uses_in(
+        &mut self,
+        unit: Unit,
+        tree: &RapidTree<'s>,
+        motions: &[u32],
+        likely: &[bool],
+        hash: &dyn Fn(&[u8]) -> usize,
+    ) {
+        let node = tree.nodes[unit.node as usize];
+        let mut next = 0;
+        for token in node.first..node.end {
+            if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
+                continue;
+            }
+            let Some(symbol) = self.symbols.find(unit.scope, tree.text(token)) else { continue };
+            let Some(&declaration) = self.declarations.get(&symbol) else { continue };
+            let found = &self.symbols.symbols[symbol as usize];
+            if found.file == unit.file && found.name == token {
+                continue;
+            }
+            let start = tree.start(token) as u32;
+            while motions
+                .get(next)
+                .is_some_and(|&motion| self.listing.motions[motion as usize].statement.end <= start)
+            {
+                next += 1;
+            }
+            let user = motions.get(next).and_then(|&index| {
+                let motion = &self.listing.motions[index as usize];
+                motion
+                    .targets
+                    .iter()
+                    .position(|target| (target.argument.start..target.argument.end).contains(&start))
+                    .map(|target| (index, target as u32))
+            });
+            let own = user.is_some_and(|(motion, target)| {
+                let target = &self.listing.motions[motion as usize].targets[target as usize];
+                matches!(target.origin, Origin::Declared(_) | Origin::Element { .. })
+                    && target.argument.start == start
+            });
+            if !own {
+                let computed = user.filter(|&(motion, target)| {
+                    let motion = &self.listing.motions[motion as usize];
+                    motion.kind != MotionKind::Unknown
+                        && motion.targets[target as usize].origin == Origin::Computed
+                });
+                let place = self.place(unit.file, token);
+                let uses = &mut self.listing.declarations[declaration as usize].other_uses;
+                uses.push(OtherUse { motion: computed, place });
+            }
+        }
+    }
+
+    /// Uses in the initial values of other declarations at module level.
+    fn uses_in_declarations(&mut self, likely: &[bool], hash: &dyn Fn(&[u8]) -> usize) {
+        for symbol in &self.symbols.symbols {
+            let What::Data(data) = &symbol.what else { continue };
+            let tree = &self.trees[symbol.file as usize];
+            let Some(value) = data.value else { continue };
+            let (first, end) = tokens_of(tree, value);
+            if end - first > 1
+                && tree.kinds()[first as usize..end as usize].iter().all(|&kind| kind != Token::Ident)
+            {
+                continue;
+            }
+            for token in first..end {
+                if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
+                    continue;
+                }
+                let Some(used) = self.symbols.find(symbol.scope, tree.text(token)) else { continue };
+                if let Some(&declaration) = self.declarations.get(&used) {
+                    let place = self.place(symbol.file, token);
+                    let uses = &mut self.listing.declarations[declaration as usize].other_uses;
+                    uses.push(OtherUse { motion: None, place });
+                }
+            }
+        }
+    }
+}
+
+impl Visitor for Lister<'_, '_> {
+    fn call(&mut self, unit: Unit, node: u32, state: &State, place: Surroundings) -> Option<u32> {
+        if self.silent {
+            return None;
+        }
+        let tree = &self.trees[unit.file as usize];
+        let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        self.late_calls |= late;
+        let name = tree.text(tree.nodes[node as usize].first);
+        let hidden = self.symbols.hides_instruction && self.symbols.routine(unit.scope, name).is_some();
+        let known = if late || hidden { None } else { instruction::find(name) };
+        let motion = match known {
+            Some(known) => self.known(unit, node, state, place, known),
+            None => self.other(unit, node, state, place)?,
+        };
+        self.listing.motions.push(motion);
+        self.statements.push(Statement { node, guarded: place.guarded });
+        self.modal.push(state.modal);
+        self.units.push(self.unit);
+        Some(self.listing.motions.len() as u32 - 1)
+    }
+
+    fn exit_of(&mut self, routine: u32) -> States {
+        if let Some(exit) = self.exits[routine as usize] {
+            return exit;
+        }
+        let anything = States::ENTRY.or(States::ANY);
+        if self.depth >= CALL_DEPTH {
+            return anything;
+        }
+        // While it is being followed, a routine that calls itself may end in any state.
+        self.exits[routine as usize] = Some(anything);
+        let unit = self.symbols.units.iter().find(|unit| unit.routine == Some(routine)).copied();
+        let Some(unit) = unit else { return anything };
+        let was = std::mem::replace(&mut self.silent, true);
+        self.depth += 1;
+        let evaluator = Evaluator::new(self.trees, self.symbols);
+        let exit = walk(&evaluator, unit, self);
+        self.depth -= 1;
+        self.silent = was;
+        self.exits[routine as usize] = Some(exit);
+        exit
+    }
+
+    fn called(&mut self, site: CallSite) {
+        if !self.silent {
+            self.sites.push((self.unit, site));
+        }
+    }
+}
+
+/// The optional arguments that decide whether a motion may be changed.
+#[derive(Default)]
+struct Options {
+    corrected: bool,
+    synchronised: bool,
+    timed: bool,
+}
+
+impl Options {
+    fn note(&mut self, tree: &RapidTree<'_>, argument: Argument) {
+        let Some(name) = argument.name.map(|name| tree.text(name)) else { return };
+        self.corrected |= same_name(name, b"Corr") || same_name(name, b"Track");
+        self.synchronised |= same_name(name, b"ID");
+        self.timed |= same_name(name, b"T") || same_name(name, b"Time");
+    }
+}
+
+fn left_by_modal(motion: &Motion) -> Option<Reason> {
+    if motion.modal.synchronised != Switch::Off {
+        Some(Reason::Synchronised)
+    } else if motion.modal.sensor_guided != Switch::Off {
+        Some(Reason::SensorGuided)
+    } else if motion.modal.displacement != Switch::Off && motion.kind != MotionKind::AbsoluteJoint {
+        Some(Reason::Displacement)
+    } else {
+        None
+    }
+}
+
+/// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost
+/// their square.
+fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    match list.iter().rev().take(256).position(|other| *other == item) {
+        Some(back) => (list.len() - 1 - back) as u32,
+        None => {
+            list.push(item);
+            list.len() as u32 - 1
+        }
+    }
+}
