@@ -490,7 +490,7 @@ impl Reporter<'_> {
             }
             (Some([w, x, y, z]), None) => {
                 let stated = Quaternion::new(w, x, y, z);
-                if !((stated.norm() - 1.0).abs() <= 1e-3) {
+                if stated.norm().is_nan() || (stated.norm() - 1.0).abs() > 1e-3 {
                     let found = format!("[{w}, {x}, {y}, {z}] of length {}", stated.norm());
                     let expected = "w, x, y, z of length 1";
                     return Err(self.value(

@@ -206,7 +206,7 @@ impl PathOptions {
             }
         }
         for (option, value) in [("lead_deg", self.lead_rad), ("tilt_deg", self.tilt_rad)] {
-            if !(value.abs() <= 80_f64.to_radians()) {
+            if value.is_nan() || value.abs() > 80_f64.to_radians() {
                 return refuse(option, value.to_degrees(), "an angle from -80 to 80 degrees");
             }
         }
@@ -252,9 +252,16 @@ struct Cut {
 /// [`PathOptions::LARGEST`] points, or a fixed direction of the tool's x axis that is along the tool.
 pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, SurfaceError> {
     options.check()?;
+    let curves = pattern::curves(surface, options)?;
+    // The chords of a few looks are no longer than the curve: what is refused here would surely be too long.
+    let least: f64 =
+        curves.iter().map(|curve| trace(surface, curve, curve.first_look() / 4)).map(total_mm).sum();
+    if least / options.max_step_mm > PathOptions::LARGEST as f64 {
+        return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+    }
     let mut passes = Vec::new();
     let mut count = 0;
-    for curve in pattern::curves(surface, options)? {
+    for curve in curves {
         for pass in cuts(surface, &curve, options, PathOptions::LARGEST - count)? {
             count += pass.len() + 2;
             if count > PathOptions::LARGEST {
@@ -269,6 +276,17 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     joined(surface, options, &passes)
 }
 
+/// The parts of a curve that lie on the surface, looked at in `looks` intervals.
+fn trace(surface: &Surface, curve: &pattern::Curve, looks: usize) -> Vec<Trace> {
+    let domain = surface.domain();
+    let point = |share: f64| surface.contact(domain.at(curve.place(share))).map(|c| c.position_mm);
+    Trace::runs(point, 0.0, 1.0, looks)
+}
+
+fn total_mm(runs: Vec<Trace>) -> f64 {
+    runs.iter().map(Trace::length_mm).sum()
+}
+
 /// The cuts along one curve; one list for each part of it that lies on the surface.
 fn cuts(
     surface: &Surface,
@@ -279,19 +297,13 @@ fn cuts(
     let domain = surface.domain();
     let steps = Steps { max_step_mm: options.max_step_mm, chord_mm: options.chord_mm };
     let contact = |share: f64| surface.contact(domain.at(curve.place(share)));
-    let point = |share: f64| contact(share).map(|c| c.position_mm);
-    let coarse = Trace::runs(point, 0.0, 1.0, curve.first_look());
-    let too_long = SurfaceError::TooLong { limit: PathOptions::LARGEST };
-    let length_mm: f64 = coarse.iter().map(Trace::length_mm).sum();
-    if length_mm / options.max_step_mm > room as f64 {
-        return Err(too_long);
-    }
+    let coarse = trace(surface, curve, curve.first_look());
     let gap_mm = coarse.iter().map(Trace::coarsest_mm).fold(0.0, f64::max);
     let finer = (8.0 * gap_mm / options.max_step_mm).ceil().max(1.0) as usize;
     let mut looks = (curve.first_look() * finer).min(FINEST);
     loop {
         let mut closest = usize::MAX;
-        let runs: Vec<(Trace, Vec<f64>)> = Trace::runs(point, 0.0, 1.0, looks)
+        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, looks)
             .into_iter()
             .map(|run| {
                 let (from, to) = (run.shares[0], run.shares[run.shares.len() - 1]);
@@ -307,7 +319,7 @@ fn cuts(
             })
             .collect();
         if runs.iter().map(|(_, shares)| shares.len()).sum::<usize>() > room {
-            return Err(too_long);
+            return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
         }
         // Steps of fewer than four looks are judged too coarsely: the chord error needs more, within reason.
         if closest < 4 && looks < FINEST.min(64 * curve.first_look() * finer) {

@@ -70,7 +70,11 @@ impl Implicit {
         let value = |z: f64| self.outward * self.f.value(&[x, y, z]);
         let height =
             |slice: usize| self.z_mm[1] + (self.z_mm[0] - self.z_mm[1]) * slice as f64 / Self::SLICES as f64;
-        let below = (1..=Self::SLICES).find(|s| value(height(s - 1)) > 0.0 && value(height(*s)) <= 0.0)?;
+        let mut above = value(self.z_mm[1]);
+        let below = (1..=Self::SLICES).find(|slice| {
+            let before = std::mem::replace(&mut above, value(height(*slice)));
+            before > 0.0 && above <= 0.0
+        })?;
         let (mut outside, mut inside) = (height(below - 1), height(below));
         let mut z = 0.5 * (outside + inside);
         for _ in 0..100 {

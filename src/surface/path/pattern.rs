@@ -110,10 +110,10 @@ pub(crate) fn curves(surface: &Surface, options: &PathOptions) -> Result<Vec<Cur
     };
     let sums = steps_across(surface, family, &options.spacing)?;
     let total = sums[ACROSS];
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return Err(SurfaceError::NoPass);
     }
-    if !(total < PathOptions::LARGEST as f64) {
+    if total >= PathOptions::LARGEST as f64 {
         return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
     }
     let places: Vec<f64> = (0..=ACROSS).map(|k| k as f64 / ACROSS as f64).collect();
