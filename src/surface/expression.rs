@@ -1,15 +1,16 @@
 //! The text of an equation: a small grammar with exact positions in front of symbolic derivatives.
 //!
-//! **Method.** The text is read by a grammar of our own, which knows where each character stands and binds as mathematics does
-//! (`-x^2` is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number). What it read is handed, with every pair of parentheses written out, to
-//! `exmex`, which differentiates it symbolically, twice, and evaluates it.
+//! **Method.** The text is read by a grammar of our own, which knows where each character stands and binds as
+//! mathematics does (`-x^2` is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number). What it read is handed, with every
+//! pair of parentheses written out, to `exmex`, which differentiates it symbolically, twice, and evaluates it.
 //!
-//! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused rows zero).
+//! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
+//! rows zero).
 //!
 //! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused.
 //!
-//! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a position; hence the grammar in
-//! front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
+//! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a
+//! position; hence the grammar in front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
 //!
 //! **Checked against.** Numerical differences of every function and operator, and the conventions above.
 //!

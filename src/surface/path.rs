@@ -1,17 +1,20 @@
 //! The path of a tool over a surface: passes, tool frames, approach, retract and links.
 //!
 //! **Method.** A pattern is a family of curves over the plan of the surface . The distance between neighbouring
-//! curves is the step-over, or follows from the scallop height ([`sampling`](super::sampling)); along a curve, points are as far apart as
-//! the chord error and the largest step allow. Each point gets a tool frame ([`frame`]). Passes are joined by a retract
-//! along the normal, a link that stays clear of the surface, and an approach along the normal .
+//! curves is the step-over, or follows from the scallop height ([`sampling`](super::sampling)); along a curve,
+//! points are as far apart as the chord error and the largest step allow. Each point gets a tool frame ([`frame`]).
+//! Passes are joined by a retract along the normal, a link that stays clear of the surface, and an approach along
+//! the normal .
 //!
-//! **Shapes.** A list of [`PathPoint`], in the order in which the tool visits them, in the surface's frame (the work object).
+//! **Shapes.** A list of [`PathPoint`], in the order in which the tool visits them, in the surface's frame (the
+//! work object).
 //!
-//! **Stops.** Never iterates without bound: the number of passes and points is known before they are made, and a path of
-//! more than [`PathOptions::LARGEST`] points is refused.
+//! **Stops.** Never iterates without bound: the number of passes and points is known before they are made, and a
+//! path of more than [`PathOptions::LARGEST`] points is refused.
 //!
-//! **Source and departures.** ltlm-2024, "Grinding compensation experiment", takes path points from the surface equation of the
-//! component and prints no more; pattern, spacing and frames here are the usual ones of computer-aided manufacturing.
+//! **Source and departures.** ltlm-2024, "Grinding compensation experiment", takes path points from the surface
+//! equation of the component and prints no more; pattern, spacing and frames here are the usual ones of
+//! computer-aided manufacturing.
 //!
 //! **Checked against.** The cusp measured between two neighbouring passes of a ball on a plane and on a cylinder, chord
 //! errors measured on the surface, frames right-handed and at the stated angle to the normal.
@@ -76,7 +79,8 @@ impl PathPoint {
 pub enum Pattern {
     /// Straight passes over the whole domain, side by side.
     Raster,
-    /// One curve from the middle outwards, over the ellipse inscribed in the domain, closed by a full turn along its rim.
+    /// One curve from the middle outwards, over the ellipse inscribed in the domain, closed by a full turn along
+    /// its rim.
     Spiral,
     /// Closed passes parallel to the border of the domain, from the border inwards.
     Contour,
@@ -107,8 +111,8 @@ pub enum Traverse {
 /// Where the tool's x axis points, about the tool's own z axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToolX {
-    /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about its z axis: the wrist
-    /// stays calm.
+    /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about
+    /// its z axis: the wrist stays calm.
     Fixed(Vector3<f64>),
     /// Along the feed.
     Feed,
@@ -117,7 +121,7 @@ pub enum ToolX {
 /// How far apart neighbouring passes are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spacing {
-    /// Largest distance on the surface [mm].
+    /// Largest distance on the surface in mm.
     StepOver {
         /// The distance.
         step_over_mm: f64,
@@ -142,23 +146,24 @@ pub struct PathOptions {
     pub traverse: Traverse,
     /// Distance of neighbouring passes.
     pub spacing: Spacing,
-    /// Largest distance of neighbouring points [mm].
+    /// Largest distance of neighbouring points in mm.
     pub max_step_mm: f64,
-    /// Largest distance of the surface curve from the straight line between neighbouring points [mm].
+    /// Largest distance of the surface curve from the straight line between neighbouring points in mm.
     pub chord_mm: f64,
-    /// Lead angle [rad]: positive leans the spindle towards the feed, about the cross-feed axis.
+    /// Lead angle in rad: positive leans the spindle towards the feed, about the cross-feed axis.
     pub lead_rad: f64,
-    /// Tilt angle [rad]: positive leans the spindle to the left of the feed (seen with the outward normal up), about the
-    /// feed direction.
+    /// Tilt angle in rad: positive leans the spindle to the left of the feed (seen with the outward normal up),
+    /// about the feed direction.
     pub tilt_rad: f64,
     /// Rule for the tool's x axis.
     pub tool_x: ToolX,
-    /// Height of approach, retract and link above the surface, along the normal [mm].
+    /// Height of approach, retract and link above the surface, along the normal in mm.
     pub approach_mm: f64,
 }
 
 impl Default for PathOptions {
-    /// A raster along the first coordinate, passes and points 5 mm apart, tool normal to the surface with x near the frame's x, 20 mm up.
+    /// A raster along the first coordinate, passes and points 5 mm apart, tool normal to the surface with x near
+    /// the frame's x, 20 mm up.
     fn default() -> Self {
         Self {
             pattern: Pattern::Raster,
@@ -232,8 +237,9 @@ struct Cut {
 
 /// The path that `options` describe over `surface`.
 ///
-/// Passes follow each other as approach, cuts, retract, then links where the straight way would come too close to the surface. A pass that leaves the
-/// surface (a hole in a mesh) is taken up again as a pass of its own. Quaternions are continuous in sign.
+/// Passes follow each other as approach, cuts, retract, then links where the straight way would come too close to
+/// the surface. A pass that leaves the surface (a hole in a mesh) is taken up again as a pass of its own.
+/// Quaternions are continuous in sign.
 ///
 /// ```
 /// use truegrind::surface::path::{self, PathOptions};
@@ -427,7 +433,8 @@ fn joined(
     Ok(points)
 }
 
-/// Part of the way from one orientation to another; a half turn, for which there is no shortest way, is made at its end.
+/// Part of the way from one orientation to another; a half turn, for which there is no shortest way, is made at its
+/// end.
 fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
     from.try_slerp(to, share, 1e-9).unwrap_or(*to)
 }

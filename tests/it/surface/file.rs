@@ -55,7 +55,8 @@ fn the_blade_lies_in_front_of_a_small_arm_and_the_tool_points_down() {
         let base_from_tool = file.work_object.base_from_work_object * cut.work_object_from_tool();
         let place = base_from_tool * Point3::origin();
         assert!((place - Point3::new(420.0, 0.0, 250.0)).norm() < 110.0);
-        // The wrist centre of an IRB 120 (flange 72 mm beyond it, upper and lower arm 270 and 310 mm from the shoulder at z = 290).
+        // The wrist centre of an IRB 120 (flange 72 mm beyond it, upper and lower arm 270 and 310 mm from the
+        // shoulder at z = 290).
         let wrist = base_from_tool * Point3::new(0.0, 0.0, -192.0);
         let reach = (wrist - Point3::new(0.0, 0.0, 290.0)).norm();
         assert!(reach < 0.97 * 580.0, "{reach}");

@@ -1,8 +1,10 @@
 use truegrind::surface::sampling::{scallop_mm, step_over_mm};
 
-/// The cusp between two balls on a circle of curvature k, by looking: the lowest point of the hull left between their centres.
+/// The cusp between two balls on a circle of curvature k, by looking: the lowest point of the hull left between
+/// their centres.
 fn looked_at(step: f64, radius: f64, k: f64) -> f64 {
-    // Surface: y = 0, or a circle of radius 1/|k| through the origin, rounded up (k > 0) or hollow (k < 0). Arc length s from the middle.
+    // Surface: y = 0, or a circle of radius 1/|k| through the origin, rounded up (k > 0) or hollow (k < 0). Arc
+    // length s from the middle.
     let surface = |s: f64| {
         if k == 0.0 {
             ([s, 0.0], [0.0, 1.0])
