@@ -7,15 +7,16 @@
 //! - which point and outward normal lie at a plan position ([`Surface::contact`]),
 //! - how far a point is from the surface, signed along the normal ([`Surface::foot`], [`Surface::deviation_mm`]),
 //! - how strongly it is bent in a direction ([`Surface::curvature_per_mm`]),
-//! - which triangles show it ([`Surface::tessellation`]).
+//! - which triangles show it ([`Surface::tessellate`]).
 //!
-//! **Frame and units.** Everything is in the surface's own frame, which is the frame of the work object, in mm and rad.
-//! The *plan* coordinates of a surface are its two parameters: (u, v) of a parametric one, (x, y) of all others; an
-//! implicit surface and a mesh are seen from above, along −z. The *outward* normal is the side from which the tool comes.
+//! **Frame and units.** Everything is in the surface's own frame, which is the frame of the work object, in mm and
+//! rad. The *plan* coordinates of a surface are its two parameters: (u, v) of a parametric one, (x, y) of all
+//! others; an implicit surface and a mesh are seen from above, along −z. The *outward* normal is the side from
+//! which the tool comes.
 //!
-//! In reading order: [`expression`] (the text of an equation), [`equation`] (the three kinds of equation), [`mesh`],
-//! [`sampling`] (how far apart passes and points may be), [`path`] (passes, tool frames, links), [`file`](mod@file) (the
-//! TOML file that states all of it), [`sample`] (the files that ship).
+//! In reading order: [`expression`] (the text of an equation), [`equation`] (the three kinds of equation),
+//! [`mesh`], [`sampling`] (how far apart passes and points may be), [`path`] (passes, tool frames, links),
+//! [`file`](mod@file) (the TOML file that states all of it), [`sample`] (the files that ship).
 
 pub mod error;
 pub mod expression;
@@ -61,9 +62,9 @@ pub struct Foot {
 /// The rectangle of plan coordinates over which a surface is used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Domain {
-    /// Range of the first plan coordinate, x [mm] or u.
+    /// Range of the first plan coordinate, x in mm or u.
     pub first: [f64; 2],
-    /// Range of the second plan coordinate, y [mm] or v.
+    /// Range of the second plan coordinate, y in mm or v.
     pub second: [f64; 2],
 }
 
@@ -102,8 +103,8 @@ impl Surface {
         }
     }
 
-    /// The point and normal at a plan position. `None` where the surface has none: off an implicit surface or a mesh, or where an
-    /// equation is not finite. An equation also answers beyond its domain.
+    /// The point and normal at a plan position. `None` where the surface has none: off an implicit surface or a
+    /// mesh, or where an equation is not finite. An equation also answers beyond its domain.
     pub fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
         match self {
             Surface::Explicit(surface) => surface.contact(plan),
@@ -115,8 +116,8 @@ impl Surface {
 
     /// The nearest point of the surface to `point` (in the surface's frame), and how far it is along the normal there.
     ///
-    /// Explicit and parametric surfaces end at the border of their domain, a mesh at its own; an implicit one is followed
-    /// beyond. `None` for a point that is not finite or one for which no nearest point is found.
+    /// Explicit and parametric surfaces end at the border of their domain, a mesh at its own; an implicit one is
+    /// followed beyond. `None` for a point that is not finite or one for which no nearest point is found.
     pub fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
         if !point.iter().all(|c| c.is_finite()) {
             return None;
@@ -129,13 +130,13 @@ impl Surface {
         }
     }
 
-    /// Deviation of `point` along the surface normal [mm], positive on the outward side (material left standing).
+    /// Deviation of `point` along the surface normal in mm, positive on the outward side (material left standing).
     pub fn deviation_mm(&self, point: &Point3<f64>) -> Option<f64> {
         self.foot(point).map(|foot| foot.normal_mm)
     }
 
-    /// Normal curvature [1/mm] at a contact in the tangential part of `direction`: positive where the surface falls away from its
-    /// outward side (1/r on a ball of radius r seen from outside), negative in a hollow.
+    /// Normal curvature in 1/mm at a contact in the tangential part of `direction`: positive where the surface
+    /// falls away from its outward side (1/r on a ball of radius r seen from outside), negative in a hollow.
     pub fn curvature_per_mm(&self, at: &Contact, direction: &Vector3<f64>) -> f64 {
         match self {
             Surface::Explicit(surface) => surface.curvature_per_mm(at, direction),
@@ -145,8 +146,8 @@ impl Surface {
         }
     }
 
-    /// Triangles over the whole domain: `cells` × `cells` cells of two triangles each for an equation (cells that leave the surface
-    /// are left out), its own triangles for a mesh.
+    /// Triangles over the whole domain: `cells` × `cells` cells of two triangles each for an equation (cells that
+    /// leave the surface are left out), its own triangles for a mesh.
     pub fn tessellate(&self, cells: usize) -> Tessellation {
         if let Surface::Mesh(mesh) = self {
             return mesh.tessellation();

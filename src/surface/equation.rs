@@ -1,18 +1,21 @@
 //! Surfaces given by equations: explicit z(x, y), parametric (x, y, z)(u, v) and implicit F(x, y, z) = 0.
 //!
-//! **Method.** Derivatives are symbolic ([`expression`](super::expression)). Explicit and parametric surfaces share one
-//! [`Jet`](jet::Jet): normal S_u × S_v, normal curvature −II/I, and Newton's method for the nearest point. The implicit one has
-//! normal ∇F/|∇F|, normal curvature tᵀ∇²F t/|∇F|, and Newton's method on the Lagrangian of the nearest point.
+//! **Method.** Derivatives are symbolic ([`expression`](super::expression)). Explicit and parametric surfaces share
+//! one second-order jet: normal S_u × S_v, normal curvature −II/I, and Newton's method for the nearest point. The
+//! implicit one has normal ∇F/|∇F|, normal curvature tᵀ∇²F t/|∇F|, and Newton's method on the Lagrangian of the
+//! nearest point.
 //!
 //! **Shapes.** Plan coordinates are (x, y), (u, v) and (x, y); positions in mm.
 //!
-//! **Stops.** Newton's method ends at a step below 1e-12 of the scale, after 60 steps at most; a ray through an implicit surface is
-//! looked at in [`Implicit::SLICES`] slices from above.
+//! **Stops.** Newton's method ends at a step below 1e-12 of the scale, after 60 steps at most; a ray through an
+//! implicit surface is looked at in [`Implicit::SLICES`] slices from above.
 //!
-//! **Source and departures.** The differential geometry is in any textbook (do Carmo, *Differential Geometry of Curves and
-//! Surfaces*, 2-4 and 3-3; for implicit surfaces R. Goldman, *Curvature formulas for implicit curves and surfaces*, 2005).
+//! **Source and departures.** The differential geometry is in any textbook (do Carmo, *Differential Geometry of
+//! Curves and Surfaces*, 2-4 and 3-3; for implicit surfaces R. Goldman, *Curvature formulas for implicit curves and
+//! surfaces*, 2005).
 //!
-//! **Checked against.** Numerical differences, the same surface written explicitly and implicitly, spheres and cylinders.
+//! **Checked against.** Numerical differences, the same surface written explicitly and implicitly, spheres and
+//! cylinders.
 
 mod implicit;
 mod jet;
@@ -25,8 +28,8 @@ use jet::Jet;
 
 pub use implicit::Implicit;
 
-/// How many intervals each side of the domain has where a surface is looked over: for values that are not finite, and for
-/// the starting points of Newton's method.
+/// How many intervals each side of the domain has where a surface is looked over: for values that are not finite,
+/// and for the starting points of Newton's method.
 const LATTICE: usize = 40;
 
 /// z as a function of x and y. Outward is up, +z.
@@ -38,7 +41,7 @@ pub struct Explicit {
 }
 
 impl Explicit {
-    /// Reads `z` as an expression in x and y [mm].
+    /// Reads `z` as an expression in x and y in mm.
     ///
     /// # Errors
     /// A text that cannot be read, an empty range, or a value that is not finite in the domain.
@@ -86,10 +89,11 @@ pub struct Parametric {
 }
 
 impl Parametric {
-    /// Reads x, y and z [mm] as expressions in u and v.
+    /// Reads x, y and z in mm as expressions in u and v.
     ///
     /// # Errors
-    /// A text that cannot be read, an empty range, or a place in the domain without a finite value or without a normal (a pole).
+    /// A text that cannot be read, an empty range, or a place in the domain without a finite value or without a
+    /// normal (a pole).
     pub fn new(coordinates: [&str; 3], domain: Domain, flipped: bool) -> Result<Self, SurfaceError> {
         domain.check(["u", "v"])?;
         let [x, y, z] = coordinates;

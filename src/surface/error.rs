@@ -99,9 +99,9 @@ pub enum SurfaceError {
          {tool_mm:.3} mm; take a smaller tool or leave that region out"
     )]
     Hollow {
-        /// Radius of the hollow [mm].
+        /// Radius of the hollow in mm.
         hollow_mm: f64,
-        /// Radius of the tool [mm].
+        /// Radius of the tool in mm.
         tool_mm: f64,
         /// Where.
         x: f64,

@@ -1,15 +1,16 @@
 //! The text of an equation: a small grammar with exact positions in front of symbolic derivatives.
 //!
-//! **Method.** The text is read by a grammar of our own, which knows where each character stands and binds as mathematics does
-//! (`-x^2` is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number). What it read is handed, with every pair of parentheses written out, to
-//! `exmex`, which differentiates it symbolically, twice, and evaluates it.
+//! **Method.** The text is read by a grammar of our own, which knows where each character stands and binds as
+//! mathematics does (`-x^2` is −(x²), `2^3^2` is 2^(3²), `1e-3` is a number). What it read is handed, with every
+//! pair of parentheses written out, to `exmex`, which differentiates it symbolically, twice, and evaluates it.
 //!
-//! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused rows zero).
+//! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
+//! rows zero).
 //!
 //! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused.
 //!
-//! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a position; hence the grammar in
-//! front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
+//! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a
+//! position; hence the grammar in front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
 //!
 //! **Checked against.** Numerical differences of every function and operator, and the conventions above.
 //!
@@ -60,7 +61,8 @@ pub struct Expression {
     text: String,
     /// Which of the named variables occur, in the alphabetical order in which exmex wants their values.
     used: Vec<usize>,
-    value: FlatEx<f64>,
+    /// Boxed, for it keeps much on the spot: some 20 kB.
+    value: Box<FlatEx<f64>>,
     first: Vec<FlatEx<f64>>,
     /// Upper triangle by rows over the used variables.
     second: Vec<FlatEx<f64>>,
@@ -97,7 +99,7 @@ impl Expression {
             .map(|(i, k)| first[i].clone().partial(k))
             .collect::<Result<Vec<_>, _>>()
             .map_err(refused)?;
-        Ok(Self { text: text.to_owned(), used, value, first, second })
+        Ok(Self { text: text.to_owned(), used, value: Box::new(value), first, second })
     }
 
     /// The text as it was given.

@@ -33,11 +33,11 @@
 //! |---|---|---|
 //! | `name` | name of the job, fit for a module | `surface` |
 //! | `surface.kind` | `explicit`, `parametric`, `implicit`, `mesh` | required |
-//! | `surface.z`, `x_mm`, `y_mm` | explicit: equation in x and y, ranges [mm] | required |
+//! | `surface.z`, `x_mm`, `y_mm` | explicit: equation in x and y, ranges in mm | required |
 //! | `surface.x`, `y`, `z`, `u`, `v` | parametric: equations in u and v, ranges | required |
-//! | `surface.f`, `x_mm`, `y_mm`, `z_mm` | implicit: equation in x, y and z, ranges [mm] | required |
-//! | `surface.mesh`, `x_mm`, `y_mm` | mesh: name of the STL file, ranges [mm] | the ranges: all of it |
-//! | `surface.unit_mm` | mesh: length of the file's unit [mm] | 1 |
+//! | `surface.f`, `x_mm`, `y_mm`, `z_mm` | implicit: equation in x, y and z, ranges in mm | required |
+//! | `surface.mesh`, `x_mm`, `y_mm` | mesh: name of the STL file, ranges in mm | the ranges: all of it |
+//! | `surface.unit_mm` | mesh: length of the file's unit in mm | 1 |
 //! | `surface.flip_normal` | parametric and mesh: the other side is outside | `false` |
 //! | `work_object.name`, `tool.name` | names of wobjdata and tooldata | required |
 //! | `….position_mm` | of the frame in the robot's base; of the TCP in the flange | required |
@@ -91,11 +91,11 @@ pub struct Tool {
     pub name: String,
     /// Frame of the TCP in the flange.
     pub flange_from_tool: Pose,
-    /// Mass [kg].
+    /// Mass in kg.
     pub mass_kg: f64,
-    /// Centre of gravity in the flange frame [mm].
+    /// Centre of gravity in the flange frame in mm.
     pub cog_mm: Vector3<f64>,
-    /// Radius of the tool where it touches [mm]; needed for a scallop height.
+    /// Radius of the tool where it touches in mm; needed for a scallop height.
     pub radius_mm: Option<f64>,
     /// How the TCP was obtained, if stated.
     pub origin: Option<Origin>,
@@ -125,16 +125,17 @@ pub struct SurfaceFile {
     pub tool: Tool,
     /// How the path runs.
     pub path: PathOptions,
-    /// Feed speed of the TCP on a cut [mm/s].
+    /// Feed speed of the TCP on a cut in mm/s.
     pub speed_mm_s: f64,
-    /// Speed of the TCP on approach, retract and link [mm/s].
+    /// Speed of the TCP on approach, retract and link in mm/s.
     pub travel_speed_mm_s: f64,
     /// Zone between cuts: `fine`, `z0`, `z1`, …, as the controller names it.
     pub zone: String,
 }
 
 impl SurfaceFile {
-    /// Reads the bytes of a surface file. `file` is the name that errors state; a mesh is asked for by the name that the file gives it.
+    /// Reads the bytes of a surface file. `file` is the name that errors state; a mesh is asked for by the name
+    /// that the file gives it.
     ///
     /// # Errors
     /// File, key (or line and column), what was found, what was expected and what to do.
@@ -490,7 +491,7 @@ impl Reporter<'_> {
             }
             (Some([w, x, y, z]), None) => {
                 let stated = Quaternion::new(w, x, y, z);
-                if !((stated.norm() - 1.0).abs() <= 1e-3) {
+                if stated.norm().is_nan() || (stated.norm() - 1.0).abs() > 1e-3 {
                     let found = format!("[{w}, {x}, {y}, {z}] of length {}", stated.norm());
                     let expected = "w, x, y, z of length 1";
                     return Err(self.value(

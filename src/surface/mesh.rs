@@ -1,16 +1,19 @@
 //! Surfaces given by triangles.
 //!
-//! **Method.** The bytes of an STL file become a `parry3d` triangle mesh, which casts rays, finds nearest points through a tree of boxes,
-//! and tells inside from outside with angle-weighted pseudo-normals. Normals shown to the tool are blended between
-//! the corners of a triangle, so that they turn smoothly over a finely faceted surface, except across a crease.
+//! **Method.** The bytes of an STL file become a `parry3d` triangle mesh, which casts rays, finds nearest points
+//! through a tree of boxes, and tells inside from outside with angle-weighted pseudo-normals. Normals shown to the
+//! tool are blended between the corners of a triangle, so that they turn smoothly over a finely faceted surface,
+//! except across a crease.
 //!
-//! **Shapes.** Vertices in mm in the file's frame, which is the surface's frame. Plan coordinates are (x, y), seen from above.
+//! **Shapes.** Vertices in mm in the file's frame, which is the surface's frame. Plan coordinates are (x, y), seen
+//! from above.
 //!
 //! **Stops.** Nothing iterates.
 //!
-//! **Source and departures.** J. A. Bærentzen and H. Aanæs, *Signed distance computation using the angle weighted pseudonormal*, 2005, as
-//! parry has it. STL knows no unit and no joined vertices: the unit is stated, equal corners are joined, and triangles without area
-//! are dropped. A binary file whose header begins with `solid` is recognised by its length.
+//! **Source and departures.** J. A. Bærentzen and H. Aanæs, *Signed distance computation using the angle weighted
+//! pseudonormal*, 2005, as parry has it. STL knows no unit and no joined vertices: the unit is stated, equal
+//! corners are joined, and triangles without area are dropped. A binary file whose header begins with `solid` is
+//! recognised by its length.
 //!
 //! **Checked against.** A faceted sphere, whose distance to the true one is bounded by its facets.
 
@@ -56,7 +59,7 @@ impl std::fmt::Debug for Mesh {
 /// How the numbers of a mesh file are to be understood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshOptions {
-    /// Length of one unit of the file [mm]: 1 for mm, 25.4 for inches, 1000 for metres.
+    /// Length of one unit of the file in mm: 1 for mm, 25.4 for inches, 1000 for metres.
     pub unit_mm: f64,
     /// Whether the triangles are wound the wrong way round.
     pub flipped: bool,
@@ -74,8 +77,8 @@ impl Mesh {
     /// Reads an STL file, binary or text.
     ///
     /// # Errors
-    /// Bytes that are not STL, a mesh without triangles or so small that its unit must be wrong, or one of which nothing is seen from
-    /// above.
+    /// Bytes that are not STL, a mesh without triangles or so small that its unit must be wrong, or one of which
+    /// nothing is seen from above.
     pub fn from_stl(bytes: &[u8], options: &MeshOptions) -> Result<Self, SurfaceError> {
         let read = stl_io::read_stl(&mut std::io::Cursor::new(recognised(bytes)?)).map_err(|error| {
             SurfaceError::Mesh {
@@ -93,8 +96,8 @@ impl Mesh {
         Self::new(vertices, facets, options)
     }
 
-    /// Makes a mesh from vertices [mm] and facets, three indices each, counter-clockwise seen from outside. Of `options`, the
-    /// unit is not used.
+    /// Makes a mesh from vertices in mm and facets, three indices each, counter-clockwise seen from outside. Of
+    /// `options`, the unit is not used.
     ///
     /// # Errors
     /// As [`Mesh::from_stl`]; an index beyond the vertices is one too.
@@ -177,7 +180,7 @@ impl Mesh {
         Some(Contact { plan: [at.x, at.y], position_mm: at, normal: self.blended_normal(facet, &at) })
     }
 
-    /// Distance of a point from the mesh [mm], negative inside (behind the triangles).
+    /// Distance of a point from the mesh in mm, negative inside (behind the triangles).
     pub fn signed_distance_mm(&self, point: &Point3<f64>) -> f64 {
         let (projection, _) =
             self.triangles.project_local_point_and_get_location(DVec3::new(point.x, point.y, point.z), false);
@@ -270,7 +273,8 @@ impl Mesh {
     }
 }
 
-/// The bytes in a form that the reader cannot mistake: a binary file must not begin with `solid`, a text file must with `solid `.
+/// The bytes in a form that the reader cannot mistake: a binary file must not begin with `solid`, a text file must
+/// with `solid `.
 fn recognised(bytes: &[u8]) -> Result<Vec<u8>, SurfaceError> {
     let count = bytes.get(80..84).map(|n| u64::from(u32::from_le_bytes([n[0], n[1], n[2], n[3]])));
     let length = bytes.len() as u64;
@@ -335,7 +339,8 @@ fn facet_normal(vertices: &[Point3<f64>], facet: &[u32; 3]) -> Unit<Vector3<f64>
     Unit::new_normalize((b - a).cross(&(c - a)))
 }
 
-/// At each corner, the normals of the facets around it that meet this facet without a crease, weighted by their angle there.
+/// At each corner, the normals of the facets around it that meet this facet without a crease, weighted by their
+/// angle there.
 fn corner_normals(
     vertices: &[Point3<f64>],
     facets: &[[u32; 3]],

@@ -1,17 +1,20 @@
 //! The path of a tool over a surface: passes, tool frames, approach, retract and links.
 //!
 //! **Method.** A pattern is a family of curves over the plan of the surface . The distance between neighbouring
-//! curves is the step-over, or follows from the scallop height ([`sampling`](super::sampling)); along a curve, points are as far apart as
-//! the chord error and the largest step allow. Each point gets a tool frame ([`frame`]). Passes are joined by a retract
-//! along the normal, a link that stays clear of the surface, and an approach along the normal .
+//! curves is the step-over, or follows from the scallop height ([`sampling`](super::sampling)); along a curve,
+//! points are as far apart as the chord error and the largest step allow. Each point gets a tool frame ([`frame`]).
+//! Passes are joined by a retract along the normal, a link that stays clear of the surface, and an approach along
+//! the normal .
 //!
-//! **Shapes.** A list of [`PathPoint`], in the order in which the tool visits them, in the surface's frame (the work object).
+//! **Shapes.** A list of [`PathPoint`], in the order in which the tool visits them, in the surface's frame (the
+//! work object).
 //!
-//! **Stops.** Never iterates without bound: the number of passes and points is known before they are made, and a path of
-//! more than [`PathOptions::LARGEST`] points is refused.
+//! **Stops.** Never iterates without bound: the number of passes and points is known before they are made, and a
+//! path of more than [`PathOptions::LARGEST`] points is refused.
 //!
-//! **Source and departures.** ltlm-2024, "Grinding compensation experiment", takes path points from the surface equation of the
-//! component and prints no more; pattern, spacing and frames here are the usual ones of computer-aided manufacturing.
+//! **Source and departures.** ltlm-2024, "Grinding compensation experiment", takes path points from the surface
+//! equation of the component and prints no more; pattern, spacing and frames here are the usual ones of
+//! computer-aided manufacturing.
 //!
 //! **Checked against.** The cusp measured between two neighbouring passes of a ball on a plane and on a cylinder, chord
 //! errors measured on the surface, frames right-handed and at the stated angle to the normal.
@@ -76,7 +79,8 @@ impl PathPoint {
 pub enum Pattern {
     /// Straight passes over the whole domain, side by side.
     Raster,
-    /// One curve from the middle outwards, over the ellipse inscribed in the domain, closed by a full turn along its rim.
+    /// One curve from the middle outwards, over the ellipse inscribed in the domain, closed by a full turn along
+    /// its rim.
     Spiral,
     /// Closed passes parallel to the border of the domain, from the border inwards.
     Contour,
@@ -107,8 +111,8 @@ pub enum Traverse {
 /// Where the tool's x axis points, about the tool's own z axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToolX {
-    /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about its z axis: the wrist
-    /// stays calm.
+    /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about
+    /// its z axis: the wrist stays calm.
     Fixed(Vector3<f64>),
     /// Along the feed.
     Feed,
@@ -117,7 +121,7 @@ pub enum ToolX {
 /// How far apart neighbouring passes are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spacing {
-    /// Largest distance on the surface [mm].
+    /// Largest distance on the surface in mm.
     StepOver {
         /// The distance.
         step_over_mm: f64,
@@ -142,23 +146,24 @@ pub struct PathOptions {
     pub traverse: Traverse,
     /// Distance of neighbouring passes.
     pub spacing: Spacing,
-    /// Largest distance of neighbouring points [mm].
+    /// Largest distance of neighbouring points in mm.
     pub max_step_mm: f64,
-    /// Largest distance of the surface curve from the straight line between neighbouring points [mm].
+    /// Largest distance of the surface curve from the straight line between neighbouring points in mm.
     pub chord_mm: f64,
-    /// Lead angle [rad]: positive leans the spindle towards the feed, about the cross-feed axis.
+    /// Lead angle in rad: positive leans the spindle towards the feed, about the cross-feed axis.
     pub lead_rad: f64,
-    /// Tilt angle [rad]: positive leans the spindle to the left of the feed (seen with the outward normal up), about the
-    /// feed direction.
+    /// Tilt angle in rad: positive leans the spindle to the left of the feed (seen with the outward normal up),
+    /// about the feed direction.
     pub tilt_rad: f64,
     /// Rule for the tool's x axis.
     pub tool_x: ToolX,
-    /// Height of approach, retract and link above the surface, along the normal [mm].
+    /// Height of approach, retract and link above the surface, along the normal in mm.
     pub approach_mm: f64,
 }
 
 impl Default for PathOptions {
-    /// A raster along the first coordinate, passes and points 5 mm apart, tool normal to the surface with x near the frame's x, 20 mm up.
+    /// A raster along the first coordinate, passes and points 5 mm apart, tool normal to the surface with x near
+    /// the frame's x, 20 mm up.
     fn default() -> Self {
         Self {
             pattern: Pattern::Raster,
@@ -206,7 +211,7 @@ impl PathOptions {
             }
         }
         for (option, value) in [("lead_deg", self.lead_rad), ("tilt_deg", self.tilt_rad)] {
-            if !(value.abs() <= 80_f64.to_radians()) {
+            if value.is_nan() || value.abs() > 80_f64.to_radians() {
                 return refuse(option, value.to_degrees(), "an angle from -80 to 80 degrees");
             }
         }
@@ -232,8 +237,9 @@ struct Cut {
 
 /// The path that `options` describe over `surface`.
 ///
-/// Passes follow each other as approach, cuts, retract, then links where the straight way would come too close to the surface. A pass that leaves the
-/// surface (a hole in a mesh) is taken up again as a pass of its own. Quaternions are continuous in sign.
+/// Passes follow each other as approach, cuts, retract, then links where the straight way would come too close to
+/// the surface. A pass that leaves the surface (a hole in a mesh) is taken up again as a pass of its own.
+/// Quaternions are continuous in sign.
 ///
 /// ```
 /// use truegrind::surface::path::{self, PathOptions};
@@ -252,9 +258,16 @@ struct Cut {
 /// [`PathOptions::LARGEST`] points, or a fixed direction of the tool's x axis that is along the tool.
 pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, SurfaceError> {
     options.check()?;
+    let curves = pattern::curves(surface, options)?;
+    // The chords of a few looks are no longer than the curve: what is refused here would surely be too long.
+    let least: f64 =
+        curves.iter().map(|curve| trace(surface, curve, curve.first_look() / 4)).map(total_mm).sum();
+    if least / options.max_step_mm > PathOptions::LARGEST as f64 {
+        return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
+    }
     let mut passes = Vec::new();
     let mut count = 0;
-    for curve in pattern::curves(surface, options)? {
+    for curve in curves {
         for pass in cuts(surface, &curve, options, PathOptions::LARGEST - count)? {
             count += pass.len() + 2;
             if count > PathOptions::LARGEST {
@@ -269,6 +282,17 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     joined(surface, options, &passes)
 }
 
+/// The parts of a curve that lie on the surface, looked at in `looks` intervals.
+fn trace(surface: &Surface, curve: &pattern::Curve, looks: usize) -> Vec<Trace> {
+    let domain = surface.domain();
+    let point = |share: f64| surface.contact(domain.at(curve.place(share))).map(|c| c.position_mm);
+    Trace::runs(point, 0.0, 1.0, looks)
+}
+
+fn total_mm(runs: Vec<Trace>) -> f64 {
+    runs.iter().map(Trace::length_mm).sum()
+}
+
 /// The cuts along one curve; one list for each part of it that lies on the surface.
 fn cuts(
     surface: &Surface,
@@ -279,19 +303,13 @@ fn cuts(
     let domain = surface.domain();
     let steps = Steps { max_step_mm: options.max_step_mm, chord_mm: options.chord_mm };
     let contact = |share: f64| surface.contact(domain.at(curve.place(share)));
-    let point = |share: f64| contact(share).map(|c| c.position_mm);
-    let coarse = Trace::runs(point, 0.0, 1.0, curve.first_look());
-    let too_long = SurfaceError::TooLong { limit: PathOptions::LARGEST };
-    let length_mm: f64 = coarse.iter().map(Trace::length_mm).sum();
-    if length_mm / options.max_step_mm > room as f64 {
-        return Err(too_long);
-    }
+    let coarse = trace(surface, curve, curve.first_look());
     let gap_mm = coarse.iter().map(Trace::coarsest_mm).fold(0.0, f64::max);
     let finer = (8.0 * gap_mm / options.max_step_mm).ceil().max(1.0) as usize;
     let mut looks = (curve.first_look() * finer).min(FINEST);
     loop {
         let mut closest = usize::MAX;
-        let runs: Vec<(Trace, Vec<f64>)> = Trace::runs(point, 0.0, 1.0, looks)
+        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, looks)
             .into_iter()
             .map(|run| {
                 let (from, to) = (run.shares[0], run.shares[run.shares.len() - 1]);
@@ -307,7 +325,7 @@ fn cuts(
             })
             .collect();
         if runs.iter().map(|(_, shares)| shares.len()).sum::<usize>() > room {
-            return Err(too_long);
+            return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
         }
         // Steps of fewer than four looks are judged too coarsely: the chord error needs more, within reason.
         if closest < 4 && looks < FINEST.min(64 * curve.first_look() * finer) {
@@ -415,7 +433,8 @@ fn joined(
     Ok(points)
 }
 
-/// Part of the way from one orientation to another; a half turn, for which there is no shortest way, is made at its end.
+/// Part of the way from one orientation to another; a half turn, for which there is no shortest way, is made at its
+/// end.
 fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
     from.try_slerp(to, share, 1e-9).unwrap_or(*to)
 }

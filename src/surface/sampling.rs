@@ -1,20 +1,23 @@
 //! How far apart passes and points may be.
 //!
-//! **Method.** Between two passes a ball of radius R leaves a cusp of height h. Across the passes the surface is a circle of curvature κ
-//! (positive where it is rounded outwards); the triangle of its centre, the ball's centre and the cusp gives, for the distance s on the surface,
+//! **Method.** Between two passes a ball of radius R leaves a cusp of height h. Across the passes the surface is a
+//! circle of curvature κ (positive where it is rounded outwards); the triangle of its centre, the ball's centre and
+//! the cusp gives, for the distance s on the surface,
 //!
 //! ```text
 //! s = 4/|κ| · asin( |κ|/2 · √( (2Rh − h²) / ((1 + κR)(1 + κh)) ) ),     s = 2√(2Rh − h²) on a plane
 //! ```
 //!
-//! which is exact, not the usual approximation for small h. Along a pass, points are put as far apart as two bounds allow: the length of the
-//! step, and the distance of the curve from its chord.
+//! which is exact, not the usual approximation for small h. Along a pass, points are put as far apart as two bounds
+//! allow: the length of the step, and the distance of the curve from its chord.
 //!
-//! **Shapes.** A curve is a function of a share 0…1 to a point; what comes back are shares in ascending order, both ends included.
+//! **Shapes.** A curve is a function of a share 0…1 to a point; what comes back are shares in ascending order, both
+//! ends included.
 //!
 //! **Stops.** A curve is looked at in at most [`FINEST`] places.
 //!
-//! **Source and departures.** The cusp formula is derived here from the law of cosines; for small h and κ it is the √(8Rh) of the handbooks.
+//! **Source and departures.** The cusp formula is derived here from the law of cosines; for small h and κ it is the
+//! √(8Rh) of the handbooks.
 //!
 //! **Checked against.** Cusps measured on a plane, a cylinder and a hollow.
 
@@ -23,11 +26,11 @@ use nalgebra::Point3;
 /// In how many places a curve is looked at, at most.
 pub const FINEST: usize = 1 << 20;
 
-/// Distance of two passes on the surface [mm] at which a ball of radius `tool_radius_mm` leaves a cusp of height `scallop_mm` where the
-/// surface's curvature across the passes is `curvature_per_mm` (positive: rounded outwards).
+/// Distance of two passes on the surface in mm at which a ball of radius `tool_radius_mm` leaves a cusp of height
+/// `scallop_mm` where the surface's curvature across the passes is `curvature_per_mm` (positive: rounded outwards).
 ///
-/// `None` where there is none: a ball that does not fit into the hollow, or a cusp not below the ball's radius. On a surface so strongly
-/// rounded that any distance leaves a lower cusp, half the way round.
+/// `None` where there is none: a ball that does not fit into the hollow, or a cusp not below the ball's radius. On
+/// a surface so strongly rounded that any distance leaves a lower cusp, half the way round.
 pub fn step_over_mm(scallop_mm: f64, tool_radius_mm: f64, curvature_per_mm: f64) -> Option<f64> {
     let (h, r, k) = (scallop_mm, tool_radius_mm, curvature_per_mm);
     let fits = (1.0 + k * r) * (1.0 + k * h);
@@ -42,8 +45,8 @@ pub fn step_over_mm(scallop_mm: f64, tool_radius_mm: f64, curvature_per_mm: f64)
     Some(4.0 / k.abs() * half_sine.min(std::f64::consts::FRAC_1_SQRT_2).asin())
 }
 
-/// Height of the cusp [mm] that a ball of radius `tool_radius_mm` leaves between two passes `step_over_mm` apart: the inverse of
-/// [`step_over_mm`]. `None` where the balls do not meet or do not fit.
+/// Height of the cusp in mm that a ball of radius `tool_radius_mm` leaves between two passes `step_over_mm` apart:
+/// the inverse of [`step_over_mm`]. `None` where the balls do not meet or do not fit.
 pub fn scallop_mm(step_over_mm: f64, tool_radius_mm: f64, curvature_per_mm: f64) -> Option<f64> {
     let (s, r, k) = (step_over_mm, tool_radius_mm, curvature_per_mm);
     // Half the distance of the two ball centres, and how far their middle lies below a centre's height.
@@ -58,9 +61,9 @@ pub fn scallop_mm(step_over_mm: f64, tool_radius_mm: f64, curvature_per_mm: f64)
 /// The two bounds on the distance of neighbouring points of a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steps {
-    /// Largest distance [mm].
+    /// Largest distance in mm.
     pub max_step_mm: f64,
-    /// Largest distance of the curve from the chord [mm].
+    /// Largest distance of the curve from the chord in mm.
     pub chord_mm: f64,
 }
 
@@ -71,12 +74,13 @@ pub(crate) struct Trace {
     pub(crate) shares: Vec<f64>,
     /// The points there.
     pub(crate) points: Vec<Point3<f64>>,
-    /// Length of the curve up to there [mm].
+    /// Length of the curve up to there in mm.
     pub(crate) lengths: Vec<f64>,
 }
 
 impl Trace {
-    /// Looks at `curve` in `count` + 1 equally spaced shares of `from`…`to`; every run of neighbours at which it has a point becomes a trace.
+    /// Looks at `curve` in `count` + 1 equally spaced shares of `from`…`to`; every run of neighbours at which it
+    /// has a point becomes a trace.
     pub(crate) fn runs(
         curve: impl Fn(f64) -> Option<Point3<f64>>,
         from: f64,
@@ -103,7 +107,7 @@ impl Trace {
         self.lengths.last().copied().unwrap_or(0.0)
     }
 
-    /// Longest distance of neighbouring points [mm].
+    /// Longest distance of neighbouring points in mm.
     pub(crate) fn coarsest_mm(&self) -> f64 {
         self.lengths.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max)
     }
@@ -118,9 +122,9 @@ impl Trace {
         interpolated(&self.shares, &self.lengths, share)
     }
 
-    /// Shares that divide the curve so that both bounds hold: equally long steps where that takes at most a third more of them, else each step as
-    /// long as the bounds allow. The second number says over how few looked-at intervals a step extends: below four the curve should be looked at more
-    /// closely.
+    /// Shares that divide the curve so that both bounds hold: equally long steps where that takes at most a third
+    /// more of them, else each step as long as the bounds allow. The second number says over how few looked-at
+    /// intervals a step extends: below four the curve should be looked at more closely.
     pub(crate) fn divided(&self, steps: &Steps) -> (Vec<f64>, usize) {
         let mut breaks = vec![0];
         while breaks[breaks.len() - 1] + 1 < self.points.len() {
@@ -169,7 +173,8 @@ impl Trace {
             (b - a).norm() <= steps.max_step_mm
                 && self.points[from + 1..to].iter().all(|p| beside_chord_mm(p, &a, &b) <= steps.chord_mm)
         };
-        // Doubling, then halving: whatever is returned has itself been found to hold, so a curve that bends back cannot deceive.
+        // Doubling, then halving: whatever is returned has itself been found to hold, so a curve that bends back
+        // cannot deceive.
         let last = self.points.len() - 1;
         let (mut reached, mut stride) = (from + 1, 1);
         while reached < last && holds((reached + stride).min(last)) {
@@ -200,7 +205,7 @@ impl Trace {
     }
 }
 
-/// Distance of a point from the straight piece between two others [mm].
+/// Distance of a point from the straight piece between two others in mm.
 pub fn beside_chord_mm(point: &Point3<f64>, from: &Point3<f64>, to: &Point3<f64>) -> f64 {
     let (chord, away) = (to - from, point - from);
     let squared = chord.norm_squared();

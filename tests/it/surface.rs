@@ -1,5 +1,7 @@
 //! Tests of `surface`.
 
+#![allow(clippy::unwrap_used)]
+
 mod expression;
 mod equation;
 mod mesh;

@@ -6,8 +6,8 @@ use super::{LATTICE, direction};
 use crate::surface::expression::Expression;
 use crate::surface::{Contact, Domain, Foot, SurfaceError};
 
-/// The zero set of F(x, y, z), seen from above. Outside is the side on which the top of the z range lies, whatever the sign
-/// of F there.
+/// The zero set of F(x, y, z), seen from above. Outside is the side on which the top of the z range lies, whatever
+/// the sign of F there.
 #[derive(Debug, Clone)]
 pub struct Implicit {
     f: Expression,
@@ -22,13 +22,14 @@ impl Implicit {
     /// In how many slices the z range is searched for the first zero from above.
     pub const SLICES: usize = 64;
 
-    /// Reads `f` as an expression in x, y, z [mm]; the surface is looked for over `domain` between the two heights `z_mm`.
+    /// Reads `f` as an expression in x, y, z in mm; the surface is looked for over `domain` between the two heights
+    /// `z_mm`.
     ///
     /// # Errors
     /// A text that cannot be read, an empty range, a value that is not finite, or no surface at all in the domain.
     pub fn new(f: &str, domain: Domain, z_mm: [f64; 2]) -> Result<Self, SurfaceError> {
         domain.check(["x", "y"])?;
-        super::super::check_range("z", z_mm)?;
+        crate::surface::check_range("z", z_mm)?;
         let mut surface = Self {
             f: Expression::parse(f, &["x", "y", "z"])?,
             domain,
@@ -70,7 +71,11 @@ impl Implicit {
         let value = |z: f64| self.outward * self.f.value(&[x, y, z]);
         let height =
             |slice: usize| self.z_mm[1] + (self.z_mm[0] - self.z_mm[1]) * slice as f64 / Self::SLICES as f64;
-        let below = (1..=Self::SLICES).find(|s| value(height(s - 1)) > 0.0 && value(height(*s)) <= 0.0)?;
+        let mut above = value(self.z_mm[1]);
+        let below = (1..=Self::SLICES).find(|slice| {
+            let before = std::mem::replace(&mut above, value(height(*slice)));
+            before > 0.0 && above <= 0.0
+        })?;
         let (mut outside, mut inside) = (height(below - 1), height(below));
         let mut z = 0.5 * (outside + inside);
         for _ in 0..100 {
@@ -93,8 +98,8 @@ impl Implicit {
         self.at(Point3::new(x, y, z))
     }
 
-    /// The nearest point: along the gradient to the surface and sideways until the rest is normal to it, then Newton's method on
-    /// the Lagrangian |q − p|²/2 + λF(q). The equation is followed beyond the domain.
+    /// The nearest point: along the gradient to the surface and sideways until the rest is normal to it, then
+    /// Newton's method on the Lagrangian |q − p|²/2 + λF(q). The equation is followed beyond the domain.
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
         let squared = |c: &Contact| (c.position_mm - point).norm_squared();
         let nearest = self.lattice.iter().min_by(|a, b| squared(a).total_cmp(&squared(b)))?;

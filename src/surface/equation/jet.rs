@@ -30,8 +30,8 @@ impl Jet {
         finite.then_some(Contact { plan, position_mm: self.point, normal })
     }
 
-    /// Normal curvature −II(t, t)/I(t, t) in the direction of the tangential part of `along`, positive where the surface
-    /// falls away from its outward side; 0 where there is no such direction.
+    /// Normal curvature −II(t, t)/I(t, t) in the direction of the tangential part of `along`, positive where the
+    /// surface falls away from its outward side; 0 where there is no such direction.
     pub(super) fn curvature(&self, along: &Vector3<f64>) -> f64 {
         let [su, sv] = self.first;
         let [suu, suv, svv] = self.second;

@@ -1,8 +1,8 @@
 //! The tool's frame at a point of a path: its z axis into the surface, turned by lead and tilt, its x axis by rule.
 //!
-//! With outward normal n, feed f and l = n × f (to the left of the feed, seen with n up), the spindle's direction, away from the surface, is
-//! n turned by the lead angle about l towards f, then by the tilt angle about f towards l. The tool's z axis is its opposite, so that
-//! z · n = −cos(lead) cos(tilt).
+//! With outward normal n, feed f and l = n × f (to the left of the feed, seen with n up), the spindle's direction,
+//! away from the surface, is n turned by the lead angle about l towards f, then by the tilt angle about f towards
+//! l. The tool's z axis is its opposite, so that z · n = −cos(lead) cos(tilt).
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 

@@ -22,8 +22,9 @@ pub(crate) fn lifted(contact: &Contact, height_mm: f64) -> Point3<f64> {
     contact.position_mm + contact.normal.into_inner() * height_mm
 }
 
-/// The points between the two lifted ends of a link that keep its straight pieces at least half the height above the surface. None are needed over a
-/// flat surface; over a dome, the link follows it. Where there is no surface below, nothing is in the way.
+/// The points between the two lifted ends of a link that keep its straight pieces at least half the height above
+/// the surface. None are needed over a flat surface; over a dome, the link follows it. Where there is no surface
+/// below, nothing is in the way.
 pub(crate) fn over(surface: &Surface, from: &Contact, to: &Contact, height_mm: f64) -> Vec<Stop> {
     let below = |share: f64| {
         let plan = [0, 1].map(|i| from.plan[i] * (1.0 - share) + to.plan[i] * share);

@@ -1,8 +1,9 @@
 //! The families of curves: where in the plan each pass runs.
 //!
-//! A family is a function of two shares 0…1, one across its curves and one along them, to a place in the domain. How the curves are spread across
-//! is decided on the surface itself: on a lattice of curves the distance of neighbours is measured, divided by the distance allowed there, and
-//! summed; the passes are put at equal parts of that sum, as few as keep every part within 1.
+//! A family is a function of two shares 0…1, one across its curves and one along them, to a place in the domain.
+//! How the curves are spread across is decided on the surface itself: on a lattice of curves the distance of
+//! neighbours is measured, divided by the distance allowed there, and summed; the passes are put at equal parts of
+//! that sum, as few as keep every part within 1.
 
 use nalgebra::{Point3, Vector3};
 
@@ -30,13 +31,14 @@ enum Family {
     Lines(Along),
     /// Ellipses about the middle.
     Ellipses,
-    /// Rectangles inset from the border by an equal distance on the surface; the numbers are how much narrower the innermost one, of no width, is
-    /// in each coordinate, as a share of the half range.
+    /// Rectangles inset from the border by an equal distance on the surface; the numbers are how much narrower the
+    /// innermost one, of no width, is in each coordinate, as a share of the half range.
     Rectangles([f64; 2]),
 }
 
 impl Family {
-    /// Place in the domain, as shares of its ranges. `across` is 0 at the first line or in the middle, 1 at the last line or on the border.
+    /// Place in the domain, as shares of its ranges. `across` is 0 at the first line or in the middle, 1 at the
+    /// last line or on the border.
     fn at(self, across: f64, along: f64) -> [f64; 2] {
         let turn = (std::f64::consts::TAU * along).sin_cos();
         match self {
@@ -101,7 +103,8 @@ impl Curve {
 /// The curves of a pattern over a surface, in the order of cutting.
 ///
 /// # Errors
-/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, or a pattern that nowhere meets the surface.
+/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, or a pattern that nowhere
+/// meets the surface.
 pub(crate) fn curves(surface: &Surface, options: &PathOptions) -> Result<Vec<Curve>, SurfaceError> {
     let family = match options.pattern {
         Pattern::Raster => Family::Lines(options.along),
@@ -110,10 +113,10 @@ pub(crate) fn curves(surface: &Surface, options: &PathOptions) -> Result<Vec<Cur
     };
     let sums = steps_across(surface, family, &options.spacing)?;
     let total = sums[ACROSS];
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return Err(SurfaceError::NoPass);
     }
-    if !(total < PathOptions::LARGEST as f64) {
+    if total >= PathOptions::LARGEST as f64 {
         return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
     }
     let places: Vec<f64> = (0..=ACROSS).map(|k| k as f64 / ACROSS as f64).collect();
@@ -142,7 +145,8 @@ pub(crate) fn curves(surface: &Surface, options: &PathOptions) -> Result<Vec<Cur
     })
 }
 
-/// How much narrower the innermost rectangle is in each coordinate: all of the shorter side, and the same distance of the longer one.
+/// How much narrower the innermost rectangle is in each coordinate: all of the shorter side, and the same distance
+/// of the longer one.
 fn insets(surface: &Surface) -> [f64; 2] {
     let domain = surface.domain();
     let length = |along: fn(f64) -> [f64; 2]| {
