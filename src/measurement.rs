@@ -4,3 +4,4 @@ pub mod dataset;
 pub mod import;
 pub mod sensor;
 pub mod registration;
+pub mod simulation;

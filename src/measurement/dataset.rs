@@ -78,7 +78,40 @@ pub struct Dataset {
     pub reading_step_mm: Option<f64>,
 }
 
+impl Row {
+    /// A row of nothing but joint angles [rad] and a reading, line `number + 2` of a file with a header.
+    pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
+        Self {
+            number,
+            line: number + 2,
+            joints,
+            reading,
+            readout_mm: None,
+            condition: Condition::default(),
+            anchor: 0,
+            session: None,
+            other: Vec::new(),
+        }
+    }
+}
+
 impl Dataset {
+    /// Rows that come from no file.
+    pub fn new(file: &str, sensor: Sensor, rows: Vec<Row>) -> Self {
+        Self {
+            file: file.into(),
+            sheet: None,
+            sha256: String::new(),
+            sensor,
+            rows,
+            other_columns: Vec::new(),
+            notes: Vec::new(),
+            angle_step_rad: None,
+            readout_step_mm: None,
+            reading_step_mm: None,
+        }
+    }
+
     /// The same file with only the rows at `indices` of [`Dataset::rows`].
     pub fn subset(&self, indices: &[usize]) -> Self {
         Self { rows: indices.iter().map(|&i| self.rows[i].clone()).collect(), ..self.clone() }
