@@ -5,5 +5,6 @@ mod published;
 mod nist;
 mod levenberg_marquardt;
 mod chaotic_search;
+mod step_size;
 mod chaos;
 mod triangular;
