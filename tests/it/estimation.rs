@@ -6,5 +6,7 @@ mod nist;
 mod levenberg_marquardt;
 mod chaotic_search;
 mod step_size;
+mod filters;
+mod swarms;
 mod chaos;
 mod triangular;

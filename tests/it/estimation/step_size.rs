@@ -1,6 +1,6 @@
 //! Gauss–Newton and the two methods that vary the step size.
 
-use truegrind::estimation::estimate::Termination;
+use truegrind::estimation::estimate::{Estimate, Termination};
 use truegrind::estimation::least_squares::{gauss_newton, lm, sslm, vslm};
 use truegrind::estimation::problem::{Prior, Problem};
 
@@ -117,7 +117,8 @@ fn bad_input_is_answered() {
         priors: vec![Prior { mean: 100.0, sigma: 1e3 }],
         ..rows(1, 2, |x: &[Dual], _| x[0].sqrt() - 2.0)
     };
-    let solvers: [&dyn Fn(&dyn Problem, &[f64]) -> truegrind::estimation::estimate::Estimate; 6] = [
+    type Solve<'a> = &'a dyn Fn(&dyn Problem, &[f64]) -> Estimate;
+    let solvers: [Solve<'_>; 6] = [
         &|p, x| gauss_newton::solve(p, x, &Default::default()),
         &|p, x| gauss_newton::solve(p, x, &gauss_newton::Options::as_printed()),
         &|p, x| sslm::solve(p, x, &Default::default()),
