@@ -9,4 +9,6 @@ pub mod problem;
 pub mod estimate;
 mod objective;
 pub mod least_squares;
+pub mod filter;
+pub mod swarm;
 pub mod chaos;

@@ -4,11 +4,17 @@
 //! |---|---|---|
 //! | [`lm`] | Levenberg–Marquardt, as printed (ltlm-2024 eq. 10) and sound | 1 |
 //! | [`ltlm`] | logistic-tent chaotic Levenberg–Marquardt (ltlm-2024, Algorithm I) | 2, and 2M rows-only passes |
+//! | [`gauss_newton`] | least squares of one linearisation (rls-2025 eq. 9), and repeated | 1 |
+//! | [`sslm`] | step-size Levenberg–Marquardt (ltlm-2024, M6) | 1, and rows-only passes |
+//! | [`vslm`] | variable step-size Levenberg–Marquardt (ukf-vslm-2023 eq. 15) | 1 |
 //! | [`triangular`] | the triangular factor of a Jacobian that is never held whole | 1 |
 //! | [`rank`] | rank, condition and null space from that factor | 0 |
 
 pub mod lm;
 pub mod ltlm;
+pub mod gauss_newton;
+pub mod sslm;
+pub mod vslm;
 pub mod triangular;
 pub mod rank;
 pub(crate) mod damped;

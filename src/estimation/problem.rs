@@ -122,6 +122,12 @@ pub fn prior_cost(priors: &[Prior], x: &[f64]) -> f64 {
 /// Rows in one chunk of parallel work: fixed, so that sums come out the same for any number of threads.
 const CHUNK_ROWS: usize = 1536;
 
+/// The rows of each observation in turn. Rows beyond the last whole observation are left out.
+pub(crate) fn observations(problem: &dyn Problem) -> impl Iterator<Item = Range<usize>> + use<> {
+    let per = problem.rows_per_observation().max(1);
+    (0..problem.rows() / per).map(move |i| i * per..(i + 1) * per)
+}
+
 /// Ranges of whole observations, of fixed size, that cover all rows in order.
 pub(crate) fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
     let per = problem.rows_per_observation().max(1);

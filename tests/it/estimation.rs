@@ -5,5 +5,8 @@ mod published;
 mod nist;
 mod levenberg_marquardt;
 mod chaotic_search;
+mod step_size;
+mod filters;
+mod swarms;
 mod chaos;
 mod triangular;

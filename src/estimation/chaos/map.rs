@@ -12,9 +12,9 @@
 //!
 //! **Guards.** Doubling a binary number shifts its digits to the left, so that in floating point tent and Bernoulli
 //! reach 0 after some 53 steps from any start and stay there (logistic-tent with r = 0 is the tent). Exact arithmetic on
-//! an irrational start would bring a new digit in at the right: here it comes from a Weyl sequence (multiples of the golden
-//! ratio), 2⁻⁵² in size. Any map that meets a fixed point, a cycle of two or a value outside its interval is started
-//! anew from the same Weyl sequence. Nothing is random: a sequence is determined by its map and start.
+//! an irrational start would bring a new digit in at the right: here it comes from SplitMix64 (Steele, Lea, Flood 2014),
+//! 2⁻⁵² in size. Any map that meets a fixed point, a cycle of two or a value outside its interval is started
+//! anew from the same source. Nothing is random: a sequence is determined by its map and start.
 //!
 //! **Source and departures.** Liu et al. 2024, Table 2 and eq. 11; formulas of the six others from the literature
 //! (May 1976 logistic, Hénon 1976, …), since the paper prints none. All maps but tent, Bernoulli and (nearly) logistic-tent
@@ -85,7 +85,7 @@ impl Map {
 
     /// The sequence from `start`, the start itself not included. A start outside (0, 1) is folded into it.
     pub fn sequence(self, start: f64) -> Sequence {
-        let mut sequence = Sequence { map: self, state: [0.0; 2], before: [f64::NAN; 2], weyl: 0.0 };
+        let mut sequence = Sequence { map: self, state: [0.0; 2], before: [f64::NAN; 2], counter: 0 };
         let fraction = if start.is_finite() { start.rem_euclid(1.0) } else { 0.0 };
         sequence.state = sequence.place(fraction);
         if fraction == 0.0 {
@@ -133,16 +133,17 @@ pub struct Sequence {
     map: Map,
     state: [f64; 2],
     before: [f64; 2],
-    weyl: f64,
+    counter: u64,
 }
 
-/// Fractional part of the golden ratio, whose multiples fill the unit interval most evenly.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
-
 impl Sequence {
-    fn next_weyl(&mut self) -> f64 {
-        self.weyl = (self.weyl + GOLDEN).fract();
-        self.weyl
+    /// The next number of SplitMix64, in (0, 1).
+    fn fresh_digits(&mut self) -> f64 {
+        self.counter = self.counter.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.counter;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 12) as f64 / (1_u64 << 52) as f64 + f64::EPSILON / 2.0
     }
 
     /// A state for a fraction of the unit interval. Hénon starts inside its basin, close to the origin.
@@ -155,7 +156,7 @@ impl Sequence {
     }
 
     fn restart(&mut self) {
-        let fraction = self.next_weyl();
+        let fraction = self.fresh_digits();
         self.state = self.place(fraction);
         self.before = [f64::NAN; 2];
     }
@@ -167,7 +168,7 @@ impl Iterator for Sequence {
     fn next(&mut self) -> Option<f64> {
         let mut next = self.map.image(self.state);
         if self.map.shifts_digits() {
-            next[0] += self.next_weyl() * f64::EPSILON;
+            next[0] += self.fresh_digits() * f64::EPSILON;
         }
         let place = self.map.fraction(next[0]);
         // Written so that not-a-number fails too.

@@ -81,6 +81,8 @@ pub(crate) struct DampedSystem {
     scale: Vec<f64>,
     /// Whether D stays the identity, as the printed methods have it.
     unscaled: bool,
+    /// Diagonal of S: 1 where the column is as large as it ever was. What a pivot is compared with.
+    diagonal: Vec<f64>,
     gradient: Vec<f64>,
     factor: Vec<f64>,
     step: Vec<f64>,
@@ -92,7 +94,8 @@ fn negligible_pivot(p: usize) -> f64 {
     64.0 * p as f64 * f64::EPSILON
 }
 
-/// Damping that a singular system gets in addition, so that a step stays finite along its null space.
+/// Damping, relative to the diagonal, that a singular system gets in addition, so that a step stays finite along its
+/// null space.
 const SINGULAR_DAMPING: f64 = 1e-9;
 
 impl DampedSystem {
@@ -102,6 +105,7 @@ impl DampedSystem {
             p,
             scale: vec![0.0; p],
             unscaled: false,
+            diagonal: vec![1.0; p],
             gradient: vec![0.0; p],
             factor: vec![0.0; p * p],
             step: vec![0.0; p],
@@ -123,6 +127,7 @@ impl DampedSystem {
             let norm = at.column_norm(k);
             if !self.unscaled {
                 self.scale[k] = self.scale[k].max(norm);
+                self.diagonal[k] = if norm > 0.0 { (norm / self.scale[k]).powi(2) } else { 1.0 };
             }
             let g = at.gradient(k);
             self.gradient[k] = if self.scale[k] > 0.0 { g / self.scale[k] } else { 0.0 };
@@ -164,9 +169,13 @@ impl DampedSystem {
     }
 
     fn solve_normal(&mut self, equations: &NormalEquations, mu: f64) -> Option<()> {
-        let smallest = self.factorise(equations, mu)?;
-        if !self.unscaled && smallest - mu < negligible_pivot(self.p) && mu < SINGULAR_DAMPING {
-            self.factorise(equations, mu + SINGULAR_DAMPING)?;
+        let enough = negligible_pivot(self.p);
+        let regular = |smallest: f64| smallest >= enough;
+        if !self.factorise(equations, mu, 0.0).is_some_and(regular) {
+            if self.unscaled {
+                return None;
+            }
+            self.factorise(equations, mu, SINGULAR_DAMPING)?;
         }
         self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
         let p = self.p;
@@ -179,8 +188,9 @@ impl DampedSystem {
         Some(())
     }
 
-    /// Cholesky factor of S + μI; gives its smallest squared pivot, `None` where it is not positive definite.
-    fn factorise(&mut self, equations: &NormalEquations, mu: f64) -> Option<f64> {
+    /// Cholesky factor of S + μI + extra · diag S; gives its smallest squared pivot against the diagonal (without μ), `None`
+    /// where it is not positive definite.
+    fn factorise(&mut self, equations: &NormalEquations, mu: f64, extra: f64) -> Option<f64> {
         let p = self.p;
         for j in 0..p {
             let column = &mut self.factor[j * p..(j + 1) * p];
@@ -190,11 +200,10 @@ impl DampedSystem {
                 column[j] = 1.0;
                 continue;
             }
-            for i in j..p {
-                let di = self.scale[i];
-                column[i] = if di > 0.0 { equations.matrix[(i, j)] / (di * dj) } else { 0.0 };
+            for (i, (entry, di)) in column.iter_mut().zip(&self.scale).enumerate().skip(j) {
+                *entry = if *di > 0.0 { equations.matrix[(i, j)] / (di * dj) } else { 0.0 };
             }
-            column[j] += mu;
+            column[j] += mu + extra * self.diagonal[j];
         }
         llt::factor::cholesky_in_place(
             MatMut::from_column_major_slice_mut(&mut self.factor, p, p),
@@ -204,7 +213,16 @@ impl DampedSystem {
             Default::default(),
         )
         .ok()?;
-        Some((0..p).map(|k| self.factor[k * p + k].powi(2)).fold(f64::INFINITY, f64::min))
+        Some(self.smallest_pivot(mu, |k| self.factor[k * p + k]))
+    }
+
+    /// Without scaling μ is the user's alone, and nothing is called negligible.
+    fn smallest_pivot(&self, mu: f64, pivot: impl Fn(usize) -> f64) -> f64 {
+        if self.unscaled || mu >= SINGULAR_DAMPING {
+            return 1.0;
+        }
+        let relative = |k: usize| (pivot(k).powi(2) - mu) / self.diagonal[k];
+        (0..self.p).filter(|k| self.scale[*k] > 0.0).map(relative).fold(1.0, f64::min)
     }
 
     /// min ‖[R D⁻¹; √μ I] s + [c; 0]‖ by one more QR of 2p rows.
@@ -213,22 +231,21 @@ impl DampedSystem {
         if p == 0 {
             return;
         }
-        let scale = &self.scale;
-        let stacked = |mu: f64| {
+        let (scale, diagonal) = (&self.scale, &self.diagonal);
+        let stacked = |extra: f64| {
             let entry = |i: usize, j: usize| match (i < p, j < p) {
                 (true, true) if scale[j] > 0.0 => factor.r[(i, j)] / scale[j],
                 (true, false) => -factor.rhs[i],
-                (false, true) if i - p == j && scale[j] > 0.0 => mu.sqrt(),
+                (false, true) if i - p == j && scale[j] > 0.0 => (mu + extra * diagonal[j]).sqrt(),
                 (false, true) if i - p == j => 1.0,
                 _ => 0.0,
             };
             Mat::<f64>::from_fn(2 * p, p + 1, entry).qr()
         };
-        let mut qr = stacked(mu);
-        let smallest = (0..p).map(|k| qr.thin_R()[(k, k)].powi(2)).fold(f64::INFINITY, f64::min);
+        let mut qr = stacked(0.0);
         // In QR a pivot is known to ε, not to √ε: its square is compared with ε².
-        if !self.unscaled && smallest - mu < negligible_pivot(p).powi(2) && mu < SINGULAR_DAMPING {
-            qr = stacked(mu + SINGULAR_DAMPING);
+        if self.smallest_pivot(mu, |k| qr.thin_R()[(k, k)]) < negligible_pivot(p).powi(2) {
+            qr = stacked(SINGULAR_DAMPING);
         }
         let r = qr.thin_R();
         for i in (0..p).rev() {

@@ -19,8 +19,9 @@
 //! radians it is nothing, next to some hundred rows of millimetres per degree it slows every step; damping slows, it is
 //! no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The Levenberg–Marquardt algorithm"
 //! (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear least squares problems* (2004), algorithm
-//! 3.16, for μ. Departures from the latter: μ starts near zero (`initial_damping`), since priors regularise here; the
-//! first refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten, not by three.
+//! 3.16, for μ. Departures from the latter: μ starts near zero (`initial_damping`), since priors regularise here; a step
+//! with less damping than 10⁻³ must keep a quarter of its promise, and a refusal lifts μ to at least 10⁻³ at once; an
+//! almost perfect gain ratio divides μ by ten, not by three.
 //!
 //! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
 
@@ -72,7 +73,7 @@ impl Default for Options {
             cost_tolerance: 1e-10,
             gradient_tolerance: 1e-12,
             step_tolerance: 1e-14,
-            small_cost: 1e-24,
+            small_cost: 1e-20,
             seed: 0,
         }
     }
@@ -134,6 +135,12 @@ impl Damping {
         Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
     }
 
+    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of its promise:
+    /// otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
+        gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
+    }
+
     /// `gain` is actual over predicted reduction of a step that was taken.
     pub(crate) fn accept(&mut self, gain: f64) {
         let factor =
@@ -182,20 +189,31 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             }
             continue;
         };
-        if let Some(end) = converged(&mut system, &here, &promise, damping.mu, refused, options) {
+        if let Some(end) = converged(
+            &mut system,
+            &here,
+            &promise,
+            &Search {
+                mu: damping.mu,
+                refused,
+                cosine,
+                cost_tolerance: options.cost_tolerance,
+                step_tolerance: options.step_tolerance,
+            },
+        ) {
             return here.finish(objective, end, trace);
         }
         let cost = here.at.cost();
         // After a refusal the cost alone is asked for first: it is several times cheaper than the derivatives.
         let worth_it = refused == 0 || {
             let new = objective.cost(&trial);
-            new.is_finite() && new < cost
+            damping.is_acceptable((cost - new) / promise.reduction)
         };
         let mut step_norm = 0.0;
         let mut accepted = false;
         if worth_it {
             let at = Linearisation::at(objective, &trial, options.factorisation);
-            if at.is_finite() && at.cost() < cost {
+            if at.is_finite() && damping.is_acceptable((cost - at.cost()) / promise.reduction) {
                 damping.accept((cost - at.cost()) / promise.reduction);
                 step_norm = promise.step_norm;
                 here.at = at;
@@ -224,31 +242,41 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
     here.finish(objective, Termination::IterationLimit, trace)
 }
 
+/// What the tests of convergence want to know of a search.
+pub(crate) struct Search {
+    pub(crate) mu: f64,
+    /// Steps refused since the last one taken.
+    pub(crate) refused: usize,
+    pub(crate) cosine: f64,
+    pub(crate) cost_tolerance: f64,
+    pub(crate) step_tolerance: f64,
+}
+
 /// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the promise
-/// is asked again almost without damping.
-fn converged(
+/// is asked again almost without damping. Where the undamped model promises more than the problem keeps (large
+/// residuals), a small promise after refusals counts as converged if the gradient is small too.
+pub(crate) fn converged(
     system: &mut DampedSystem,
     here: &Point,
     promise: &Promise,
-    mu: f64,
-    refused: usize,
-    options: &Options,
+    search: &Search,
 ) -> Option<Termination> {
     const LIGHT: f64 = 1e-8;
-    let enough = options.cost_tolerance * here.at.cost();
-    let tiny = options.step_tolerance * (system.scaled_norm(&here.x) + options.step_tolerance);
+    const SMALL_COSINE: f64 = 1e-5;
+    let enough = search.cost_tolerance * here.at.cost();
+    let tiny = search.step_tolerance * (system.scaled_norm(&here.x) + search.step_tolerance);
     if promise.reduction > enough && promise.step_norm > tiny {
         return None;
     }
-    if mu <= LIGHT {
+    if search.mu <= LIGHT {
         return Some(if promise.reduction <= enough { Termination::Cost } else { Termination::Step });
     }
     let mut unused = vec![0.0; here.x.len()];
     match system.step(&here.at, LIGHT, &here.x, &mut unused) {
         Some(light) if light.reduction <= enough => Some(Termination::Cost),
         Some(light) if light.step_norm <= tiny => Some(Termination::Step),
-        // The model promises more than any step so far has kept.
-        _ if refused > 0 => Some(Termination::Stalled),
+        _ if search.refused > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
+        _ if search.refused > 0 => Some(Termination::Stalled),
         _ => None,
     }
 }

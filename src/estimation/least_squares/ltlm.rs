@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::estimation::chaos::map::{Map, Sequence};
 use crate::estimation::estimate::{Estimate, Iteration, Termination};
 use crate::estimation::least_squares::damped::{DampedSystem, Linearisation};
-use crate::estimation::least_squares::lm::{Damping, Point};
+use crate::estimation::least_squares::lm::{Damping, Point, Search, converged};
 use crate::estimation::least_squares::{Factorisation, Form};
 use crate::estimation::objective::Objective;
 use crate::estimation::problem::Problem;
@@ -82,7 +82,7 @@ impl Default for Options {
             max_iterations: 60,
             cost_tolerance: 1e-10,
             gradient_tolerance: 1e-12,
-            small_cost: 1e-24,
+            small_cost: 1e-20,
             seed: 0,
         }
     }
@@ -113,6 +113,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let mut system = if printed { DampedSystem::unscaled(p) } else { DampedSystem::new(p) };
     let mut damping = Damping::new(if printed { options.mu } else { options.initial_damping });
     let mut sequence = options.map.sequence(options.first);
+    let mut refused = 0;
     let (mut x1, mut x2) = (vec![0.0; p], vec![0.0; p]);
     for _ in 0..options.max_iterations {
         let cost = here.at.cost();
@@ -128,19 +129,28 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 return here.finish(&objective, Termination::Singular, trace);
             }
             damping.refuse();
+            refused += 1;
             continue;
         };
-        if !printed && promise.reduction <= options.cost_tolerance * cost {
-            let end = if damping.mu <= 1e-3 { Termination::Cost } else { Termination::Stalled };
+        let search = Search {
+            mu: damping.mu,
+            refused,
+            cosine,
+            cost_tolerance: options.cost_tolerance,
+            step_tolerance: 0.0,
+        };
+        if !printed && let Some(end) = converged(&mut system, &here, &promise, &search) {
             return here.finish(&objective, end, trace);
         }
         let at1 = Linearisation::at(&mut objective, &x1, options.factorisation);
-        let usable = at1.is_finite() && (printed || at1.cost() < cost);
+        let gain = (cost - at1.cost()) / promise.reduction;
+        let usable = at1.is_finite() && (printed || damping.is_acceptable(gain));
         if !usable {
             if printed {
                 return here.finish(&objective, Termination::NotFinite, trace);
             }
             damping.refuse();
+            refused += 1;
             trace.push(entry(cost, 0.0, damping.mu, cosine, &objective));
             if damping.is_exhausted() {
                 return here.finish(&objective, Termination::Stalled, trace);
@@ -148,7 +158,8 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             continue;
         }
         if !printed {
-            damping.accept((cost - at1.cost()) / promise.reduction);
+            damping.accept(gain);
+            refused = 0;
         }
         system.enter(&at1);
         if system.step(&at1, damping.mu, &x1, &mut x2).is_none() {

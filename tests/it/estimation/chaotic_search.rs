@@ -16,6 +16,7 @@ fn the_sound_form_finds_the_published_minima() {
         let sum = 2.0 * estimate.cost;
         println!("{}: {} Σr² {sum:e}", case.name, estimate.termination);
         assert!(case.minima.iter().any(|m| (sum - m).abs() <= 2e-5 * m + 1e-12), "{}: {sum:e}", case.name);
+        assert!(estimate.termination.is_converged(), "{}: {}", case.name, estimate.termination);
         assert!(estimate.trace.windows(2).all(|pair| pair[1].cost <= pair[0].cost), "{}", case.name);
     }
 }

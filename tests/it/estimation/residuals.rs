@@ -27,12 +27,6 @@ impl Dual {
     pub(crate) fn sin(self) -> Self {
         self.chain(self.value.sin(), self.value.cos())
     }
-    pub(crate) fn cos(self) -> Self {
-        self.chain(self.value.cos(), -self.value.sin())
-    }
-    pub(crate) fn powf(self, e: f64) -> Self {
-        self.chain(self.value.powf(e), e * self.value.powf(e - 1.0))
-    }
     pub(crate) fn powi(self, e: i32) -> Self {
         self.chain(self.value.powi(e), f64::from(e) * self.value.powi(e - 1))
     }

@@ -10,7 +10,7 @@ use super::residuals::{Dual, rows};
 
 #[test]
 fn has_the_normal_equations_of_the_whole_jacobian() {
-    let (problem, _) = wide(4000);
+    let (problem, _) = wide(1700);
     let x = vec![0.01; 28];
     let factor = triangular_factor(&problem, &x, &[1.0; 28]);
     let mut normal = problem.normal_equations(&x);
