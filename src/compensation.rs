@@ -2,6 +2,7 @@
 //!
 //! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
 //! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
+//! - [`verify`]: runs a program on an arm.
 //! - [`deviation`]: the points of a path and how far an arm is off at each, before and after.
 
 pub mod deviation;
@@ -9,4 +10,5 @@ pub mod cell;
 pub mod mounting;
 pub mod why;
 pub mod rewrite;
+pub mod verify;
 mod segment;

@@ -1,1 +1,3 @@
-//! planning
+//! From intentions to motions: surfaces to programs.
+
+pub mod toolpath;

@@ -255,7 +255,7 @@ fn usual_joints(
 }
 
 /// The joints that the controller takes for a flange pose with a target's configuration.
-fn configured(
+pub(super) fn configured(
     nominal: &Inverse<'_>,
     flange: &Pose,
     target: &RobTarget,
@@ -295,7 +295,7 @@ fn configured(
 type SolvedTargets = Vec<Result<Solved, Why>>;
 
 /// Whether the controller checks the configuration of a motion.
-fn monitored(motion: &Motion) -> Switch {
+pub(super) fn monitored(motion: &Motion) -> Switch {
     match motion.kind {
         MotionKind::Joint => motion.modal.conf_joint,
         _ => motion.modal.conf_linear,
@@ -661,10 +661,12 @@ pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit) -> Extra {
                 quaternion: [q.w, q.i, q.j, q.k],
                 conf: None,
             },
+            external: None,
         },
         Emit::Joints => Extra {
             kind: MotionKind::AbsoluteJoint,
             target: NewTarget::Joint { robot_deg: std::array::from_fn(|i| joints[i].to_degrees()) },
+            external: None,
         },
     }
 }
