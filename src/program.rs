@@ -4,6 +4,7 @@
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change.
 //! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
+//! - [`draft`]: a program that does not exist yet, for a dialect to write.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
 //!
 //! ```
@@ -28,4 +29,5 @@ pub mod tree;
 pub mod edit;
 pub mod motion;
 pub mod rewrite;
+pub mod draft;
 pub mod rapid;

@@ -3,3 +3,6 @@
 mod tree;
 mod samples;
 mod rewriting;
+mod evaluation;
+mod writing;
+mod edits;

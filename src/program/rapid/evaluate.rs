@@ -328,17 +328,17 @@ impl<'a, 's> Evaluator<'a, 's> {
     fn binary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
         let mut left: Option<Value> = None;
         let mut operator = None;
-        for part in parts(tree, node) {
-            match token_kind(tree, part) {
-                Some(kind) if !is_value(kind) => operator = Some(kind),
-                _ => {
-                    let right = self.value(context, part);
-                    left = Some(match (left, operator) {
-                        (Some(left), Some(operator)) => combined(&left, operator, &right),
-                        _ => right,
-                    });
-                }
+        // Operands and operators alternate (`*` could be either by itself).
+        for (index, part) in parts(tree, node).enumerate() {
+            if index % 2 == 1 {
+                operator = token_kind(tree, part);
+                continue;
             }
+            let right = self.value(context, part);
+            left = Some(match (left, operator) {
+                (Some(left), Some(operator)) => combined(&left, operator, &right),
+                _ => right,
+            });
         }
         left.unwrap_or(Value::Unknown(Reason::WrongShape))
     }
@@ -469,19 +469,6 @@ impl<'a, 's> Evaluator<'a, 's> {
             Err(reason) => Value::Unknown(reason),
         }
     }
-}
-
-fn is_value(kind: Token) -> bool {
-    matches!(
-        kind,
-        Token::Ident
-            | Token::Number
-            | Token::String
-            | Token::True
-            | Token::False
-            | Token::Placeholder
-            | Token::Star
-    )
 }
 
 /// The target that a literal of plain numbers is; `None` where it is no such literal.

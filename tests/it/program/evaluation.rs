@@ -1,0 +1,218 @@
+//! What targets, tools and work objects are worth.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use truegrind::program::motion::{Frame, Reason, RobTarget, TargetValue};
+use truegrind::program::rapid::Task;
+use truegrind::program::rapid::number;
+
+const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+
+/// The target of a MoveL of this expression, with these declarations before.
+fn target(data: &str, body: &str, expression: &str) -> Result<RobTarget, Reason> {
+    let source = format!(
+        "MODULE M\n{data}\nPROC main()\n{body}\nMoveL {expression},v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    );
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let motion = task.listing.motions.last().unwrap();
+    match motion.targets[0].value {
+        Ok(TargetValue::Cartesian(target)) => Ok(target),
+        Ok(TargetValue::Joint(_)) => panic!("{source}"),
+        Err(reason) => Err(reason),
+    }
+}
+
+fn base() -> String {
+    format!("CONST robtarget p:=[[500,-20,300],[0.5,0.5,-0.5,0.5],[1,-1,2,0],{EXT}];")
+}
+
+fn close(found: RobTarget, wanted: &nalgebra::Isometry3<f64>) {
+    let found = found.pose();
+    assert!((found.translation.vector - wanted.translation.vector).norm() < 1e-9, "{found} {wanted}");
+    assert!(found.rotation.angle_to(&wanted.rotation) < 1e-9, "{found} {wanted}");
+}
+
+#[test]
+fn quaternions_are_scalar_first() {
+    let data =
+        format!("CONST robtarget p:=[[0,0,0],[0.7071067811865476,0,0,0.7071067811865476],[0,0,0,0],{EXT}];");
+    let pose = target(&data, "", "p").unwrap().pose();
+    let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+    assert!(pose.rotation.angle_to(&quarter) < 1e-12);
+    let frame = Frame::from_pose(&pose);
+    assert!((frame.quaternion[0] - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-12);
+}
+
+#[test]
+fn offs_moves_in_the_object_frame_and_reltool_along_and_about_the_tool() {
+    let p = target(&base(), "", "p").unwrap();
+    let shifted = target(&base(), "", "Offs(p,1,2,3)").unwrap();
+    assert_eq!(shifted.position_mm, [501.0, -18.0, 303.0]);
+    assert_eq!((shifted.quaternion, shifted.conf), (p.quaternion, p.conf));
+
+    let turn = |axis, degrees: f64| UnitQuaternion::from_axis_angle(&axis, degrees.to_radians());
+    let x = turn(Vector3::x_axis(), 30.0);
+    let y = turn(Vector3::y_axis(), -40.0);
+    let z = turn(Vector3::z_axis(), 50.0);
+    // About the tool's x, then the new y, then the new z, whatever the order of the arguments.
+    let wanted = p.pose() * nalgebra::Isometry3::from_parts(Vector3::new(1.0, 2.0, 3.0).into(), x * y * z);
+    close(target(&base(), "", "RelTool(p,1,2,3\\Rx:=30\\Ry:=-40\\Rz:=50)").unwrap(), &wanted);
+    close(target(&base(), "", "RelTool(p,1,2,3\\Rz:=50,\\Rx:=30\\Ry:=-40)").unwrap(), &wanted);
+    let wanted = p.pose() * nalgebra::Isometry3::from_parts(Vector3::new(0.0, 0.0, -10.0).into(), y);
+    close(target(&base(), "", "RelTool(p,0,0,-10\\Ry:=-40)").unwrap(), &wanted);
+}
+
+#[test]
+fn expressions_are_folded() {
+    let cases = [
+        ("2*3+4*5", 26.0),
+        ("2+3*4-1", 13.0),
+        ("-(2+3)*2", -10.0),
+        ("- 5 + 1", -4.0),
+        ("7 DIV 2 + 7 MOD 2", 4.0),
+        ("10/4/2", 1.25),
+        ("a*b-a", 2.0),
+        ("Abs(-3)+Sqrt(16)", 7.0),
+        ("Sin(30)*2+Cos(60)", 1.5),
+        ("ATan2(1,1)", 45.0),
+        ("table{2}+grid{2,1}", 24.0),
+        ("p.trans.z/100", 3.0),
+        ("frame.trans.y", 8.0),
+        ("0x1F+0b101+0o17+0d12", 31.0 + 5.0 + 15.0 + 12.0),
+        ("1.5E1+.5+5.", 20.5),
+        ("tool0.tframe.rot.q1", 1.0),
+        ("v100.v_tcp", 100.0),
+    ];
+    let data = format!(
+        "{}\nCONST num a:=2*b-5;\nCONST num b:=3;\nCONST num table{{2}}:=[1,4];\nCONST num grid{{2,2}}:=[[10,11],[20,21]];\nCONST pose frame:=[[7,8,9],[1,0,0,0]];\nCONST num loop1:=loop2;\nCONST num loop2:=loop1;",
+        base()
+    );
+    for (text, wanted) in cases {
+        let found = target(&data, "", &format!("Offs(p,{text},0,0)")).unwrap();
+        assert!((found.position_mm[0] - 500.0 - wanted).abs() < 1e-9, "{text}: {:?}", found.position_mm);
+    }
+    assert_eq!(target(&data, "", "Offs(p,loop1,0,0)"), Err(Reason::RunTimeOffset));
+    assert_eq!(target(&data, "", "Offs(p,reg1,0,0)"), Err(Reason::RunTimeOffset));
+    let aggregate = format!("[p.trans,OrientZYX(90,0,0),[a,b,0,0],{EXT}]");
+    let found = target(&data, "", &aggregate).unwrap();
+    assert_eq!((found.position_mm, found.conf), ([500.0, -20.0, 300.0], [1, 3, 0, 0]));
+    assert!((found.quaternion[3] - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-12);
+}
+
+#[test]
+fn assignments_are_followed_in_straight_lines_and_nowhere_else() {
+    let data = format!("{}\nVAR robtarget q;\nPERS num h:=10;", base());
+    let cases: &[(&str, Result<f64, Reason>)] = &[
+        ("q:=p;", Ok(500.0)),
+        ("q:=p; q.trans.x:=q.trans.x+1;", Ok(501.0)),
+        ("q:=p; q.trans.x:=10*2;", Ok(20.0)),
+        ("q:=p; q.trans:=[7,8,9];", Ok(7.0)),
+        ("q:=p; q.trans.x:=reg1;", Err(Reason::Undeclared)),
+        ("q.trans:=[7,8,9];", Err(Reason::Assigned)),
+        ("q:=p; IF x q.trans.x:=1;", Err(Reason::Assigned)),
+        ("IF x THEN q:=p; ELSE q:=p; ENDIF", Ok(500.0)),
+        ("IF x THEN q:=p; ENDIF", Err(Reason::Assigned)),
+        ("q:=p; FOR i FROM 1 TO 3 DO q.trans.x:=q.trans.x+1; ENDFOR", Err(Reason::Assigned)),
+        ("q:=p; lab: q.trans.y:=1; GOTO lab;", Err(Reason::Assigned)),
+        ("q:=p; other;", Err(Reason::Assigned)),
+        ("q:=p; unknown q;", Err(Reason::Assigned)),
+        ("q:=p; unknown;", Err(Reason::Assigned)),
+        ("q:=p; WaitTime 1; Set do1;", Ok(500.0)),
+        ("q:=p; SearchL di1,q,p,v100,tool0;", Err(Reason::Assigned)),
+        ("q:=p; IF x THEN q:=CRobT(); RETURN; ENDIF", Ok(500.0)),
+    ];
+    for (body, wanted) in cases {
+        let data = format!("{data}\nPROC other()\nq:=CRobT();\nENDPROC");
+        let found = target(&data, body, "q").map(|target| target.position_mm[0]);
+        assert_eq!(found, *wanted, "{body}");
+    }
+    // A variable of the routine has its value at every call until something changes it.
+    let local = format!("VAR robtarget q:=[[1,2,3],[1,0,0,0],[0,0,0,0],{EXT}];");
+    assert_eq!(target("", &local, "q").unwrap().position_mm[0], 1.0);
+    let changed = format!("{local} q.trans.x:=4;");
+    assert_eq!(target("", &changed, "q").unwrap().position_mm, [4.0, 2.0, 3.0]);
+    let looped = format!("{local} WHILE y DO q.trans.x:=4; ENDWHILE");
+    assert_eq!(target("", &looped, "q"), Err(Reason::Assigned));
+}
+
+#[test]
+fn names_are_looked_up_from_routine_to_module_to_task() {
+    let literal = |x: i32| format!("[[{x},0,0],[1,0,0,0],[0,0,0,0],{EXT}]");
+    let first = format!(
+        "MODULE A\nCONST robtarget p:={};\nLOCAL CONST robtarget l:={};\nCONST robtarget g:={};\nPROC main()\nMoveL p,v100,fine,tool0;\nMoveL l,v100,fine,tool0;\ninner;\nENDPROC\nPROC inner()\nVAR robtarget P:={};\nMoveL p,v100,fine,tool0;\nENDPROC\nENDMODULE",
+        literal(1),
+        literal(2),
+        literal(3),
+        literal(4)
+    );
+    let second = format!(
+        "MODULE B\nLOCAL CONST robtarget p:={};\nPROC b()\nMoveL p,v100,fine,tool0;\nMoveL G,v100,fine,tool0;\nMoveL l,v100,fine,tool0;\nENDPROC\nENDMODULE",
+        literal(5)
+    );
+    let task = Task::read(&[("a.mod", first.as_bytes()), ("b.mod", second.as_bytes())]);
+    let x: Vec<Result<f64, Reason>> = task
+        .listing
+        .motions
+        .iter()
+        .map(|motion| motion.targets[0].value.map(|value| value.cartesian().unwrap().position_mm[0]))
+        .collect();
+    assert_eq!(x, [Ok(1.0), Ok(2.0), Ok(4.0), Ok(5.0), Ok(3.0), Err(Reason::Undeclared)]);
+}
+
+#[test]
+fn tools_work_objects_speeds_and_zones_are_told() {
+    let source = "MODULE M\nPERS tooldata t:=[FALSE,[[1,2,3],[0.7071068,0,0.7071068,0]],[4.5,[5,6,7],[1,0,0,0],0,0,0]];\nPERS wobjdata w:=[TRUE,TRUE,\"a\"\"b\",[[1,0,0],[1,0,0,0]],[[0,2,0],[1,0,0,0]]];\nPROC main()\nMoveL [[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v150,z20,t\\WObj:=w;\nENDPROC\nENDMODULE";
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    let listing = &task.listing;
+    let motion = &listing.motions[0];
+    let tool = listing.tool(motion).unwrap();
+    assert_eq!(tool.place.unwrap().line, 2);
+    let tool = tool.value.unwrap();
+    assert!(!tool.robhold && tool.mass_kg == 4.5 && tool.centre_of_gravity_mm == [5.0, 6.0, 7.0]);
+    assert_eq!(tool.frame.quaternion[2], 0.7071068);
+    let work_object = listing.work_object(motion).unwrap().value.as_ref().unwrap();
+    assert!(work_object.robhold && work_object.fixed);
+    assert_eq!(work_object.mechanical_unit, "a\"b");
+    assert_eq!(work_object.object_frame.position_mm, [0.0, 2.0, 0.0]);
+    assert_eq!(listing.speed(motion).unwrap().value.unwrap().tcp_mm_s, 150.0);
+    let zone = listing.zone(motion).unwrap().value.unwrap();
+    assert!(!zone.fine && zone.tcp_mm == 20.0 && zone.orientation_deg == 3.0);
+    assert_eq!(motion.reason(), None);
+}
+
+#[test]
+fn numbers_are_read_and_written_exactly() {
+    for text in [
+        "0",
+        "12",
+        "12.",
+        ".5",
+        "1.5E-3",
+        "2E6",
+        "9E+09",
+        "123456789.123456789",
+        "1e-300",
+        "0.1",
+        "3.14159265358979",
+    ] {
+        let wanted: f64 = text.parse().unwrap();
+        assert_eq!(number::value(text.as_bytes()), Some(wanted), "{text}");
+    }
+    let cases = [
+        (0.0, 4, "0.0000"),
+        (-0.000_04, 4, "0.0000"),
+        (-0.000_06, 4, "-0.0001"),
+        (1234.567_89, 3, "1234.568"),
+        (-5.0, 0, "-5"),
+        (0.05, 1, "0.1"),
+        (99.999_99, 2, "100.00"),
+    ];
+    for (value, decimals, wanted) in cases {
+        let mut out = Vec::new();
+        number::write(&mut out, value, decimals);
+        assert_eq!(String::from_utf8(out).unwrap(), wanted);
+    }
+    for (text, wanted) in [("5", 0), ("5.", 0), ("5.25", 2), ("1.5E-3", 4), ("1.5E3", 0), ("9E9", 0)] {
+        assert_eq!(number::decimals(text.as_bytes()), wanted, "{text}");
+    }
+}
