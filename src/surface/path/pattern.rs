@@ -12,8 +12,8 @@ use crate::surface::sampling::{self, interpolated};
 use crate::surface::{Contact, Surface, SurfaceError};
 
 /// How many curves, and how many places on each, the lattice has.
-const ACROSS: usize = 200;
-const ALONG: usize = 48;
+const ACROSS: usize = 120;
+const ALONG: usize = 36;
 
 /// One curve over the plan, a function of a share 0…1.
 #[derive(Debug, Clone)]
