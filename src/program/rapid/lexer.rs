@@ -36,7 +36,9 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
     while !rest.is_empty() {
         let at = source.len() - rest.len();
         let (after, kind) = match rest[0] {
-            b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0 => (space(rest, at, &mut tree), Token::Space),
+            b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0 => {
+                (space(rest, at, &mut tree), Token::Space)
+            }
             _ => token(rest).unwrap_or((&rest[1..], Token::Unknown)),
         };
         if kind == Token::Header {
@@ -88,7 +90,9 @@ fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
         b';' => one(Token::Semicolon),
         b'\\' => one(Token::Backslash),
         b':' => two(b'=', Token::Assign, Token::Colon),
-        b'!' => take_while(|byte| byte != b'\n' && byte != b'\r').parse(input).map(|(r, _)| (r, Token::Comment)),
+        b'!' => {
+            take_while(|byte| byte != b'\n' && byte != b'\r').parse(input).map(|(r, _)| (r, Token::Comment))
+        }
         b'"' => string(input),
         b'(' => one(Token::ParenOpen),
         b')' => one(Token::ParenClose),

@@ -366,7 +366,8 @@ impl<'t, 's> Parser<'t, 's> {
     /// An END: closes the nearest open block that `wanted` accepts, inside the current routine.
     fn end(&mut self, wanted: impl Fn(Syntax) -> bool) -> Parsed {
         let inner = |kind: Syntax| kind.is_statement_block();
-        let is_block_end = matches!(self.peek(), Token::EndIf | Token::EndFor | Token::EndWhile | Token::EndTest);
+        let is_block_end =
+            matches!(self.peek(), Token::EndIf | Token::EndFor | Token::EndWhile | Token::EndTest);
         for index in (1..self.blocks.len()).rev() {
             let kind = self.blocks[index].kind;
             if wanted(kind) {

@@ -220,8 +220,9 @@ pub fn arguments<'t>(tree: &'t RapidTree<'_>, call: u32) -> impl Iterator<Item =
                 Some(Argument { name: None, optional: false, value: expressions(tree, node).next() })
             }
             Syntax::Named | Syntax::Option => {
-                let mut inner = parts(tree, node)
-                    .filter(|&part| !matches!(token_kind(tree, part), Some(Token::Backslash | Token::Assign)));
+                let mut inner = parts(tree, node).filter(|&part| {
+                    !matches!(token_kind(tree, part), Some(Token::Backslash | Token::Assign))
+                });
                 let name = inner.next().and_then(|part| match part {
                     Child::Token(token) => Some(token),
                     Child::Node(_) => None,
@@ -338,15 +339,13 @@ pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
             (Child::Token(token), Some(Token::Ident | Token::Placeholder)) => {
                 (head.name, named) = (token, true);
             }
-            (Child::Node(list), _) => {
-                match tree.nodes[list as usize].kind {
-                    Syntax::Parameters => {
-                        let nodes = tree.child_nodes(list);
-                        head.parameters = nodes.filter_map(|node| parameter(tree, node)).collect();
-                    }
-                    _ => break,
+            (Child::Node(list), _) => match tree.nodes[list as usize].kind {
+                Syntax::Parameters => {
+                    let nodes = tree.child_nodes(list);
+                    head.parameters = nodes.filter_map(|node| parameter(tree, node)).collect();
                 }
-            }
+                _ => break,
+            },
             _ => {}
         }
     }

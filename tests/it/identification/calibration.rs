@@ -79,18 +79,10 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
                 Sensor::Pose => Reading::Pose(pose_from_vector(&[2.0, 1.0, -3.0, 0.02, -0.03, 0.01]) * pose),
             };
             let anchor = if sensor == Sensor::Cable { number % 2 } else { 0 };
-            Row { number, joints, reading, readout_mm: None, condition, anchor, session: None }
+            Row { condition, anchor, ..Row::new(number, joints, reading) }
         })
         .collect();
-    Dataset {
-        file: "made".into(),
-        sha256: String::new(),
-        sensor,
-        rows,
-        notes: Vec::new(),
-        angle_step_rad: None,
-        readout_step_mm: None,
-    }
+    Dataset::new("made", sensor, rows)
 }
 
 fn parameters(sensor: Sensor) -> Vec<Parameter> {

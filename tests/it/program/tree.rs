@@ -80,7 +80,12 @@ fn a_program_of_every_construct_has_no_opaque_region() {
     let told: Vec<_> = tree
         .opaque
         .iter()
-        .map(|o| (tree.line_column(tree.start(o.at)), String::from_utf8_lossy(&PROGRAM.as_bytes()[tree.range(o.first, o.end)])))
+        .map(|o| {
+            (
+                tree.line_column(tree.start(o.at)),
+                String::from_utf8_lossy(&PROGRAM.as_bytes()[tree.range(o.first, o.end)]),
+            )
+        })
         .collect();
     assert!(told.is_empty(), "{told:?}");
 }
@@ -88,7 +93,12 @@ fn a_program_of_every_construct_has_no_opaque_region() {
 #[test]
 fn what_cannot_be_read_is_opaque_with_its_reason_and_the_rest_is_read() {
     let cases: &[(&str, OpaqueReason, (u32, u32), &str)] = &[
-        ("PROC a()\nMoveL p1 v1;\nMoveL p2,v1;\nENDPROC", OpaqueReason::MissingSemicolon, (2, 10), "MoveL p1 v1;"),
+        (
+            "PROC a()\nMoveL p1 v1;\nMoveL p2,v1;\nENDPROC",
+            OpaqueReason::MissingSemicolon,
+            (2, 10),
+            "MoveL p1 v1;",
+        ),
         ("PROC a()\nMoveL p1\nMoveL p2,v1;\nENDPROC", OpaqueReason::MissingSemicolon, (3, 1), "MoveL p1"),
         ("PROC a()\nx:=;\ny:=1;\nENDPROC", OpaqueReason::ExpectedExpression, (2, 4), "x:=;"),
         ("PROC a()\nx:=[1,2;\ny:=1;\nENDPROC", OpaqueReason::Unclosed, (2, 8), "x:=[1,2;"),
@@ -113,7 +123,8 @@ fn what_cannot_be_read_is_opaque_with_its_reason_and_the_rest_is_read() {
 #[test]
 fn deep_nesting_ends_in_an_opaque_region_and_not_in_the_stack() {
     for (open, close) in [("[", "]"), ("(", ")"), ("f(", ")"), ("-", ""), ("NOT ", ""), ("a{", "}")] {
-        let source = format!("PROC a()\nx:={}1{};\ny:=2;\nENDPROC", open.repeat(100_000), close.repeat(100_000));
+        let source =
+            format!("PROC a()\nx:={}1{};\ny:=2;\nENDPROC", open.repeat(100_000), close.repeat(100_000));
         check(source.as_bytes());
         let tree = parse(source.as_bytes());
         assert!(tree.opaque.iter().any(|o| o.reason == OpaqueReason::TooDeep), "{open}");
