@@ -10,6 +10,7 @@ use truegrind::kinematics::arm_file::ArmFile;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::kinematics::model::Model;
 use truegrind::report::deviation as view;
+use truegrind::report::document::Document;
 
 use super::compensate::{CellArguments, Programs};
 use super::files::{self, Batch};
@@ -95,7 +96,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if reports.iter().all(|r| r.points.is_empty()) {
         bail!("{name}: no motion has a target that is known from the text");
     }
-    arguments.outputs.print(&view::summary(&reports));
+    let mut summary = Document::new(format!("Deviation of {name}"));
+    summary.push(view::block_table(&reports));
+    summary.push(view::registered_table(&reports));
+    arguments.outputs.print(&summary);
     let mut batch = Batch::sparing(&all);
     arguments.outputs.add_to(
         &mut batch,

@@ -55,8 +55,8 @@ fn say(path: &Toolpath, robot: &Robot, output: &Path) {
 
 /// Reads a surface file; a mesh is looked up beside it.
 pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
-    let text = files::read_text(path)?;
+    let bytes = files::read(path)?;
     let name = path.display().to_string();
     let resolve = |mesh: &str| inputs::read_beside(path, mesh).map_err(|e| format!("{e:#}"));
-    SurfaceFile::read(&name, &text, resolve).map_err(|e| anyhow!("{e}"))
+    SurfaceFile::read(&name, &bytes, resolve).map_err(|e| anyhow!("{e}"))
 }
