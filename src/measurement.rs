@@ -6,4 +6,5 @@ pub mod sensor;
 pub mod registration;
 pub mod simulation;
 pub mod split;
+pub mod convention;
 pub mod plausibility;

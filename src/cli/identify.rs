@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
 use truegrind::identification::calibration::Frames;
 use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
@@ -13,8 +13,11 @@ use truegrind::identification::study::study;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::estimated::Judgement;
 use truegrind::kinematics::model::Model;
+use truegrind::measurement::convention::AngleConvention;
 use truegrind::measurement::dataset::Dataset;
-use truegrind::measurement::{import, plausibility, split};
+use truegrind::measurement::import;
+use truegrind::measurement::plausibility::{Evidence, plausibility};
+use truegrind::measurement::split::{self, Split};
 use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
@@ -101,7 +104,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = options(arguments)?;
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
-    let found = on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
+    let found =
+        on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
     drop(work);
     for note in &dataset.notes {
         eprintln!("note: {note}");
@@ -183,20 +187,23 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
         Some(angles) => angles == Angles::Dh,
         None => robot.sheet.joints.angles == truegrind::robots::sheet::Angles::Dh,
     };
-    if dh {
-        plausibility::from_dh_angles(&mut dataset, &robot.model);
-    }
+    let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
     if !arguments.allow_odd_units {
-        let suspicions = plausibility::plausibility(&dataset, &robot.model);
-        if let Some(first) = suspicions.first() {
-            bail!("{first}");
+        for suspicion in plausibility(&dataset, &robot.model, convention) {
+            match suspicion.evidence {
+                Evidence::Sensor => bail!("{suspicion} (--allow-odd-units takes the file at its word)"),
+                Evidence::Readout => dataset.notes.push(suspicion.to_string()),
+            }
         }
     }
+    let dataset = convention.apply(&dataset, &robot.model).ok_or_else(|| {
+        anyhow!("{}: its joint map cannot be inverted, so DH angles cannot be read", robot.sheet.name)
+    })?;
     Ok((robot, dataset))
 }
 
 /// The rows to fit and to hold out; repeated poses stay together.
-pub(super) fn split_of(dataset: &Dataset, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
+pub(super) fn split_of(dataset: &Dataset, share: f64, seed: u64) -> Split {
     split::random(dataset, share, seed)
 }
 

@@ -37,16 +37,6 @@ pub(super) enum NamedModel {
     },
 }
 
-impl NamedModel {
-    /// Name for reports.
-    pub(super) fn name(&self) -> &str {
-        match self {
-            NamedModel::Nominal => "nominal",
-            NamedModel::Estimated { name, .. } => name,
-        }
-    }
-}
-
 /// Reads `nominal` or a model file.
 pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     if argument.eq_ignore_ascii_case("nominal") {
@@ -57,7 +47,10 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let arm = Estimated::from_toml(&text)
         .map_err(|e| anyhow!("{argument}: {e}; a model file is what `truegrind identify -o` writes"))?;
     if arm.verdict.status == Judgement::Fail {
-        bail!("{argument}: the fit behind this model failed ({}); it is not used", arm.verdict.reasons.join("; "));
+        bail!(
+            "{argument}: the fit behind this model failed ({}); it is not used",
+            arm.verdict.reasons.join("; ")
+        );
     }
     let hash = hash(text.as_bytes());
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })

@@ -20,6 +20,7 @@ use crate::kinematics::parameter::{Parameter, link_parameters};
 use crate::kinematics::region::Region;
 use crate::math::statistics::{ErrorSummary, median};
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split::{self, Split};
 
 /// How to identify.
 #[derive(Debug, Clone)]
@@ -111,9 +112,6 @@ const WRONG_ARM_MM: f64 = 25.0;
 /// A parameter farther than this many prior standard deviations from nominal makes the fit fail.
 const STRANGE_DEVIATION: f64 = 6.0;
 
-/// Rows that a split leaves for the fit and holds out, as indices, from a seeded permutation.
-pub type Split = (Vec<usize>, Vec<usize>);
-
 /// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows
 /// that were not set aside, given their number.
 ///
@@ -134,7 +132,7 @@ pub fn identify(
     let kept: Vec<usize> =
         (0..dataset.rows.len()).filter(|i| outliers.rows.iter().all(|(o, _)| o != i)).collect();
     let observed = observed.subset(&kept);
-    let (train, test) = split(&observed.dataset);
+    let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
     let sensing = frame_parameters(&observed.dataset);
@@ -360,8 +358,12 @@ fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     }
 }
 
-/// What rounding of angles and readings alone leaves in a row [mm]; `None` where nothing is known to be rounded.
+/// What repeated poses scatter by [mm], or else what the rounding of angles alone leaves in a row; `None` where
+/// neither is known.
 fn noise_floor(observed: &Observed, fitted: &Fitted) -> Option<f64> {
+    if let Some(floor) = split::noise_floor(&observed.dataset) {
+        return Some(floor.sigma_mm);
+    }
     let shares =
         super::rounding::angle_shares(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles);
     let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;

@@ -4,11 +4,12 @@ use rayon::prelude::*;
 
 use crate::estimation::estimate::Termination;
 use crate::identification::calibration::Frames;
-use crate::identification::identify::{IdentifyError, Options, Split, identify};
+use crate::identification::identify::{IdentifyError, Options, identify};
 use crate::identification::solver::{SOLVERS, Solver};
 use crate::kinematics::model::Model;
 use crate::math::statistics::{ErrorSummary, mean_and_deviation};
 use crate::measurement::dataset::Dataset;
+use crate::measurement::split::Split;
 
 /// One method over all splits.
 #[derive(Debug, Clone)]

@@ -284,9 +284,9 @@ fn mean_rotation(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Option
     Some(UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(SVector::<f64, 4>::from(v))))
 }
 
-/// Prior standard deviation of a cable's zero [mm per mm of residual]: lengths seen from one side hardly tell the
-/// zero from the outlet's distance.
-const ZERO_SIGMA: f64 = 200.0;
+/// Prior standard deviation of a cable's zero and of its hook [mm per mm of residual]: lengths seen from one side
+/// hardly tell them from the outlet's distance.
+const PRIOR_SIGMA: f64 = 200.0;
 
 /// A cable's outlet and zero from the hook's positions in the base and the lengths read.
 ///
@@ -323,13 +323,13 @@ pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegist
                 let u = away / distance;
                 normal.add(&[u.x, u.y, u.z, 1.0], distance + state.1 - l);
             }
-            normal.add(&[0.0, 0.0, 0.0, 1.0 / ZERO_SIGMA], state.1 / ZERO_SIGMA);
+            normal.add(&[0.0, 0.0, 0.0, 1.0 / PRIOR_SIGMA], state.1 / PRIOR_SIGMA);
         };
     let step = |state: &(Vector3<f64>, f64), d: &DVector<f64>| {
         (state.0 + Vector3::new(d[0], d[1], d[2]), state.1 + d[3])
     };
     // The valleys show in a sample; only the candidates are worked out on all rows.
-    let stride = n.div_ceil(200);
+    let stride = n.div_ceil(80);
     let thin_points: Vec<_> = hook_mm.iter().step_by(stride).copied().collect();
     let thin_lengths: Vec<_> = lengths_mm.iter().step_by(stride).copied().collect();
     let mut valleys: Vec<(f64, (Vector3<f64>, f64))> = Vec::new();
@@ -357,6 +357,42 @@ pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegist
     Some(CableRegistration { outlet_mm, zero_mm, rmse_mm: rmse(cost), rival })
 }
 
+/// A cable's outlet and zero together with the hook on the flange, all unknown.
+///
+/// The hook has a prior about the flange's origin (σ 200 mm for residuals of 1 mm): one cable sees one direction of
+/// each pose, and the hook is told from the outlet only by turning the flange.
+pub fn cable_and_hook(
+    base_from_flange: &[Pose],
+    lengths_mm: &[f64],
+) -> Option<(CableRegistration, Vector3<f64>)> {
+    let n = base_from_flange.len().min(lengths_mm.len());
+    let origins: Vec<_> = base_from_flange[..n].iter().map(|f| f.translation.vector).collect();
+    let plain = cable(&origins, lengths_mm)?;
+    let mut starts = vec![(plain.outlet_mm, plain.zero_mm, Vector3::zeros())];
+    starts.extend(plain.rival.map(|(outlet, zero)| (outlet, zero, Vector3::zeros())));
+    let rows = |(outlet, zero, hook): &(Vector3<f64>, f64, Vector3<f64>), normal: &mut Normal| {
+        for (flange, length) in base_from_flange.iter().zip(lengths_mm) {
+            let away = flange.rotation * hook + flange.translation.vector - outlet;
+            let distance = away.norm().max(1e-6);
+            let u = away / distance;
+            let on_flange = flange.rotation.inverse_transform_vector(&u);
+            let row = [-u.x, -u.y, -u.z, 1.0, on_flange.x, on_flange.y, on_flange.z];
+            normal.add(&row, distance + zero - length);
+        }
+        for (k, value) in [(3, *zero), (4, hook.x), (5, hook.y), (6, hook.z)] {
+            let mut row = [0.0; 7];
+            row[k] = 1.0 / PRIOR_SIGMA;
+            normal.add(&row, value / PRIOR_SIGMA);
+        }
+    };
+    let step = |(outlet, zero, hook): &(Vector3<f64>, f64, Vector3<f64>), d: &DVector<f64>| {
+        (outlet + Vector3::new(d[0], d[1], d[2]), zero + d[3], hook + Vector3::new(d[4], d[5], d[6]))
+    };
+    let (cost, (outlet_mm, zero_mm, hook_mm)) = best(starts, 7, rows, step)?;
+    let rmse_mm = (cost / n as f64).sqrt();
+    Some((CableRegistration { outlet_mm, zero_mm, rmse_mm, rival: None }, hook_mm))
+}
+
 /// o, z from lᵢ² − |pᵢ|² = 2 lᵢ z − 2 pᵢ·o + (|o|² − z²), the last bracket free.
 fn squared_lengths(
     hook_mm: &[Vector3<f64>],
@@ -372,7 +408,8 @@ fn squared_lengths(
     Some((centre + Vector3::new(x[0], x[1], x[2]) * 1e3, x[3] * 1e3))
 }
 
-/// The best of several starts.
+/// The best of several starts; a later one has to be better by more than rounding, so that where the data leave a
+/// direction open the first, plainest start decides.
 fn best<S: Clone>(
     starts: Vec<S>,
     size: usize,
@@ -383,7 +420,7 @@ fn best<S: Clone>(
         .into_iter()
         .map(|start| fit(start, size, &rows, &step))
         .filter(|(cost, _)| cost.is_finite())
-        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .reduce(|best, next| if next.0 + 1e-9 < 0.999 * best.0 { next } else { best })
 }
 
 impl Normal {

@@ -1,11 +1,189 @@
-//! temp
-use super::dataset::Dataset;
-/// temp
-pub fn random(dataset: &Dataset, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
-    use rand::seq::SliceRandom;
-    use rand::SeedableRng;
-    let mut all: Vec<usize> = (0..dataset.rows.len()).collect();
-    all.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
-    let test = all.split_off((all.len() as f64 * (1.0 - share)).round() as usize);
-    (all, test)
+//! Which rows train and which test, and what repeated poses say about the noise.
+//!
+//! A pose that was measured several times stays on one side of every split: a fit that has seen a pose has seen its
+//! repetitions. All functions return indices of [`Dataset::rows`] in ascending order.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::dataset::{Dataset, Reading};
+
+/// Rows to fit and rows to judge the fit by.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Split {
+    /// Rows of the fit.
+    pub train: Vec<usize>,
+    /// Held-out rows.
+    pub test: Vec<usize>,
+}
+
+impl From<Split> for (Vec<usize>, Vec<usize>) {
+    fn from(split: Split) -> Self {
+        (split.train, split.test)
+    }
+}
+
+/// Difference of every joint up to which two rows are the same pose [rad]: below the step of a rounded log, or what an
+/// encoder read back at rest scatters by.
+fn same_rad(data: &Dataset) -> f64 {
+    if data.angle_step_rad.is_some() { 0.000_5f64.to_radians() } else { 0.003f64.to_radians() }
+}
+
+/// Rows of the same pose, in the order of their first row. Poses are the same when all joints agree (to 0.0005° in a
+/// log rounded to fixed steps, else to 0.003°) and the controller's read-out, where logged, does not tell them apart,
+/// as it may where angles are rounded coarsely.
+pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
+    // One number for each row, in which equal poses lie close together and others hardly ever: only neighbours have to
+    // be compared. The weights are powers of the golden section, so that no grid of angles lines up.
+    const WEIGHTS: [f64; 6] = [1.0, 0.618_034, 0.381_966, 0.236_068, 0.145_898, 0.090_170];
+    let same = same_rad(data);
+    let reach = same * WEIGHTS.iter().sum::<f64>();
+    let place: Vec<f64> =
+        data.rows.iter().map(|row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum()).collect();
+    let mut order: Vec<usize> = (0..data.rows.len()).collect();
+    order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
+    let mut group: Vec<usize> = (0..data.rows.len()).collect();
+    for (k, &i) in order.iter().enumerate() {
+        for &j in order[k + 1..].iter().take_while(|&&j| place[j] - place[i] <= reach) {
+            if (data.rows[i].joints - data.rows[j].joints).amax() <= same && !told_apart(data, i, j) {
+                let (a, b) = (root(&group, i), root(&group, j));
+                group[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for i in 0..data.rows.len() {
+        out.entry(root(&group, i)).or_default().push(i);
+    }
+    out.into_values().collect()
+}
+
+fn root(group: &[usize], mut i: usize) -> usize {
+    while group[i] != i {
+        i = group[i];
+    }
+    i
+}
+
+/// Whether the controller's read-out says that two rows of equal rounded angles are different poses.
+fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
+    match (data.rows[i].readout_mm, data.rows[j].readout_mm) {
+        (Some(a), Some(b)) => (a - b).amax() > 1.5 * data.readout_step_mm.unwrap_or(1e-3),
+        _ => false,
+    }
+}
+
+/// A random share of the poses held out: `held_out` = 0.2 for 80/20. Both sides get a pose at least, where there are
+/// two; a share outside 0 to 1 is taken to its nearest end.
+pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
+    let poses = shuffled(poses(data), seed);
+    let wanted = (data.rows.len() as f64 * held_out.clamp(0.0, 1.0)).round() as usize;
+    let mut test = Vec::new();
+    let mut train = Vec::new();
+    for pose in poses {
+        // A group of repetitions that would overshoot by more than half of itself goes to the other side.
+        if 2 * test.len() + pose.len() <= 2 * wanted { test.extend(pose) } else { train.extend(pose) }
+    }
+    sorted(train, test)
+}
+
+/// k-fold cross-validation over random poses: k splits whose test rows cover every row once. `folds` above the number
+/// of poses is that number.
+pub fn folds(data: &Dataset, folds: usize, seed: u64) -> Vec<Split> {
+    let poses = shuffled(poses(data), seed);
+    let k = folds.clamp(1, poses.len().max(1));
+    let mut test: Vec<Vec<usize>> = vec![Vec::new(); k];
+    for pose in poses {
+        // The smallest fold next: repetitions are shared out evenly too.
+        if let Some(fold) = test.iter_mut().min_by_key(|fold| fold.len()) {
+            fold.extend(pose);
+        }
+    }
+    complements(data.rows.len(), test)
+}
+
+/// Cross-validation over contiguous blocks of rows: what drifts or jumps while measuring shows here and hides in
+/// random folds. Repetitions of a test pose in other blocks are left out of the fit.
+pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
+    let n = data.rows.len();
+    let k = blocks.clamp(1, n.max(1));
+    let poses = poses(data);
+    let mut pose_of = vec![0; n];
+    for (p, rows) in poses.iter().enumerate() {
+        rows.iter().for_each(|&i| pose_of[i] = p);
+    }
+    (0..k)
+        .map(|b| {
+            let test: Vec<usize> = (b * n / k..(b + 1) * n / k).collect();
+            let mut held = vec![false; poses.len()];
+            test.iter().for_each(|&i| held[pose_of[i]] = true);
+            let train = (0..n).filter(|&i| !held[pose_of[i]]).collect();
+            Split { train, test }
+        })
+        .collect()
+}
+
+fn shuffled(mut poses: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Fisher and Yates.
+    for i in (1..poses.len()).rev() {
+        poses.swap(i, rng.random_range(0..=i));
+    }
+    poses
+}
+
+fn sorted(mut train: Vec<usize>, mut test: Vec<usize>) -> Split {
+    train.sort_unstable();
+    test.sort_unstable();
+    Split { train, test }
+}
+
+fn complements(rows: usize, tests: Vec<Vec<usize>>) -> Vec<Split> {
+    tests
+        .into_iter()
+        .map(|test| {
+            let mut held = vec![false; rows];
+            test.iter().for_each(|&i| held[i] = true);
+            sorted((0..rows).filter(|&i| !held[i]).collect(), test)
+        })
+        .collect()
+}
+
+/// What repeated poses scatter by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseFloor {
+    /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) [mm].
+    pub sigma_mm: f64,
+    /// Poses that were measured more than once.
+    pub poses: usize,
+    /// Degrees of freedom: rows in these poses minus poses.
+    pub freedom: usize,
+}
+
+/// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
+/// `None` where no pose was repeated. Drift between the repetitions counts as noise.
+pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
+    let (mut square, mut count, mut freedom) = (0.0, 0, 0);
+    for pose in poses(data) {
+        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<Vector3<f64>>> = BTreeMap::new();
+        for i in pose {
+            let row = &data.rows[i];
+            alike.entry((row.anchor, row.condition.approach)).or_default().push(match row.reading {
+                Reading::Cable(l) => Vector3::new(l, 0.0, 0.0),
+                Reading::Position(p) => p,
+                Reading::Pose(pose) => pose.translation.vector,
+            });
+        }
+        for readings in alike.values().filter(|r| r.len() > 1) {
+            let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
+            square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
+            freedom += readings.len() - 1;
+            count += 1;
+        }
+    }
+    (freedom > 0).then(|| NoiseFloor { sigma_mm: (square / freedom as f64).sqrt(), poses: count, freedom })
 }

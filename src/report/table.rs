@@ -91,14 +91,15 @@ impl Table {
         self.rows.push(row.into_iter().collect());
     }
 
-    /// The table with at most `limit` rows, the first and the last ones, and a note that says how many are left out.
-    /// For pages: a path of 100,000 points belongs in the CSV file.
+    /// The table with at most `limit` rows, the first and the last ones, dots between them and a note that says how many
+    /// are left out. For pages: a path of 100,000 points belongs in the CSV file.
     pub fn excerpt(&self, limit: usize) -> Table {
         let mut table = self.clone();
         let left_out = self.rows.len().saturating_sub(limit);
         if left_out > 0 {
             let head = limit - limit / 3;
-            table.rows.drain(head..head + left_out);
+            let dots = vec![Cell::Text("⋮".to_owned()); self.columns.len()];
+            table.rows.splice(head..head + left_out, [dots]);
             table.notes.push(format!(
                 "{left_out} of {} rows are left out here, between the first {head} and the last {}.",
                 self.rows.len(),

@@ -1,1 +1,304 @@
-//! Tests of `command`.
+//! The binary as a user runs it: exit codes, streams, files, and what bad input gets.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+const CABLE: &str = include_str!("../data/irb120-cable.csv");
+
+fn truegrind(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output =
+        Command::cargo_bin("truegrind").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut out: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    out.sort();
+    out
+}
+
+/// The shipped measurements with every cell of some columns passed through `change`.
+fn changed(columns: &[&str], change: impl Fn(usize, &str) -> String) -> String {
+    let mut lines = CABLE.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut out = header.join(",") + "\n";
+    for (row, line) in lines.enumerate() {
+        let cells: Vec<String> = line
+            .split(',')
+            .zip(&header)
+            .map(|(cell, name)| if columns.contains(name) { change(row, cell) } else { cell.to_owned() })
+            .collect();
+        out += &(cells.join(",") + "\n");
+    }
+    out
+}
+
+/// Runs `identify` on a text and expects exit code 2, no model, and all of `words` in the message.
+fn refused(text: &str, words: &[&str]) {
+    let dir = folder();
+    fs::write(dir.path().join("data.csv"), text).unwrap();
+    let (code, out, err) =
+        truegrind(dir.path(), &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert_eq!(code, 2, "expected a refusal, got:\n{out}\n{err}");
+    for word in words {
+        assert!(err.to_lowercase().contains(&word.to_lowercase()), "`{word}` is not in: {err}");
+    }
+    assert_eq!(files(dir.path()).len(), 1, "nothing is written beside the input");
+}
+
+#[test]
+fn identify_path_compensate_deviation_as_in_the_readme() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    fs::write(at.join("blade.toml"), include_str!("../../surfaces/blade.toml")).unwrap();
+    fs::write(at.join("recipe.toml"), include_str!("../data/irb120-cable.toml")).unwrap();
+    let (code, out, err) = truegrind(
+        at,
+        &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "model.toml", "--json", "id.json"],
+    );
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("held"), "the summary states held-out errors:\n{out}");
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(at.join("id.json")).unwrap()).unwrap();
+    assert!(json.is_object());
+    let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "blade.mod"]);
+    assert_eq!(code, 0, "{err}");
+    let original = fs::read(at.join("blade.mod")).unwrap();
+    let (code, out, err) = truegrind(
+        at,
+        &[
+            "compensate",
+            "blade.mod",
+            "--model",
+            "model.toml",
+            "-o",
+            "out.mod",
+            "--surface",
+            "blade.toml",
+            "--json",
+        ],
+    );
+    assert!(code == 0 || code == 1, "{err}");
+    let contract: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(contract["schema"], "truegrind.compensation/1");
+    let motions = contract["programs"][0]["motions"].as_array().unwrap();
+    assert!(motions.len() > 300);
+    for motion in motions {
+        assert!(motion["line"].as_u64().unwrap() > 0);
+        let status = motion["status"].as_str().unwrap();
+        assert!(["changed", "left", "refused", "flagged"].contains(&status), "{status}");
+    }
+    assert_eq!(fs::read(at.join("blade.mod")).unwrap(), original, "the input stays");
+    let rewritten = fs::read(at.join("out.mod")).unwrap();
+    assert_ne!(rewritten, original);
+    // The same model again: nothing is written.
+    let (code, out, _) =
+        truegrind(at, &["compensate", "out.mod", "--model", "model.toml", "-o", "twice.mod"]);
+    assert_eq!((code, out.contains("already compensated")), (1, true), "{out}");
+    assert!(!at.join("twice.mod").exists());
+    // The simulated actual arm runs both: the rewritten program is better.
+    let (code, _, err) = truegrind(at, &["simulate", "recipe.toml", "-o", "again.csv", "--arm", "arm.toml"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(fs::read_to_string(at.join("again.csv")).unwrap(), CABLE, "the recipe makes the shipped file");
+    let (code, out, err) = truegrind(
+        at,
+        &[
+            "deviation",
+            "out.mod",
+            "--model",
+            "nominal",
+            "--robot",
+            "abb-irb-120",
+            "--intended",
+            "blade.mod",
+            "--actual",
+            "arm.toml",
+            "--surface",
+            "blade.toml",
+            "--csv",
+            "table.csv",
+            "--json",
+        ],
+    );
+    assert_eq!(code, 0, "{err}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert!(report.is_object());
+    assert!(fs::read_to_string(at.join("table.csv")).unwrap().lines().count() > 300);
+}
+
+#[test]
+fn the_model_nominal_copies_the_bytes() {
+    let dir = folder();
+    let at = dir.path();
+    let source = "MODULE m\r\n  ! \u{e4}\r\n  PROC main()\r\n    MoveL [[400,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\r\n  ENDPROC\r\nENDMODULE\r\n";
+    fs::write(at.join("p.mod"), source).unwrap();
+    let (code, _, err) = truegrind(
+        at,
+        &["compensate", "p.mod", "--model", "nominal", "--robot", "abb-irb-120", "-o", "q.mod"],
+    );
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(fs::read(at.join("q.mod")).unwrap(), source.as_bytes());
+}
+
+#[test]
+fn inputs_are_never_overwritten() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    for output in ["data.csv", "./data.csv"] {
+        let (code, _, err) = truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", output]);
+        assert_eq!(code, 2);
+        assert!(err.contains("never overwritten"), "{err}");
+    }
+    assert_eq!(fs::read_to_string(at.join("data.csv")).unwrap(), CABLE);
+    let (code, _, err) =
+        truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "no/model.toml"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("does not exist"), "{err}");
+}
+
+#[test]
+fn a_full_disk_leaves_nothing() {
+    // /dev/full takes no byte: the write fails after the work.
+    if !Path::new("/dev/full").exists() {
+        return;
+    }
+    let dir = folder();
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_truegrind"))
+        .current_dir(dir.path())
+        .args(["robots", "abb-irb-120"])
+        .stdout(fs::File::options().write(true).open("/dev/full").unwrap())
+        .output()
+        .unwrap();
+    assert_ne!(output.status.code(), Some(0), "a result that could not be printed is no success");
+}
+
+#[test]
+fn wrong_units_are_noticed_and_named() {
+    let number = |c: &str| c.parse::<f64>().unwrap();
+    let angles = ["q1", "q2", "q3", "q4", "q5", "q6"];
+    refused(&changed(&angles, |_, c| format!("{:.6}", number(c).to_radians())), &["radian", "degree"]);
+    refused(&changed(&["L"], |_, c| format!("{:.6}", number(c) / 1000.0)), &["metre", "mm"]);
+}
+
+#[test]
+fn broken_cells_get_file_row_column_and_remedy() {
+    refused(
+        &changed(&["q3"], |row, c| if row == 6 { "NaN".into() } else { c.into() }),
+        &["data.csv", "8", "q3"],
+    );
+    refused(
+        &changed(&["L"], |row, c| if row == 3 { "far".into() } else { c.into() }),
+        &["data.csv", "5", "far", "L"],
+    );
+    refused(&CABLE.replacen("q5", "qq5", 1), &["q5", "qq5"]);
+    refused(&CABLE.replacen("L,", "length,", 1), &["L"]);
+    refused("", &["data.csv"]);
+    let seven = CABLE.replacen("q6,", "q6,q7,", 1).replace('\n', ",0\n");
+    refused(&seven, &["q7"]);
+}
+
+#[test]
+fn too_few_rows_say_how_many_are_needed() {
+    let five: String = CABLE.lines().take(6).map(|l| format!("{l}\n")).collect();
+    refused(&five, &["5 rows", "at least"]);
+}
+
+#[test]
+fn outliers_are_found_listed_and_do_no_harm() {
+    let number = |c: &str| c.parse::<f64>().unwrap();
+    let dir = folder();
+    let at = dir.path();
+    let rmse = |name: &str, text: &str| {
+        fs::write(at.join(name), text).unwrap();
+        let (code, out, err) = truegrind(at, &["identify", name, "--robot", "abb-irb-120", "--json"]);
+        assert_eq!(code, 0, "{err}");
+        let _ = out;
+        let (_, _, _) = (code, &out, &err);
+        let model = format!("{name}.toml");
+        let (code, _, err) = truegrind(at, &["identify", name, "--robot", "abb-irb-120", "-o", &model]);
+        assert_eq!(code, 0, "{err}");
+        let arm = truegrind::kinematics::estimated::Estimated::from_toml(
+            &fs::read_to_string(at.join(&model)).unwrap(),
+        )
+        .unwrap();
+        (arm.geometry.held_out.rmse, arm.provenance.set_aside)
+    };
+    let (clean, none) = rmse("clean.csv", CABLE);
+    assert!(none.is_empty(), "nothing is set aside on clean data: {none:?}");
+    let off = |row: usize, c: &str| match row {
+        40 => format!("{:.3}", number(c) + 500.0),
+        99 | 150 | 222 => format!("{:.3}", number(c) + 5.0),
+        _ => c.to_owned(),
+    };
+    let (dirty, mut set_aside) = rmse("dirty.csv", &changed(&["L"], off));
+    set_aside.sort_unstable();
+    assert_eq!(set_aside, [40, 99, 150, 222]);
+    assert!(dirty < 1.2 * clean, "{dirty} against {clean}");
+}
+
+#[test]
+fn wrong_names_list_what_exists() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    let (code, _, err) = truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-12"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("abb-irb-12") && err.contains("abb-irb-120"), "{err}");
+    let (code, _, err) =
+        truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "--method", "newton"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("newton") && err.contains("ltlm"), "{err}");
+    let (code, _, err) = truegrind(at, &["identify", "nothing.csv", "--robot", "abb-irb-120"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("nothing.csv"), "{err}");
+    let (code, _, _) = truegrind(at, &["grind"]);
+    assert_eq!(code, 2);
+    let (code, out, _) = truegrind(at, &["--help"]);
+    assert_eq!(code, 0);
+    for verb in ["demo", "robots", "simulate", "identify", "path", "compensate", "deviation"] {
+        assert!(out.contains(verb), "{verb} is not in the help");
+    }
+}
+
+#[test]
+fn a_surface_that_does_not_parse_names_file_and_place() {
+    let dir = folder();
+    let at = dir.path();
+    let broken = include_str!("../../surfaces/blade.toml").replacen("sin(y/40)", "sin(y/40", 1);
+    fs::write(at.join("blade.toml"), broken).unwrap();
+    let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "b.mod"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("blade.toml"), "{err}");
+    assert!(!at.join("b.mod").exists());
+    let far = include_str!("../../surfaces/blade.toml").replacen("[420, 0, 250]", "[1420, 0, 250]", 1);
+    fs::write(at.join("blade.toml"), far).unwrap();
+    let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "b.mod"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("point 1") && err.contains("reach"), "{err}");
+}
+
+#[test]
+fn a_robot_that_is_not_the_models_is_an_error_naming_both() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    let (code, _, err) = truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "m.toml"]);
+    assert_eq!(code, 0, "{err}");
+    fs::write(at.join("p.mod"), "MODULE m\nENDMODULE\n").unwrap();
+    let (code, _, err) = truegrind(
+        at,
+        &["compensate", "p.mod", "--model", "m.toml", "--robot", "kuka-kr6-r900-sixx", "-o", "q.mod"],
+    );
+    assert_eq!(code, 2);
+    assert!(err.contains("abb-irb-120") && err.contains("kuka-kr6-r900-sixx"), "{err}");
+}

@@ -28,7 +28,9 @@ fn perturbed(seed: u64, scale: f64) -> Model {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut model = nominal();
     for parameter in link_parameters(&model.clone()) {
-        let truegrind::kinematics::parameter::Parameter::Link { joint, coordinate } = parameter else { continue };
+        let truegrind::kinematics::parameter::Parameter::Link { joint, coordinate } = parameter else {
+            continue;
+        };
         let size = if coordinate.is_length() { 0.4 } else { 0.002 };
         let link = &mut model.links[joint];
         link.set(coordinate, link.get(coordinate) + scale * size * random.random_range(-1.0..1.0));
@@ -104,7 +106,11 @@ fn a_perfectly_known_arm_follows_the_blade_to_the_printed_decimals() {
         for emit in [Emit::Targets, Emit::Joints] {
             let options = Options { emit, ..Options::default() };
             let (planned, program) = rewritten(&source, &known, &Cell::default(), &options);
-            assert!(planned.outcomes.iter().all(|o| o.status == Status::Changed), "{:?}", planned.outcomes.iter().find(|o| o.status != Status::Changed));
+            assert!(
+                planned.outcomes.iter().all(|o| o.status == Status::Changed),
+                "{:?}",
+                planned.outcomes.iter().find(|o| o.status != Status::Changed)
+            );
             let report = run_on(&actual, &source, &program, &Cell::default());
             assert!(worst(&report, false) > 0.3, "the arm is off before");
             assert!(worst(&report, true) < 5e-4, "after: {} mm", worst(&report, true));
@@ -166,7 +172,8 @@ fn a_long_line_gets_targets_only_where_the_tolerance_would_be_broken() {
     let task = Task::read(&[("p.mod", &source[..])]);
     let actual = perturbed(5, 3.0);
     let known = estimated(actual.clone(), &[Joints::zeros()]);
-    let loose = plan(&task.listing, &known, &Cell::default(), &Options { tolerance_mm: 5.0, ..Options::default() });
+    let loose =
+        plan(&task.listing, &known, &Cell::default(), &Options { tolerance_mm: 5.0, ..Options::default() });
     assert_eq!(loose.outcomes[1].inserted, 0, "{:?}", loose.outcomes);
     let bend = loose.outcomes[1].bend_mm.unwrap();
     assert!(bend > 0.02, "the line bends by {bend} mm");
@@ -248,7 +255,8 @@ fn teaching_by_points_recovers_tool_and_frame() {
     assert!((taught_tcp(&posed, &poses).unwrap() - tcp).norm() < 1e-6);
     assert!(taught_tcp(&posed, &[near, near, near, near]).is_none());
     let frame = Pose::new(Vector3::new(400.0, 20.0, 100.0), Vector3::new(0.1, 0.2, -0.3));
-    let points = [[-30.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 70.0, 0.0]].map(|p| frame * nalgebra::Point3::from(p));
+    let points =
+        [[-30.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 70.0, 0.0]].map(|p| frame * nalgebra::Point3::from(p));
     let found = taught_frame(&points).unwrap();
     assert!((found.translation.vector - frame.translation.vector).norm() < 1e-9);
     assert!(found.rotation.angle_to(&frame.rotation) < 1e-9);

@@ -126,7 +126,8 @@ fn a_fixture_that_points_upward_fails() {
     assert_eq!(found.len(), 2, "{found:?}");
     let grouped = violations(Path::new("math.rs"), "use crate::{kinematics::link, report};\n");
     assert_eq!(grouped.len(), 2, "{grouped:?}");
-    let down = violations(Path::new("kinematics/model.rs"), "use crate::math::se3::Pose;\nuse super::link::Link;\n");
+    let down =
+        violations(Path::new("kinematics/model.rs"), "use crate::math::se3::Pose;\nuse super::link::Link;\n");
     assert!(down.is_empty(), "{down:?}");
 }
 

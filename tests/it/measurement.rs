@@ -1,5 +1,8 @@
 //! Tests of `measurement`.
 
 mod import;
+mod plausibility;
 mod real;
+mod registration;
 mod simulation;
+mod split;

@@ -1,5 +1,7 @@
 //! Tests of `program`.
 
+#![allow(clippy::unwrap_used)]
+
 mod tree;
 mod samples;
 mod rewriting;

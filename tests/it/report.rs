@@ -1,1 +1,6 @@
 //! Tests of `report`.
+
+mod formats;
+mod numbers;
+mod page;
+mod plots;

@@ -22,11 +22,12 @@ impl Normal {
 
     /// Adds the row ∂r/∂x with its residual r.
     pub(super) fn add(&mut self, row: &[f64], residual: f64) {
-        for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-            for (j, b) in row.iter().enumerate() {
-                self.matrix[(i, j)] += a * b;
+        let columns = self.matrix.as_mut_slice().chunks_exact_mut(row.len());
+        for ((column, a), gradient) in columns.zip(row).zip(self.gradient.iter_mut()) {
+            if *a != 0.0 {
+                column.iter_mut().zip(row).for_each(|(entry, b)| *entry += a * b);
+                *gradient += a * residual;
             }
-            self.gradient[i] += a * residual;
         }
         self.cost += residual * residual;
     }

@@ -5,9 +5,9 @@
 //! line end in the second byte of a character. There is no `\"` escape in RAPID strings.
 
 use nom::branch::alt;
-use nom::bytes::complete::{tag, tag_no_case, take_while, take_while1};
-use nom::character::complete::{digit0, digit1, one_of};
-use nom::combinator::{opt, recognize};
+use nom::bytes::complete::{tag, tag_no_case, take, take_while, take_while1};
+use nom::character::complete::digit1;
+use nom::combinator::recognize;
 use nom::{IResult, Parser};
 
 use super::syntax::Syntax;
@@ -120,6 +120,7 @@ fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
 
 /// A number: decimal with optional fraction and exponent, or binary, octal, decimal, hexadecimal with its prefix.
 /// The sign is no part of it.
+#[inline]
 pub fn number(input: Bytes<'_>) -> Lexed<'_> {
     if input.first() == Some(&b'0') && input.get(1).is_some_and(u8::is_ascii_alphabetic) {
         let prefixed = alt((
@@ -133,17 +134,40 @@ pub fn number(input: Bytes<'_>) -> Lexed<'_> {
             return prefixed;
         }
     }
-    let decimal = alt((recognize((digit1, opt((tag("."), digit0)))), recognize((tag("."), digit1))));
-    let exponent = (one_of("eE"), opt(one_of("+-")), digit1);
-    recognize((decimal, opt(exponent))).parse(input)
+    let digits = |mut at: usize| {
+        while input.get(at).is_some_and(u8::is_ascii_digit) {
+            at += 1;
+        }
+        at
+    };
+    let whole = digits(0);
+    let mut end = whole;
+    if input.get(end) == Some(&b'.') {
+        end = digits(end + 1);
+    }
+    if end - usize::from(end > whole) == 0 {
+        return Err(nom::Err::Error(()));
+    }
+    if matches!(input.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(input.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    take(end).parse(input)
 }
 
 /// An identifier or reserved word. Bytes from 0x80 belong to it: Latin-1 letters, and the pieces of letters of other
 /// encodings.
 #[inline]
 fn word(input: Bytes<'_>) -> Lexed<'_, Token> {
-    if input.starts_with(b"\xEF\xBB\xBF") || input.starts_with(b"\xE3\x80\x80") {
-        return Ok((&input[3..], Token::Space));
+    // Blanks of UTF-8: byte order mark, ideographic space, no-break space.
+    match input {
+        [0xEF, 0xBB, 0xBF, rest @ ..] | [0xE3, 0x80, 0x80, rest @ ..] | [0xC2, 0xA0, rest @ ..] => {
+            return Ok((rest, Token::Space));
+        }
+        _ => {}
     }
     let (rest, text) =
         take_while(|byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80).parse(input)?;

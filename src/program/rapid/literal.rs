@@ -4,9 +4,7 @@
 //! Signs, white space and comments may stand anywhere between; anything else (a name, arithmetic) makes the answer
 //! `None`, and the evaluator takes the general way.
 
-use nom::character::complete::one_of;
-use nom::combinator::opt;
-use nom::{IResult, Parser};
+use nom::IResult;
 
 use super::lexer;
 use super::number;
@@ -81,10 +79,14 @@ fn symbol(wanted: u8) -> impl Fn(&[u8]) -> Rest<'_, ()> {
 /// A number with an optional sign.
 #[inline]
 fn signed(input: &[u8]) -> Rest<'_, f64> {
-    let (rest, sign) = opt(one_of("+-")).parse(input)?;
-    let (rest, text) = lexer::number(if sign.is_some() { trivia(rest) } else { rest })?;
+    let (rest, negative) = match input {
+        [b'-', rest @ ..] => (trivia(rest), true),
+        [b'+', rest @ ..] => (trivia(rest), false),
+        _ => (input, false),
+    };
+    let (rest, text) = lexer::number(rest)?;
     let value = number::value(text).ok_or(nom::Err::Error(()))?;
-    Ok((rest, if sign == Some('-') { -value } else { value }))
+    Ok((rest, if negative { -value } else { value }))
 }
 
 /// The decimals that the number in `span` of a literal states.

@@ -37,8 +37,7 @@ pub fn value(text: &[u8]) -> Option<f64> {
             }
             b'.' if !fraction => fraction = true,
             b'e' | b'E' => {
-                let written: i32 = std::str::from_utf8(&text[index + 1..]).ok()?.parse().ok()?;
-                exponent = exponent.saturating_add(written);
+                exponent = exponent.saturating_add(written_exponent(&text[index + 1..])?);
                 break;
             }
             _ => return None,
@@ -56,6 +55,24 @@ pub fn value(text: &[u8]) -> Option<f64> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
+/// A signed whole number; far beyond the range of a double it stays there.
+#[inline]
+fn written_exponent(text: &[u8]) -> Option<i32> {
+    let (digits, sign) = match text {
+        [b'-', digits @ ..] => (digits, -1),
+        [b'+', digits @ ..] => (digits, 1),
+        digits => (digits, 1),
+    };
+    let mut value = 0_i32;
+    for &digit in digits {
+        if !digit.is_ascii_digit() {
+            return None;
+        }
+        value = (value * 10 + i32::from(digit - b'0')).min(100_000);
+    }
+    (!digits.is_empty()).then_some(sign * value)
+}
+
 /// How many decimals a number token states: those after the point less the exponent.
 pub fn decimals(text: &[u8]) -> u8 {
     let split = text.iter().position(|byte| matches!(byte, b'e' | b'E')).unwrap_or(text.len());
@@ -64,7 +81,7 @@ pub fn decimals(text: &[u8]) -> u8 {
         digits.iter().position(|&byte| byte == b'.').map_or(0, |point| digits.len() - point - 1) as i32;
     let exponent: i32 = match exponent {
         [] => 0,
-        [_, rest @ ..] => std::str::from_utf8(rest).ok().and_then(|text| text.parse().ok()).unwrap_or(0),
+        [_, rest @ ..] => written_exponent(rest).unwrap_or(0),
     };
     after.saturating_sub(exponent).clamp(0, i32::from(MOST_DECIMALS)) as u8
 }

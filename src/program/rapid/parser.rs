@@ -334,7 +334,11 @@ impl<'t, 's> Parser<'t, 's> {
         self.name()?;
         if self.peek() == Token::ParenOpen {
             let node = self.open(Syntax::Attributes);
-            while !matches!(self.peek(), Token::ParenClose | Token::End) && !self.begins_line() {
+            self.bump();
+            while self.peek() == Token::Comma
+                || self.peek() == Token::Ident
+                || self.peek().is_keyword() && !self.peek().begins_statement()
+            {
                 self.bump();
             }
             self.expect(Token::ParenClose, OpaqueReason::Unclosed)?;
@@ -480,7 +484,7 @@ impl<'t, 's> Parser<'t, 's> {
 
     fn data(&mut self) -> Parsed {
         let node = self.open(Syntax::Data);
-        if self.peek() == Token::Local || self.at_word(b"TASK") {
+        while self.peek() == Token::Local || self.at_word(b"TASK") {
             self.bump();
         }
         if !matches!(self.peek(), Token::Var | Token::Pers | Token::Const) {
@@ -791,60 +795,66 @@ impl<'t, 's> Parser<'t, 's> {
 
     #[inline]
     fn expression(&mut self) -> Parsed {
-        // Most expressions are one number in an aggregate.
-        if self.peek() == Token::Number
+        // Most expressions are one token, most of these a number in an aggregate.
+        if matches!(self.peek(), Token::Number | Token::Ident | Token::String)
             && matches!(
                 self.kinds.get(self.at as usize + 1),
-                Some(Token::Comma | Token::BracketClose | Token::Semicolon)
+                Some(
+                    Token::Comma
+                        | Token::BracketClose
+                        | Token::Semicolon
+                        | Token::Backslash
+                        | Token::ParenClose
+                )
             )
         {
             self.bump();
             return Ok(());
         }
-        if self.depth >= EXPRESSION_DEPTH {
-            return Err(Fail(OpaqueReason::TooDeep));
-        }
-        self.depth += 1;
-        let result = self.chain(0);
-        self.depth -= 1;
-        result
+        self.nested(|parser| parser.chain(0))
     }
 
-    /// A chain of operators of one priority: 0 OR XOR, 1 AND, 2 relations, 3 sums, 4 products.
+    /// Operators of this priority and all above: 0 OR XOR, 1 AND, 2 relations, 3 sums, 4 products.
     fn chain(&mut self, level: u8) -> Parsed {
         let (node, first) = (self.nodes.len(), self.at);
-        self.operand(level)?;
+        if self.peek() == Token::Not && level <= 2 {
+            // NOT covers all operators that bind more strongly than those of this level.
+            self.open(Syntax::Unary);
+            self.bump();
+            self.nested(|parser| parser.chain(level + 1))?;
+            self.close(node);
+            return self.operators(level, node, first);
+        }
+        self.operand()?;
+        if self.peek().operator_level().is_none() {
+            return Ok(());
+        }
+        (level..=4).rev().try_for_each(|level| self.operators(level, node, first))
+    }
+
+    /// A flat chain of operators of one priority after its first operand, which began at `node` and `first`.
+    fn operators(&mut self, level: u8, node: usize, first: u32) -> Parsed {
         if self.peek().operator_level() != Some(level) {
             return Ok(());
         }
         self.wrap(Syntax::Binary, node, first);
         while self.peek().operator_level() == Some(level) {
             self.bump();
-            self.operand(level)?;
+            if level == 4 { self.operand()? } else { self.chain(level + 1)? }
         }
         self.close(node);
         Ok(())
     }
 
-    fn operand(&mut self, level: u8) -> Parsed {
-        match (level, self.peek()) {
-            (0..=2, Token::Not) => {
-                let node = self.open(Syntax::Unary);
-                self.bump();
-                self.nested(|parser| parser.operand(level))?;
-                self.close(node);
-                Ok(())
-            }
-            (4, Token::Minus | Token::Plus | Token::Not) => {
-                let node = self.open(Syntax::Unary);
-                self.bump();
-                self.nested(|parser| parser.operand(4))?;
-                self.close(node);
-                Ok(())
-            }
-            (4, _) => self.primary(),
-            _ => self.chain(level + 1),
+    fn operand(&mut self) -> Parsed {
+        if !matches!(self.peek(), Token::Minus | Token::Plus | Token::Not) {
+            return self.primary();
         }
+        let node = self.open(Syntax::Unary);
+        self.bump();
+        self.nested(Self::operand)?;
+        self.close(node);
+        Ok(())
     }
 
     fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Parsed) -> Parsed {

@@ -64,6 +64,35 @@ struct Wish {
     fresh: Fresh,
 }
 
+/// Who uses which declared target.
+struct Users {
+    /// The motions of each declaration, array elements apart by the first byte of their literal.
+    own: HashMap<(u32, u32), Vec<(u32, u32)>>,
+    /// Declarations that something reads which will not be written out as a literal.
+    read_elsewhere: HashSet<u32>,
+}
+
+impl Users {
+    fn of(task: &Task<'_>, replaced: &HashSet<(u32, u32)>) -> Users {
+        let mut users = Users { own: HashMap::new(), read_elsewhere: HashSet::new() };
+        for (index, declaration) in (0_u32..).zip(&task.listing.declarations) {
+            for &user in &declaration.uses {
+                let target = &task.listing.motions[user.0 as usize].targets[user.1 as usize];
+                let start = match target.origin {
+                    Origin::Element { literal, .. } => literal.start,
+                    _ => 0,
+                };
+                users.own.entry((index, start)).or_default().push(user);
+            }
+            let mut others = declaration.other_uses.iter();
+            if others.any(|other| other.motion.is_none_or(|user| !replaced.contains(&user))) {
+                users.read_elsewhere.insert(index);
+            }
+        }
+        users
+    }
+}
+
 struct Rewriter<'r, 's> {
     task: &'r Task<'s>,
     options: &'r RewriteOptions,
@@ -91,8 +120,11 @@ impl Rewriter<'_, '_> {
             outcomes.push(outcome);
         }
         let replaced: HashSet<(u32, u32)> = computed.iter().map(|wish| (wish.motion, wish.target)).collect();
-        for ((declaration, _), wishes) in wishes {
-            self.declared(declaration, &wishes, &replaced, &mut outcomes);
+        if !wishes.is_empty() {
+            let users = Users::of(task, &replaced);
+            for ((declaration, literal), wishes) in wishes {
+                self.declared((declaration, literal), &wishes, &users, &mut outcomes);
+            }
         }
         self.computed(&computed, &mut outcomes);
         for (change, outcome) in changes.iter().zip(&mut outcomes) {
@@ -163,7 +195,7 @@ impl Rewriter<'_, '_> {
             let (motion_index, position) = (change.motion, position as u32);
             let wish = Wish { change: index, motion: motion_index, target: position, fresh };
             if matches!((&fresh, &old), (Fresh::Joint { .. }, TargetValue::Cartesian(_))) {
-                self.to_joints(motion, target.argument, &old, &fresh);
+                self.take_joint_form(motion, target.argument, &old, &fresh);
                 outcome = worse(outcome, Outcome::Inlined);
                 continue;
             }
@@ -208,7 +240,7 @@ impl Rewriter<'_, '_> {
     }
 
     /// The instruction becomes the one that takes joints.
-    fn to_joints(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+    fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
         let Some(name) = self.instruction(motion).and_then(|instruction| instruction.joint_form) else {
             return;
         };
@@ -223,9 +255,9 @@ impl Rewriter<'_, '_> {
     /// The wishes for one declared target or array element.
     fn declared(
         &mut self,
-        index: u32,
+        (index, start): (u32, u32),
         wishes: &[Wish],
-        replaced: &HashSet<(u32, u32)>,
+        users: &Users,
         outcomes: &mut [Outcome],
     ) {
         let task = self.task;
@@ -252,16 +284,9 @@ impl Rewriter<'_, '_> {
         }
         // Whoever else needs the old value.
         let wished: HashSet<(u32, u32)> = wishes.iter().map(|wish| (wish.motion, wish.target)).collect();
-        let others_hold = declaration.uses.iter().any(|user| {
-            let same = match task.listing.motions[user.0 as usize].targets[user.1 as usize].origin {
-                Origin::Element { literal: other, .. } => other == literal,
-                _ => true,
-            };
-            same && !wished.contains(user)
-        }) || declaration
-            .other_uses
-            .iter()
-            .any(|other| other.motion.is_none_or(|user| !replaced.contains(&user)))
+        let own = users.own.get(&(index, start)).map_or(&[][..], Vec::as_slice);
+        let others_hold = users.read_elsewhere.contains(&index)
+            || own.iter().any(|user| !wished.contains(user))
             || groups.iter().any(|(text, _)| *text == original);
         let mut free = !others_hold;
         for (text, group) in groups {
@@ -318,7 +343,7 @@ impl Rewriter<'_, '_> {
         let name = self.new_name(&declaration.name);
         let statement = &source[declaration.statement.range()];
         let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
-        let joints = matches!(super::literal::numbers(literal, super::literal::ROBTARGET), None);
+        let joints = super::literal::numbers(literal, super::literal::ROBTARGET).is_none();
         // After the declaration, and after a comment that stands behind it on its line.
         let end = declaration.statement.end as usize;
         let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);

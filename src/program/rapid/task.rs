@@ -618,9 +618,10 @@ impl<'a, 's> Lister<'a, 's> {
         // Own uses by the first byte of the argument; whatever else lies within a motion's argument is a base.
         for (unit_index, unit) in self.symbols.units.iter().enumerate() {
             let tree = &self.trees[unit.file as usize];
-            let motions: Vec<u32> = (0..self.listing.motions.len() as u32)
-                .filter(|&motion| self.units[motion as usize] == unit_index as u32)
-                .collect();
+            // Motions are listed unit by unit.
+            let first = self.units.partition_point(|&unit| unit < unit_index as u32) as u32;
+            let end = self.units.partition_point(|&unit| unit <= unit_index as u32) as u32;
+            let motions: Vec<u32> = (first..end).collect();
             self.uses_in(*unit, tree, &motions, &likely, &hash);
         }
         self.uses_in_declarations(&likely, &hash);

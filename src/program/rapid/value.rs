@@ -248,7 +248,7 @@ pub fn built_in(name: &[u8]) -> Option<Value> {
             identity(),
             identity(),
         ]),
-        b"pi" => Value::Number(3.141_592_654),
+        b"pi" => Value::Number(std::f64::consts::PI),
         b"vmax" => speed(5000.0),
         b"fine" => zone(true, 0.0, 0.0, 0.0),
         [b'v', digits @ ..] => {

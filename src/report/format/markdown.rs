@@ -2,6 +2,7 @@
 //!
 //! Pictures appear by their captions: Markdown has no place for SVG inside the file.
 
+use super::html;
 use crate::report::document::{Block, Document};
 use crate::report::table::{Alignment, Table};
 
@@ -107,7 +108,7 @@ fn push_blocks(text: &mut String, blocks: &[Block]) {
                 }
             }
             Block::Details { summary, blocks } => {
-                text.push_str(&format!("<details>\n<summary>{}</summary>\n", escape(summary)));
+                text.push_str(&format!("<details>\n<summary>{}</summary>\n", html::escape(summary)));
                 push_blocks(text, blocks);
                 text.push_str("\n</details>\n");
             }

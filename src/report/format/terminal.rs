@@ -17,27 +17,20 @@ pub fn table(table: &Table, width: usize) -> String {
     if !table.title.is_empty() {
         text.push_str(&wrapped(&table.title, width, ""));
     }
-    let cells: Vec<Vec<String>> = (0..table.columns.len())
-        .map(|column| {
-            std::iter::once(table.columns[column].label())
-                .chain((0..table.rows.len()).map(|row| table.shown(row, column)))
-                .map(|cell| cell.replace(['\r', '\n', '\t'], " "))
-                .collect()
-        })
-        .collect();
+    let columns = 0..table.columns.len();
+    let heading: Vec<String> = table.columns.iter().map(|column| flat(&column.label())).collect();
+    let rows = (0..table.rows.len()).map(|row| columns.clone().map(|c| flat(&table.shown(row, c))).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(heading).chain(rows).collect();
     let mut widths: Vec<usize> =
-        cells.iter().map(|column| column.iter().map(|cell| length(cell)).max().unwrap_or(0)).collect();
+        columns.map(|c| lines.iter().map(|line| length(&line[c])).max().unwrap_or(0)).collect();
     shrink(table, &mut widths, width);
     for block in blocks(&widths, width) {
         if !text.is_empty() && block.first() == Some(&0) && block.get(1).is_some_and(|&second| second > 1) {
             text.push('\n');
         }
-        for line in 0..=table.rows.len() {
-            push_line(
-                &mut text,
-                block.iter().map(|&c| fit(&cells[c][line], widths[c], table.columns[c].alignment)),
-            );
-            if line == 0 {
+        for (index, line) in lines.iter().enumerate() {
+            push_line(&mut text, block.iter().map(|&c| fit(&line[c], widths[c], table.columns[c].alignment)));
+            if index == 0 {
                 push_line(&mut text, block.iter().map(|&c| "─".repeat(widths[c])));
             }
         }
@@ -48,19 +41,33 @@ pub fn table(table: &Table, width: usize) -> String {
     text
 }
 
-/// The document as lines of at most `width` characters. Pictures are named by their captions; folded parts are left
-/// out but named.
+/// The document as lines of at most `width` characters. Pictures and folded parts are left out, and so are headings
+/// that have nothing else below them.
 pub fn document(document: &Document, width: usize) -> String {
     let mut text = wrapped(&document.title, width, "");
     text.push_str(&format!("{}\n", "═".repeat(length(&document.title).min(width))));
     if !document.subtitle.is_empty() {
         text.push_str(&wrapped(&document.subtitle, width, ""));
     }
-    for block in &document.blocks {
-        text.push('\n');
-        push_block(&mut text, block, width);
+    for (index, block) in document.blocks.iter().enumerate() {
+        if shows(block, &document.blocks[index + 1..]) {
+            text.push('\n');
+            push_block(&mut text, block, width);
+        }
     }
     text
+}
+
+/// Whether a block leaves anything on a terminal, knowing those after it.
+fn shows(block: &Block, after: &[Block]) -> bool {
+    match block {
+        Block::Figure(_) | Block::Details { .. } => false,
+        Block::Heading(level, _) => after
+            .iter()
+            .take_while(|block| !matches!(block, Block::Heading(next, _) if next <= level))
+            .any(|block| !matches!(block, Block::Figure(_) | Block::Details { .. } | Block::Heading(..))),
+        _ => true,
+    }
 }
 
 /// A judgement for a terminal, `[warning]`.
@@ -85,9 +92,10 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
         Block::KeyFigures(figures) => {
             let label = figures.iter().map(|figure| length(&figure.label)).max().unwrap_or(0);
             let value = figures.iter().map(|figure| length(&figure.shown().0)).max().unwrap_or(0);
+            let unit_width = figures.iter().map(|figure| length(figure.shown().1)).max().unwrap_or(0);
             for figure in figures {
                 let (shown, unit) = figure.shown();
-                let mut line = format!("{:label$}  {shown:>value$} {unit}", figure.label);
+                let mut line = format!("{:label$}  {shown:>value$} {unit:unit_width$}", figure.label);
                 if let Some(status) = figure.status {
                     line.push_str(&format!("  {}", badge(status)));
                 }
@@ -99,17 +107,12 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
             }
         }
         Block::Table(block) => text.push_str(&table(block, width)),
-        Block::Figure(figure) => {
-            text.push_str(&wrapped(&format!("[picture] {}", figure.caption), width, "  "))
-        }
+        Block::Figure(_) | Block::Details { .. } => {}
         Block::Verdict(verdict) => {
             text.push_str(&wrapped(&format!("{} {}", badge(verdict.status), verdict.headline), width, "  "));
             for reason in &verdict.reasons {
                 text.push_str(&wrapped(&format!("  - {reason}"), width, "    "));
             }
-        }
-        Block::Details { summary, .. } => {
-            text.push_str(&wrapped(&format!("[details] {summary}"), width, "  "))
         }
         Block::Code(code) => {
             for line in code.lines() {
@@ -158,6 +161,11 @@ fn blocks(widths: &[usize], width: usize) -> Vec<Vec<usize>> {
 
 fn total(widths: impl Iterator<Item = usize>) -> usize {
     widths.map(|width| width + GAP).sum::<usize>().saturating_sub(GAP)
+}
+
+/// A cell on one line.
+fn flat(cell: &str) -> String {
+    cell.replace(['\r', '\n', '\t'], " ")
 }
 
 fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {

@@ -60,7 +60,13 @@ impl Bars {
             (0..group.values.len()).flat_map(|index| {
                 let value = group.value(index);
                 let spread = group.deviation(index).unwrap_or(0.0);
-                [value, value.map(|value| value - spread), value.map(|value| value + spread)]
+                // A number over a bar needs room.
+                let room = match (self.labels, value) {
+                    (Some(_), Some(value)) if self.y.log => Some((value + spread) * 1.5),
+                    (Some(_), Some(value)) => Some((value + spread.copysign(value)) * 1.06),
+                    _ => None,
+                };
+                [value, value.map(|value| value - spread), value.map(|value| value + spread), room]
             })
         });
         let legend = self.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty());
@@ -82,6 +88,10 @@ impl Bars {
             right: 0,
         };
         let inside = frame.draw(pen)?;
+        if !self.groups.iter().any(|group| (0..group.values.len()).any(|index| group.value(index).is_some()))
+        {
+            return inside.say_empty(pen);
+        }
         let slot = f64::from(inside.x.end - inside.x.start) / self.names.len().max(1) as f64;
         let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
         for (index, group) in self.groups.iter().enumerate() {

@@ -42,8 +42,8 @@ impl Sheet {
         self.0.dash.set(pattern);
     }
 
-    /// Opens a group that shows only what lies inside the rectangle, in units of the canvas, and shows the title when
-    /// pointed at. An inner `svg` element cuts without the page-wide names that `clipPath` needs.
+    /// Opens a group that shows only what lies inside the rectangle, in units of the canvas. An inner `svg` element cuts
+    /// without the page-wide names that `clipPath` needs.
     pub(super) fn open_window(&self, x: std::ops::Range<i32>, y: std::ops::Range<i32>) {
         let (left, top) = (px(x.start), px(y.start));
         let (width, height) = (px(x.end - x.start), px(y.end - y.start));
@@ -55,6 +55,43 @@ impl Sheet {
     /// Closes [`Sheet::open_window`].
     pub(super) fn close_window(&self) {
         self.push("</svg>\n");
+    }
+
+    /// Lines of one colour and width as a single element, which for thousands of them is far shorter than one each.
+    /// With round ends lines that continue each other show no seam; without, they end exactly.
+    pub(super) fn strokes(
+        &self,
+        lines: &[Vec<BackendCoord>],
+        color: [u8; 3],
+        alpha: f64,
+        width: i32,
+        round: bool,
+    ) {
+        if lines.is_empty() {
+            return;
+        }
+        let mut tag = String::from("<path d=\"");
+        for line in lines {
+            for (index, &(x, y)) in line.iter().enumerate() {
+                write_all(
+                    &mut tag,
+                    format_args!("{}{} {}", if index == 0 { "M" } else { "L" }, px(x), px(y)),
+                );
+            }
+        }
+        let [red, green, blue] = color;
+        let color = paint(BackendColor { alpha, rgb: (red, green, blue) });
+        write_all(
+            &mut tag,
+            format_args!("\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\"", px(width)),
+        );
+        if alpha < 1.0 {
+            write_all(&mut tag, format_args!(" stroke-opacity=\"{}\"", rounded(alpha)));
+        }
+        if round {
+            tag.push_str(" stroke-linecap=\"round\" stroke-linejoin=\"round\"");
+        }
+        self.push(&(tag + "/>\n"));
     }
 
     /// Opens a group that tells this when pointed at.

@@ -49,6 +49,10 @@ impl Colors {
         Paint(self.map.rgb(fraction), 1.0)
     }
 
+    pub(super) fn at(&self, fraction: f64) -> [u8; 3] {
+        self.map.at(fraction)
+    }
+
     /// Room that the bar takes at the right of a picture.
     pub(super) fn room(&self) -> i32 {
         let widest = self.scale.ticks.iter().map(|tick| letters::width(&tick.1, LABEL)).fold(0.0, f64::max);
@@ -59,11 +63,10 @@ impl Colors {
     pub(super) fn draw(&self, pen: Pen<'_>, left: i32, top: i32, bottom: i32) -> Result<(), DrawingError> {
         let at = |fraction: f64| bottom - (fraction * f64::from(bottom - top)).round() as i32;
         for step in 0..STEPS {
-            let [low, high] = [step, step + 1].map(|step| at(f64::from(step) / f64::from(STEPS)));
+            let low = at(f64::from(step) / f64::from(STEPS));
             let paint = self.paint((f64::from(step) + 0.5) / f64::from(STEPS));
-            // A little overlap hides the seams.
-            let high = if step + 1 == STEPS { high } else { high - 2 };
-            pen.rectangle([(left, high), (left + BREADTH, low)], paint)?;
+            // Each step reaches to the top and the next lies over it: edges that meet would show seams.
+            pen.rectangle([(left, top), (left + BREADTH, low)], paint)?;
         }
         pen.outline([(left, top), (left + BREADTH, bottom)], Paint::text(0.5), THIN)?;
         let mut right = left + BREADTH;

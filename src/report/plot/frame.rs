@@ -187,6 +187,12 @@ impl Inside {
         (self.x.start..=self.x.end).contains(&x) && (self.y.start..=self.y.end).contains(&y)
     }
 
+    /// Says in the middle that there is nothing to show.
+    pub(super) fn say_empty(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let middle = (self.x.start / 2 + self.x.end / 2, self.y.start / 2 + self.y.end / 2);
+        pen.text("no data", middle, TITLE, HPos::Center, VPos::Center)
+    }
+
     /// Draws what may reach beyond the inside; what does is cut off, except for the breadth of a marker.
     pub(super) fn cut(
         &self,

@@ -147,6 +147,10 @@ impl Graph {
             })
             .collect();
         let inside = self.frame(&drawn).draw(pen)?;
+        let places = |series: &Series| series.points.iter().any(|[x, y]| inside.place(*x, *y).is_some());
+        if !self.series.iter().any(places) {
+            return inside.say_empty(pen);
+        }
         inside.cut(pen, || {
             for span in &self.spans {
                 draw_span(&inside, pen, span)?;

@@ -110,10 +110,19 @@ impl Histogram {
             right: 0,
         };
         let inside = frame.draw(pen)?;
+        if bins.edges.is_empty() {
+            return inside.say_empty(pen);
+        }
         inside.cut(pen, || {
             for (index, counts) in bins.counts.iter().enumerate() {
                 let mut outline = Vec::new();
-                for (bin, &count) in counts.iter().enumerate() {
+                // From the first bin that holds anything to the last.
+                let held = counts
+                    .iter()
+                    .position(|count| *count > 0)
+                    .zip(counts.iter().rposition(|count| *count > 0));
+                let Some((first, last)) = held else { continue };
+                for (bin, &count) in counts.iter().enumerate().take(last + 1).skip(first) {
                     let ends = [
                         inside.place(bins.edges[bin], count as f64),
                         inside.place(bins.edges[bin + 1], count as f64),
@@ -153,7 +162,7 @@ fn freedman_diaconis(sorted: &[f64]) -> Option<f64> {
 fn edges(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     let span = high - low;
     let size = low.abs().max(high.abs());
-    if !(span > size * 1e-12) || !span.is_finite() {
+    if span <= size * 1e-12 || !span.is_finite() {
         // A constant has one bin around it.
         let room = if size == 0.0 { 0.5 } else { size * 0.05 };
         return vec![low - room, high + room];

@@ -104,6 +104,9 @@ impl Intervals {
             pen.rectangle([(from, inside.y.start), (to, inside.y.end)], Paint::text(PRIOR_ALPHA))?;
             pen.line(vec![(zero, inside.y.start), (zero, inside.y.end)], Paint::text(0.6), THIN, "")?;
         }
+        if self.rows.is_empty() {
+            return inside.say_empty(pen);
+        }
         for (index, (row, text)) in self.rows.iter().zip(&texts).enumerate() {
             let Some(y) = inside.down((self.rows.len() - 1 - index) as f64) else { continue };
             pen.text(text, (inside.x.end + EDGE, y), LABEL, HPos::Left, VPos::Center)?;

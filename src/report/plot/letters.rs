@@ -15,7 +15,7 @@ const WIDTHS: [u16; 95] = [
 /// Width of a line of text of the given size, in the unit of the size. Generous by a twentieth, since the viewer may
 /// have a wider font.
 pub(super) fn width(text: &str, size: f64) -> f64 {
-    let thousandths: f64 = text.chars().map(|character| advance(character)).sum();
+    let thousandths: f64 = text.chars().map(advance).sum();
     thousandths * size * 1.05e-3
 }
 

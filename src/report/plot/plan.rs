@@ -10,8 +10,11 @@ use super::ink::ColorMap;
 use super::pen::{Marker, Paint, Pen, TITLE};
 use super::scale::{Ends, Scale};
 
-/// Colours told apart along a path. Neighbouring pieces of the same one are drawn as one line.
-const SHADES: f64 = 96.0;
+/// Colours told apart along a path. All pieces of one colour are a single element.
+const SHADES: usize = 96;
+
+/// Points closer than this to the one before are merged with it, in canvas units; the largest value stays.
+const NEAR: i32 = 2 * PIXEL;
 
 /// Paths in plan view.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,8 +50,20 @@ impl PlanView {
         let name = if self.title.is_empty() { self.value.text() } else { self.title.clone() };
         let columns = self.paths.len().clamp(1, 3);
         let rows = self.paths.len().div_ceil(columns).max(1);
-        let height = if columns == 1 { 460 } else { 360 };
-        picture((900, 40 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
+        // Panels as high as the shape of the paths asks for.
+        let span = |axis: usize| {
+            let ends = self.paths.iter().flat_map(|path| &path.points).map(|point| point[axis]);
+            let ends = ends
+                .filter(|end| end.is_finite())
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], end| [low.min(end), high.max(end)]);
+            ends[1] - ends[0]
+        };
+        let aspect = span(1) / span(0);
+        let width = 800.0 / columns as f64 - 75.0;
+        // Nothing to show has no shape; NaN is replaced too.
+        let inside = if aspect > 0.0 { (width * aspect * 1.1).clamp(140.0, 560.0) } else { 200.0 };
+        let height = inside as u32 + 90;
+        picture((900, 30 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
     }
 
     fn draw(&self, pen: Pen<'_>, columns: usize, rows: usize) -> Result<(), DrawingError> {
@@ -70,6 +85,9 @@ impl PlanView {
             let inside = frame.draw(Pen { area: &panel, sheet: pen.sheet })?;
             if let Some(path) = self.paths.get(index) {
                 inside.cut(pen, || path.draw(&inside, &colors, pen))?;
+            }
+            if self.paths.get(index).is_none_or(|path| path.points.is_empty()) {
+                inside.say_empty(pen)?;
             }
             if index == 0 {
                 bar.0 = inside.y.start;
@@ -112,40 +130,66 @@ fn linear(axis: &Axis) -> Axis {
 
 impl PlanPath {
     fn draw(&self, inside: &Inside, colors: &Colors, pen: Pen<'_>) -> Result<(), DrawingError> {
-        // A value belongs to a point; a piece between two points shows their mean. `None` where either is unknown.
-        let mut pieces: Vec<(Option<i64>, Vec<(i32, i32)>)> = Vec::new();
-        let mut before: Option<((i32, i32), f64)> = None;
+        let mut rim: Vec<Vec<(i32, i32)>> = Vec::new();
+        let mut unknown: Vec<Vec<(i32, i32)>> = Vec::new();
+        let mut shades: Vec<Vec<Vec<(i32, i32)>>> = vec![Vec::new(); SHADES + 1];
+        for run in self.runs(inside) {
+            if let [(place, value)] = run[..] {
+                let paint =
+                    colors.fraction(value).map_or(Paint::text(0.3), |fraction| colors.paint(fraction));
+                pen.marker(Marker::Circle, place, paint)?;
+            }
+            rim.push(run.iter().map(|(place, _)| *place).collect());
+            let mut last = None;
+            for pair in run.windows(2) {
+                // A value belongs to a point; the piece between two points shows their mean.
+                let value = pair[0].1 / 2.0 + pair[1].1 / 2.0;
+                let shade =
+                    colors.fraction(value).map(|fraction| (fraction * SHADES as f64).round() as usize);
+                let lines = match shade {
+                    Some(shade) => &mut shades[shade],
+                    None => &mut unknown,
+                };
+                match lines.last_mut() {
+                    Some(line) if last == Some(shade) => line.push(pair[1].0),
+                    _ => lines.push(vec![pair[0].0, pair[1].0]),
+                }
+                last = Some(shade);
+            }
+        }
+        // A faint rim sets pale colours off from a pale page, and dark ones from a dark one.
+        pen.sheet.strokes(&rim, [0; 3], 0.35, 5 * PIXEL, true);
+        pen.sheet.strokes(&unknown, [0; 3], 0.3, 34, true);
+        for (shade, lines) in shades.iter().enumerate() {
+            pen.sheet.strokes(lines, colors.at(shade as f64 / SHADES as f64), 1.0, 34, true);
+        }
+        Ok(())
+    }
+
+    /// Stretches of the path without gaps, as places and values; of near points one is kept, with the largest value.
+    fn runs(&self, inside: &Inside) -> Vec<Vec<((i32, i32), f64)>> {
+        let mut runs: Vec<Vec<((i32, i32), f64)>> = vec![Vec::new()];
         for (index, [x, y]) in self.points.iter().enumerate() {
             let value = self.values.get(index).copied().unwrap_or(f64::NAN);
             let Some(place) = inside.place(*x, *y) else {
-                before = None;
+                runs.push(Vec::new());
                 continue;
             };
-            if let Some((start, earlier)) = before {
-                let shade =
-                    colors.fraction(earlier / 2.0 + value / 2.0).map(|part| (part * SHADES).round() as i64);
-                match pieces.last_mut() {
-                    Some((last, points)) if *last == shade && points.last() == Some(&start) => {
-                        points.push(place)
+            let Some(run) = runs.last_mut() else { continue };
+            match run.last_mut() {
+                Some((before, kept))
+                    if (place.0 - before.0).abs() < NEAR
+                        && (place.1 - before.1).abs() < NEAR
+                        && kept.is_nan() == value.is_nan() =>
+                {
+                    if value.abs() > kept.abs() {
+                        *kept = value;
                     }
-                    _ => pieces.push((shade, vec![start, place])),
                 }
+                _ => run.push((place, value)),
             }
-            before = Some((place, value));
         }
-        if let ([point], [value, ..]) = (&self.points[..], &self.values[..])
-            && let (Some(place), Some(part)) = (inside.place(point[0], point[1]), colors.fraction(*value))
-        {
-            return pen.marker(Marker::Circle, place, colors.paint(part));
-        }
-        // A faint rim sets pale colours off from a pale page.
-        for (_, points) in &pieces {
-            pen.line(points.clone(), Paint::text(0.35), 5 * PIXEL as u32, "")?;
-        }
-        for (shade, points) in pieces {
-            let paint = shade.map_or(Paint::text(0.3), |shade| colors.paint(shade as f64 / SHADES));
-            pen.line(points, paint, 34, "")?;
-        }
-        Ok(())
+        runs.retain(|run| !run.is_empty());
+        runs
     }
 }

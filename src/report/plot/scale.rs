@@ -9,6 +9,9 @@ use super::Axis;
 /// Canvas coordinates beyond this are cut off long before anyone sees them.
 const FAR: f64 = 1e6;
 
+/// Numbers smaller than this are drawn as zero: the powers of ten that would scale them do not exist.
+const SMALLEST: f64 = 1e-290;
+
 /// One axis of a frame, ready to be drawn.
 #[derive(Debug, Clone)]
 pub(super) struct Scale {
@@ -55,9 +58,9 @@ impl Scale {
             // Halved, so that the span of the largest numbers is finite.
             let span = 2.0 * (high / 2.0 - low / 2.0);
             let size = low.abs().max(high.abs());
-            if span <= size * 1e-12 {
+            if span <= size * 1e-12 || size < SMALLEST {
                 // A constant: room on both sides, so that its line lies in the middle.
-                let room = if size == 0.0 { 1.0 } else { size * 0.1 };
+                let room = if size < SMALLEST { 1.0 } else { size * 0.1 };
                 [low, high] = [low - room, high + room];
             } else {
                 let margin = if matches!(ends, Ends::Tight | Ends::Nought) { 0.0 } else { 0.05 * span };
@@ -73,6 +76,7 @@ impl Scale {
         if let Some([first, last]) = axis.range
             && first.is_finite()
             && last > first
+            && last.abs().max(first.abs()) > SMALLEST
             && last.is_finite()
             && (!axis.log || first > 0.0)
         {
@@ -166,7 +170,7 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     };
     let width = place(1.0);
     let (first, last) = ((low / width - 1e-9).ceil(), (high / width + 1e-9).floor());
-    if !(width > 0.0) || first.abs().max(last.abs()) > 1e15 {
+    if width == 0.0 || first.abs().max(last.abs()) > 1e15 {
         return vec![low, high];
     }
     let count = (last - first).max(0.0) as usize;
@@ -192,7 +196,8 @@ pub fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         let stride = (decades as usize + 1).div_ceil(wanted.max(2)) as i32;
         return (first..=last).filter(|power| power.rem_euclid(stride) == 0).map(ten).collect();
     }
-    let inside = |place: &f64| *place >= low * (1.0 - 1e-9) && *place <= high * (1.0 + 1e-9);
+    let inside =
+        |place: &f64| place.is_finite() && *place >= low * (1.0 - 1e-9) && *place <= high * (1.0 + 1e-9);
     let places: Vec<f64> = (first - 1..=last)
         .flat_map(|power| [1.0, 2.0, 5.0].map(|factor| factor * ten(power)))
         .map(|place| format!("{place:.3e}").parse().unwrap_or(place))

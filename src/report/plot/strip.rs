@@ -14,6 +14,9 @@ const STRIP: u32 = 30;
 /// Cells across at most; of several values in a cell the one farthest from zero is shown.
 const CELLS: usize = 400;
 
+/// Colours told apart.
+const SHADES: usize = 64;
+
 /// Strips under each other.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HeatStrip {
@@ -67,39 +70,44 @@ impl HeatStrip {
         let inside = frame.draw(pen)?;
         let width = f64::from(inside.x.end - inside.x.start);
         let cells = longest.min(CELLS);
+        let height = STRIP as i32 * PIXEL * 8 / 10;
+        let mut shades: Vec<Vec<Vec<(i32, i32)>>> = vec![Vec::new(); SHADES + 1];
+        let mut rims = Vec::new();
         for (index, strip) in self.strips.iter().enumerate() {
             let Some(middle) = inside.down((self.strips.len() - 1 - index) as f64) else { continue };
-            let half = STRIP as i32 * PIXEL * 4 / 10;
+            let cell = |cell: usize| inside.x.start + (width * cell as f64 / cells as f64).round() as i32;
+            let colored: Vec<Option<usize>> =
+                (0..cells).map(|cell| shade(strip, &colors, cell, cells, longest)).collect();
             let mut from = 0;
-            while from < cells {
-                let shade = self.shade(strip, &colors, from, cells, longest);
-                let mut to = from + 1;
-                while to < cells && self.shade(strip, &colors, to, cells, longest) == shade {
-                    to += 1;
-                }
-                if let Some(shade) = shade {
-                    let [left, right] = [from, to]
-                        .map(|cell| inside.x.start + (width * cell as f64 / cells as f64).round() as i32);
-                    let corners = [(left, middle - half), (right, middle + half)];
-                    pen.rectangle(corners, colors.paint(f64::from(shade) / 128.0))?;
+            for run in colored.chunk_by(|a, b| a == b) {
+                let to = from + run.len();
+                if let Some(shade) = run[0] {
+                    // Half a pixel under the next cell: edges that meet would show seams.
+                    let beyond = if colored.get(to).is_some_and(Option::is_some) { PIXEL / 2 } else { 0 };
+                    shades[shade].push(vec![(cell(from), middle), (cell(to) + beyond, middle)]);
                 }
                 from = to;
             }
-            let corners = [(inside.x.start, middle - half), (inside.x.end, middle + half)];
-            pen.outline(corners, Paint::text(0.3), THIN)?;
+            rims.push([(inside.x.start, middle - height / 2), (inside.x.end, middle + height / 2)]);
+        }
+        for (shade, lines) in shades.iter().enumerate() {
+            pen.sheet.strokes(lines, colors.at(shade as f64 / SHADES as f64), 1.0, height, false);
+        }
+        for rim in rims {
+            pen.outline(rim, Paint::text(0.3), THIN)?;
+        }
+        if cells == 0 {
+            inside.say_empty(pen)?;
         }
         colors.draw(pen, inside.x.end + 2 * EDGE, inside.y.start, inside.y.end)
     }
+}
 
-    /// Shade of a cell in 128ths of the range.
-    fn shade(&self, strip: &Strip, colors: &Colors, cell: usize, cells: usize, longest: usize) -> Option<u8> {
-        let (from, to) = (cell * longest / cells, (cell + 1) * longest / cells);
-        let values = strip.values.get(from..to.min(strip.values.len()))?;
-        let value = values
-            .iter()
-            .copied()
-            .filter(|value| value.is_finite())
-            .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        colors.fraction(value).map(|fraction| (fraction * 128.0).round() as u8)
-    }
+/// Shade of a cell, `None` where none of its values is finite.
+fn shade(strip: &Strip, colors: &Colors, cell: usize, cells: usize, longest: usize) -> Option<usize> {
+    let (from, to) = (cell * longest / cells, (cell + 1) * longest / cells);
+    let values = strip.values.get(from..to.min(strip.values.len()))?;
+    let finite = values.iter().copied().filter(|value| value.is_finite());
+    let value = finite.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    colors.fraction(value).map(|fraction| (fraction * SHADES as f64).round() as usize)
 }

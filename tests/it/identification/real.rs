@@ -7,7 +7,7 @@ use truegrind::identification::solver::by_name;
 use truegrind::identification::start::starts;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::measurement::dataset::Dataset;
-use truegrind::measurement::import;
+use truegrind::measurement::{import, split};
 
 fn data(name: &str) -> Option<(String, Vec<u8>)> {
     let Some(folder) = std::env::var_os("TRUEGRIND_DATA") else {
@@ -16,15 +16,6 @@ fn data(name: &str) -> Option<(String, Vec<u8>)> {
     };
     let path = PathBuf::from(folder).join(name);
     Some((name.to_owned(), std::fs::read(path).unwrap()))
-}
-
-fn shuffled(dataset: &Dataset, seed: u64) -> (Vec<usize>, Vec<usize>) {
-    use rand::seq::SliceRandom;
-    use rand::SeedableRng;
-    let mut all: Vec<usize> = (0..dataset.rows.len()).collect();
-    all.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
-    let test = all.split_off(all.len() * 8 / 10);
-    (all, test)
 }
 
 /// Held-out RMSE of geometry, mean over three splits, against what a dense reference with the same kind of priors
@@ -48,7 +39,7 @@ fn robocali_meets_the_reference() {
                 limit_max_mm: None,
                 stated_frames: None,
             };
-            let split = |d: &Dataset| shuffled(d, seed);
+            let split = |d: &Dataset| split::random(d, 0.2, seed);
             let found = identify(&dataset, "abb-irb-120", &robot.model, &frames, &split, &options).unwrap();
             assert_eq!(found.sharpening.is_ok(), sharpen);
             assert!(found.training.termination().is_converged());

@@ -161,7 +161,7 @@ fn names_are_looked_up_from_routine_to_module_to_task() {
 
 #[test]
 fn tools_work_objects_speeds_and_zones_are_told() {
-    let source = "MODULE M\nPERS tooldata t:=[FALSE,[[1,2,3],[0.7071068,0,0.7071068,0]],[4.5,[5,6,7],[1,0,0,0],0,0,0]];\nPERS wobjdata w:=[TRUE,TRUE,\"a\"\"b\",[[1,0,0],[1,0,0,0]],[[0,2,0],[1,0,0,0]]];\nPROC main()\nMoveL [[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v150,z20,t\\WObj:=w;\nENDPROC\nENDMODULE";
+    let source = "MODULE M\nPERS tooldata t:=[FALSE,[[1,2,3],[0.8,0,0.6,0]],[4.5,[5,6,7],[1,0,0,0],0,0,0]];\nPERS wobjdata w:=[TRUE,TRUE,\"a\"\"b\",[[1,0,0],[1,0,0,0]],[[0,2,0],[1,0,0,0]]];\nPROC main()\nMoveL [[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v150,z20,t\\WObj:=w;\nENDPROC\nENDMODULE";
     let task = Task::read(&[("m.mod", source.as_bytes())]);
     let listing = &task.listing;
     let motion = &listing.motions[0];
@@ -169,7 +169,7 @@ fn tools_work_objects_speeds_and_zones_are_told() {
     assert_eq!(tool.place.unwrap().line, 2);
     let tool = tool.value.unwrap();
     assert!(!tool.robhold && tool.mass_kg == 4.5 && tool.centre_of_gravity_mm == [5.0, 6.0, 7.0]);
-    assert_eq!(tool.frame.quaternion[2], 0.7071068);
+    assert_eq!(tool.frame.quaternion[2], 0.6);
     let work_object = listing.work_object(motion).unwrap().value.as_ref().unwrap();
     assert!(work_object.robhold && work_object.fixed);
     assert_eq!(work_object.mechanical_unit, "a\"b");
@@ -202,7 +202,7 @@ fn numbers_are_read_and_written_exactly() {
         (0.0, 4, "0.0000"),
         (-0.000_04, 4, "0.0000"),
         (-0.000_06, 4, "-0.0001"),
-        (1234.567_89, 3, "1234.568"),
+        (1_234.567_89, 3, "1234.568"),
         (-5.0, 0, "-5"),
         (0.05, 1, "0.1"),
         (99.999_99, 2, "100.00"),

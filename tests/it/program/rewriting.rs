@@ -162,9 +162,7 @@ fn array_elements_change_in_place_or_in_the_instruction() {
 fn a_linear_motion_can_be_told_in_joints() {
     let source = module(
         "",
-        &format!(
-            "  movel [[500,0,300],[0,0,1,0],[0,0,0,0],[100,9E9,9E9,9E9,9E9,9E9]],v100,z5,tool0\\WObj:=wobj0;\n"
-        ),
+        "  movel [[500,0,300],[0,0,1,0],[0,0,0,0],[100,9E9,9E9,9E9,9E9,9E9]],v100,z5,tool0\\WObj:=wobj0;\n",
     );
     let joints = NewTarget::Joint { robot_deg: [1.0, -2.5, 3.123_456_78, 0.0, 90.0, -0.000_000_01] };
     let (text, rewritten) = rewrite(&source, &[change(0, joints)]);
@@ -343,5 +341,31 @@ fn every_sample_reads_back_what_was_written() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn twenty_thousand_targets_on_one_line_take_linear_time() {
+    let target = |index: usize| format!("[[{index},0,300],[0,0,1,0],[0,0,0,0],{EXT}]");
+    let list: Vec<String> = (0..10_000).map(target).collect();
+    let mut body: String =
+        (1..=10_000).map(|index| format!("MoveL path{{{index}}},v100,z1,tool0;")).collect();
+    body.extend((0..10_000).map(|index| format!("MoveL {},v100,z1,tool0;", target(index))));
+    let source = format!(
+        "MODULE M CONST robtarget path{{10000}}:=[{}]; PROC main() {body} ENDPROC ENDMODULE",
+        list.join(",")
+    );
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert_eq!(task.listing.motions.len(), 20_000);
+    let changes: Vec<Change> = (0..20_000_u32)
+        .map(|motion| change(motion, at(f64::from(motion % 10_000) + 0.5, 0.0, 300.0)))
+        .collect();
+    let rewritten = task.rewrite(&changes, &RewriteOptions::default()).unwrap();
+    assert!(rewritten.outcomes.iter().all(|outcome| *outcome == Outcome::InPlace));
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    let again = Task::read(&[("m.mod", &text)]);
+    for (index, motion) in again.listing.motions.iter().enumerate() {
+        let x = motion.targets[0].value.unwrap().cartesian().unwrap().position_mm[0];
+        assert_eq!(x, (index % 10_000) as f64 + 0.5);
     }
 }

@@ -13,8 +13,11 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
 }
 
+/// A sample by its name: its files with their bytes.
+pub(crate) type Sample = (String, Vec<(String, Vec<u8>)>);
+
 /// The samples that belong together: a task list names several, every other file stands alone.
-pub(crate) fn groups() -> Vec<(String, Vec<(String, Vec<u8>)>)> {
+pub(crate) fn groups() -> Vec<Sample> {
     let folder = root().join("programs");
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
