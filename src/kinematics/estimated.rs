@@ -3,12 +3,12 @@
 //! The TOML file of an estimated arm is complete: it holds the nominal arm too, so a program can be rewritten from it
 //! alone.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::arm_file::ArmFile;
 use super::condition::Condition;
-use super::jacobian::{Ends, parameter_jacobian};
+use super::jacobian::{Ends, effect_twist, link_twist, parameter_jacobian};
 use super::model::{Joints, Model, Posed};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
@@ -141,9 +141,35 @@ impl Estimated {
         product.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// Predicted standard deviation of the position of a point on the flange [mm]: √trace of its covariance.
+    /// Predicted standard deviation of the position of a point on the flange [mm]: √trace(J Σ Jᵀ), the double sum of
+    /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
     pub fn position_sigma_mm(&self, arm: &Posed<'_>, q: &Joints, flange_from_tool: &Pose) -> f64 {
-        self.position_covariance(arm, q, flange_from_tool).trace().max(0.0).sqrt()
+        let frames = arm.frames(q);
+        let flange = frames.last() * arm.model.flange;
+        let point: [f64; 3] = (flange * flange_from_tool).translation.vector.into();
+        let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
+        let velocity = |parameter: &Parameter| -> Vector3<f64> {
+            let twist = match *parameter {
+                Parameter::Link { joint, coordinate } => {
+                    let scale = if coordinate.is_length() { 1.0 + growth } else { 1.0 };
+                    link_twist(&frames, joint, coordinate, &point) * scale
+                }
+                Parameter::Effect { index, parameter } => {
+                    effect_twist(arm, q, &frames, index, parameter, &point)
+                }
+                _ => Vector6::zeros(),
+            };
+            twist.fixed_rows::<3>(0).into_owned()
+        };
+        let velocities: Vec<Vector3<f64>> = self.order.iter().map(velocity).collect();
+        let mut variance = 0.0;
+        for (i, v) in velocities.iter().enumerate() {
+            variance += self.covariance[(i, i)] * v.norm_squared();
+            for (j, w) in velocities[..i].iter().enumerate() {
+                variance += 2.0 * self.covariance[(j, i)] * v.dot(w);
+            }
+        }
+        variance.max(0.0).sqrt()
     }
 
     /// Derivative of the position of a point on the flange with respect to the arm's parameters: 3 × p, in the base.

@@ -261,3 +261,20 @@ fn teaching_by_points_recovers_tool_and_frame() {
     assert!((found.translation.vector - frame.translation.vector).norm() < 1e-9);
     assert!(found.rotation.angle_to(&frame.rotation) < 1e-9);
 }
+
+#[test]
+fn the_quick_sigma_equals_the_covariance() {
+    let (_, joints) = blade();
+    let mut known = estimated(perturbed(3, 1.0), &joints);
+    let n = known.order.len();
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    let factor = DMatrix::from_fn(n, n, |_, _| random.random_range(-1e-3..1e-3));
+    known.covariance = &factor * factor.transpose();
+    let posed = known.model.under(&known.condition);
+    let tool = Pose::new(Vector3::new(5.0, -3.0, 120.0), Vector3::new(0.1, 0.0, 0.2));
+    for q in joints.iter().step_by(37) {
+        let slow = known.position_covariance(&posed, q, &tool).trace().sqrt();
+        let quick = known.position_sigma_mm(&posed, q, &tool);
+        assert!((slow - quick).abs() < 1e-9 * slow, "{slow} {quick}");
+    }
+}

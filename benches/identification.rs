@@ -1,0 +1,112 @@
+//! Identification of 28 parameters on cable data: 1,042 rows to 1e-8 of the optimal cost, and a thousand times as many.
+//!
+//! `cargo bench --no-default-features --bench identification`; one thread, so wall time is CPU time.
+
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use truegrind::estimation::least_squares::lm;
+use truegrind::estimation::problem::{Prior, Problem, prior_cost};
+use truegrind::identification::calibration::{Calibration, Frames, Weight};
+use truegrind::identification::tolerance::Tolerance;
+use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::model::{Joints, Model};
+use truegrind::kinematics::parameter::{Parameter, link_parameters};
+use truegrind::measurement::dataset::{Dataset, Reading, Row, Sensor};
+
+fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    pool.install(divan::main);
+}
+
+/// 24 link parameters, outlet and zero: 28.
+fn parameters(model: &Model) -> Vec<Parameter> {
+    let mut out = link_parameters(model);
+    out.extend((0..3).map(|axis| Parameter::Outlet { anchor: 0, axis }));
+    out.push(Parameter::Zero { anchor: 0 });
+    out
+}
+
+fn task(rows: usize) -> Calibration {
+    let nominal = truegrind::robots::load("abb-irb-120").expect("in the catalogue").model;
+    let mut random = ChaCha8Rng::seed_from_u64(1042);
+    let mut actual = nominal.clone();
+    for parameter in link_parameters(&nominal) {
+        let Parameter::Link { joint, coordinate } = parameter else { continue };
+        let size = if coordinate.is_length() { 0.5 } else { 0.003 };
+        let link = &mut actual.links[joint];
+        link.set(coordinate, link.get(coordinate) + size * random.random_range(-1.0..1.0));
+    }
+    let outlet = Vector3::new(742.0, 183.0, 39.0);
+    let still = Condition::default();
+    let posed = actual.under(&still);
+    let rows: Vec<Row> = (0..rows)
+        .map(|number| {
+            let joints = Joints::from_fn(|_, _| random.random_range(-1.2..1.2));
+            let length = (posed.forward(&joints).translation.vector - outlet).norm() + 17.0;
+            Row {
+                number,
+                line: number + 2,
+                joints,
+                reading: Reading::Cable(length + 0.05 * random.random_range(-1.0..1.0)),
+                readout_mm: None,
+                condition: still,
+                anchor: 0,
+                session: None,
+                other: Vec::new(),
+            }
+        })
+        .collect();
+    let weights = vec![Weight { per_mm: 1.0 / 0.03, per_rad: 1.0 }; rows.len()];
+    let dataset = Dataset {
+        file: "made".into(),
+        sha256: String::new(),
+        sheet: None,
+        sensor: Sensor::Cable,
+        rows,
+        other_columns: Vec::new(),
+        notes: Vec::new(),
+        angle_step_rad: None,
+        readout_step_mm: None,
+        reading_step_mm: None,
+    };
+    let mut frames = Frames::at_origin(1);
+    // A start a few millimetres off, as multilateration under the nominal arm gives it.
+    frames.outlets_mm[0] = outlet + Vector3::new(4.0, -3.0, 5.0);
+    frames.zeros_mm[0] = 14.0;
+    let list = parameters(&nominal);
+    let priors: Vec<Prior> = Tolerance::default().priors(&list, &nominal);
+    Calibration::new(&dataset, &nominal, &frames, &list, &priors, &weights)
+}
+
+fn cost(task: &Calibration, x: &[f64]) -> f64 {
+    task.row_cost(x) + prior_cost(task.priors(), x)
+}
+
+/// From the nominal arm to 1e-8 of the optimal cost.
+#[divan::bench(args = [1_042, 1_042_000], sample_count = 20)]
+fn fit_28_parameters(bencher: divan::Bencher<'_, '_>, rows: usize) {
+    let task = task(rows);
+    let start = vec![0.0; task.parameters()];
+    let optimum = lm::solve(
+        &task,
+        &start,
+        &lm::Options { cost_tolerance: 1e-15, gradient_tolerance: 0.0, ..lm::Options::default() },
+    );
+    let options = lm::Options { cost_tolerance: 1e-9, ..lm::Options::default() };
+    let found = lm::solve(&task, &start, &options);
+    let best = cost(&task, &optimum.x);
+    let gap = (cost(&task, &found.x) - best) / best;
+    assert!(gap < 1e-8, "relative gap to the optimal cost {gap:e}");
+    let passes = found.evaluations.jacobians / task.rows() as u64;
+    eprintln!("{rows} rows: {passes} passes with Jacobians, relative gap {gap:.1e}");
+    bencher.bench_local(|| lm::solve(divan::black_box(&task), &start, &options));
+}
+
+/// One pass: residuals, Jacobian and normal equations of all rows.
+#[divan::bench(args = [1_042, 1_042_000], sample_count = 20)]
+fn one_pass(bencher: divan::Bencher<'_, '_>, rows: usize) {
+    let task = task(rows);
+    let x = vec![1e-5; task.parameters()];
+    bencher.bench_local(|| task.normal_equations(divan::black_box(&x)));
+}
