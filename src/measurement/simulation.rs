@@ -99,7 +99,7 @@ pub enum RecipeError {
 }
 
 /// Independent streams of one seed.
-pub(self) enum Stream {
+enum Stream {
     Poses,
     Circumstances,
     Noise,

@@ -29,6 +29,43 @@ const AFTER: Side = |point| point.after;
 /// One row per path point of one program under one model, all columns. Positions and vectors in the work object.
 pub fn table(report: &PathReport) -> Table {
     let (word, key) = words(report.after);
+    let columns = point_columns((word, key), decimals(report.after));
+    let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
+    report.points.iter().for_each(|point| table.push(point_cells(point)));
+    table.notes = notes(report);
+    table
+}
+
+/// The same for several programs and models under each other, for a file: each row names its program and model, what
+/// "after" is, and the model's held-out error.
+pub fn whole_table(reports: &[PathReport]) -> Table {
+    let mut columns = vec![
+        Column::text("program", "Program"),
+        Column::text("model", "Model"),
+        Column::text("after_is", "After is"),
+        Column::number("model_held_out_rmse_mm", "Held-out error", "mm", 3),
+    ];
+    columns.extend(point_columns(("after", "after"), 4));
+    let mut table = Table::new("Deviation of path points", columns);
+    for report in reports {
+        for point in &report.points {
+            let mut row: Vec<Cell> = vec![
+                report.program.as_str().into(),
+                report.model.as_str().into(),
+                if point.after.is_some() { meaning(report.after).into() } else { Cell::Missing },
+                report.held_out_mm.into(),
+            ];
+            row.extend(point_cells(point));
+            table.push(row);
+        }
+    }
+    if let Some(first) = reports.first() {
+        table.notes = notes(first);
+    }
+    table
+}
+
+fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
     let mut columns = vec![
         Column::count("index", "Point"),
         Column::count("line", "Line"),
@@ -37,15 +74,9 @@ pub fn table(report: &PathReport) -> Table {
         Column::number("y_mm", "y", "mm", 3),
         Column::number("z_mm", "z", "mm", 3),
     ];
-    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals(report.after))] {
-        for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")]
-        {
-            columns.push(Column::number(
-                format!("{key}_{part}_mm"),
-                format!("{side} {name}"),
-                "mm",
-                decimals,
-            ));
+    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals)] {
+        for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")] {
+            columns.push(Column::number(format!("{key}_{part}_mm"), format!("{side} {name}"), "mm", decimals));
         }
     }
     columns.extend([
@@ -53,26 +84,25 @@ pub fn table(report: &PathReport) -> Table {
         Column::text("status", "Status"),
         Column::text("reason", "Reason"),
     ]);
-    let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
-    for point in &report.points {
-        let mut row = place(point);
-        for side in [point.before, point.after] {
-            row.extend(match side {
-                Some(d) => [
-                    d.vector_mm.x.into(),
-                    d.vector_mm.y.into(),
-                    d.vector_mm.z.into(),
-                    d.norm_mm().into(),
-                    d.normal_mm.into(),
-                ],
-                None => [const { Cell::Missing }; 5],
-            });
-        }
-        row.extend(outcome(point));
-        table.push(row);
+    columns
+}
+
+fn point_cells(point: &PathPoint) -> Vec<Cell> {
+    let mut row = place(point);
+    for side in [point.before, point.after] {
+        row.extend(match side {
+            Some(d) => [
+                d.vector_mm.x.into(),
+                d.vector_mm.y.into(),
+                d.vector_mm.z.into(),
+                d.norm_mm().into(),
+                d.normal_mm.into(),
+            ],
+            None => [const { Cell::Missing }; 5],
+        });
     }
-    table.notes = notes(report);
-    table
+    row.extend(outcome(point));
+    row
 }
 
 /// What fits a page: position, sizes before and after, 1σ and what became of the point.
@@ -90,12 +120,7 @@ pub fn short_table(report: &PathReport) -> Table {
     for (side, key, decimals) in [("before", "before", 3), (word, key, decimals(report.after))] {
         columns.push(Column::number(format!("{key}_norm_mm"), format!("{side} |d|"), "mm", decimals));
         if normals {
-            columns.push(Column::number(
-                format!("{key}_normal_mm"),
-                format!("{side} normal"),
-                "mm",
-                decimals,
-            ));
+            columns.push(Column::number(format!("{key}_normal_mm"), format!("{side} normal"), "mm", decimals));
         }
     }
     columns.push(Column::number("sigma_mm", "1σ", "mm", 3));
@@ -475,23 +500,16 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     };
     let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
-        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(
-            first,
-            BEFORE,
-            "as programmed",
-        )));
+        figures.push(
+            KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(first, BEFORE, "as programmed")),
+        );
     }
     for report in reports.iter().filter(|report| has(report, AFTER)).take(3) {
-        let label = if reports.len() > 1 {
-            format!("Largest after, {}", report.model)
-        } else {
-            "Largest after".into()
-        };
-        figures.push(KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm").note(note(
-            report,
-            AFTER,
-            meaning(report.after),
-        )));
+        let label = if reports.len() > 1 { format!("Largest after, {}", report.model) } else { "Largest after".into() };
+        figures.push(
+            KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm")
+                .note(note(report, AFTER, meaning(report.after))),
+        );
     }
     if let [report] = reports {
         figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));

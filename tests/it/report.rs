@@ -1,6 +1,10 @@
 //! Tests of `report`.
 
+mod examples;
 mod formats;
+mod identification;
 mod numbers;
 mod page;
 mod plots;
+mod robots;
+mod study;

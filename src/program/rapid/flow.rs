@@ -225,11 +225,7 @@ impl Walk<'_, '_, '_> {
         let end = node + tree.nodes[node as usize].size;
         let mut out: Vec<u32> = Vec::new();
         for node in node..end {
-            let kind = tree.nodes[node as usize].kind;
-            if matches!(
-                kind,
-                Syntax::Assignment | Syntax::Call | Syntax::LateCall | Syntax::Function | Syntax::For
-            ) {
+            if tree.nodes[node as usize].kind.may_change() {
                 out.extend(self.evaluator.symbols.changed_by(tree, self.unit.scope, node));
             }
         }

@@ -324,8 +324,10 @@ impl Symbols {
                 node += tree.nodes[node as usize].size;
                 continue;
             }
-            for symbol in self.changed_by(tree, unit.scope, node) {
-                self.symbols[symbol as usize].assigned = true;
+            if kind.may_change() {
+                for symbol in self.changed_by(tree, unit.scope, node) {
+                    self.symbols[symbol as usize].assigned = true;
+                }
             }
             node += 1;
         }

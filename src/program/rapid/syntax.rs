@@ -125,6 +125,11 @@ impl Syntax {
         ) || self == Syntax::Body
     }
 
+    /// Whether it may change data by itself.
+    pub(super) fn may_change(self) -> bool {
+        matches!(self, Syntax::Assignment | Syntax::Call | Syntax::LateCall | Syntax::Function | Syntax::For)
+    }
+
     /// Whether it is closed by an END of its own.
     pub(super) fn needs_end(self) -> bool {
         self.is_routine()

@@ -334,6 +334,8 @@ impl<'a, 's> Lister<'a, 's> {
         let mut motion = self.motion(unit, node, state, around);
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
+        // A hundred thousand motions: no room for targets that never come.
+        motion.targets.reserve_exact(if instruction.kind == MotionKind::Circular { 2 } else { 1 });
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let (mut index, mut work_object, mut has_tool) = (0, None, false);
         let mut options = Options::default();
