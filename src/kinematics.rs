@@ -21,3 +21,4 @@ pub mod arm_file;
 pub mod region;
 pub mod estimated;
 pub mod inverse;
+pub mod batch;

@@ -93,38 +93,85 @@ pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6],
         origin: [[zero; 3]; 7],
         x: [one, zero, zero],
     };
-    let mut x = [one, zero, zero];
-    let mut y = [zero, one, zero];
-    let mut z = [zero, zero, one];
-    let mut o = [zero; 3];
-    out.z[0] = z;
+    let mut end = End { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] };
+    out.z[0] = end.axes[2];
     for (i, link) in links.iter().enumerate() {
+        out.lateral[i] = end.advance(link, sin[i], cos[i], scale);
+        out.y[i] = end.axes[1];
+        out.z[i + 1] = end.axes[2];
+        out.origin[i + 1] = end.origin;
+    }
+    out.x = end.axes[0];
+    out
+}
+
+/// The last frame alone, with the bits of [`chain`].
+#[inline(always)]
+pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R> {
+    let (zero, one) = (R::splat(0.0), R::splat(1.0));
+    let mut end = End { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] };
+    for (i, link) in links.iter().enumerate() {
+        end.advance(link, sin[i], cos[i], one);
+    }
+    end
+}
+
+/// One frame in the base.
+#[derive(Debug, Clone, Copy)]
+pub struct End<R> {
+    /// x, y and z axis.
+    pub axes: [[R; 3]; 3],
+    /// Origin [mm].
+    pub origin: [R; 3],
+}
+
+impl<R: Real> End<R> {
+    /// Goes on over one link; hands back the x axis after the joint's rotation.
+    #[inline(always)]
+    fn advance(&mut self, link: &LinkTable, sin: R, cos: R, scale: R) -> [R; 3] {
+        let [x, y, z] = self.axes;
         // sin and cos of joint angle plus offset
         let (so, co) = (R::splat(link.sin_theta), R::splat(link.cos_theta));
-        let s = sin[i] * co + cos[i] * so;
-        let c = cos[i] * co - sin[i] * so;
+        let s = sin * co + cos * so;
+        let c = cos * co - sin * so;
         let lateral = blend(c, &x, s, &y);
         let upright = blend(c, &y, -s, &x);
         let (a, d) = (scale * R::splat(link.a_mm), scale * R::splat(link.d_mm));
         for k in 0..3 {
-            o[k] += d * z[k] + a * lateral[k];
+            self.origin[k] += d * z[k] + a * lateral[k];
         }
         let (sa, ca) = (R::splat(link.sin_alpha), R::splat(link.cos_alpha));
-        y = blend(ca, &upright, sa, &z);
-        z = blend(ca, &z, -sa, &upright);
-        x = lateral;
+        self.axes[1] = blend(ca, &upright, sa, &z);
+        let z = blend(ca, &z, -sa, &upright);
         if link.twisted {
             let (sb, cb) = (R::splat(link.sin_beta), R::splat(link.cos_beta));
-            x = blend(cb, &lateral, -sb, &z);
-            z = blend(cb, &z, sb, &lateral);
+            self.axes[0] = blend(cb, &lateral, -sb, &z);
+            self.axes[2] = blend(cb, &z, sb, &lateral);
+        } else {
+            self.axes[0] = lateral;
+            self.axes[2] = z;
         }
-        out.lateral[i] = lateral;
-        out.y[i] = y;
-        out.z[i + 1] = z;
-        out.origin[i + 1] = o;
+        lateral
     }
-    out.x = x;
-    out
+
+    /// A frame that is fixed to this one, in the base.
+    #[inline(always)]
+    pub fn then(&self, fixed: &End<f64>) -> Self {
+        let carried = |v: &[f64; 3]| {
+            let mut out = [R::splat(0.0); 3];
+            for k in 0..3 {
+                out[k] = R::splat(v[0]) * self.axes[0][k]
+                    + R::splat(v[1]) * self.axes[1][k]
+                    + R::splat(v[2]) * self.axes[2][k];
+            }
+            out
+        };
+        let mut origin = carried(&fixed.origin);
+        for k in 0..3 {
+            origin[k] += self.origin[k];
+        }
+        Self { axes: [carried(&fixed.axes[0]), carried(&fixed.axes[1]), carried(&fixed.axes[2])], origin }
+    }
 }
 
 impl Chain<f64> {

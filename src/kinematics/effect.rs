@@ -20,9 +20,10 @@ use self::coupling::Coupling;
 use self::harmonic::Harmonic;
 use self::ratio::Ratio;
 use self::thermal::Thermal;
-use super::chain::{self, LinkTable, cross, dot, minus};
+use super::chain::{self, Chain, LinkTable, cross, dot};
 use super::condition::Condition;
 use super::model::{Body, Joints, Model};
+use crate::math::lanes::{SinCos, sin_cos};
 
 /// One effect with its parameters. The serialised names are those of the diagnosis contract.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,6 +108,36 @@ impl Effect {
         each!(self, e => e.rotation(statics, u, condition))
     }
 
+    /// Adds [`Effect::rotation`] for one row or eight in lanes; `torque` from [`Statics::loads`].
+    #[inline(always)]
+    pub fn turn<R: SinCos>(&self, u: &[R; 6], torque: &[R; 6], condition: &Condition, out: &mut [R; 6]) {
+        match self {
+            Effect::JointCompliance(e) => e.turn(torque, out),
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.turn(u, out),
+            Effect::GearRatio(e) => e.turn(u, out),
+            Effect::JointCoupling(e) => e.turn(u, out),
+            Effect::Backlash(e) => e.turn(condition, out),
+            Effect::ThermalDrift(_) => {}
+        }
+    }
+
+    /// Adds the slope times a step of u, for one row or eight in lanes, where that is cheap: the slope of compliance,
+    /// some 1e-3, is left out. For Newton's method, which forgives it.
+    #[inline(always)]
+    pub fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+        match self {
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
+            Effect::GearRatio(e) => e.carry(step, out),
+            Effect::JointCoupling(e) => e.carry(step, out),
+            Effect::JointCompliance(_) | Effect::Backlash(_) | Effect::ThermalDrift(_) => {}
+        }
+    }
+
+    /// Whether the effect depends on the torques of gravity.
+    pub fn needs_torque(&self) -> bool {
+        matches!(self, Effect::JointCompliance(_))
+    }
+
     /// Derivative of [`Effect::rotation`] with respect to u.
     pub fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
         each!(self, e => e.slope(statics, u, condition))
@@ -151,33 +182,62 @@ impl Statics {
     /// Torque of gravity about each joint axis [N m] at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
     /// symmetric because torque is the gradient of the potential energy.
     pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
-        let sin: [f64; 6] = std::array::from_fn(|i| u[i].sin());
-        let cos: [f64; 6] = std::array::from_fn(|i| u[i].cos());
-        let frames = chain::chain(&self.tables, &sin, &cos);
-        // Force times lever of everything beyond each joint: Σ m (c − o), and Σ m z × (c − o).
-        let mut weighted = [([0.0; 3], 0.0); 7];
-        for k in (0..6).rev() {
-            let (y, z, o) = (frames.y[k], frames.z[k + 1], frames.origin[k + 1]);
-            let x = cross(&y, &z);
-            let add = |(sum, mass): ([f64; 3], f64), m: f64, c: [f64; 3]| {
-                let at = |i: usize| o[i] + c[0] * x[i] + c[1] * y[i] + c[2] * z[i];
-                ([sum[0] + m * at(0), sum[1] + m * at(1), sum[2] + m * at(2)], mass + m)
-            };
-            let body = self.bodies[k];
-            let mut total = add(weighted[k + 1], body.mass_kg, body.centre_mm);
-            if k == 5 {
-                total = add(total, condition.payload_kg.unwrap_or(0.0), condition.payload_centre_mm);
-            }
-            weighted[k] = total;
-        }
-        let g = [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3);
-        let lever = |j: usize| {
-            let (sum, mass) = weighted[j];
-            minus(&sum, &frames.origin[j].map(|o| o * mass))
-        };
-        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&lever(j), &g)));
-        let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &lever(i)), &g));
+        let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
+        let g = self.gravity_newton();
+        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
+        let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &levers[i]), &g));
         let slope = Matrix6::from_fn(|j, i| dot(&frames.z[j.min(i)], &turned[j.max(i)]));
         (torque, slope)
+    }
+
+    /// The torques alone, for one row or eight in lanes.
+    #[inline(always)]
+    pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
+        let (frames, levers) = self.levers(u, condition);
+        let g = self.gravity_newton().map(R::splat);
+        let mut out = [R::splat(0.0); 6];
+        for j in 0..6 {
+            out[j] = dot(&frames.z[j], &cross(&levers[j], &g));
+        }
+        out
+    }
+
+    /// Weight of a kilogram, with metres for the millimetres of the levers.
+    #[inline(always)]
+    fn gravity_newton(&self) -> [f64; 3] {
+        [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3)
+    }
+
+    /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
+    #[inline(always)]
+    fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
+        let zero = R::splat(0.0);
+        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
+        for i in 0..6 {
+            (sin[i], cos[i]) = sin_cos(u[i]);
+        }
+        let frames = chain::chain(&self.tables, &sin, &cos);
+        let mut levers = [[zero; 3]; 6];
+        let (mut sum, mut mass) = ([zero; 3], 0.0);
+        for k in (0..6).rev() {
+            let (y, z, o) = (&frames.y[k], &frames.z[k + 1], &frames.origin[k + 1]);
+            let x = cross(y, z);
+            let body = &self.bodies[k];
+            let payload = if k == 5 { condition.payload_kg.unwrap_or(0.0) } else { 0.0 };
+            // Σ m c of the body, and of the payload, which has its centre in the same frame.
+            let c = std::array::from_fn::<f64, 3, _>(|i| {
+                body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i]
+            });
+            let here = body.mass_kg + payload;
+            mass += here;
+            for i in 0..3 {
+                sum[i] += R::splat(here) * o[i]
+                    + R::splat(c[0]) * x[i]
+                    + R::splat(c[1]) * y[i]
+                    + R::splat(c[2]) * z[i];
+                levers[k][i] = sum[i] - R::splat(mass) * frames.origin[k][i];
+            }
+        }
+        (frames, levers)
     }
 }

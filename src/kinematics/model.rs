@@ -7,7 +7,7 @@ use super::chain::{self, Chain, LinkTable};
 use super::condition::Condition;
 use super::effect::{Effect, Statics};
 use super::link::Link;
-use crate::math::lanes::sin_cos;
+use crate::math::lanes::{Real, SinCos, sin_cos};
 use crate::math::se3::Pose;
 
 /// Joint angles of the controller [rad].
@@ -72,6 +72,7 @@ impl Model {
             condition: *condition,
             tables: chain::tables(&self.links_under(condition)),
             statics: (!self.effects.is_empty()).then(|| Statics::of(self)),
+            loaded: self.effects.iter().any(Effect::needs_torque),
         }
     }
 
@@ -99,6 +100,7 @@ pub struct Posed<'a> {
     /// Link tables under the condition.
     pub tables: [LinkTable; 6],
     statics: Option<Statics>,
+    loaded: bool,
 }
 
 impl Posed<'_> {
@@ -119,11 +121,35 @@ impl Posed<'_> {
 
     /// DH joint rotations (offsets of the links not included): joint map, then the joint effects.
     pub fn rotations(&self, q: &Joints) -> Joints {
-        let mapped = self.model.joint_map * q;
-        let mut out = mapped;
+        self.affected(&self.mapped(&(*q).into())).into()
+    }
+
+    /// Joint angles after the joint map, for one row or eight in lanes.
+    #[inline(always)]
+    pub fn mapped<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
+        let map = &self.model.joint_map;
+        let mut out = [R::splat(0.0); 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                if map[(i, j)] != 0.0 {
+                    out[i] += R::splat(map[(i, j)]) * q[j];
+                }
+            }
+        }
+        out
+    }
+
+    /// DH joint rotations for mapped joint angles: the effects alone, for one row or eight in lanes.
+    #[inline(always)]
+    pub fn affected<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
+        let mut out = *mapped;
         if let Some(statics) = &self.statics {
+            let torque = match self.loaded {
+                true => statics.loads(mapped, &self.condition),
+                false => [R::splat(0.0); 6],
+            };
             for effect in &self.model.effects {
-                out += effect.rotation(statics, &mapped, &self.condition);
+                effect.turn(mapped, &torque, &self.condition, &mut out);
             }
         }
         out
@@ -134,8 +160,14 @@ impl Posed<'_> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {
             let mapped = self.model.joint_map * q;
+            let torque = self.loaded.then(|| statics.torques(&mapped, &self.condition).1);
             for effect in &self.model.effects {
-                slope += effect.slope(statics, &mapped, &self.condition);
+                match (effect, &torque) {
+                    (Effect::JointCompliance(compliance), Some(torque)) => {
+                        compliance.add_slope(torque, &mut slope)
+                    }
+                    _ => slope += effect.slope(statics, &mapped, &self.condition),
+                }
             }
         }
         slope * self.model.joint_map

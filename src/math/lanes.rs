@@ -27,6 +27,10 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// The largest magnitude over the lanes.
     fn max_abs(self) -> f64;
+    /// 1 where the magnitude is at most `limit`, 0 elsewhere and for NaN.
+    fn within(self, limit: f64) -> Self;
+    /// 1 where the value is above 0, 0 elsewhere and for NaN.
+    fn positive(self) -> Self;
 }
 
 impl Real for f64 {
@@ -41,6 +45,14 @@ impl Real for f64 {
     #[inline(always)]
     fn max_abs(self) -> f64 {
         self.abs()
+    }
+    #[inline(always)]
+    fn within(self, limit: f64) -> Self {
+        if self.abs() <= limit { 1.0 } else { 0.0 }
+    }
+    #[inline(always)]
+    fn positive(self) -> Self {
+        if self > 0.0 { 1.0 } else { 0.0 }
     }
 }
 
@@ -109,6 +121,22 @@ impl Real for Lanes {
     fn max_abs(self) -> f64 {
         self.0.iter().fold(0.0, |m, v| if v.abs() > m { v.abs() } else { m })
     }
+    #[inline(always)]
+    fn within(self, limit: f64) -> Self {
+        let mut out = self.0;
+        for o in &mut out {
+            *o = o.within(limit);
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    fn positive(self) -> Self {
+        let mut out = self.0;
+        for o in &mut out {
+            *o = o.positive();
+        }
+        Self(out)
+    }
 }
 
 impl Lanes {
@@ -124,6 +152,20 @@ impl Lanes {
             }
         }
         Self(out)
+    }
+}
+
+impl Lanes {
+    /// Writes the lanes to neighbours of a column, as far as the column goes.
+    #[inline(always)]
+    pub fn store(&self, column: &mut [f64], from: usize) {
+        if let Some(full) = column.get_mut(from..from + WIDTH) {
+            full.copy_from_slice(&self.0);
+        } else {
+            for (place, value) in column.iter_mut().skip(from).zip(self.0) {
+                *place = value;
+            }
+        }
     }
 }
 

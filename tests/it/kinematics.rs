@@ -1,4 +1,11 @@
-//! Tests of `kinematics`.
+//! Tests of `kinematics`, and of the mathematics below it.
 
 mod arms;
+mod batch;
+mod effect;
+mod forward;
 mod inverse;
+mod inverse_path;
+mod jacobian;
+mod lanes;
+mod se3;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{EffectParameter, Statics};
 use crate::kinematics::condition::Condition;
 use crate::kinematics::model::Joints;
+use crate::math::lanes::Real;
 
 /// Play of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,12 @@ impl Backlash {
 
     pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.play_rad
+    }
+
+    #[inline(always)]
+    pub(super) fn turn<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
+        let side = f64::from(condition.approach[self.joint]);
+        out[self.joint] += R::splat(self.play_rad * 0.5 * side);
     }
 
     pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{EffectParameter, Statics};
 use crate::kinematics::condition::Condition;
 use crate::kinematics::model::Joints;
+use crate::math::lanes::Real;
 
 /// Compliance of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,10 +44,21 @@ impl Compliance {
         self.regressors(statics, u, condition)[0] * self.compliance_rad_per_nm
     }
 
+    #[inline(always)]
+    pub(super) fn turn<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += R::splat(self.compliance_rad_per_nm) * torque[self.joint];
+    }
+
     pub(super) fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
         let mut out = Matrix6::zeros();
-        let torque = statics.torques(u, condition).1;
-        out.set_row(self.joint, &(torque.row(self.joint) * self.compliance_rad_per_nm));
+        self.add_slope(&statics.torques(u, condition).1, &mut out);
         out
+    }
+
+    /// Adds the slope, given that of the torques.
+    pub(in crate::kinematics) fn add_slope(&self, torque: &Matrix6<f64>, out: &mut Matrix6<f64>) {
+        for i in 0..6 {
+            out[(self.joint, i)] += self.compliance_rad_per_nm * torque[(self.joint, i)];
+        }
     }
 }

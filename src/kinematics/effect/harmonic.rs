@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{EffectParameter, Statics};
 use crate::kinematics::condition::Condition;
 use crate::kinematics::model::Joints;
+use crate::math::lanes::{SinCos, sin_cos};
 
 /// One harmonic of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,6 +64,19 @@ impl Harmonic {
         let mut out = Joints::zeros();
         out[self.joint] = self.sine_rad * sin + self.cosine_rad * cos;
         out
+    }
+
+    #[inline(always)]
+    pub(super) fn turn<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
+        out[self.joint] += R::splat(self.sine_rad) * sin + R::splat(self.cosine_rad) * cos;
+    }
+
+    #[inline(always)]
+    pub(super) fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
+        let slope = R::splat(self.order * self.sine_rad) * cos - R::splat(self.order * self.cosine_rad) * sin;
+        out[self.joint] += slope * step[self.joint];
     }
 
     pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {

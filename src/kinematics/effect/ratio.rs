@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{EffectParameter, Statics};
 use crate::kinematics::condition::Condition;
 use crate::kinematics::model::Joints;
+use crate::math::lanes::Real;
 
 /// Ratio error of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,16 @@ impl Ratio {
 
     pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         self.regressors(statics, u, condition)[0] * self.error
+    }
+
+    #[inline(always)]
+    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += R::splat(self.error) * u[self.joint];
+    }
+
+    #[inline(always)]
+    pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
+        self.turn(step, out);
     }
 
     pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {

@@ -15,10 +15,10 @@
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 
-use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
 use super::structure::{Branch, Structure};
+use crate::kinematics::condition::Condition;
 use crate::kinematics::model::{Joints, Model};
 
 /// RAPID's `confdata`.
@@ -45,23 +45,22 @@ pub(super) const QUARTER_AXES: [usize; 3] = [0, 3, 5];
 
 /// How far a solution may lie outside a requested quarter [rad]: an estimated arm stands some tenths of a degree
 /// beside the nominal one, more near the wrist singularity, while other branches are a quarter turn away and more.
-pub(super) const QUARTER_TOLERANCE_RAD: f64 = 0.09;
+const QUARTER_TOLERANCE_RAD: f64 = 0.09;
 
 /// How near to its border a branch may be taken for its neighbour (see [`Structure::margins`]).
 pub(super) const BRANCH_TOLERANCE: f64 = 0.02;
 
-/// Configuration of an arm at controller angles [rad]; cfx is 0 for an arm without a closed form.
-///
-/// Build an [`Inverse`](super::Inverse) and take [`Inverse::configuration`](super::Inverse::configuration) for many.
-pub fn configuration(nominal: &Model, joints: &Joints) -> Configuration {
-    of(&Structure::of(nominal), &nominal.joint_map, joints)
+/// Configuration of an arm at controller angles [rad]; cfx is 0 for an arm without a closed form. For the nominal arm,
+/// or for an estimated one without its effects; [`Inverse::configuration`](super::Inverse::configuration) counts them in.
+pub fn configuration(model: &Model, joints: &Joints) -> Configuration {
+    let frames = model.under(&Condition::default()).frames(joints);
+    let structure = Structure::of(model);
+    of(structure.has_branches().then(|| Branch::of(&structure.margins_of(&frames))), joints)
 }
 
-pub(super) fn of(structure: &Structure, joint_map: &Matrix6<f64>, joints: &Joints) -> Configuration {
+pub(super) fn of(branch: Option<Branch>, joints: &Joints) -> Configuration {
     let quarter = |axis: usize| (joints[axis] / FRAC_PI_2).floor() as i32;
-    let rotations: [f64; 6] = (joint_map * joints).into();
-    let cfx = structure.branch(&rotations).map_or(0, |branch| branch.index());
-    Configuration { cf1: quarter(0), cf4: quarter(3), cf6: quarter(5), cfx }
+    Configuration { cf1: quarter(0), cf4: quarter(3), cf6: quarter(5), cfx: branch.map_or(0, |b| b.index()) }
 }
 
 impl Configuration {
@@ -80,8 +79,13 @@ impl Configuration {
         out
     }
 
+    /// Whether joints and their margins are of this configuration, borders counted to both sides.
+    pub(super) fn fits(&self, joints: &Joints, margins: &[f64; 3]) -> bool {
+        self.overshoot_rad(joints) <= QUARTER_TOLERANCE_RAD && self.has_branch(margins)
+    }
+
     /// Whether margins of a solution belong to the stated branch, borders counted to both sides.
-    pub(super) fn has_branch(&self, margins: &[f64; 3]) -> bool {
+    fn has_branch(&self, margins: &[f64; 3]) -> bool {
         (0..3).all(|k| {
             let wanted_negative = (self.cfx >> (2 - k)) & 1 == 1;
             margins[k].abs() < BRANCH_TOLERANCE || (margins[k] < 0.0) == wanted_negative

@@ -10,8 +10,10 @@
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
-use crate::kinematics::jacobian::joint_jacobian;
+use crate::kinematics::chain::Chain;
+use crate::kinematics::jacobian::{joint_jacobian, link_twist};
 use crate::kinematics::model::{Joints, Posed};
+use crate::kinematics::parameter::LinkCoordinate;
 use crate::math::se3::Pose;
 
 /// A solution misses its target by less [mm].
@@ -67,17 +69,18 @@ struct State {
     jacobian: Matrix6<f64>,
 }
 
-/// The Jacobian of the flange at `joints`, translation rows divided by `length_mm`.
+/// Jacobian of the flange with respect to the rotations of the joints, translation rows divided by `length_mm`.
 pub(super) fn scaled_jacobian(arm: &Posed<'_>, joints: &Joints, length_mm: f64) -> Matrix6<f64> {
     let frames = arm.frames(joints);
-    let axes = frame_matrix(&frames);
-    let point = Vector3::from(frames.origin[6]) + axes * arm.model.flange.translation.vector;
-    let mut jacobian = joint_jacobian(arm, joints, &frames, &point.into());
+    let point = Vector3::from(frames.origin[6]) + frame_matrix(&frames) * arm.model.flange.translation.vector;
+    let mut jacobian = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|joint| {
+        link_twist(&frames, joint, LinkCoordinate::Theta, &point.into())
+    }));
     jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / length_mm);
     jacobian
 }
 
-fn frame_matrix(frames: &crate::kinematics::chain::Chain<f64>) -> Matrix3<f64> {
+fn frame_matrix(frames: &Chain<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[frames.x.into(), frames.y[5].into(), frames.z[6].into()])
 }
 

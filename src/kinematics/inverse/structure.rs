@@ -1,10 +1,12 @@
 //! Which closed form an arm has, and the three signs that tell its branches apart.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
-use super::axes::{Axes, rotated};
+use super::axes::Axes;
 use super::{spherical, ur};
+use crate::kinematics::chain::{Chain, cross, dot, minus};
 use crate::kinematics::model::Model;
+use crate::math::lanes::Real;
 use crate::math::se3::Pose;
 
 /// Where Newton's method starts.
@@ -43,6 +45,7 @@ pub struct Branch {
 pub(super) struct Structure {
     pub(super) axes: Axes,
     pub(super) family: Family,
+    scales: [f64; 3],
 }
 
 impl Structure {
@@ -52,10 +55,12 @@ impl Structure {
             .map(Family::Spherical)
             .or_else(|| ur::wrist_point(&axes).map(Family::Parallel))
             .unwrap_or(Family::Other);
-        Self { axes, family }
+        let scales = scales(&axes, family);
+        Self { axes, family, scales }
     }
 
-    /// All branches for a pose of the last frame, nearest first where `free` decides; empty without a closed form.
+    /// All branches for a pose of the last frame; `free` gives the rotations that a singular pose leaves open. Empty
+    /// without a closed form.
     pub(super) fn seeds(&self, target: &Pose, free: &[f64; 6]) -> Vec<Seed> {
         match &self.family {
             Family::Spherical(centre) => spherical::solve(&self.axes, centre, target, free),
@@ -64,40 +69,64 @@ impl Structure {
         }
     }
 
-    /// Signed distances from the borders between branches, each within −1 and 1: how far the wrist centre lies in
-    /// front of axis 1 (as part of the arm's extent), the sine of the elbow, the sine of the wrist.
-    pub(super) fn margins(&self, rotations: &[f64; 6]) -> Option<[f64; 3]> {
-        let axes = &self.axes;
-        let h = &axes.direction;
-        let (wrist, forearm_end, reference) = match self.family {
-            Family::Spherical(centre) => (centre, centre, h[3]),
-            Family::Parallel(point) => (point, axes.point[3], h[1]),
-            Family::Other => return None,
-        };
-        let sense = axes.sense;
-        // With axis 1 undone: turning axis 1 moves all of this alike.
-        let carry =
-            |x: &Vector3<f64>, last: usize| (1..=last).rev().fold(*x, |x, j| axes.turn(j, rotations[j], &x));
-        let wrist_there = match self.family {
-            Family::Parallel(_) => carry(&wrist, 3),
-            _ => carry(&wrist, 2),
-        };
-        let forward = h[1].cross(&h[0]) * sense[1];
-        let shoulder = forward.dot(&(wrist_there - axes.point[0])) / axes.extent_mm;
-        let flat = |x: Vector3<f64>| x - h[1] * h[1].dot(&x);
-        let upper = flat(axes.point[2] - axes.point[1]);
-        let fore = flat(rotated(&h[2], rotations[2], &(forearm_end - axes.point[2])));
-        let elbow = sense[1] * h[1].dot(&upper.cross(&fore)) / (upper.norm() * fore.norm());
-        let tip = rotated(&h[4], rotations[4], &h[5]);
-        let wrist = sense[4] * h[4].dot(&reference.cross(&tip));
-        Some([shoulder, elbow, wrist])
+    /// The point that joints 4 to 6 move least, in the last frame [mm]: where the twist is taken.
+    pub(super) fn wrist_in_last(&self) -> [f64; 3] {
+        match self.family {
+            Family::Spherical(point) | Family::Parallel(point) => {
+                (self.axes.home_inverse * Point3::from(point)).coords.into()
+            }
+            Family::Other => [0.0; 3],
+        }
     }
 
-    pub(super) fn branch(&self, rotations: &[f64; 6]) -> Option<Branch> {
-        self.margins(rotations).map(|[shoulder, elbow, wrist]| Branch {
-            behind: shoulder < 0.0,
-            elbow_back: elbow < 0.0,
-            wrist_negative: wrist < 0.0,
-        })
+    /// Signed distances from the borders between branches: how far the wrist point lies in front of axis 1 (as part of the
+    /// arm's extent), the sine of the elbow, the sine of the wrist. Behind, elbow back and axis 5 negative count as
+    /// negative. All 1 for an arm without a closed form, which has no branches.
+    #[inline(always)]
+    pub(super) fn margins<R: Real>(&self, frames: &Chain<R>, wrist: &[R; 3]) -> [R; 3] {
+        let (z, o) = (&frames.z, &frames.origin);
+        let (end, reference) = match self.family {
+            Family::Spherical(_) => (*wrist, z[3]),
+            Family::Parallel(_) => (o[3], z[1]),
+            Family::Other => return [R::splat(1.0); 3],
+        };
+        let shoulder = dot(&cross(&z[1], &z[0]), &minus(wrist, &o[0])) * R::splat(self.scales[0]);
+        let bend = cross(&minus(&o[2], &o[1]), &minus(&end, &o[2]));
+        let elbow = dot(&z[1], &bend) * R::splat(self.scales[1]);
+        let wrist = dot(&z[4], &cross(&reference, &z[5])) * R::splat(self.scales[2]);
+        [shoulder, elbow, wrist]
     }
+
+    /// The margins of a model of this structure whose joints have been put into frames.
+    pub(super) fn margins_of(&self, frames: &Chain<f64>) -> [f64; 3] {
+        let [x, y, z] = self.wrist_in_last();
+        let wrist = std::array::from_fn(|k| {
+            frames.origin[6][k] + x * frames.x[k] + y * frames.y[5][k] + z * frames.z[6][k]
+        });
+        self.margins(frames, &wrist)
+    }
+
+    /// Whether the arm has a closed form, and so branches.
+    pub(super) fn has_branches(&self) -> bool {
+        self.family != Family::Other
+    }
+}
+
+impl Branch {
+    pub(super) fn of(margins: &[f64; 3]) -> Self {
+        Self { behind: margins[0] < 0.0, elbow_back: margins[1] < 0.0, wrist_negative: margins[2] < 0.0 }
+    }
+}
+
+/// What makes the margins signed parts of one: with the controller's senses of joints 2 and 5.
+fn scales(axes: &Axes, family: Family) -> [f64; 3] {
+    let end = match family {
+        Family::Spherical(centre) => centre,
+        Family::Parallel(_) => axes.point[3],
+        Family::Other => return [0.0; 3],
+    };
+    let h = axes.direction[1];
+    let flat = |x: Vector3<f64>| (x - h * h.dot(&x)).norm();
+    let area = flat(axes.point[2] - axes.point[1]) * flat(end - axes.point[2]);
+    [axes.sense[1] / axes.extent_mm, axes.sense[1] / area, axes.sense[4]]
 }

@@ -1,0 +1,185 @@
+//! Forward and inverse kinematics of a calibrated IRB 120, one pose at a time and in lanes.
+//!
+//! `cargo bench --bench kinematics --no-default-features`; items per second are poses per second of one thread.
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use nalgebra::{Matrix6, Vector3};
+use truegrind::kinematics::batch::{JointColumns, PoseColumns};
+use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::effect::Effect;
+use truegrind::kinematics::effect::compliance::Compliance;
+use truegrind::kinematics::effect::harmonic::Harmonic;
+use truegrind::kinematics::inverse::Inverse;
+use truegrind::kinematics::link::{Link, LinkModel};
+use truegrind::kinematics::model::{Body, Joints, Limits, Model};
+use truegrind::math::se3::Pose;
+
+fn main() {
+    divan::main();
+}
+
+const COUNT: usize = 4096;
+
+/// The nominal arm, as ltlm-2024 Table 1 has it.
+fn nominal() -> Model {
+    let table = [
+        [0.0, 290.0, -90.0, 0.0],
+        [270.0, 0.0, 0.0, -90.0],
+        [70.0, 0.0, -90.0, 0.0],
+        [0.0, 302.0, 90.0, 0.0],
+        [0.0, 0.0, -90.0, 0.0],
+        [0.0, 72.0, 0.0, 0.0_f64],
+    ];
+    Model {
+        links: std::array::from_fn(|i| {
+            let [a_mm, d_mm, alpha, theta] = table[i];
+            let model = if i == 1 { LinkModel::Hayati } else { LinkModel::Dh };
+            Link {
+                model,
+                a_mm,
+                d_mm,
+                alpha_rad: alpha.to_radians(),
+                theta_rad: theta.to_radians(),
+                beta_rad: 0.0,
+            }
+        }),
+        joint_map: Matrix6::identity(),
+        limits: Limits {
+            min_rad: [-165.0_f64, -110.0, -110.0, -160.0, -120.0, -400.0].map(f64::to_radians),
+            max_rad: [165.0_f64, 110.0, 70.0, 160.0, 120.0, 400.0].map(f64::to_radians),
+            speed_rad_s: None,
+        },
+        flange: Pose::identity(),
+        bodies: None,
+        gravity: -Vector3::z(),
+        effects: Vec::new(),
+    }
+}
+
+/// Every link number off by some tenths of a millimetre and some thousandths of a radian.
+fn calibrated() -> Model {
+    let mut out = nominal();
+    for (i, link) in out.links.iter_mut().enumerate() {
+        let off = 0.3 - 0.1 * i as f64;
+        link.a_mm += off;
+        link.alpha_rad += 3e-3 * off;
+        link.theta_rad -= 4e-3 * off;
+        match link.model {
+            LinkModel::Dh => link.d_mm -= off,
+            LinkModel::Hayati => link.beta_rad = 1e-3,
+        }
+    }
+    out
+}
+
+/// The calibrated arm with six compliances and an eccentric gear.
+fn with_effects() -> Model {
+    let mut out = calibrated();
+    out.bodies =
+        Some([3.1, 3.9, 2.9, 1.3, 0.5, 0.1].map(|mass_kg| Body { mass_kg, centre_mm: [-50.0, 10.0, 20.0] }));
+    out.effects = (0..6)
+        .map(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 1e-5 }))
+        .chain([Effect::GearEccentricity(Harmonic {
+            joint: 1,
+            order: 1.0,
+            sine_rad: 2e-4,
+            cosine_rad: 1e-4,
+        })])
+        .collect();
+    out
+}
+
+/// Joints along a smooth path, some millimetres from point to point.
+fn path() -> Vec<Joints> {
+    (0..COUNT)
+        .map(|i| {
+            let t = i as f64 / COUNT as f64 * std::f64::consts::TAU;
+            Joints::from_fn(|j, _| {
+                let start = [0.2, 0.4, -0.3, 0.5, 0.8, -0.2][j];
+                start + 0.5 * (t * (1.0 + j as f64) + j as f64).sin()
+            })
+        })
+        .collect()
+}
+
+fn arm(name: &str) -> Model {
+    if name == "effects" { with_effects() } else { calibrated() }
+}
+
+fn targets(model: &Model) -> Vec<Pose> {
+    let posed = model.under(&Condition::default());
+    path().iter().map(|q| posed.forward(q)).collect()
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn forward_scalar(bencher: Bencher<'_, '_>, name: &str) {
+    let (model, joints) = (arm(name), path());
+    let posed = model.under(&Condition::default());
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
+        for q in &joints {
+            black_box(posed.forward(black_box(q)));
+        }
+    });
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn forward_lanes(bencher: Bencher<'_, '_>, name: &str) {
+    let (model, joints) = (arm(name), path().into_iter().collect::<JointColumns>());
+    let posed = model.under(&Condition::default());
+    let mut poses = PoseColumns::default();
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
+        posed.forward_columns(black_box(&joints), &mut poses);
+        black_box(&poses);
+    });
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn inverse_scalar_near_nominal_joints(bencher: Bencher<'_, '_>, name: &str) {
+    let model = arm(name);
+    let (targets, seeds, nominal) = (targets(&model), path(), nominal());
+    let inverse = Inverse::new(&model, &Condition::default(), &nominal);
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
+        for (target, seed) in targets.iter().zip(&seeds) {
+            let _ = black_box(inverse.solve_near(target, &seed.map(|q| q + 3e-3)));
+        }
+    });
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn inverse_lanes_near_nominal_joints(bencher: Bencher<'_, '_>, name: &str) {
+    let model = arm(name);
+    let nominal = nominal();
+    let targets = targets(&model);
+    let seeds: Vec<Joints> = path().iter().map(|seed| seed.map(|q| q + 3e-3)).collect();
+    let inverse = Inverse::new(&model, &Condition::default(), &nominal);
+    let portion = 1024; // what one thread takes
+    assert!(inverse.solve_seeded(&targets, &seeds).iter().all(Result::is_ok));
+    bencher
+        .counter(ItemsCount::new(portion))
+        .bench_local(|| black_box(inverse.solve_seeded(black_box(&targets[..portion]), &seeds[..portion])));
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn inverse_lanes_along_path(bencher: Bencher<'_, '_>, name: &str) {
+    let model = arm(name);
+    let (targets, start, nominal) = (targets(&model), path()[0], nominal());
+    let inverse = Inverse::new(&model, &Condition::default(), &nominal);
+    assert!(inverse.solve_path(&targets, &start).iter().all(Result::is_ok));
+    bencher
+        .counter(ItemsCount::new(COUNT))
+        .bench_local(|| black_box(inverse.solve_path(black_box(&targets), &start)));
+}
+
+#[divan::bench(args = ["links", "effects"])]
+fn inverse_all_branches(bencher: Bencher<'_, '_>, name: &str) {
+    let model = arm(name);
+    let nominal = nominal();
+    let targets: Vec<Pose> = targets(&model).into_iter().step_by(64).collect();
+    let inverse = Inverse::new(&model, &Condition::default(), &nominal);
+    bencher.counter(ItemsCount::new(targets.len())).bench_local(|| {
+        for target in &targets {
+            black_box(inverse.all(black_box(target)));
+        }
+    });
+}

@@ -1,0 +1,258 @@
+//! The careful road: all branches, all turns, seeds spread over the joint ranges.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
+use super::newton::{self, Goal, Outcome};
+use super::{Inverse, InverseError, Solution, same_branch};
+use crate::kinematics::model::{Joints, Limits};
+
+/// Solutions nearer than this are one [rad].
+const SAME_RAD: f64 = 1e-6;
+/// Spread seeds for an arm without a closed form.
+const SPREAD: usize = 64;
+/// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
+const SPREAD_RESCUE: usize = 24;
+
+impl Inverse<'_> {
+    /// [`Inverse::solve_near`] where the kernel's answer does not count.
+    pub(super) fn solve_carefully(
+        &self,
+        goal: &Goal,
+        seed: &Joints,
+        margins: &[f64; 3],
+    ) -> Result<Solution, InverseError> {
+        let mut found = self.branches(goal, Some(seed))?;
+        let direct = newton::solve(&self.arm, goal, seed, self.kernel.length_mm);
+        let turned = on_turn_near(&direct.joints, seed);
+        if direct.converged() && (turned - direct.joints).amax() == 0.0 {
+            found.push(direct);
+        }
+        let mut best: Option<(bool, f64, &Outcome)> = None;
+        let mut other: Option<(f64, &Outcome)> = None;
+        for outcome in &found {
+            let distance = (outcome.joints - seed).amax();
+            if !same_branch(margins, &self.margins(&outcome.joints)) {
+                if other.is_none_or(|(d, _)| distance < d) {
+                    other = Some((distance, outcome));
+                }
+                continue;
+            }
+            let outside = self.check_limits(&outcome.joints).is_err();
+            if best.is_none_or(|(o, d, _)| (outside, distance) < (o, d)) {
+                best = Some((outside, distance, outcome));
+            }
+        }
+        match (best, other) {
+            (Some((_, _, outcome)), _) => {
+                self.check_limits(&outcome.joints)?;
+                Ok(self.solution(outcome))
+            }
+            (None, Some((_, outcome))) => Err(InverseError::OtherBranch {
+                wanted: self.configuration(seed).cfx,
+                found: self.configuration(&outcome.joints).cfx,
+            }),
+            (None, None) => Err(InverseError::NotFinite),
+        }
+    }
+
+    /// [`Inverse::solve_configured`] by way of all branches.
+    pub(super) fn solve_in(
+        &self,
+        goal: &Goal,
+        configuration: &Configuration,
+        near: Option<&Joints>,
+    ) -> Result<Solution, InverseError> {
+        let wanted = Joints::from_fn(|axis, _| match QUARTER_AXES.iter().position(|&a| a == axis) {
+            Some(k) => (f64::from(configuration.quarters()[k]) + 0.5) * FRAC_PI_2,
+            None => near.map_or_else(|| self.middle(axis), |near| near[axis]),
+        });
+        let mut best: Option<([f64; 2], Outcome)> = None;
+        let mut nearest: Option<(f64, Joints)> = None;
+        let mut outside = None;
+        for found in self.branches(goal, near)? {
+            let outcome = self.turned(goal, found, &wanted);
+            if !outcome.converged() {
+                continue;
+            }
+            let joints = outcome.joints;
+            let overshoot = configuration.overshoot_rad(&joints);
+            if nearest.is_none_or(|(o, _)| overshoot < o) {
+                nearest = Some((overshoot, joints));
+            }
+            if !configuration.fits(&joints, &self.margins(&joints)) {
+                continue;
+            }
+            if let Err(error) = self.check_limits(&joints) {
+                outside = Some(error);
+                continue;
+            }
+            let distance = near.map_or(0.0, |near| (joints - near).amax());
+            let rank = [distance, overshoot.max(0.0)];
+            if best.as_ref().is_none_or(|(r, _)| rank < *r) {
+                best = Some((rank, outcome));
+            }
+        }
+        match (best, outside, nearest) {
+            (Some((_, outcome)), _, _) => Ok(self.solution(&outcome)),
+            (None, Some(error), _) => Err(error),
+            (None, None, Some((_, joints))) => Err(InverseError::OtherConfiguration {
+                wanted: *configuration,
+                nearest: self.configuration(&joints),
+            }),
+            (None, None, None) => Err(InverseError::NotFinite),
+        }
+    }
+
+    /// Every solution within the limits.
+    pub(super) fn every_turn(&self, goal: &Goal) -> Vec<Solution> {
+        let mut out: Vec<Solution> = Vec::new();
+        for outcome in self.branches(goal, None).unwrap_or_default() {
+            for start in turns_within(&outcome.joints, &self.arm.model.limits) {
+                let outcome = newton::solve(&self.arm, goal, &start, self.kernel.length_mm);
+                let new = !out.iter().any(|s| (s.joints - outcome.joints).amax() < SAME_RAD);
+                if outcome.converged() && new && self.check_limits(&outcome.joints).is_ok() {
+                    out.push(self.solution(&outcome));
+                }
+            }
+        }
+        out
+    }
+
+    /// Converged solutions on all branches, limits not looked at; each joint on the turn nearest to `near`, or to the
+    /// middle of its range. An error where there is none.
+    fn branches(&self, goal: &Goal, near: Option<&Joints>) -> Result<Vec<Outcome>, InverseError> {
+        let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
+        let seeds = self.structure.seeds(&goal.last, &(self.arm.model.joint_map * around).into());
+        let beyond_mm = seeds.iter().map(|s| s.beyond_mm).fold(f64::INFINITY, f64::min);
+        let mut search = Search { inverse: self, goal, around, found: Vec::with_capacity(8), closest: None };
+        if let Some(map_inverse) = &self.map_inverse {
+            for seed in &seeds {
+                search.attempt(&(map_inverse * Joints::from(seed.rotations)));
+            }
+        }
+        let spread = match self.structure.has_branches() {
+            false => SPREAD,
+            true if search.found.is_empty() && beyond_mm < 0.05 * self.kernel.length_mm => SPREAD_RESCUE,
+            true => 0,
+        };
+        for k in 0..spread {
+            search.attempt(&self.spread_seed(k));
+        }
+        if !search.found.is_empty() {
+            return Ok(search.found);
+        }
+        let Some(closest) = search.closest else { return Err(InverseError::NotFinite) };
+        if beyond_mm.is_finite() && beyond_mm > 0.0 {
+            return Err(InverseError::Unreachable { beyond_mm });
+        }
+        if let Some((singularity, distance)) =
+            self.singularity_distances(&closest.joints).map(|d| d.nearest())
+            && distance < BRANCH_TOLERANCE
+        {
+            return Err(InverseError::NearSingularity { singularity, distance });
+        }
+        Err(InverseError::NotConverged {
+            residual_mm: closest.residual_mm,
+            residual_rad: closest.residual_rad,
+        })
+    }
+
+    /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again.
+    fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
+        let joints = on_turn_near(&outcome.joints, wanted);
+        if joints == outcome.joints {
+            return outcome;
+        }
+        newton::solve(&self.arm, goal, &joints, self.kernel.length_mm)
+    }
+
+    fn middle(&self, axis: usize) -> f64 {
+        let (low, high) = range(&self.arm.model.limits, axis);
+        0.5 * (low + high)
+    }
+
+    /// Point `k` of a Halton sequence over the joint ranges.
+    fn spread_seed(&self, k: usize) -> Joints {
+        Joints::from_fn(|axis, _| {
+            let base = [2, 3, 5, 7, 11, 13][axis];
+            let (mut fraction, mut scale, mut rest) = (0.0, 1.0, k + 1);
+            while rest > 0 {
+                scale /= base as f64;
+                fraction += scale * (rest % base) as f64;
+                rest /= base;
+            }
+            let (low, high) = range(&self.arm.model.limits, axis);
+            low + fraction * (high - low)
+        })
+    }
+}
+
+/// Solutions gathered from seed after seed.
+struct Search<'s, 'a> {
+    inverse: &'s Inverse<'a>,
+    goal: &'s Goal,
+    around: Joints,
+    found: Vec<Outcome>,
+    closest: Option<Outcome>,
+}
+
+impl Search<'_, '_> {
+    fn attempt(&mut self, seed: &Joints) {
+        let (inverse, length_mm) = (self.inverse, self.inverse.kernel.length_mm);
+        let start = on_turn_near(seed, &self.around);
+        let outcome = newton::solve(&inverse.arm, self.goal, &start, length_mm);
+        if !outcome.converged() {
+            let miss = |o: &Outcome| o.residual_mm / length_mm + o.residual_rad;
+            if self.closest.as_ref().is_none_or(|c| miss(&outcome) < miss(c)) {
+                self.closest = Some(outcome);
+            }
+            return;
+        }
+        let outcome = inverse.turned(self.goal, outcome, &self.around);
+        if outcome.converged() && !self.found.iter().any(|f| (f.joints - outcome.joints).amax() < SAME_RAD) {
+            self.found.push(outcome);
+        }
+    }
+}
+
+/// The same joint positions, each on the turn nearest to `wanted`.
+fn on_turn_near(joints: &Joints, wanted: &Joints) -> Joints {
+    joints.zip_map(wanted, |q, w| q + TAU * ((w - q) / TAU).round())
+}
+
+/// Range of an axis; one turn where none is stated.
+fn range(limits: &Limits, axis: usize) -> (f64, f64) {
+    let (low, high) = (limits.min_rad[axis], limits.max_rad[axis]);
+    if (high - low).is_finite() { (low, high) } else { (-PI, PI) }
+}
+
+/// More combinations of turns than a robot has; an arm with wider limits gets the nearest turn of each joint alone.
+const MOST_COMBINATIONS: usize = 4096;
+
+/// Every combination of full turns that lies within the limits.
+fn turns_within(joints: &Joints, limits: &Limits) -> Vec<Joints> {
+    let mut out = vec![*joints];
+    for axis in 0..6 {
+        // A joint may lie outside by as much as effects move it from turn to turn; Newton and the limits decide.
+        let slack = 0.02;
+        let (min, max) = range(limits, axis);
+        let low = ((min - slack - joints[axis]) / TAU).ceil();
+        let high = ((max + slack - joints[axis]) / TAU).floor();
+        let count = (high - low + 1.0).max(0.0);
+        if count * out.len() as f64 > MOST_COMBINATIONS as f64 {
+            continue;
+        }
+        out = out
+            .iter()
+            .flat_map(|base| {
+                (0..count as usize).map(move |turn| {
+                    let mut shifted = *base;
+                    shifted[axis] += TAU * (low + turn as f64);
+                    shifted
+                })
+            })
+            .collect();
+    }
+    out
+}
