@@ -4,14 +4,15 @@
 //! What cannot be read becomes one `Opaque` node that ends at the next `;`, block keyword or, where only a `;` is
 //! missing, line; reading then goes on. Chains of one operator are one flat node.
 
+mod declaration;
+mod expression;
+
 use super::lexer::lex;
 use super::syntax::Syntax;
 use super::token::{Token, same_name};
 use crate::program::motion::OpaqueReason;
 use crate::program::tree::{Node, Opaque, Tree};
 
-/// How deeply brackets and calls may nest.
-const EXPRESSION_DEPTH: u32 = 100;
 /// How deeply blocks may nest.
 const BLOCK_DEPTH: usize = 100;
 
@@ -410,107 +411,6 @@ impl<'t, 's> Parser<'t, 's> {
         Ok(())
     }
 
-    fn routine_header(&mut self, kind: Syntax) -> Parsed {
-        if kind == Syntax::Func {
-            self.name()?;
-        }
-        self.name()?;
-        if kind == Syntax::Trap || self.peek() != Token::ParenOpen {
-            return Ok(());
-        }
-        let node = self.open(Syntax::Parameters);
-        self.bump();
-        while !matches!(self.peek(), Token::ParenClose | Token::End) {
-            while matches!(self.peek(), Token::Comma | Token::Pipe) {
-                self.bump();
-            }
-            self.parameter()?;
-        }
-        self.expect(Token::ParenClose, OpaqueReason::Unclosed)?;
-        self.close(node);
-        Ok(())
-    }
-
-    fn parameter(&mut self) -> Parsed {
-        let node = self.open(Syntax::Parameter);
-        self.eat(Token::Backslash);
-        if matches!(self.peek(), Token::Var | Token::Pers | Token::InOut) {
-            self.bump();
-        }
-        let lone = self.peek() == Token::Placeholder;
-        self.name()?;
-        if self.peek() == Token::Ident || self.peek() == Token::Placeholder {
-            self.name()?;
-        } else if !lone {
-            return Err(Fail(OpaqueReason::ExpectedName));
-        }
-        if self.eat(Token::BraceOpen) {
-            while matches!(self.peek(), Token::Star | Token::Comma | Token::Placeholder) {
-                self.bump();
-            }
-            self.expect(Token::BraceClose, OpaqueReason::Unclosed)?;
-        }
-        self.close(node);
-        Ok(())
-    }
-
-    fn record(&mut self) -> Parsed {
-        let node = self.open(Syntax::Record);
-        self.eat(Token::Local);
-        self.bump();
-        self.name()?;
-        while !matches!(self.peek(), Token::EndRecord | Token::End) {
-            let component = self.open(Syntax::Component);
-            self.name()?;
-            self.name()?;
-            self.expect(Token::Semicolon, OpaqueReason::MissingSemicolon)?;
-            self.close(component);
-        }
-        self.expect(Token::EndRecord, OpaqueReason::MissingEnd)?;
-        self.close(node);
-        Ok(())
-    }
-
-    fn alias(&mut self) -> Parsed {
-        let node = self.open(Syntax::Alias);
-        self.eat(Token::Local);
-        self.bump();
-        self.name()?;
-        self.name()?;
-        self.expect(Token::Semicolon, OpaqueReason::MissingSemicolon)?;
-        self.close(node);
-        Ok(())
-    }
-
-    fn data(&mut self) -> Parsed {
-        let node = self.open(Syntax::Data);
-        while self.peek() == Token::Local || self.at_word(b"TASK") {
-            self.bump();
-        }
-        if !matches!(self.peek(), Token::Var | Token::Pers | Token::Const) {
-            return Err(Fail(OpaqueReason::Unexpected));
-        }
-        self.bump();
-        self.name()?;
-        self.name()?;
-        if self.peek() == Token::BraceOpen {
-            let dimensions = self.open(Syntax::Dimensions);
-            self.bump();
-            self.expression()?;
-            while self.eat(Token::Comma) {
-                self.expression()?;
-            }
-            self.expect(Token::BraceClose, OpaqueReason::Unclosed)?;
-            self.close(dimensions);
-        }
-        if self.eat(Token::Assign) {
-            self.expression()?;
-        }
-        self.expect(Token::Semicolon, OpaqueReason::MissingSemicolon)?;
-        self.close(node);
-        Ok(())
-    }
-
     fn clause(&mut self) -> Parsed {
         let Some(index) = self.blocks.iter().rposition(|block| block.kind.is_routine()) else {
             return Err(Fail(OpaqueReason::Unexpected));
@@ -528,17 +428,6 @@ impl<'t, 's> Parser<'t, 's> {
             self.header_done(header, result);
         }
         Ok(())
-    }
-
-    fn expression_list(&mut self, open: Token, close: Token) -> Parsed {
-        self.expect(open, OpaqueReason::Unexpected)?;
-        if self.peek() != close {
-            self.expression()?;
-            while self.eat(Token::Comma) {
-                self.expression()?;
-            }
-        }
-        self.expect(close, OpaqueReason::Unclosed)
     }
 
     /// The nearest open block of a kind in the current routine.
@@ -743,198 +632,9 @@ impl<'t, 's> Parser<'t, 's> {
         self.expression()?;
         Ok(Syntax::Assignment)
     }
-
-    /// The arguments of a call, up to the token that ends them.
-    fn arguments(&mut self) -> Parsed {
-        let mut separated = true;
-        loop {
-            match self.peek() {
-                Token::Semicolon | Token::ParenClose | Token::End => return Ok(()),
-                Token::Comma => {
-                    self.bump();
-                    separated = true;
-                    if matches!(self.peek(), Token::Semicolon | Token::ParenClose | Token::Comma) {
-                        return Err(Fail(OpaqueReason::ExpectedExpression));
-                    }
-                }
-                Token::Backslash => {
-                    let node = self.open(Syntax::Option);
-                    self.bump();
-                    if !self.peek().is_keyword() && self.peek() != Token::Ident {
-                        return Err(Fail(OpaqueReason::ExpectedName));
-                    }
-                    self.bump();
-                    if self.eat(Token::Assign) {
-                        self.expression()?;
-                    } else if self.eat(Token::Question) {
-                        self.name()?;
-                    }
-                    self.close(node);
-                    separated = false;
-                }
-                _ if !separated => return Err(Fail(OpaqueReason::MissingSemicolon)),
-                Token::Ident if self.peek_second() == Token::Assign => {
-                    let node = self.open(Syntax::Named);
-                    self.bump();
-                    self.bump();
-                    self.expression()?;
-                    self.close(node);
-                    separated = false;
-                }
-                _ => {
-                    let node = self.open(Syntax::Argument);
-                    self.expression()?;
-                    self.close(node);
-                    separated = false;
-                }
-            }
-        }
-    }
-
-    // ---- expressions ----
-
-    #[inline]
-    fn expression(&mut self) -> Parsed {
-        // Most expressions are one token, most of these a number in an aggregate.
-        if matches!(self.peek(), Token::Number | Token::Ident | Token::String)
-            && matches!(
-                self.kinds.get(self.at as usize + 1),
-                Some(
-                    Token::Comma
-                        | Token::BracketClose
-                        | Token::Semicolon
-                        | Token::Backslash
-                        | Token::ParenClose
-                )
-            )
-        {
-            self.bump();
-            return Ok(());
-        }
-        self.nested(|parser| parser.chain(0))
-    }
-
-    /// Operators of this priority and all above: 0 OR XOR, 1 AND, 2 relations, 3 sums, 4 products.
-    fn chain(&mut self, level: u8) -> Parsed {
-        let (node, first) = (self.nodes.len(), self.at);
-        if self.peek() == Token::Not && level <= 2 {
-            // NOT covers all operators that bind more strongly than those of this level.
-            self.open(Syntax::Unary);
-            self.bump();
-            self.nested(|parser| parser.chain(level + 1))?;
-            self.close(node);
-            return self.operators(level, node, first);
-        }
-        self.operand()?;
-        if self.peek().operator_level().is_none() {
-            return Ok(());
-        }
-        (level..=4).rev().try_for_each(|level| self.operators(level, node, first))
-    }
-
-    /// A flat chain of operators of one priority after its first operand, which began at `node` and `first`.
-    fn operators(&mut self, level: u8, node: usize, first: u32) -> Parsed {
-        if self.peek().operator_level() != Some(level) {
-            return Ok(());
-        }
-        self.wrap(Syntax::Binary, node, first);
-        while self.peek().operator_level() == Some(level) {
-            self.bump();
-            if level == 4 { self.operand()? } else { self.chain(level + 1)? }
-        }
-        self.close(node);
-        Ok(())
-    }
-
-    fn operand(&mut self) -> Parsed {
-        if !matches!(self.peek(), Token::Minus | Token::Plus | Token::Not) {
-            return self.primary();
-        }
-        let node = self.open(Syntax::Unary);
-        self.bump();
-        self.nested(Self::operand)?;
-        self.close(node);
-        Ok(())
-    }
-
-    fn nested(&mut self, inner: impl FnOnce(&mut Self) -> Parsed) -> Parsed {
-        if self.depth >= EXPRESSION_DEPTH {
-            return Err(Fail(OpaqueReason::TooDeep));
-        }
-        self.depth += 1;
-        let result = inner(self);
-        self.depth -= 1;
-        result
-    }
-
-    fn primary(&mut self) -> Parsed {
-        let (node, first) = (self.nodes.len(), self.at);
-        match self.peek() {
-            Token::Number | Token::String | Token::True | Token::False | Token::Star => {
-                self.bump();
-                return Ok(());
-            }
-            Token::Ident | Token::Placeholder => {
-                self.bump();
-                if self.peek() == Token::ParenOpen {
-                    self.wrap(Syntax::Function, node, first);
-                    self.bump();
-                    self.nested(Self::arguments)?;
-                    self.expect(Token::ParenClose, OpaqueReason::Unclosed)?;
-                    self.close(node);
-                }
-            }
-            Token::BracketOpen => {
-                self.open(Syntax::Aggregate);
-                self.expression_list(Token::BracketOpen, Token::BracketClose)?;
-                self.close(node);
-            }
-            Token::ParenOpen => {
-                self.open(Syntax::Paren);
-                self.bump();
-                self.expression()?;
-                self.expect(Token::ParenClose, OpaqueReason::Unclosed)?;
-                self.close(node);
-            }
-            Token::OpenString => return Err(Fail(OpaqueReason::UnclosedString)),
-            _ => return Err(Fail(OpaqueReason::ExpectedExpression)),
-        }
-        if matches!(self.peek(), Token::Dot | Token::BraceOpen) {
-            self.wrap(Syntax::Place, node, first);
-            loop {
-                if self.eat(Token::Dot) {
-                    self.name()?;
-                } else if self.peek() == Token::BraceOpen {
-                    let index = self.open(Syntax::Index);
-                    self.expression_list(Token::BraceOpen, Token::BraceClose)?;
-                    self.close(index);
-                } else {
-                    break;
-                }
-            }
-            self.close(node);
-        }
-        Ok(())
-    }
 }
 
 impl Token {
-    fn operator_level(self) -> Option<u8> {
-        match self {
-            Token::Or | Token::Xor => Some(0),
-            Token::And => Some(1),
-            Token::Equal
-            | Token::NotEqual
-            | Token::Less
-            | Token::LessEqual
-            | Token::Greater
-            | Token::GreaterEqual => Some(2),
-            Token::Plus | Token::Minus => Some(3),
-            Token::Star | Token::Slash | Token::Div | Token::Mod => Some(4),
-            _ => None,
-        }
-    }
-
     /// Keywords that close or continue a block.
     fn ends_block(self) -> bool {
         matches!(

@@ -1,5 +1,8 @@
 //! From files to the listing: every motion with its targets, speed, zone, tool and work object.
 
+mod frames;
+mod uses;
+
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -13,10 +16,9 @@ use super::parser::parse;
 use super::symbol::{Symbols, Unit, What, only_reads};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
-use super::value::Value;
 use crate::program::motion::{
-    Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, OtherUse, Place, Reason,
-    Role, Routine, Speed, Switch, Tool, WorkObject, Zone,
+    Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, Place, Reason, Role,
+    Routine, Switch,
 };
 use crate::program::tree::Child;
 
@@ -498,215 +500,6 @@ impl<'a, 's> Lister<'a, 's> {
             _ => None,
         }
     }
-
-    // ---- speed, zone, tool, work object ----
-
-    /// Whether a name or expression may have another value at another motion.
-    fn varies(&self, unit: Unit, value: Child) -> bool {
-        let tree = &self.trees[unit.file as usize];
-        let (first, end) = tokens_of(tree, value);
-        (first..end).any(|token| {
-            tree.kind(token) == Some(Token::Ident)
-                && self
-                    .symbols
-                    .find(unit.scope, tree.text(token))
-                    .is_some_and(|symbol| self.symbols.symbols[symbol as usize].assigned)
-        })
-    }
-
-    fn evaluated(&self, unit: Unit, state: &State, value: Child) -> Value {
-        self.evaluator.value(Context::new(unit.file, unit.scope, &state.known), value)
-    }
-
-    fn speed(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
-        let text = text_of(&self.trees[unit.file as usize], value);
-        if let Some(index) = self.speeds.get(unit.scope, text) {
-            return index;
-        }
-        let speed = Speed { text: display(text), value: self.evaluated(unit, state, value).speed() };
-        let index = intern(&mut self.listing.speeds, speed);
-        if !self.varies(unit, value) {
-            self.speeds.put(unit.scope, text, index);
-        }
-        index
-    }
-
-    fn zone(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
-        let text = text_of(&self.trees[unit.file as usize], value);
-        if let Some(index) = self.zones.get(unit.scope, text) {
-            return index;
-        }
-        let zone = Zone { text: display(text), value: self.evaluated(unit, state, value).zone() };
-        let index = intern(&mut self.listing.zones, zone);
-        if !self.varies(unit, value) {
-            self.zones.put(unit.scope, text, index);
-        }
-        index
-    }
-
-    fn declared_at(&self, unit: Unit, value: Child) -> Option<Place> {
-        let tree = &self.trees[unit.file as usize];
-        let symbol = &self.symbols.symbols[self.symbols.root(tree, unit.scope, value)? as usize];
-        Some(self.place(symbol.file, symbol.name))
-    }
-
-    fn tool(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
-        let text = text_of(&self.trees[unit.file as usize], value);
-        if let Some(index) = self.tools.get(unit.scope, text) {
-            return index;
-        }
-        let tool = Tool {
-            name: display(text),
-            value: self.evaluated(unit, state, value).tool(),
-            place: self.declared_at(unit, value),
-        };
-        let index = intern(&mut self.listing.tools, tool);
-        if !self.varies(unit, value) {
-            self.tools.put(unit.scope, text, index);
-        }
-        index
-    }
-
-    fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
-        let text: &'s [u8] = match value {
-            Some(value) => text_of(&self.trees[unit.file as usize], value),
-            None => b"wobj0",
-        };
-        // Without an argument it is wobj0 in every scope, whatever a scope calls by that name.
-        let scope = if value.is_some() { unit.scope } else { u32::MAX };
-        if let Some(index) = self.work_objects.get(scope, text) {
-            return index;
-        }
-        let work_object = WorkObject {
-            name: display(text),
-            value: match value {
-                Some(value) => self.evaluated(unit, state, value).work_object(),
-                None => super::value::built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
-            },
-            place: value.and_then(|value| self.declared_at(unit, value)),
-        };
-        let index = intern(&mut self.listing.work_objects, work_object);
-        if value.is_none_or(|value| !self.varies(unit, value)) {
-            self.work_objects.put(scope, text, index);
-        }
-        index
-    }
-
-    // ---- uses ----
-
-    /// Finds every use of the declared targets in the listing that is no motion's own target argument.
-    fn other_uses(&mut self) {
-        for (index, motion) in self.listing.motions.iter().enumerate() {
-            for (target_index, target) in motion.targets.iter().enumerate() {
-                if let Origin::Declared(declaration) | Origin::Element { declaration, .. } = target.origin {
-                    let uses = &mut self.listing.declarations[declaration as usize].uses;
-                    uses.push((index as u32, target_index as u32));
-                }
-            }
-        }
-        if self.declarations.is_empty() {
-            return;
-        }
-        // Names seldom begin and end as a target's does: most are turned away by one look.
-        let mut likely = vec![false; 1 << 16];
-        let hash = |text: &[u8]| {
-            let ends = [text[0], text[text.len() - 1]].map(|byte| usize::from(super::token::fold(byte)));
-            (ends[0] << 8 | ends[1]) ^ text.len() << 4 & 0xFFFF
-        };
-        for &symbol in self.declarations.keys().collect::<std::collections::BTreeSet<_>>() {
-            let symbol = &self.symbols.symbols[symbol as usize];
-            likely[hash(self.trees[symbol.file as usize].text(symbol.name))] = true;
-        }
-        // Own uses by the first byte of the argument; whatever else lies within a motion's argument is a base.
-        for (unit_index, unit) in self.symbols.units.iter().enumerate() {
-            let tree = &self.trees[unit.file as usize];
-            // Motions are listed unit by unit.
-            let first = self.units.partition_point(|&unit| unit < unit_index as u32) as u32;
-            let end = self.units.partition_point(|&unit| unit <= unit_index as u32) as u32;
-            let motions: Vec<u32> = (first..end).collect();
-            self.uses_in(*unit, tree, &motions, &likely, &hash);
-        }
-        self.uses_in_declarations(&likely, &hash);
-    }
-
-    fn uses_in(
-        &mut self,
-        unit: Unit,
-        tree: &RapidTree<'s>,
-        motions: &[u32],
-        likely: &[bool],
-        hash: &dyn Fn(&[u8]) -> usize,
-    ) {
-        let node = tree.nodes[unit.node as usize];
-        let mut next = 0;
-        for token in node.first..node.end {
-            if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
-                continue;
-            }
-            let Some(symbol) = self.symbols.find(unit.scope, tree.text(token)) else { continue };
-            let Some(&declaration) = self.declarations.get(&symbol) else { continue };
-            let found = &self.symbols.symbols[symbol as usize];
-            if found.file == unit.file && found.name == token {
-                continue;
-            }
-            let start = tree.start(token) as u32;
-            while motions
-                .get(next)
-                .is_some_and(|&motion| self.listing.motions[motion as usize].statement.end <= start)
-            {
-                next += 1;
-            }
-            let user = motions.get(next).and_then(|&index| {
-                let motion = &self.listing.motions[index as usize];
-                motion
-                    .targets
-                    .iter()
-                    .position(|target| (target.argument.start..target.argument.end).contains(&start))
-                    .map(|target| (index, target as u32))
-            });
-            let own = user.is_some_and(|(motion, target)| {
-                let target = &self.listing.motions[motion as usize].targets[target as usize];
-                matches!(target.origin, Origin::Declared(_) | Origin::Element { .. })
-                    && target.argument.start == start
-            });
-            if !own {
-                let computed = user.filter(|&(motion, target)| {
-                    let motion = &self.listing.motions[motion as usize];
-                    motion.kind != MotionKind::Unknown
-                        && motion.targets[target as usize].origin == Origin::Computed
-                });
-                let place = self.place(unit.file, token);
-                let uses = &mut self.listing.declarations[declaration as usize].other_uses;
-                uses.push(OtherUse { motion: computed, place });
-            }
-        }
-    }
-
-    /// Uses in the initial values of other declarations at module level.
-    fn uses_in_declarations(&mut self, likely: &[bool], hash: &dyn Fn(&[u8]) -> usize) {
-        for symbol in &self.symbols.symbols {
-            let What::Data(data) = &symbol.what else { continue };
-            let tree = &self.trees[symbol.file as usize];
-            let Some(value) = data.value else { continue };
-            let (first, end) = tokens_of(tree, value);
-            if end - first > 1
-                && tree.kinds()[first as usize..end as usize].iter().all(|&kind| kind != Token::Ident)
-            {
-                continue;
-            }
-            for token in first..end {
-                if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
-                    continue;
-                }
-                let Some(used) = self.symbols.find(symbol.scope, tree.text(token)) else { continue };
-                if let Some(&declaration) = self.declarations.get(&used) {
-                    let place = self.place(symbol.file, token);
-                    let uses = &mut self.listing.declarations[declaration as usize].other_uses;
-                    uses.push(OtherUse { motion: None, place });
-                }
-            }
-        }
-    }
 }
 
 impl Visitor for Lister<'_, '_> {
@@ -786,17 +579,5 @@ fn left_by_modal(motion: &Motion) -> Option<Reason> {
         Some(Reason::Displacement)
     } else {
         None
-    }
-}
-
-/// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost
-/// their square.
-fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
-    match list.iter().rev().take(256).position(|other| *other == item) {
-        Some(back) => (list.len() - 1 - back) as u32,
-        None => {
-            list.push(item);
-            list.len() as u32 - 1
-        }
     }
 }
