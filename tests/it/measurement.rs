@@ -6,3 +6,4 @@ mod real;
 mod registration;
 mod simulation;
 mod split;
+mod workbook;

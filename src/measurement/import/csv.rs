@@ -1,5 +1,7 @@
 //! Text tables: comma, semicolon or tab; UTF-8, UTF-16 with a byte order mark, or Latin-1.
 
+use std::borrow::Cow;
+
 use ::csv::{ByteRecord, ReaderBuilder};
 
 use super::cell::{Cell, Line, Table};
@@ -55,10 +57,10 @@ impl LineCounter<'_> {
 }
 
 /// Text of a file in whatever encoding spreadsheets export.
-fn text(bytes: &[u8]) -> String {
+fn text(bytes: &[u8]) -> Cow<'_, str> {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| from([c[0], c[1]])).collect();
-        String::from_utf16_lossy(&units)
+        Cow::Owned(String::from_utf16_lossy(&units))
     };
     match bytes {
         [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
@@ -66,9 +68,9 @@ fn text(bytes: &[u8]) -> String {
         _ => {
             let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
             match std::str::from_utf8(bytes) {
-                Ok(text) => text.to_owned(),
+                Ok(text) => Cow::Borrowed(text),
                 // Latin-1: every byte is the code point of its character.
-                Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
+                Err(_) => Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()),
             }
         }
     }

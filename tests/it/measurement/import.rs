@@ -217,3 +217,19 @@ fn a_sheet_of_a_text_table_is_refused() {
     let error = import::read("rows.csv", HEADER.as_bytes(), &options).unwrap_err().to_string();
     assert!(error.contains("Sheet2") && error.contains("without sheets"), "{error}");
 }
+
+proptest::proptest! {
+    /// Whatever the bytes, the answer is a data set or a message, and every number in a data set is finite.
+    #[test]
+    fn no_file_panics(
+        cells in proptest::collection::vec("[0-9eE+.,;\"\t \n\r#qL-]{0,12}|nan|1e999|q[1-7]|\u{fffd}", 0..60),
+        head in proptest::bool::ANY,
+    ) {
+        let text = format!("{}{}", if head { "q1,q2,q3,q4,q5,q6,L\n" } else { "" }, cells.join(","));
+        if let Ok(data) = read(&text) {
+            for row in &data.rows {
+                proptest::prop_assert!(row.joints.iter().all(|q| q.is_finite()));
+            }
+        }
+    }
+}
