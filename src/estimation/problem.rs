@@ -80,32 +80,25 @@ pub trait Problem: Sync {
 
     /// ½ Σ r² over all rows at `x`, without priors.
     fn row_cost(&self, x: &[f64]) -> f64 {
-        chunks(self)
-            .into_par_iter()
-            .map(|rows| {
-                let mut out = vec![0.0; rows.len()];
-                self.residuals(x, rows, &mut out);
-                0.5 * out.iter().map(|r| r * r).sum::<f64>()
-            })
-            .collect::<Vec<f64>>()
-            .iter()
-            .sum()
+        let parts = map_chunks(self, |rows| {
+            let mut out = vec![0.0; rows.len()];
+            self.residuals(x, rows, &mut out);
+            0.5 * out.iter().map(|r| r * r).sum::<f64>()
+        });
+        parts.iter().sum()
     }
 
     /// The normal equations of all rows at `x`, without priors. Chunks are summed in order, so the result does not
     /// depend on the number of threads. A problem with a faster way (rows in SIMD lanes) overrides this.
     fn normal_equations(&self, x: &[f64]) -> NormalEquations {
         let p = self.parameters();
-        let parts: Vec<NormalEquations> = chunks(self)
-            .into_par_iter()
-            .map(|rows| {
-                let n = rows.len();
-                let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
-                self.jacobian(x, rows, &mut r, &mut j);
-                let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
-                NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.5 * r.norm_squared() }
-            })
-            .collect();
+        let parts = map_chunks(self, |rows| {
+            let n = rows.len();
+            let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
+            self.jacobian(x, rows, &mut r, &mut j);
+            let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+            NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.5 * r.norm_squared() }
+        });
         let mut total = NormalEquations::zeros(p);
         parts.iter().for_each(|part| total.add(part));
         total
@@ -128,8 +121,23 @@ pub(crate) fn observations(problem: &dyn Problem) -> impl Iterator<Item = Range<
     (0..problem.rows() / per).map(move |i| i * per..(i + 1) * per)
 }
 
+/// What `work` makes of each chunk of rows, in order; several chunks are worked on in parallel.
+pub(crate) fn map_chunks<P, T>(problem: &P, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T>
+where
+    P: Problem + ?Sized,
+    T: Send,
+{
+    let chunks = chunks(problem);
+    // Handing one small chunk to the pool costs more than a swarm's whole evaluation of it.
+    if chunks.len() <= 1 {
+        chunks.into_iter().map(work).collect()
+    } else {
+        chunks.into_par_iter().map(&work).collect()
+    }
+}
+
 /// Ranges of whole observations, of fixed size, that cover all rows in order.
-pub(crate) fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
+fn chunks<P: Problem + ?Sized>(problem: &P) -> Vec<Range<usize>> {
     let per = problem.rows_per_observation().max(1);
     let step = (CHUNK_ROWS / per).max(1) * per;
     (0..problem.rows()).step_by(step).map(|from| from..(from + step).min(problem.rows())).collect()

@@ -131,7 +131,10 @@ impl Recursion {
                 let pa = &self.matrix * a;
                 let d = forgetting + a.dot(&pa);
                 self.x.axpy(-e / d, &pa, 1.0);
-                self.matrix.ger(-1.0 / d, &pa, &pa, 1.0);
+                // Written out as in eq. 14, which also keeps P exactly symmetric.
+                for (mut column, right) in self.matrix.column_iter_mut().zip(pa.iter()) {
+                    column.iter_mut().zip(pa.iter()).for_each(|(entry, left)| *entry -= left * right / d);
+                }
                 if forgetting != 1.0 {
                     self.matrix /= forgetting;
                 }

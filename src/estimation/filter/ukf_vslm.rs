@@ -2,8 +2,8 @@
 //!
 //! **Method** (ukf-vslm-2023, Algorithm 1). The filter goes through the data T₃ times; what it ends on is the start of T₉ iterations of
 //! eq. 15.
-//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`](crate::estimation::filter::ukf) and
-//!   [`vslm`](crate::estimation::least_squares::vslm)), with line 17, X₀ = x_ukf, inside the loop: each iteration begins
+//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and
+//!   [`vslm`]), with line 17, X₀ = x_ukf, inside the loop: each iteration begins
 //!   where the filter ended and undoes the one before it, while the step size has decayed further. Its result is one sweep of
 //!   tiny steps from the filter's result.
 //! - [`Form::Sound`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it converges.

@@ -11,7 +11,7 @@
 //!
 //! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step size", without an
 //! equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed form (the same recurrence as
-//! [`vslm`](crate::estimation::least_squares::vslm) with decay per iteration). What M6 ran exactly is not known. Sound:
+//! [`vslm`] with decay per iteration). What M6 ran exactly is not known. Sound:
 //! Nocedal and Wright, *Numerical Optimization*, 2nd ed., §3.5.
 //!
 //! **Checked against** published minima.

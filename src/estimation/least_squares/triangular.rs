@@ -14,10 +14,9 @@
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use crate::estimation::objective::Objective;
-use crate::estimation::problem::{Problem, chunks};
+use crate::estimation::problem::{Problem, map_chunks};
 
 /// R, c and ρ of a linearised problem: ‖J h + r‖² = ‖R h + c‖² + ρ².
 #[derive(Debug, Clone, PartialEq)]
@@ -103,16 +102,13 @@ pub fn triangular_factor(problem: &dyn Problem, x: &[f64], scale: &[f64]) -> Tri
 /// The triangle of [J | r] over all rows, at most (p + 1) × (p + 1).
 fn triangle_of_rows(problem: &dyn Problem, x: &[f64]) -> DMatrix<f64> {
     let p = x.len();
-    let parts: Vec<DMatrix<f64>> = chunks(problem)
-        .into_par_iter()
-        .map(|rows| {
-            let n = rows.len();
-            let mut block = DMatrix::zeros(n, p + 1);
-            let (jacobian, residuals) = block.as_mut_slice().split_at_mut(n * p);
-            problem.jacobian(x, rows, residuals, jacobian);
-            triangle(block)
-        })
-        .collect();
+    let parts = map_chunks(problem, |rows| {
+        let n = rows.len();
+        let mut block = DMatrix::zeros(n, p + 1);
+        let (jacobian, residuals) = block.as_mut_slice().split_at_mut(n * p);
+        problem.jacobian(x, rows, residuals, jacobian);
+        triangle(block)
+    });
     let mut parts = parts.into_iter();
     let Some(first) = parts.next() else { return DMatrix::zeros(0, p + 1) };
     parts.fold(first, |above, below| {

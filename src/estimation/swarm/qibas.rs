@@ -1,6 +1,6 @@
 //! Quadratic interpolated beetle antennae search.
 //!
-//! **Method.** As [`bas`](crate::estimation::swarm::bas); in addition the parabola through the costs at both antennae and at the beetle gives a
+//! **Method.** As [`bas`]; in addition the parabola through the costs at both antennae and at the beetle gives a
 //! fourth point, its vertex t = ½ d (f₋ − f₊)/(f₋ − 2f₀ + f₊) along the antennae, which is taken where it is better than the step.
 //!
 //! **Shapes, stops.** As `bas`; four evaluations for each iteration.

@@ -57,15 +57,15 @@ fn reach_what_their_literature_promises_on_few_parameters() {
                 let all = published::all();
                 let case = all.iter().find(|case| case.name == problem).unwrap();
                 let mut sums: Vec<f64> =
-                    (0..5).map(|seed| 2.0 * solve(&*case.problem, &case.start, printed, seed).cost).collect();
+                    (0..3).map(|seed| 2.0 * solve(&*case.problem, &case.start, printed, seed).cost).collect();
                 sums.sort_by(f64::total_cmp);
-                println!("{name} printed {printed} {problem}: {:e} … {:e} … {:e}", sums[0], sums[2], sums[4]);
+                println!("{name} printed {printed} {problem}: {:e} … {:e} … {:e}", sums[0], sums[1], sums[2]);
                 assert!(
-                    sums[2] <= asked(name)[usize::from(!printed)][i],
+                    sums[1] <= asked(name)[usize::from(!printed)][i],
                     "{name} {printed} {problem}: {sums:?}"
                 );
                 let start = 2.0 * case.problem.row_cost(&case.start);
-                assert!(sums[4] <= start, "never worse than the start");
+                assert!(sums[2] <= start, "never worse than the start");
             }
         }
     }
