@@ -15,3 +15,8 @@ pub mod table;
 pub mod plot;
 pub mod document;
 pub mod format;
+pub mod identification;
+pub mod study;
+pub mod deviation;
+pub mod compensation;
+pub mod robots;
