@@ -92,6 +92,8 @@ pub struct Fitted {
     pub task: Calibration,
     /// Work of all rounds together.
     pub evaluations: Evaluations,
+    /// The story of every round. Weights change between rounds, so their costs do not share a scale.
+    pub rounds: Vec<Vec<Iteration>>,
 }
 
 /// What a stage starts from.
@@ -124,7 +126,7 @@ pub fn fit(
     let mut model = start.model.clone();
     let mut frames = start.frames.clone();
     let mut evaluations = Evaluations::default();
-    let mut last = None;
+    let (mut last, mut rounds) = (None, Vec::with_capacity(ROUNDS));
     for _ in 0..ROUNDS {
         let weights =
             rounding::weights(&observed.dataset, &model, &frames, &observed.angles, sigma_mm, sigma_rad);
@@ -138,6 +140,7 @@ pub fn fit(
         let shares = rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles);
         let spent = spent_freedom(&task, &estimate);
         (sigma_mm, sigma_rad) = spreads(&task, &x, &shares, spent);
+        rounds.push(estimate.trace.clone());
         last = Some((task, estimate));
     }
     let (task, estimate) = last.unwrap_or_else(|| unreachable!("at least one round"));
@@ -151,6 +154,7 @@ pub fn fit(
         sigma_rad,
         task,
         evaluations,
+        rounds,
     }
 }
 

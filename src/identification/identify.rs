@@ -295,7 +295,8 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     let freedom = (task.rows() as f64 - parameters.len() as f64).max(1.0);
     let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
     let priors = Tolerance::default().priors(&parameters, nominal);
-    Fitted { parameters, priors, estimate, model, frames, sigma_mm, sigma_rad: 1e-3, task, evaluations }
+    let rounds = vec![estimate.trace.clone()];
+    Fitted { parameters, priors, estimate, model, frames, sigma_mm, sigma_rad: 1e-3, task, evaluations, rounds }
 }
 
 fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {

@@ -1,12 +1,16 @@
-//! What became of each motion of a program.
+//! What became of each motion of a program: the contract `truegrind.compensation/1`, the table, the reasons, the page.
 
 use serde_json::{Value, json};
 
-use super::document::Document;
-use super::table::Table;
-use crate::compensation::deviation::PathReport;
-use crate::compensation::rewrite::Plan;
-use crate::program::motion::Listing;
+use super::deviation::{fate, fate_word, sections};
+use super::document::{Block, Document, KeyFigure, Verdict};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use crate::compensation::deviation::{PathReport, Status as Fate};
+use crate::compensation::rewrite::{MotionOutcome, Plan};
+use crate::compensation::why::Why;
+use crate::kinematics::inverse::InverseError;
+use crate::program::motion::{Listing, Place};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,32 +21,386 @@ pub struct ProgramFile {
     pub output: Option<String>,
 }
 
+/// Lines that a reason names before it says "and so many more".
+const LINES_NAMED: usize = 6;
+
+/// Rows of the table of motions on a page; the whole table belongs in the CSV file.
+const ROWS_ON_PAGE: usize = 150;
+
+/// All, in the order in which a reader wants them.
+const FATES: [Fate; 4] = [Fate::Changed, Fate::Flagged, Fate::Refused, Fate::Left];
+
 /// One row per motion. `files` in the order in which the listing counts them.
 pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let _ = (plan, listing, files);
-    Table::new("", Vec::new())
+    let several = files.len() > 1;
+    let mut columns = vec![
+        Column::count("line", "Line"),
+        Column::text("instruction", "Instruction"),
+        Column::text("status", "Status"),
+        Column::number("before_mm", "before", "mm", 3),
+        Column::number("after_mm", "predicted remainder", "mm", 4),
+        Column::number("sigma_mm", "predicted 1σ", "mm", 3),
+        Column::number("bend_mm", "bend between targets", "mm", 3),
+        Column::count("inserted", "Inserted"),
+        Column::text("reason", "Reason"),
+    ];
+    if several {
+        columns.insert(0, Column::text("file", "File"));
+    }
+    let mut table = Table::new("Motions", columns);
+    for outcome in &plan.outcomes {
+        let (place, instruction) = motion(outcome, listing);
+        let mut row = vec![
+            Cell::Count(u64::from(place.line)),
+            instruction.into(),
+            fate(outcome.status),
+            outcome.before_mm.into(),
+            outcome.after_mm.into(),
+            outcome.sigma_mm.into(),
+            outcome.bend_mm.into(),
+            if outcome.inserted > 0 { outcome.inserted.into() } else { Cell::Missing },
+            outcome.reason.map(|reason| reason.to_string()).into(),
+        ];
+        if several {
+            row.insert(0, file_name(files, place).into());
+        }
+        table.push(row);
+    }
+    table.notes.push(
+        "before: how far the tool is off at the end of the motion as programmed. predicted remainder: what rounding and \
+         inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ is \
+         predicted from the covariance of the model."
+            .to_owned(),
+    );
+    table
 }
 
-/// Reasons why motions were left, refused or flagged, with counts and first lines.
+/// Reasons why motions were left, refused or flagged, with counts and first lines; the most frequent first within each
+/// status.
 pub fn reason_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let _ = (plan, listing, files);
-    Table::new("", Vec::new())
+    let mut table = Table::new(
+        "Reasons",
+        vec![
+            Column::text("status", "Status"),
+            Column::count("motions", "Motions"),
+            Column::text("reason", "Reason"),
+            Column::text("worst", "Worst"),
+            Column::text("lines", "Lines"),
+        ],
+    );
+    for group in grouped(plan) {
+        let places: Vec<Place> = group.outcomes.iter().map(|outcome| motion(outcome, listing).0).collect();
+        table.push([
+            fate(group.fate),
+            group.outcomes.len().into(),
+            group.reason.into(),
+            group.worst.map(|(value, unit)| worst_text(value, unit)).into(),
+            lines(&places, files).into(),
+        ]);
+    }
+    table
 }
 
-/// The contract `truegrind.compensation/1`.
+/// The contract `truegrind.compensation/1`. `output` is `null` where nothing was written.
 pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
-    let _ = (plan, listing, files);
-    json!({ "schema": "truegrind.compensation/1" })
+    let programs: Vec<Value> = files
+        .iter()
+        .enumerate()
+        .map(|(index, file)| {
+            let here = |place: &Place| place.file as usize == index;
+            let opaque: Vec<Value> = listing
+                .opaque
+                .iter()
+                .filter(|region| here(&region.place))
+                .map(|region| json!({ "line": region.place.line, "reason": region.reason.text() }))
+                .collect();
+            let motions: Vec<Value> = plan
+                .outcomes
+                .iter()
+                .map(|outcome| (outcome, motion(outcome, listing)))
+                .filter(|(_, (place, _))| here(place))
+                .map(|(outcome, (place, instruction))| {
+                    json!({
+                        "line": place.line,
+                        "instruction": instruction,
+                        "status": fate_word(outcome.status),
+                        "reason": outcome.reason.map(|reason| reason.to_string()),
+                        "before_mm": outcome.before_mm,
+                        "after_mm": outcome.after_mm,
+                        "sigma_mm": outcome.sigma_mm,
+                    })
+                })
+                .collect();
+            json!({
+                "file": file.file,
+                "output": file.output,
+                "opaque_regions": opaque,
+                "motions": motions,
+            })
+        })
+        .collect();
+    json!({ "schema": "truegrind.compensation/1", "programs": programs })
 }
 
-/// What fits a terminal: coverage, reasons, notes.
+/// What fits a terminal: verdict with coverage, reasons, what could not be read, notes on tools and work objects.
 pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Document {
-    let _ = (plan, listing, files);
-    Document::new("Compensation")
+    let mut page = heading(files);
+    page.push(verdict(plan));
+    let reasons = reason_table(plan, listing, files);
+    if !reasons.rows.is_empty() {
+        page.push(reasons);
+    }
+    if !listing.opaque.is_empty() {
+        page.push(opaque_table(listing, files));
+    }
+    if !plan.notes.is_empty() {
+        page.push(Block::List(plan.notes.clone()));
+    }
+    page
 }
 
 /// The page, with the deviation of the path where reports are given.
 pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: &[PathReport]) -> Document {
-    let _ = (plan, listing, files, reports);
-    Document::new("Compensation")
+    let mut page = heading(files);
+    page.push(verdict(plan));
+    page.push(key_figures(plan));
+    let reasons = reason_table(plan, listing, files);
+    if !reasons.rows.is_empty() {
+        page.push(reasons);
+    }
+    if !plan.notes.is_empty() {
+        page.heading(2, "Tools and work objects");
+        page.push(Block::List(plan.notes.clone()));
+    }
+    let mut programs: Vec<&str> = Vec::new();
+    for report in reports {
+        if programs.contains(&report.program.as_str()) {
+            continue;
+        }
+        programs.push(&report.program);
+        let of: Vec<&PathReport> = reports.iter().filter(|r| r.program == report.program).collect();
+        page.heading(2, format!("Deviation of {}", report.program));
+        page.blocks.extend(sections(&of, 3));
+    }
+    page.heading(2, "Motions");
+    page.push(table(plan, listing, files).excerpt(ROWS_ON_PAGE));
+    if !listing.opaque.is_empty() {
+        page.heading(2, "What could not be read");
+        page.paragraph("These regions are in the output as they were, byte for byte; motions inside them, if any, too.");
+        page.push(opaque_table(listing, files));
+    }
+    page
+}
+
+/// Regions that could not be read.
+pub fn opaque_table(listing: &Listing, files: &[ProgramFile]) -> Table {
+    let mut table = Table::new(
+        "Not read, left as it is",
+        vec![Column::text("file", "File"), Column::count("line", "Line"), Column::text("reason", "Reason")],
+    );
+    for region in &listing.opaque {
+        table.push([
+            file_name(files, region.place).into(),
+            Cell::Count(u64::from(region.place.line)),
+            region.reason.text().into(),
+        ]);
+    }
+    table
+}
+
+/// One sentence: how many motions were changed, flagged, refused and left, with their shares.
+pub fn coverage(plan: &Plan) -> String {
+    let all = plan.outcomes.len();
+    if all == 0 {
+        return "the program holds no motion".to_owned();
+    }
+    let parts: Vec<String> = FATES
+        .iter()
+        .map(|&fate| {
+            let found = count(plan, fate);
+            format!("{found} {} ({})", fate_word(fate), share(found, all))
+        })
+        .collect();
+    format!("{all} motions: {}", parts.join(", "))
+}
+
+/// Share in per cent: never 100 % where something is missing, never 0 % where something is there.
+fn share(part: usize, all: usize) -> String {
+    let percent = 100.0 * part as f64 / all as f64;
+    if part < all && percent > 99.9 {
+        "> 99.9 %".to_owned()
+    } else if part > 0 && percent < 0.1 {
+        "< 0.1 %".to_owned()
+    } else if part == all || part == 0 {
+        format!("{percent:.0} %")
+    } else {
+        format!("{percent:.1} %")
+    }
+}
+
+fn count(plan: &Plan, fate: Fate) -> usize {
+    plan.outcomes.iter().filter(|outcome| outcome.status == fate).count()
+}
+
+fn heading(files: &[ProgramFile]) -> Document {
+    let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
+    let mut page = Document::new(match names.as_slice() {
+        [name] => format!("Compensation of {name}"),
+        _ => format!("Compensation of {} files", names.len()),
+    });
+    let outputs: Vec<&str> = files.iter().filter_map(|file| file.output.as_deref()).collect();
+    page.subtitle = match outputs.as_slice() {
+        [] => "nothing was written".to_owned(),
+        outputs => format!("written to {}", outputs.join(", ")),
+    };
+    page
+}
+
+fn verdict(plan: &Plan) -> Verdict {
+    let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
+    let written = count(plan, Fate::Changed) + flagged;
+    let (status, headline) = match (written, refused + flagged) {
+        (0, 0) => (Status::NotEvaluated, "Nothing was rewritten"),
+        (0, _) => (Status::Bad, "Nothing could be rewritten"),
+        (_, 0) => (Status::Good, "Everything that can be rewritten is rewritten"),
+        _ => (Status::Warning, "Rewritten, but look at what was refused or flagged before the program runs"),
+    };
+    let mut reasons = vec![coverage(plan)];
+    if refused > 0 && written > 0 {
+        reasons.push(
+            "a refused motion goes where it always went: between it and its rewritten neighbours the path steps by the \
+             correction"
+                .to_owned(),
+        );
+    }
+    let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
+    if inserted > 0 {
+        reasons.push(format!("{inserted} targets put in, so that straight lines stay straight within the tolerance"));
+    }
+    Verdict::new(status, headline, reasons)
+}
+
+fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
+    let all = plan.outcomes.len();
+    let worst = |value: fn(&MotionOutcome) -> Option<f64>, only: fn(Fate) -> bool| {
+        plan.outcomes.iter().filter(|o| only(o.status)).filter_map(value).reduce(f64::max)
+    };
+    let rewritten: fn(Fate) -> bool = |fate| matches!(fate, Fate::Changed | Fate::Flagged);
+    let mut figures: Vec<KeyFigure> = FATES
+        .iter()
+        .map(|&fate| {
+            let found = count(plan, fate);
+            let mut word = fate_word(fate).to_owned();
+            word[..1].make_ascii_uppercase();
+            let figure = KeyFigure::new(word, found, 0, "");
+            if all > 0 { figure.note(format!("{} of {all} motions", share(found, all))) } else { figure }
+        })
+        .collect();
+    figures.push(KeyFigure::new("Largest before", worst(|o| o.before_mm, |_| true), 3, "mm").note("all motions"));
+    figures.push(
+        KeyFigure::new("Predicted remainder", worst(|o| o.after_mm, rewritten), 4, "mm")
+            .note("largest of the rewritten motions"),
+    );
+    figures.push(
+        KeyFigure::new("Predicted 1σ", worst(|o| o.sigma_mm, rewritten), 3, "mm")
+            .note("largest of the rewritten motions"),
+    );
+    figures
+}
+
+fn motion<'a>(outcome: &MotionOutcome, listing: &'a Listing) -> (Place, &'a str) {
+    match listing.motions.get(outcome.motion as usize) {
+        Some(motion) => (motion.place, &motion.instruction),
+        None => (Place::default(), ""),
+    }
+}
+
+fn file_name(files: &[ProgramFile], place: Place) -> &str {
+    files.get(place.file as usize).map_or("", |file| file.file.as_str())
+}
+
+/// Motions with the same status and the same kind of reason.
+struct Group<'a> {
+    fate: Fate,
+    reason: String,
+    /// The figure of the reason farthest from what is wanted, with its unit.
+    worst: Option<(f64, &'static str)>,
+    outcomes: Vec<&'a MotionOutcome>,
+}
+
+fn grouped(plan: &Plan) -> Vec<Group<'_>> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    for outcome in plan.outcomes.iter().filter(|outcome| outcome.status != Fate::Changed) {
+        let (reason, figure) = match &outcome.reason {
+            Some(why) => kind(why),
+            None => ("nothing to change".to_owned(), None),
+        };
+        match groups.iter_mut().find(|group| group.fate == outcome.status && group.reason == reason) {
+            Some(group) => {
+                group.outcomes.push(outcome);
+                group.worst = match (group.worst, figure) {
+                    (Some(a), Some(b)) if b.0 > a.0 => Some(b),
+                    (None, b) => b,
+                    (a, _) => a,
+                };
+            }
+            None => groups.push(Group { fate: outcome.status, reason, worst: figure, outcomes: vec![outcome] }),
+        }
+    }
+    let rank = |fate: Fate| [Fate::Refused, Fate::Flagged, Fate::Left].iter().position(|f| *f == fate);
+    groups.sort_by(|a, b| rank(a.fate).cmp(&rank(b.fate)).then(b.outcomes.len().cmp(&a.outcomes.len())));
+    groups
+}
+
+/// A reason without the numbers of one motion, and its number.
+fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
+    let plain = |text: &str| (text.to_owned(), None);
+    let sized = |text: String, value: f64, unit| (text, Some((value, unit)).filter(|_| value.is_finite()));
+    match *why {
+        Why::Inverse(InverseError::Unreachable { beyond_mm }) => {
+            sized("target is out of reach".to_owned(), beyond_mm, "mm")
+        }
+        Why::Inverse(InverseError::OtherConfiguration { .. }) => plain("target is not reachable in its configuration"),
+        Why::Inverse(InverseError::OtherBranch { .. }) => plain("target is reachable only in another configuration"),
+        Why::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
+        Why::TooFar { mm } => sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm"),
+        Why::TooMuchTurn { deg } => sized("correction of the orientation exceeds the bound".to_owned(), deg, "°"),
+        Why::Bend { mm } => sized("the path between targets leaves the intended one".to_owned(), mm, "mm"),
+        Why::JointNotMeasured { joint, by_deg } => sized(
+            format!("joint {} is outside the range in which the arm was measured", joint + 1),
+            by_deg,
+            "°",
+        ),
+        Why::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
+        Why::Uncertain { sigma_mm } => sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ"),
+        ref other => (other.to_string(), None),
+    }
+}
+
+fn worst_text(value: f64, unit: &str) -> String {
+    match unit {
+        "°" => format!("{value:.2}°"),
+        "×" => format!("{value:.1} times the usual distance"),
+        unit => format!("{value:.3} {unit}"),
+    }
+}
+
+/// The first lines, by file where there are several: `a.mod 12, 14; b.mod 3 and 7 more`.
+fn lines(places: &[Place], files: &[ProgramFile]) -> String {
+    let mut text = String::new();
+    let mut last_file = None;
+    for place in places.iter().take(LINES_NAMED) {
+        if files.len() > 1 && last_file != Some(place.file) {
+            let gap = if text.is_empty() { "" } else { "; " };
+            text.push_str(&format!("{gap}{} {}", file_name(files, *place), place.line));
+        } else {
+            let gap = if text.is_empty() { "" } else { ", " };
+            text.push_str(&format!("{gap}{}", place.line));
+        }
+        last_file = Some(place.file);
+    }
+    if places.len() > LINES_NAMED {
+        text.push_str(&format!(" and {} more", places.len() - LINES_NAMED));
+    }
+    text
 }
