@@ -5,3 +5,5 @@ pub mod import;
 pub mod sensor;
 pub mod registration;
 pub mod simulation;
+pub mod split;
+pub mod plausibility;

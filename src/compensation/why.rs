@@ -83,7 +83,11 @@ impl fmt::Display for Why {
             Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
             Why::JointNotMeasured { joint, by_deg } => {
-                write!(f, "joint {} is {by_deg:.1}° outside the range in which the arm was measured", joint + 1)
+                write!(
+                    f,
+                    "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
+                    joint + 1
+                )
             }
             Why::NotCovered { ratio } => {
                 write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")

@@ -17,8 +17,8 @@
 mod fit;
 
 use nalgebra::{
-    DMatrix, DVector, Matrix3, Point3, SMatrix, SVector, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
-    Vector6,
+    DMatrix, DVector, Matrix3, Point3, SMatrix, SVector, SymmetricEigen, Translation3, UnitQuaternion,
+    Vector3, Vector6,
 };
 
 use self::fit::{Normal, fit};
@@ -116,10 +116,7 @@ pub fn points(base_mm: &[Vector3<f64>], sensor_mm: &[Vector3<f64>]) -> Option<Fr
 ///
 /// Where the orientation of the flange hardly changes, the point cannot be told from the frame; then the point stays
 /// near the flange's origin.
-pub fn touching_point(
-    base_from_flange: &[Pose],
-    measured_mm: &[Vector3<f64>],
-) -> Option<PointRegistration> {
+pub fn touching_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<PointRegistration> {
     let n = base_from_flange.len().min(measured_mm.len());
     let origins: Vec<_> = base_from_flange.iter().map(|f| f.translation.vector).collect();
     let plain = points(&origins, measured_mm)?;
@@ -129,9 +126,8 @@ pub fn touching_point(
         let (base_from_sensor, t) = state;
         for (flange, m) in base_from_flange.iter().zip(measured_mm) {
             let seen = base_from_sensor.rotation * m;
-            let residual = flange.rotation * t + flange.translation.vector
-                - seen
-                - base_from_sensor.translation.vector;
+            let residual =
+                flange.rotation * t + flange.translation.vector - seen - base_from_sensor.translation.vector;
             let turn = skew(&seen);
             let to_base = flange.rotation.to_rotation_matrix();
             for k in 0..3 {
@@ -298,7 +294,10 @@ const ZERO_SIGMA: f64 = 200.0;
 /// of 1 mm).
 pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegistration> {
     let n = hook_mm.len().min(lengths_mm.len());
-    if n < 4 || hook_mm.iter().any(|p| !p.iter().all(|v| v.is_finite())) || lengths_mm.iter().any(|l| !l.is_finite()) {
+    if n < 4
+        || hook_mm.iter().any(|p| !p.iter().all(|v| v.is_finite()))
+        || lengths_mm.iter().any(|l| !l.is_finite())
+    {
         return None;
     }
     let (hook_mm, lengths_mm) = (&hook_mm[..n], &lengths_mm[..n]);
@@ -316,15 +315,16 @@ pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegist
         starts.push((outlet, zero));
         starts.push((outlet - normal * 2.0 * normal.dot(&(outlet - centre)), zero));
     }
-    let rows = |points: &[Vector3<f64>], lengths: &[f64], state: &(Vector3<f64>, f64), normal: &mut Normal| {
-        for (p, l) in points.iter().zip(lengths) {
-            let away = state.0 - p;
-            let distance = away.norm().max(1e-6);
-            let u = away / distance;
-            normal.add(&[u.x, u.y, u.z, 1.0], distance + state.1 - l);
-        }
-        normal.add(&[0.0, 0.0, 0.0, 1.0 / ZERO_SIGMA], state.1 / ZERO_SIGMA);
-    };
+    let rows =
+        |points: &[Vector3<f64>], lengths: &[f64], state: &(Vector3<f64>, f64), normal: &mut Normal| {
+            for (p, l) in points.iter().zip(lengths) {
+                let away = state.0 - p;
+                let distance = away.norm().max(1e-6);
+                let u = away / distance;
+                normal.add(&[u.x, u.y, u.z, 1.0], distance + state.1 - l);
+            }
+            normal.add(&[0.0, 0.0, 0.0, 1.0 / ZERO_SIGMA], state.1 / ZERO_SIGMA);
+        };
     let step = |state: &(Vector3<f64>, f64), d: &DVector<f64>| {
         (state.0 + Vector3::new(d[0], d[1], d[2]), state.1 + d[3])
     };

@@ -144,8 +144,7 @@ impl Recipe {
             })?;
             let distance = seen_by.distance_mm(&flange, planned.anchor).unwrap_or_default();
             let mut reading = noisy(&exact, distance, &self.noise, &mut rng);
-            let mut readout =
-                nominal.forward(&planned.joints, &Condition::default()).translation.vector;
+            let mut readout = nominal.forward(&planned.joints, &Condition::default()).translation.vector;
             for fault in &self.fault {
                 fault.after(number, &seen_by, &flange, planned.anchor, &mut reading, &mut readout);
             }
@@ -172,7 +171,8 @@ impl Recipe {
 fn noisy(exact: &Reading, distance_mm: f64, noise: &Noise, rng: &mut ChaCha8Rng) -> Reading {
     let sigma = noise.sigma_mm + noise.per_metre_mm * distance_mm * 1e-3;
     // The degrees of freedom were checked to be above 2.
-    let tail = noise.student_t.and_then(|dof| StudentT::new(dof).ok().map(|t| (t, ((dof - 2.0) / dof).sqrt())));
+    let tail =
+        noise.student_t.and_then(|dof| StudentT::new(dof).ok().map(|t| (t, ((dof - 2.0) / dof).sqrt())));
     let normal = Normal::new(0.0, 1.0).ok();
     let mut draw = |sigma: f64| match (&tail, &normal) {
         (Some((t, scale)), _) => t.sample(rng) * scale * sigma,

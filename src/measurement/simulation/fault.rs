@@ -88,9 +88,8 @@ impl Fault {
                 match rig {
                     Rig::Cable { outlets_mm, .. } => outlets_mm.iter_mut().for_each(|o| *o += shift),
                     Rig::Position { base_from_sensor, .. } | Rig::Pose { base_from_sensor, .. } => {
-                        let turn = UnitQuaternion::from_scaled_axis(
-                            Vector3::from(*turn_deg).map(f64::to_radians),
-                        );
+                        let turn =
+                            UnitQuaternion::from_scaled_axis(Vector3::from(*turn_deg).map(f64::to_radians));
                         let at = base_from_sensor.translation.vector + shift;
                         *base_from_sensor =
                             Pose::from_parts(Translation3::from(at), turn * base_from_sensor.rotation);

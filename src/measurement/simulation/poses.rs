@@ -55,9 +55,10 @@ fn set_circumstances(rows: &mut [Planned], circumstances: &Circumstances) {
     for (i, row) in rows.iter_mut().enumerate() {
         let condition = &mut row.condition;
         condition.time_h = circumstances.hours.map(|hours| hours * i as f64 / last);
-        condition.temperature_c = circumstances.temperature.zip(condition.time_h).map(|(warm, t)| {
-            warm.end_c + (warm.start_c - warm.end_c) * (-t / warm.time_constant_h).exp()
-        });
+        condition.temperature_c = circumstances
+            .temperature
+            .zip(condition.time_h)
+            .map(|(warm, t)| warm.end_c + (warm.start_c - warm.end_c) * (-t / warm.time_constant_h).exp());
         let payloads = &circumstances.payload_kg;
         condition.payload_kg = (!payloads.is_empty()).then(|| payloads[i % payloads.len()]);
         condition.payload_centre_mm = circumstances.payload_centre_mm;

@@ -410,7 +410,11 @@ impl Recipe {
         if let SensorSetup::Cable { outlets_mm, zeros_mm, .. } = &self.sensor {
             if outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len() {
                 let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
-                return wrong("sensor.outlets_mm", found, "one outlet at least, and no more zeros than outlets");
+                return wrong(
+                    "sensor.outlets_mm",
+                    found,
+                    "one outlet at least, and no more zeros than outlets",
+                );
             }
         }
         if let Some(dof) = self.noise.student_t.filter(|dof| !(*dof > 2.0)) {
@@ -430,7 +434,9 @@ impl Recipe {
             ("rounding.readout_mm", self.rounding.readout_mm),
             ("rounding.reading_mm", self.rounding.reading_mm),
         ];
-        if let Some((key, Some(step))) = steps.iter().find(|(_, s)| s.is_some_and(|s| !(s > 0.0 && s.is_finite()))) {
+        if let Some((key, Some(step))) =
+            steps.iter().find(|(_, s)| s.is_some_and(|s| !(s > 0.0 && s.is_finite())))
+        {
             return wrong(key, step.to_string(), "a step above 0");
         }
         if self.circumstances.temperature.is_some() && self.circumstances.hours.is_none() {

@@ -61,7 +61,13 @@ pub(super) fn csv(recipe: &Recipe, rig: &Rig, rows: &[Logged]) -> String {
         Sensor::Cable => &["L"],
         Sensor::Position => &["measured_x", "measured_y", "measured_z"],
         Sensor::Pose => &[
-            "measured_x", "measured_y", "measured_z", "measured_qw", "measured_qx", "measured_qy", "measured_qz",
+            "measured_x",
+            "measured_y",
+            "measured_z",
+            "measured_qw",
+            "measured_qx",
+            "measured_qy",
+            "measured_qz",
         ],
     };
     let mut name = |wanted: bool, names: &[&str]| {

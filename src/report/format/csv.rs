@@ -9,8 +9,11 @@ use crate::report::table::{Cell, Table};
 /// The table as CSV.
 pub fn table(table: &Table) -> String {
     let fields = table.fields();
-    let header: Vec<&str> =
-        fields.iter().flat_map(|field| std::iter::once(&field.key).chain(&field.sigma_key)).map(String::as_str).collect();
+    let header: Vec<&str> = fields
+        .iter()
+        .flat_map(|field| std::iter::once(&field.key).chain(&field.sigma_key))
+        .map(String::as_str)
+        .collect();
     let mut text = line(&header);
     for row in 0..table.rows.len() {
         let mut cells = Vec::with_capacity(header.len());

@@ -62,7 +62,9 @@ pub fn table(table: &Table) -> String {
         html.push_str("<tr>");
         for (index, column) in table.columns.iter().enumerate() {
             let shown = match table.cell(row, index) {
-                Cell::Judged(status, text) => judged(*status, if text.is_empty() { status.word() } else { text }),
+                Cell::Judged(status, text) => {
+                    judged(*status, if text.is_empty() { status.word() } else { text })
+                }
                 _ => escape(&table.shown(row, index)),
             };
             html.push_str(&format!("<td{}>{shown}</td>", side(column.alignment)));

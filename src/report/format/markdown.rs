@@ -76,7 +76,11 @@ fn push_blocks(text: &mut String, blocks: &[Block]) {
             Block::KeyFigures(figures) => {
                 for figure in figures {
                     let (shown, unit) = figure.shown();
-                    let mut line = format!("- {}: **{}**", escape(&figure.label), escape(format!("{shown} {unit}").trim()));
+                    let mut line = format!(
+                        "- {}: **{}**",
+                        escape(&figure.label),
+                        escape(format!("{shown} {unit}").trim())
+                    );
                     if let Some(status) = figure.status {
                         line.push_str(&format!(" ({} {})", status.sign(), status.word()));
                     }
@@ -135,7 +139,9 @@ fn escape(text: &str) -> String {
             // Alone, brackets are text; only a link's or image's `](`, `][` or `]:` makes them more.
             ']' if matches!(characters.get(index + 1), Some('(' | '[' | ':')) => escaped.push('\\'),
             '_' if !(word(index.checked_sub(1)) && word(Some(index + 1))) => escaped.push('\\'),
-            '#' | '-' | '+' | '>' if index == 0 && characters.len() > 1 && !characters[1].is_ascii_digit() => {
+            '#' | '-' | '+' | '>'
+                if index == 0 && characters.len() > 1 && !characters[1].is_ascii_digit() =>
+            {
                 escaped.push('\\');
             }
             '&' if characters[index + 1..].iter().take(12).any(|c| *c == ';') => escaped.push('\\'),

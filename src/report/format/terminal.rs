@@ -99,14 +99,18 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
             }
         }
         Block::Table(block) => text.push_str(&table(block, width)),
-        Block::Figure(figure) => text.push_str(&wrapped(&format!("[picture] {}", figure.caption), width, "  ")),
+        Block::Figure(figure) => {
+            text.push_str(&wrapped(&format!("[picture] {}", figure.caption), width, "  "))
+        }
         Block::Verdict(verdict) => {
             text.push_str(&wrapped(&format!("{} {}", badge(verdict.status), verdict.headline), width, "  "));
             for reason in &verdict.reasons {
                 text.push_str(&wrapped(&format!("  - {reason}"), width, "    "));
             }
         }
-        Block::Details { summary, .. } => text.push_str(&wrapped(&format!("[details] {summary}"), width, "  ")),
+        Block::Details { summary, .. } => {
+            text.push_str(&wrapped(&format!("[details] {summary}"), width, "  "))
+        }
         Block::Code(code) => {
             for line in code.lines() {
                 text.push_str(&format!("    {line}\n"));

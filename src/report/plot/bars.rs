@@ -53,7 +53,9 @@ impl Bars {
     }
 
     fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
-        let ink = |index: usize| self.groups[index].ink.unwrap_or(Ink::nth(index + usize::from(self.groups.len() == 1)));
+        let ink = |index: usize| {
+            self.groups[index].ink.unwrap_or(Ink::nth(index + usize::from(self.groups.len() == 1)))
+        };
         let values = self.groups.iter().flat_map(|group| {
             (0..group.values.len()).flat_map(|index| {
                 let value = group.value(index);
@@ -89,7 +91,9 @@ impl Bars {
                 let middle = center + offset.round() as i32;
                 let half = (breadth * 0.46).round() as i32;
                 let base = inside.base();
-                let Some((value, top)) = group.value(place).and_then(|value| Some((value, inside.down(value)?))) else {
+                let Some((value, top)) =
+                    group.value(place).and_then(|value| Some((value, inside.down(value)?)))
+                else {
                     pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom)?;
                     continue;
                 };
@@ -101,11 +105,15 @@ impl Bars {
                     Precision::Significant(4).format(value),
                     self.y.unit
                 ));
-                pen.rectangle([(middle - half, top.min(base)), (middle + half, top.max(base))], Paint(ink(index).rgb(), 1.0))?;
+                pen.rectangle(
+                    [(middle - half, top.min(base)), (middle + half, top.max(base))],
+                    Paint(ink(index).rgb(), 1.0),
+                )?;
                 let mut above = top.min(base);
                 if let Some(spread) = group.deviation(place) {
-                    let ends = [value - spread, value + spread]
-                        .map(|end| inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end));
+                    let ends = [value - spread, value + spread].map(|end| {
+                        inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end)
+                    });
                     let cap = half / 3;
                     for path in [
                         vec![(middle, ends[0]), (middle, ends[1])],
@@ -133,7 +141,12 @@ impl Bars {
             }
         }
         // The line at zero lies over the feet of the bars.
-        pen.line(vec![(inside.x.start, inside.base()), (inside.x.end, inside.base())], Paint::text(0.5), THIN, "")
+        pen.line(
+            vec![(inside.x.start, inside.base()), (inside.x.end, inside.base())],
+            Paint::text(0.5),
+            THIN,
+            "",
+        )
     }
 }
 

@@ -91,7 +91,10 @@ pub(super) fn draw(
     let drawn = drawing(&area, &sheet).and_then(|()| area.present());
     drop(area);
     if let Err(error) = drawn {
-        sheet.push(&format!("<text x=\"10\" y=\"20\">this picture could not be drawn: {}</text>\n", escape(&error.to_string())));
+        sheet.push(&format!(
+            "<text x=\"10\" y=\"20\">this picture could not be drawn: {}</text>\n",
+            escape(&error.to_string())
+        ));
     }
     sheet.push("</svg>\n");
     sheet.0.text.take()
@@ -147,7 +150,11 @@ impl DrawingBackend for Canvas {
         Ok(())
     }
 
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
         let mut shape = String::from("<polyline points=\"");
         push_points(&mut shape, path);
         self.shape(&shape, style, false);
@@ -238,7 +245,10 @@ impl Canvas {
             write_all(&mut attributes, format_args!(" {kind}-opacity=\"{}\"", rounded(color.alpha)));
         }
         if !fill {
-            write_all(&mut attributes, format_args!(" fill=\"none\" stroke-width=\"{}\"", px(style.stroke_width() as i32)));
+            write_all(
+                &mut attributes,
+                format_args!(" fill=\"none\" stroke-width=\"{}\"", px(style.stroke_width() as i32)),
+            );
             if tag.starts_with("<polyline") {
                 attributes.push_str(" stroke-linejoin=\"round\"");
             }

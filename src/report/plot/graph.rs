@@ -95,7 +95,10 @@ impl Series {
 
     /// A line through values at 0, 1, 2, …
     pub fn sequence(name: impl Into<String>, values: &[f64]) -> Self {
-        Self::line(name, values.iter().enumerate().map(|(index, value)| [index as f64, *value]).collect::<Vec<_>>())
+        Self::line(
+            name,
+            values.iter().enumerate().map(|(index, value)| [index as f64, *value]).collect::<Vec<_>>(),
+        )
     }
 
     /// The same in a stated colour.
@@ -106,8 +109,7 @@ impl Series {
 
     /// The same with a band or error bars of so much to both sides of each point.
     pub fn plus_minus(mut self, sizes: &[f64]) -> Self {
-        self.bounds =
-            self.points.iter().zip(sizes).map(|([_, y], size)| [y - size, y + size]).collect();
+        self.bounds = self.points.iter().zip(sizes).map(|([_, y], size)| [y - size, y + size]).collect();
         self
     }
 }
@@ -242,7 +244,8 @@ impl Drawn<'_> {
             (Mark::Points, Some(marker)) => Glyph::Point(marker),
             (_, marker) => Glyph::Line { dash: self.dash, width: BOLD, marker },
         };
-        Some(Entry { name: self.series.name.clone(), ink: self.ink, glyph }).filter(|entry| !entry.name.is_empty())
+        Some(Entry { name: self.series.name.clone(), ink: self.ink, glyph })
+            .filter(|entry| !entry.name.is_empty())
     }
 
     fn draw(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
@@ -290,13 +293,16 @@ impl Drawn<'_> {
 
     fn draw_bounds(&self, inside: &Inside, pen: Pen<'_>) -> Result<(), DrawingError> {
         let bounded = self.series.points.iter().zip(&self.series.bounds);
-        let places =
-            bounded.map(|([x, _], [low, high])| inside.place(*x, *low).zip(inside.place(*x, *high)));
+        let places = bounded.map(|([x, _], [low, high])| inside.place(*x, *low).zip(inside.place(*x, *high)));
         let color = self.ink.rgb();
         if self.series.mark == Mark::Points {
             for ((x, low), (_, high)) in places.flatten() {
                 let cap = 3 * PIXEL;
-                for ends in [[(x, low), (x, high)], [(x - cap, low), (x + cap, low)], [(x - cap, high), (x + cap, high)]] {
+                for ends in [
+                    [(x, low), (x, high)],
+                    [(x - cap, low), (x + cap, low)],
+                    [(x - cap, high), (x + cap, high)],
+                ] {
                     pen.line(ends.to_vec(), Paint(color, 0.8), THIN, "")?;
                 }
             }
@@ -337,7 +343,8 @@ pub(super) fn thinned(run: Vec<(i32, i32)>) -> Vec<(i32, i32)> {
     let mut kept: Vec<(i32, i32)> = Vec::new();
     for column in run.chunk_by(|a, b| a.0 / (PIXEL / 2) == b.0 / (PIXEL / 2)) {
         let extreme = |index: usize, better: fn(i32, i32) -> bool| {
-            (0..column.len()).fold(index, |best, i| if better(column[i].1, column[best].1) { i } else { best })
+            (0..column.len())
+                .fold(index, |best, i| if better(column[i].1, column[best].1) { i } else { best })
         };
         let mut picks = [0, extreme(0, |a, b| a < b), extreme(0, |a, b| a > b), column.len() - 1];
         picks.sort_unstable();

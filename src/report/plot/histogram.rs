@@ -78,7 +78,11 @@ impl Histogram {
 
     /// The picture, 900 × 340 pixels.
     pub fn svg(&self) -> String {
-        let name = if self.title.is_empty() { format!("histogram of {}", self.x.text()) } else { self.title.clone() };
+        let name = if self.title.is_empty() {
+            format!("histogram of {}", self.x.text())
+        } else {
+            self.title.clone()
+        };
         picture((900, 340), &name, |pen| self.draw(pen))
     }
 
@@ -110,10 +114,15 @@ impl Histogram {
             for (index, counts) in bins.counts.iter().enumerate() {
                 let mut outline = Vec::new();
                 for (bin, &count) in counts.iter().enumerate() {
-                    let ends = [inside.place(bins.edges[bin], count as f64), inside.place(bins.edges[bin + 1], count as f64)];
+                    let ends = [
+                        inside.place(bins.edges[bin], count as f64),
+                        inside.place(bins.edges[bin + 1], count as f64),
+                    ];
                     outline.extend(ends.into_iter().flatten());
                 }
-                let (Some(first), Some(last)) = (outline.first().copied(), outline.last().copied()) else { continue };
+                let (Some(first), Some(last)) = (outline.first().copied(), outline.last().copied()) else {
+                    continue;
+                };
                 let base = inside.base();
                 outline.insert(0, (first.0, base));
                 outline.push((last.0, base));

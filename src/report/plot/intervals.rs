@@ -78,7 +78,11 @@ impl Intervals {
         });
         let entry = |name: &str, ink, glyph| Entry { name: name.to_owned(), ink, glyph };
         let mut legend = vec![
-            entry("value ± 1σ (thick), ± 2σ (thin)", INK, Glyph::Line { dash: "", width: THICK, marker: Some(Marker::Circle) }),
+            entry(
+                "value ± 1σ (thick), ± 2σ (thin)",
+                INK,
+                Glyph::Line { dash: "", width: THICK, marker: Some(Marker::Circle) },
+            ),
             entry("prior ± 1σ", Ink::Text, Glyph::Area { alpha: PRIOR_ALPHA, outlined: false }),
         ];
         if self.rows.iter().any(|row| !row.determined) {
@@ -107,18 +111,25 @@ impl Intervals {
             let color = INK.rgb();
             for (sigmas, width) in [(2.0, THIN), (1.0, THICK)] {
                 let reach = sigmas * row.sigma;
-                let ends = [row.value - reach, row.value + reach].map(|end| inside.across(end / row.prior_sigma));
+                let ends =
+                    [row.value - reach, row.value + reach].map(|end| inside.across(end / row.prior_sigma));
                 let [Some(from), Some(to)] = ends else { continue };
                 if row.determined {
                     pen.line(vec![(from, y), (to, y)], Paint(color, 1.0), width, "")?;
                 } else {
                     // The ring stays hollow.
-                    for part in [(from, x - MARKER), (x + MARKER, to)].into_iter().filter(|part| part.0 < part.1) {
+                    for part in
+                        [(from, x - MARKER), (x + MARKER, to)].into_iter().filter(|part| part.0 < part.1)
+                    {
                         pen.line(vec![(part.0, y), (part.1, y)], Paint(color, 1.0), width, "")?;
                     }
                 }
             }
-            pen.marker(if row.determined { Marker::Circle } else { Marker::Ring }, (x, y), Paint(color, 1.0))?;
+            pen.marker(
+                if row.determined { Marker::Circle } else { Marker::Ring },
+                (x, y),
+                Paint(color, 1.0),
+            )?;
         }
         Ok(())
     }

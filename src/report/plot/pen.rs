@@ -2,7 +2,9 @@
 
 use plotters::element::{Circle, PathElement, Polygon, Rectangle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{BLACK, Color, FontDesc, FontFamily, FontStyle, FontTransform, RGBColor, ShapeStyle, TextStyle};
+use plotters::style::{
+    BLACK, Color, FontDesc, FontFamily, FontStyle, FontTransform, RGBColor, ShapeStyle, TextStyle,
+};
 
 use super::canvas::{Area, DrawingError, PIXEL, Sheet};
 
@@ -93,7 +95,9 @@ impl Pen<'_> {
                 let h = r * 8 / 10;
                 self.rectangle([(x - h, y - h), (x + h, y + h)], paint)
             }
-            Marker::Triangle => self.polygon(vec![(x - r, y + r * 7 / 10), (x + r, y + r * 7 / 10), (x, y - r)], paint),
+            Marker::Triangle => {
+                self.polygon(vec![(x - r, y + r * 7 / 10), (x + r, y + r * 7 / 10), (x, y - r)], paint)
+            }
             Marker::Diamond => {
                 let h = r * 11 / 10;
                 self.polygon(vec![(x - h, y), (x, y - h), (x + h, y), (x, y + h)], paint)
@@ -118,7 +122,8 @@ impl Pen<'_> {
 impl Pen<'_> {
     /// Words that read from bottom to top, their top at the left of the point and their middle at its height.
     pub(super) fn upright(&self, words: &str, at: Point, size: f64) -> Drawn {
-        let style = text(size, FontStyle::Normal, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
+        let style =
+            text(size, FontStyle::Normal, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
         self.area.draw_text(words, &style, at)
     }
 }

@@ -122,9 +122,12 @@ impl PlanPath {
                 continue;
             };
             if let Some((start, earlier)) = before {
-                let shade = colors.fraction(earlier / 2.0 + value / 2.0).map(|part| (part * SHADES).round() as i64);
+                let shade =
+                    colors.fraction(earlier / 2.0 + value / 2.0).map(|part| (part * SHADES).round() as i64);
                 match pieces.last_mut() {
-                    Some((last, points)) if *last == shade && points.last() == Some(&start) => points.push(place),
+                    Some((last, points)) if *last == shade && points.last() == Some(&start) => {
+                        points.push(place)
+                    }
                     _ => pieces.push((shade, vec![start, place])),
                 }
             }

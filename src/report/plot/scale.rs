@@ -40,10 +40,9 @@ impl Scale {
     /// Scale of an axis for the values on it, with at most about `ticks` ticks.
     pub(super) fn of(axis: &Axis, values: impl Iterator<Item = f64>, ends: Ends, ticks: usize) -> Self {
         let usable = |value: &f64| value.is_finite() && (!axis.log || *value > 0.0);
-        let [mut low, mut high] =
-            values.filter(usable).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                [low.min(value), high.max(value)]
-            });
+        let [mut low, mut high] = values
+            .filter(usable)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
         if low > high {
             [low, high] = if axis.log { [0.1, 10.0] } else { [0.0, 1.0] };
         }
@@ -159,7 +158,11 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     let (factor, exponent) = step(span / wanted.max(1) as f64);
     // A tick is a whole number times a power of ten, divided or multiplied exactly, so that 0.3 is 0.3.
     let place = |count: f64| {
-        if exponent < 0 { count * factor / 10f64.powi(-exponent) } else { count * factor * 10f64.powi(exponent) }
+        if exponent < 0 {
+            count * factor / 10f64.powi(-exponent)
+        } else {
+            count * factor * 10f64.powi(exponent)
+        }
     };
     let width = place(1.0);
     let (first, last) = ((low / width - 1e-9).ceil(), (high / width + 1e-9).floor());

@@ -47,7 +47,8 @@ impl HeatStrip {
     }
 
     fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
-        let colors = Colors::of(&self.value, self.colors, self.strips.iter().flat_map(|strip| &strip.values).copied());
+        let colors =
+            Colors::of(&self.value, self.colors, self.strips.iter().flat_map(|strip| &strip.values).copied());
         let longest = self.strips.iter().map(|strip| strip.values.len()).max().unwrap_or(0);
         let axis = Axis { log: false, ..self.x.clone() };
         let last = longest.max(2) as f64 - 1.0;
@@ -77,8 +78,8 @@ impl HeatStrip {
                     to += 1;
                 }
                 if let Some(shade) = shade {
-                    let [left, right] =
-                        [from, to].map(|cell| inside.x.start + (width * cell as f64 / cells as f64).round() as i32);
+                    let [left, right] = [from, to]
+                        .map(|cell| inside.x.start + (width * cell as f64 / cells as f64).round() as i32);
                     let corners = [(left, middle - half), (right, middle + half)];
                     pen.rectangle(corners, colors.paint(f64::from(shade) / 128.0))?;
                 }

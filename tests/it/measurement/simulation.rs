@@ -21,9 +21,8 @@ pub(super) fn measure(recipe: &str) -> (Simulation, Dataset) {
 }
 
 fn try_measure(recipe: &str) -> Result<Simulation, RecipeError> {
-    Recipe::parse(recipe, "recipe.toml")?.simulate(|name| {
-        robots::load(name).map(|robot| robot.model).map_err(|error| error.to_string())
-    })
+    Recipe::parse(recipe, "recipe.toml")?
+        .simulate(|name| robots::load(name).map(|robot| robot.model).map_err(|error| error.to_string()))
 }
 
 pub(super) const CABLE: &str = "[sensor]\nkind = \"cable\"\noutlets_mm = [[700, 0, 100]]\nzeros_mm = [12.5]\n\
@@ -127,12 +126,17 @@ fn circumstances_are_logged_and_felt() {
     let last = data.rows.last().unwrap().condition;
     assert_eq!((last.time_h, last.payload_kg), (Some(4.0), Some(2.0)));
     assert!((last.temperature_c.unwrap() - (32.0 - 12.0 * (-4f64).exp())).abs() < 1e-3);
+    let mut widest = 0f64;
     for pair in data.rows.chunks(2) {
         assert_eq!((pair[0].condition.approach, pair[1].condition.approach), ([-1; 6], [1; 6]));
-        let [Reading::Position(a), Reading::Position(b)] = [pair[0].reading, pair[1].reading] else { panic!() };
+        let [Reading::Position(a), Reading::Position(b)] = [pair[0].reading, pair[1].reading] else {
+            panic!()
+        };
         let moved = (a - b).norm();
-        assert!((0.05..1.5).contains(&moved), "play of 0.002 rad moves the reflector: {moved}");
+        assert!(moved < 1.5, "play of 0.002 rad within reach of the arm: {moved}");
+        widest = widest.max(moved);
     }
+    assert!(widest > 0.5, "{widest}");
     assert_eq!(data.rows[0].joints, data.rows[80].joints, "the second round repeats the first");
 }
 
@@ -164,7 +168,10 @@ fn grids_lists_and_views() {
     let degrees = |i: usize| data.rows[i].joints.map(|q| q.to_degrees().round());
     assert_eq!(degrees(0).as_slice(), [-90.0, -90.0, 30.0, 0.0, 0.0, 0.0]);
     assert_eq!(degrees(7).as_slice(), [0.0, -30.0, 30.0, 0.0, 0.0, 90.0]);
-    let seen = random(50, "[view]\ndistance_mm = [300, 600]\ntilt_deg = 60.0\nbox_mm = [[0,-400,0],[900,400,900]]\n");
+    let seen = random(
+        50,
+        "[view]\ndistance_mm = [300, 600]\ntilt_deg = 60.0\nbox_mm = [[0,-400,0],[900,400,900]]\n",
+    );
     let (simulation, _) = measure(&format!("{seen}{CABLE}"));
     for row in &simulation.rows {
         let Reading::Cable(length) = row.reading else { panic!() };
@@ -180,7 +187,10 @@ fn recipes_that_cannot_be_meant_are_refused() {
     let cases = [
         (random(5, CABLE).replace("irb-120", "irb-12"), "robot: unknown robot"),
         (random(5, &format!("colour = 3\n{CABLE}")), "recipe.toml: line 3"),
-        (random(5, &format!("{CABLE}[noise]\nstudent_t = 1.5\n")), "noise.student_t: found 1.5, expected more than 2"),
+        (
+            random(5, &format!("{CABLE}[noise]\nstudent_t = 1.5\n")),
+            "noise.student_t: found 1.5, expected more than 2",
+        ),
         (random(5, &format!("{CABLE}[noise]\nsigma_mm = -1.0\n")), "noise.sigma_mm: found -1"),
         (random(5, &format!("{CABLE}[[arm.link]]\njoint = 6\n")), "arm.link.joint: found 6"),
         (random(5, &format!("{CABLE}[rounding]\nangles_deg = 0.0\n")), "rounding.angles_deg: found 0"),

@@ -1,0 +1,203 @@
+//! `truegrind demo [-o DIR]`: the whole way on what ships with the project.
+//!
+//! The shipped surface becomes a RAPID program, the shipped simulated measurements identify the arm, the program is
+//! rewritten, and the simulated actual arm, which has effects and noise that geometry cannot hold, runs both.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::{Point3, Vector3};
+use truegrind::compensation::cell::{Cell, CellFrame, FrameOrigin};
+use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::rewrite::{Options as RewriteBounds, plan};
+use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::identification::identify::{Identification, Options};
+use truegrind::identification::solver::SOLVERS;
+use truegrind::identification::tolerance::Tolerance;
+use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::inverse::Inverse;
+use truegrind::kinematics::model::Model;
+use truegrind::math::se3::Pose;
+use truegrind::measurement::import;
+use truegrind::planning::toolpath::{Toolpath, toolpath};
+use truegrind::program::motion::Mark;
+use truegrind::program::rapid::{Task, writer};
+use truegrind::program::rewrite::RewriteOptions;
+use truegrind::report::document::Document;
+use truegrind::report::{deviation as deviation_view, format, identification as identification_view};
+use truegrind::surface::{SurfaceFile, sample};
+
+use super::files::{self, Batch};
+use super::outputs::width;
+use super::progress::Work;
+use super::{Common, Ending, identify, inputs, on_threads, simulate};
+
+/// The shipped measurements and the recipe that made them.
+const DATA: &[u8] = include_bytes!("../../tests/data/irb120-cable.csv");
+const RECIPE: &str = include_str!("../../tests/data/irb120-cable.toml");
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder for everything that is written.
+    #[arg(short, long, default_value = "truegrind-demo")]
+    output: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    files::make_folder(&arguments.output)?;
+    on_threads(arguments.common.threads, || whole_way(&arguments.output, arguments.common.seed))?
+}
+
+fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
+    let robot = inputs::robot("abb-irb-120")?;
+    let nominal = &robot.model;
+    let work = Work::start("surface to program");
+    let surface = sample::BLADE.read()?;
+    let path = toolpath(&surface, nominal, &robot.sheet.name)?;
+    let program = writer::write(&path.draft)?;
+    let task = Task::read(&[("blade.mod", program.as_slice())]);
+    let cell = taught_cell(&surface, &path, nominal)?;
+
+    drop(work);
+    let work = Work::start("identifying the arm with four methods");
+    let dataset = import::read("irb120-cable.csv", DATA, &import::Options::default())?;
+    let simulation = simulate::simulation(RECIPE, "irb120-cable.toml", None)?;
+    let mut found: Vec<Identification> = Vec::new();
+    for solver in SOLVERS {
+        let options = Options {
+            tolerance: Tolerance::default(),
+            solver,
+            held_out: 0.2,
+            seed,
+            sharpen: true,
+            limit_rmse_mm: None,
+            limit_max_mm: None,
+            stated_frames: None,
+        };
+        found.push(identify::identified(&dataset, &robot.sheet.name, nominal, &options)?);
+    }
+
+    drop(work);
+    let work = Work::start("rewriting the program, running both on the simulated actual arm");
+    let mass = path.draft.tool.1.mass_kg;
+    let condition = Condition { payload_kg: Some(mass), ..Condition::default() };
+    let mut reports: Vec<PathReport> = Vec::new();
+    let mut rewritten_program = None;
+    for one in &found {
+        let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
+        let planned = plan(&task.listing, &one.estimated, &cell, &bounds);
+        let text = one.estimated.to_toml().map_err(anyhow::Error::msg)?;
+        let mark = Mark {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            model: inputs::hash(text.as_bytes()),
+        };
+        let rewrite = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
+        let edits = task.rewrite(&planned.changes, &rewrite)?;
+        let bytes = edits.files[0].edits.apply(&program)?;
+        let after = Task::read(&[("blade.mod", bytes.as_slice())]);
+        let judged = Judged {
+            original: &task.listing,
+            rewritten: Some(&after.listing),
+            cell: &cell,
+            surface: Some(&surface.surface),
+            program: "blade.mod",
+            name: &one.estimated.provenance.method,
+            after: After::Achieved,
+        };
+        let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
+        let mut report = judge(&judged, &acting);
+        report.held_out_mm = Some(one.estimated.geometry.held_out.rmse);
+        for (point, planned) in report.points.iter_mut().zip(&planned.points) {
+            (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
+            (point.status, point.reason) = (planned.status, planned.reason.clone());
+        }
+        reports.push(report);
+        if rewritten_program.is_none() {
+            rewritten_program = Some((bytes, text));
+        }
+    }
+
+    drop(work);
+    let mut page: Document = deviation_view::document(&reports);
+    page.title = "truegrind demo: a blade ground by an IRB 120".to_owned();
+    let mut batch = Batch::default();
+    let place = |name: &str| folder.join(name);
+    batch.add(place("blade.mod"), program.clone());
+    if let Some((bytes, model)) = rewritten_program {
+        batch.add(place("blade-compensated.mod"), bytes);
+        batch.add(place("model.toml"), model);
+    }
+    batch.add(place("measurements.csv"), DATA.to_vec());
+    batch.add(place("cell.toml"), toml::to_string(&cell)?);
+    batch.add(place("actual-arm.toml"), simulate::arm_text(&simulation.actual)?);
+    batch.add(place("deviation.csv"), format::csv::table(&deviation_view::table(&reports[0])));
+    batch.add(place("deviation.md"), format::markdown::document(&page));
+    batch.add(place("deviation.html"), format::html::document(&page));
+    batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))? + "\n");
+    let identification = identification_view::document(&found[0], &dataset);
+    batch.add(place("identification.html"), format::html::document(&identification));
+    #[cfg(feature = "visual")]
+    batch.add(
+        place("demo.rrd"),
+        super::view::path(
+            "truegrind demo",
+            &simulation.actual,
+            "simulated actual arm",
+            condition,
+            &reports[..1],
+            Some(&surface),
+        )?,
+    );
+    batch.write()?;
+
+    print!("{}", format::terminal::table(&deviation_view::block_table(&reports), width()));
+    println!();
+    print!("{}", format::terminal::table(&deviation_view::registered_table(&reports), width()));
+    println!();
+    println!("Simulated throughout: tests/data/README.md has recipe and seed. In {}:", folder.display());
+    for (name, what) in [
+        ("deviation.html", "the page: deviation along the path before and after"),
+        ("identification.html", "what the measurements told of the arm"),
+        ("blade.mod, blade-compensated.mod", "the program before and after"),
+        ("model.toml", "the estimated arm (method lm)"),
+        ("demo.rrd", "the picture: truegrind view, or any Rerun viewer"),
+    ] {
+        println!("  {name:<34} {what}");
+    }
+    Ok(Ending::Done)
+}
+
+/// The blade's work object as it is set up in most cells: taught with the uncalibrated arm, by three points.
+fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> anyhow::Result<Cell> {
+    let inverse = Inverse::new(nominal, &Condition::default(), nominal);
+    let object = surface.work_object.base_from_work_object;
+    let orientation = path.points[path.points.len() / 2].orientation;
+    let near = path.joints[path.joints.len() / 2];
+    let teaching_deg = [Vector3::new(-40.0, 0.0, 0.0), Vector3::new(40.0, 0.0, 0.0), Vector3::new(0.0, 60.0, 0.0)]
+        .iter()
+        .map(|p| {
+            let point = Point3::from(*p);
+            let tip = Pose::from_parts(point.coords.into(), orientation);
+            let flange = object * tip * surface.tool.flange_from_tool.inverse();
+            let joints = inverse.solve_near(&flange, &near)?.joints;
+            Ok(std::array::from_fn(|i| joints[i].to_degrees()))
+        })
+        .collect::<anyhow::Result<Vec<[f64; 6]>>>()?;
+    Ok(Cell {
+        tool: vec![CellFrame {
+            name: surface.tool.name.clone(),
+            origin: FrameOrigin::Metrology,
+            teaching_deg: Vec::new(),
+            taught_with: None,
+        }],
+        wobj: vec![CellFrame {
+            name: surface.work_object.name.clone(),
+            origin: FrameOrigin::Taught,
+            teaching_deg,
+            taught_with: Some(surface.tool.name.clone()),
+        }],
+    })
+}

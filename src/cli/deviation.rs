@@ -1,0 +1,150 @@
+//! `truegrind deviation PROGRAM… --model MODEL.toml…`: the report alone.
+
+use std::path::PathBuf;
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::kinematics::arm_file::ArmFile;
+use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::Model;
+use truegrind::report::deviation as view;
+use truegrind::report::document::Document;
+
+use super::compensate::{CellArguments, Programs};
+use super::files::{self, Batch};
+use super::inputs::NamedModel;
+use super::outputs::Outputs;
+use super::{Common, Ending, inputs, on_threads};
+
+/// Arguments of `deviation`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// RAPID modules of one task, or a .pgf list of them.
+    #[arg(required = true)]
+    programs: Vec<PathBuf>,
+    /// Estimated arms; one row each. With --actual the word `nominal` is enough.
+    #[arg(long, required = true, num_args = 1..)]
+    model: Vec<String>,
+    /// Robot; optional where a model says it, and checked against it.
+    #[arg(long)]
+    robot: Option<String>,
+    /// The original program, which states what was meant; PROGRAM is then what came of it.
+    #[arg(long, value_name = "ORIGINAL")]
+    intended: Vec<PathBuf>,
+    /// A simulated actual arm (`simulate --arm`), on which the programs are run.
+    #[arg(long, value_name = "ARM.toml")]
+    actual: Option<PathBuf>,
+    #[command(flatten)]
+    cell: CellArguments,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+/// An arm on which programs are run.
+struct Runner {
+    name: String,
+    nominal: Model,
+    model: Model,
+    knowledge: Option<Box<Estimated>>,
+    after: After,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let programs = Programs::read(&arguments.programs)?;
+    let originals =
+        if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
+    let all: Vec<&std::path::Path> = programs
+        .files
+        .iter()
+        .chain(originals.iter().flat_map(|o| &o.files))
+        .map(|(p, _)| p.as_path())
+        .collect();
+    Batch::check(&all, &arguments.outputs.files())?;
+    let runners = runners(arguments)?;
+    let task = programs.task();
+    let original = originals.as_ref().map(Programs::task);
+    let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
+    let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
+    let name = programs.files.iter().map(|(p, _)| files::name(p)).collect::<Vec<_>>().join(", ");
+    let reports: Vec<PathReport> = on_threads(arguments.common.threads, || {
+        runners
+            .iter()
+            .map(|runner| {
+                let judged = Judged {
+                    original: original.as_ref().map_or(&task.listing, |o| &o.listing),
+                    rewritten: original.as_ref().map(|_| &task.listing),
+                    cell: &cell,
+                    surface: surface.as_ref().map(|s| &s.surface),
+                    program: &name,
+                    name: &runner.name,
+                    after: runner.after,
+                };
+                let acting = Acting {
+                    nominal: &runner.nominal,
+                    model: &runner.model,
+                    knowledge: runner.knowledge.as_deref(),
+                    condition,
+                };
+                judge(&judged, &acting)
+            })
+            .collect()
+    })?;
+    if reports.iter().all(|r| r.points.is_empty()) {
+        bail!("{name}: no motion has a target that is known from the text");
+    }
+    let mut summary = Document::new(format!("Deviation of {name}"));
+    summary.push(view::block_table(&reports));
+    summary.push(view::registered_table(&reports));
+    arguments.outputs.print(&summary);
+    let mut batch = Batch::sparing(&all);
+    arguments.outputs.add_to(
+        &mut batch,
+        &view::document(&reports),
+        &view::table(&reports[0]),
+        &view::json(&reports),
+    )?;
+    #[cfg(feature = "visual")]
+    if let Some(path) = &arguments.outputs.rrd {
+        let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
+        let bytes = super::view::path(&name, &first.model, is, condition, &reports, surface.as_ref())?;
+        batch.add(path, bytes);
+    }
+    batch.write()?;
+    Ok(Ending::Done)
+}
+
+fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
+    let models = arguments.model.iter().map(|m| inputs::model(m)).collect::<anyhow::Result<Vec<_>>>()?;
+    if let Some(path) = &arguments.actual {
+        let text = files::read_text(path)?;
+        let file: ArmFile = toml::from_str(&text)
+            .map_err(|e| anyhow!("{}: not an arm of `simulate --arm`: {e}", path.display()))?;
+        let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
+        let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;
+        let (_, nominal) = inputs::nominal(first, arguments.robot.as_deref())?;
+        let name = format!("actual arm {}", files::name(path));
+        return Ok(vec![Runner { name, nominal, model, knowledge: None, after: After::Achieved }]);
+    }
+    models
+        .into_iter()
+        .map(|model| {
+            let (_, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
+            match model {
+                NamedModel::Nominal => bail!(
+                    "--model nominal has no deviation from itself: give an estimated arm, or --actual ARM.toml"
+                ),
+                NamedModel::Estimated { name, arm, .. } => Ok(Runner {
+                    name,
+                    nominal,
+                    model: arm.model.clone(),
+                    knowledge: Some(arm),
+                    after: After::PredictedRemainder,
+                }),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,62 @@
+//! `truegrind path SURFACE.toml --robot R -o PROGRAM.mod`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use clap::Args;
+use truegrind::planning::toolpath::{Toolpath, toolpath};
+use truegrind::program::rapid::writer;
+use truegrind::robots::Robot;
+use truegrind::surface::SurfaceFile;
+
+use super::files::{self, Batch};
+use super::{Ending, inputs};
+
+/// Arguments of `path`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Surface, work object, tool and pattern.
+    surface: PathBuf,
+    /// Robot: a name of `truegrind robots`, or a TOML file.
+    #[arg(long)]
+    robot: String,
+    /// The RAPID module to write; `-` prints it.
+    #[arg(short, long, value_name = "PROGRAM.mod")]
+    output: PathBuf,
+    /// Put the targets into the instructions instead of naming them p10, p20, …
+    #[arg(long)]
+    inline: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    Batch::check(&[&arguments.surface], &[&arguments.output])?;
+    let robot = inputs::robot(&arguments.robot)?;
+    let file = surface(&arguments.surface)?;
+    let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
+    path.draft.named_targets = !arguments.inline;
+    let bytes = writer::write(&path.draft)?;
+    say(&path, &robot, &arguments.output);
+    let mut batch = Batch::sparing([&arguments.surface]);
+    batch.add(&arguments.output, bytes);
+    batch.write()?;
+    Ok(Ending::Done)
+}
+
+fn say(path: &Toolpath, robot: &Robot, output: &Path) {
+    let passes = path.points.iter().map(|p| p.pass + 1).max().unwrap_or(0);
+    eprintln!(
+        "{} targets in {passes} passes for {}, distance to singularity at least {:.3}; written to {}",
+        path.points.len(),
+        robot.sheet.name,
+        path.singularity,
+        output.display()
+    );
+}
+
+/// Reads a surface file; a mesh is looked up beside it.
+pub(super) fn surface(path: &Path) -> anyhow::Result<SurfaceFile> {
+    let bytes = files::read(path)?;
+    let name = path.display().to_string();
+    let resolve = |mesh: &str| inputs::read_beside(path, mesh).map_err(|e| format!("{e:#}"));
+    SurfaceFile::read(&name, &bytes, resolve).map_err(|e| anyhow!("{e}"))
+}

@@ -1,0 +1,63 @@
+//! `truegrind simulate RECIPE.toml -o DATA.csv`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use truegrind::kinematics::arm_file::ArmFile;
+use truegrind::kinematics::model::Model;
+use truegrind::measurement::simulation::Simulation;
+use truegrind::measurement::simulation::recipe::Recipe;
+
+use super::files::{self, Batch};
+use super::{Ending, inputs};
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// What the actual arm is, which poses are measured, and how.
+    recipe: PathBuf,
+    /// The measurements to write; `-` prints them.
+    #[arg(short, long, value_name = "DATA.csv")]
+    output: PathBuf,
+    /// Also write the simulated actual arm, for `deviation --actual`.
+    #[arg(long, value_name = "ARM.toml")]
+    arm: Option<PathBuf>,
+    /// Seed of poses and noise instead of the recipe's; the arm stays the same.
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let mut targets = vec![arguments.output.as_path()];
+    targets.extend(arguments.arm.as_deref());
+    Batch::check(&[&arguments.recipe], &targets)?;
+    let text = files::read_text(&arguments.recipe)?;
+    let simulation = simulation(&text, &arguments.recipe.display().to_string(), arguments.seed)?;
+    let mut batch = Batch::sparing([&arguments.recipe]);
+    eprintln!(
+        "{} rows, sensor {:?}, written to {}",
+        simulation.rows.len(),
+        simulation.sensor(),
+        arguments.output.display()
+    );
+    batch.add(&arguments.output, simulation.csv);
+    if let Some(path) = &arguments.arm {
+        batch.add(path, arm_text(&simulation.actual)?);
+    }
+    batch.write()?;
+    Ok(Ending::Done)
+}
+
+/// Runs a recipe.
+pub(super) fn simulation(text: &str, name: &str, seed: Option<u64>) -> anyhow::Result<Simulation> {
+    let mut recipe = Recipe::parse(text, name)?;
+    if let Some(seed) = seed {
+        recipe.seed = seed;
+    }
+    Ok(recipe.simulate(|name| inputs::robot(name).map(|r| r.model).map_err(|e| format!("{e:#}")))?)
+}
+
+/// The file of a simulated actual arm.
+pub(super) fn arm_text(model: &Model) -> anyhow::Result<String> {
+    Ok(format!("# A simulated actual arm.\n{}", toml::to_string(&ArmFile::from(model))?))
+}
