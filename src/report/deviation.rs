@@ -29,6 +29,43 @@ const AFTER: Side = |point| point.after;
 /// One row per path point of one program under one model, all columns. Positions and vectors in the work object.
 pub fn table(report: &PathReport) -> Table {
     let (word, key) = words(report.after);
+    let columns = point_columns((word, key), decimals(report.after));
+    let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
+    report.points.iter().for_each(|point| table.push(point_cells(point)));
+    table.notes = notes(report);
+    table
+}
+
+/// The same for several programs and models under each other, for a file: each row names its program and model, what
+/// "after" is, and the model's held-out error.
+pub fn whole_table(reports: &[PathReport]) -> Table {
+    let mut columns = vec![
+        Column::text("program", "Program"),
+        Column::text("model", "Model"),
+        Column::text("after_is", "After is"),
+        Column::number("model_held_out_rmse_mm", "Held-out error", "mm", 3),
+    ];
+    columns.extend(point_columns(("after", "after"), 4));
+    let mut table = Table::new("Deviation of path points", columns);
+    for report in reports {
+        for point in &report.points {
+            let mut row: Vec<Cell> = vec![
+                report.program.as_str().into(),
+                report.model.as_str().into(),
+                if point.after.is_some() { meaning(report.after).into() } else { Cell::Missing },
+                report.held_out_mm.into(),
+            ];
+            row.extend(point_cells(point));
+            table.push(row);
+        }
+    }
+    if let Some(first) = reports.first() {
+        table.notes = notes(first);
+    }
+    table
+}
+
+fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
     let mut columns = vec![
         Column::count("index", "Point"),
         Column::count("line", "Line"),
@@ -37,7 +74,7 @@ pub fn table(report: &PathReport) -> Table {
         Column::number("y_mm", "y", "mm", 3),
         Column::number("z_mm", "z", "mm", 3),
     ];
-    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals(report.after))] {
+    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals)] {
         for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")] {
             columns.push(Column::number(format!("{key}_{part}_mm"), format!("{side} {name}"), "mm", decimals));
         }
@@ -47,26 +84,25 @@ pub fn table(report: &PathReport) -> Table {
         Column::text("status", "Status"),
         Column::text("reason", "Reason"),
     ]);
-    let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
-    for point in &report.points {
-        let mut row = place(point);
-        for side in [point.before, point.after] {
-            row.extend(match side {
-                Some(d) => [
-                    d.vector_mm.x.into(),
-                    d.vector_mm.y.into(),
-                    d.vector_mm.z.into(),
-                    d.norm_mm().into(),
-                    d.normal_mm.into(),
-                ],
-                None => [const { Cell::Missing }; 5],
-            });
-        }
-        row.extend(outcome(point));
-        table.push(row);
+    columns
+}
+
+fn point_cells(point: &PathPoint) -> Vec<Cell> {
+    let mut row = place(point);
+    for side in [point.before, point.after] {
+        row.extend(match side {
+            Some(d) => [
+                d.vector_mm.x.into(),
+                d.vector_mm.y.into(),
+                d.vector_mm.z.into(),
+                d.norm_mm().into(),
+                d.normal_mm.into(),
+            ],
+            None => [const { Cell::Missing }; 5],
+        });
     }
-    table.notes = notes(report);
-    table
+    row.extend(outcome(point));
+    row
 }
 
 /// What fits a page: position, sizes before and after, 1σ and what became of the point.
