@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::estimation::estimate::Termination;
+use crate::estimation::problem::Problem;
 use crate::identification::calibration::Frames;
 use crate::identification::identify::{IdentifyError, Options, identify};
 use crate::identification::solver::{SOLVERS, Solver};
@@ -20,7 +21,7 @@ pub struct MethodRow {
     pub held_out: Vec<ErrorSummary>,
     /// How each fit ended.
     pub terminations: Vec<Termination>,
-    /// Passes over the rows that brought Jacobians, of each final fit.
+    /// Passes over the rows that brought Jacobians, over all rounds of each fit.
     pub jacobian_passes: Vec<f64>,
 }
 
@@ -51,8 +52,8 @@ pub fn study(
         .map(|&(s, seed)| {
             let options = Options { solver: &SOLVERS[s], seed, ..options.clone() };
             let result = identify(dataset, robot, nominal, frames, &|d| split(d, seed), &options)?;
-            let rows = (result.training.task.errors_mm(&result.training.estimate.x).len()).max(1);
-            let per = result.training.estimate.evaluations.jacobians as f64 / rows as f64;
+            let rows = result.training.task.rows().max(1);
+            let per = result.training.evaluations.jacobians as f64 / rows as f64;
             Ok((
                 s,
                 result.estimated.registered.held_out,
