@@ -1,0 +1,226 @@
+//! A recording: what an `.rrd` file holds, with numbers from a counter instead of a clock.
+//!
+//! Rerun's stream stamps chunks, rows and stores with the time of day and random names. Chunks are therefore made here
+//! one by one: chunk k has the identifier (k, 0), its rows (k, 1), (k, 2), …; the store is named by the SHA-256 of
+//! its own content. The same result gives the same bytes, and two different results never merge in a viewer.
+
+use std::path::Path;
+use std::time::Duration;
+
+use rerun::external::re_log_encoding::Encoder;
+use rerun::external::re_log_types::external::re_tuid::Tuid;
+use rerun::external::re_log_types::{
+    BlueprintActivationCommand, LogMsg, SetStoreInfo, StoreInfo, StoreSource, TimePoint,
+};
+use rerun::external::re_types_core::{ChunkId, RowId};
+use rerun::log::{Chunk, TimeColumn};
+use rerun::sink::{GrpcSink, LogSink};
+use rerun::{
+    AsComponents, EntityPath, RecordingInfo, SerializedComponentBatch, SerializedComponentColumn, StoreId,
+    StoreKind,
+};
+use sha2::{Digest, Sha256};
+use thiserror::Error;
+
+/// Where a Rerun viewer listens if nothing else is said.
+pub const VIEWER: &str = rerun::DEFAULT_CONNECT_URL;
+
+/// How long a viewer may take to accept a recording.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Why there is no picture.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum VisualError {
+    /// There is nothing to be drawn.
+    #[error("there is nothing to draw: {0}")]
+    Empty(&'static str),
+    /// Rerun refused the content.
+    #[error("the recording cannot be encoded: {0}")]
+    Encoding(String),
+    /// The address of a viewer cannot be read.
+    #[error("{url} is no address of a Rerun viewer ({problem}); expected one such as {VIEWER}")]
+    Address {
+        /// What was given.
+        url: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// No viewer answers.
+    #[error("no Rerun viewer takes the recording at {url} ({problem}); start one with `rerun`, or write an .rrd file")]
+    Viewer {
+        /// Where it was looked for.
+        url: String,
+        /// What happened.
+        problem: String,
+    },
+    /// The viewer's program cannot be started.
+    #[error(
+        "the Rerun viewer cannot be started ({0}); install it with `pip install rerun-sdk` or \
+         `cargo install rerun-cli`, so that `rerun` is on the path, or write an .rrd file"
+    )]
+    Start(String),
+}
+
+/// A finished picture. See the module page.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    messages: Vec<LogMsg>,
+}
+
+impl Recording {
+    /// The bytes of an `.rrd` file.
+    ///
+    /// # Errors
+    /// [`VisualError::Encoding`]; not known to happen.
+    pub fn rrd(&self) -> Result<Vec<u8>, VisualError> {
+        Encoder::encode(self.messages.iter().map(Ok)).map_err(encoding)
+    }
+
+    /// Sends the recording to a viewer that is running at `url`, such as [`VIEWER`].
+    ///
+    /// # Errors
+    /// [`VisualError::Address`] and [`VisualError::Viewer`].
+    pub fn connect(&self, url: &str) -> Result<(), VisualError> {
+        let address = url
+            .parse()
+            .map_err(|e| VisualError::Address { url: url.to_owned(), problem: format!("{e}") })?;
+        let sink = GrpcSink::new(address);
+        sink.send_all(self.messages.clone());
+        sink.flush_blocking(PATIENCE)
+            .map_err(|e| VisualError::Viewer { url: url.to_owned(), problem: e.to_string() })
+    }
+
+    /// Starts a viewer, or takes the one that runs at [`VIEWER`], and sends the recording to it.
+    ///
+    /// # Errors
+    /// [`VisualError::Start`] and [`VisualError::Viewer`].
+    pub fn spawn(&self) -> Result<(), VisualError> {
+        let options =
+            rerun::SpawnOptions { wait_for_bind: true, hide_welcome_screen: true, ..Default::default() };
+        rerun::spawn(&options).map_err(|e| VisualError::Start(first_line(&e.to_string())))?;
+        self.connect(VIEWER)
+    }
+
+    /// Opens an `.rrd` file in a viewer of its own.
+    ///
+    /// # Errors
+    /// [`VisualError::Start`].
+    pub fn open(file: &Path) -> Result<(), VisualError> {
+        let options = rerun::SpawnOptions {
+            new: true,
+            hide_welcome_screen: true,
+            extra_args: vec![file.display().to_string()],
+            ..Default::default()
+        };
+        rerun::spawn(&options).map(drop).map_err(|e| VisualError::Start(first_line(&e.to_string())))
+    }
+
+    /// Puts content and page together. `application` keeps the layouts of different kinds of pages apart.
+    pub(super) fn new(
+        application: &'static str,
+        name: &str,
+        mut content: Store,
+        page: Store,
+    ) -> Result<Self, VisualError> {
+        content.fixed(EntityPath::properties(), &RecordingInfo::new().with_name(name))?;
+        let mut messages = content.messages(StoreKind::Recording, application)?;
+        let page = page.messages(StoreKind::Blueprint, application)?;
+        let activation = page.first().map(|m| BlueprintActivationCommand::make_active(m.store_id().clone()));
+        messages.extend(page);
+        messages.extend(activation.map(LogMsg::from));
+        Ok(Self { messages })
+    }
+}
+
+/// Rerun's longer messages carry advice of their own.
+fn first_line(message: &str) -> String {
+    message.lines().next().unwrap_or_default().trim().to_owned()
+}
+
+fn encoding(error: impl std::fmt::Display) -> VisualError {
+    VisualError::Encoding(error.to_string())
+}
+
+/// Entities and what is known of them, in the order in which they were told.
+#[derive(Debug, Default)]
+pub(super) struct Store {
+    chunks: Vec<Chunk>,
+}
+
+impl Store {
+    fn next_id(&self) -> ChunkId {
+        ChunkId::from_tuid(Tuid::from_nanos_and_inc(self.chunks.len() as u64 + 1, 0))
+    }
+
+    fn row(
+        &mut self,
+        path: impl Into<EntityPath>,
+        time: TimePoint,
+        batches: impl IntoIterator<Item = SerializedComponentBatch>,
+    ) -> Result<(), VisualError> {
+        let id = self.next_id();
+        let row = RowId::from_tuid(id.as_tuid().next());
+        let chunk = Chunk::builder_with_id(id, path)
+            .with_serialized_batches(row, time, batches)
+            .build()
+            .map_err(encoding)?;
+        self.chunks.push(chunk);
+        Ok(())
+    }
+
+    /// Something that does not change.
+    pub(super) fn fixed(
+        &mut self,
+        path: impl Into<EntityPath>,
+        what: &dyn AsComponents,
+    ) -> Result<(), VisualError> {
+        self.row(path, TimePoint::default(), what.as_serialized_batches())
+    }
+
+    /// Something that holds from one time on.
+    pub(super) fn at(
+        &mut self,
+        path: impl Into<EntityPath>,
+        (axis, time): (&'static str, i64),
+        batches: impl IntoIterator<Item = SerializedComponentBatch>,
+    ) -> Result<(), VisualError> {
+        let axis = rerun::Timeline::new_sequence(axis);
+        self.row(path, TimePoint::default().with(axis, time), batches)
+    }
+
+    /// Something that changes: one row of `columns` for each of `times`.
+    pub(super) fn over(
+        &mut self,
+        path: impl Into<EntityPath>,
+        (axis, times): (&'static str, &[i64]),
+        columns: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> Result<(), VisualError> {
+        if times.is_empty() {
+            return Ok(());
+        }
+        let time = TimeColumn::new_sequence(axis, times.iter().copied());
+        let timelines = std::iter::once((*time.timeline().name(), time)).collect();
+        let components = columns.into_iter().map(|c| (c.descriptor, c.list_array)).collect();
+        let chunk = Chunk::from_auto_row_ids(self.next_id(), path.into(), timelines, components)
+            .map_err(encoding)?;
+        self.chunks.push(chunk);
+        Ok(())
+    }
+
+    /// The store as messages, the first of which names it.
+    fn messages(self, kind: StoreKind, application: &'static str) -> Result<Vec<LogMsg>, VisualError> {
+        let name = |id: &str| StoreId::new(kind, application, id.to_owned());
+        let said = |store: &StoreId| {
+            let arrow = |c: &Chunk| Ok(LogMsg::ArrowMsg(store.clone(), c.to_arrow_msg().map_err(encoding)?));
+            self.chunks.iter().map(arrow).collect::<Result<Vec<_>, _>>()
+        };
+        let bytes = Encoder::encode(said(&name("content"))?.iter().map(Ok)).map_err(encoding)?;
+        let digest: String = Sha256::digest(&bytes).iter().take(16).map(|b| format!("{b:02x}")).collect();
+        let store_id = name(&digest);
+        let source = StoreSource::Other("truegrind".to_owned());
+        let info = StoreInfo::new(store_id.clone(), source);
+        let mut messages = vec![LogMsg::SetStoreInfo(SetStoreInfo { row_id: Tuid::ZERO, info })];
+        messages.extend(said(&store_id)?);
+        Ok(messages)
+    }
+}
