@@ -16,14 +16,19 @@
 //! **Same input, same bytes.** Rerun's own recording stream numbers everything by the clock. [`recording`] numbers it
 //! by a counter instead and names the recording by its content, so the file of the same result is the same file.
 //!
-//! In reading order: [`colour`], [`recording`], `page` (the layout with which a recording opens), `arm` (bodies and
-//! motion of an arm), [`path`], [`measured`].
+//! In reading order: [`colour`], [`recording`], `page` (the layout with which a recording opens), `legend`, `curve`,
+//! `markdown` and `arm` (what pages are made of), [`path`], [`measured`].
 
 pub mod colour;
 pub mod recording;
 mod page;
+mod legend;
+mod curve;
+mod markdown;
 mod arm;
 pub mod path;
 pub mod measured;
 
+pub use measured::{MeasuredScene, dataset_recording, measured_recording};
+pub use path::{PathScene, Workpiece, path_recording};
 pub use recording::{Recording, VisualError};

@@ -46,7 +46,10 @@ pub(super) struct CellArguments {
 
 impl CellArguments {
     /// The cell, the surface and the condition, starting from that of the model.
-    pub(super) fn read(&self, model: Option<&Estimated>) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
+    pub(super) fn read(
+        &self,
+        model: Option<&Estimated>,
+    ) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
         let cell = match &self.cell {
             Some(path) => {
                 Cell::from_toml(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?
@@ -150,7 +153,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         checked.extend(targets.iter().flatten().map(PathBuf::as_path));
     }
     Batch::check(&inputs_of, &checked)?;
-    for (value, name) in [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")] {
+    for (value, name) in
+        [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")]
+    {
         if !(value > 0.0 && value.is_finite()) {
             bail!("{name} {value}: expected a length above 0 in mm");
         }
@@ -179,8 +184,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ..Options::default()
     };
     let work = Work::start(format!("rewriting {} motions", task.listing.motions.len()));
-    let mut planned =
-        on_threads(arguments.common.threads, || plan(&task.listing, arm, &cell, &options))?;
+    let mut planned = on_threads(arguments.common.threads, || plan(&task.listing, arm, &cell, &options))?;
     let rewrite = RewriteOptions {
         mark: Some(Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: hash.clone() }),
         ..RewriteOptions::default()
@@ -272,7 +276,11 @@ fn outputs_of(arguments: &Arguments, programs: &Programs, dry: bool) -> anyhow::
         return Ok(vec![Some(output.clone())]);
     }
     if output.is_file() {
-        bail!("{} is a file, but there are {} programs: name a folder", output.display(), programs.files.len());
+        bail!(
+            "{} is a file, but there are {} programs: name a folder",
+            output.display(),
+            programs.files.len()
+        );
     }
     Ok(programs.files.iter().map(|(p, _)| Some(output.join(files::name(p)))).collect())
 }
@@ -313,7 +321,11 @@ fn already(
                 mark.model
             );
         }
-        eprintln!("note: {}: compensated before with model {}; corrections add up", path.display(), mark.model);
+        eprintln!(
+            "note: {}: compensated before with model {}; corrections add up",
+            path.display(),
+            mark.model
+        );
     }
     Ok(None)
 }

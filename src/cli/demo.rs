@@ -90,10 +90,8 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
         let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
         let planned = plan(&task.listing, &one.estimated, &cell, &bounds);
         let text = one.estimated.to_toml().map_err(anyhow::Error::msg)?;
-        let mark = Mark {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            model: inputs::hash(text.as_bytes()),
-        };
+        let mark =
+            Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: inputs::hash(text.as_bytes()) };
         let rewrite = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
         let edits = task.rewrite(&planned.changes, &rewrite)?;
         let bytes = edits.files[0].edits.apply(&program)?;
@@ -176,16 +174,17 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> anyho
     let object = surface.work_object.base_from_work_object;
     let orientation = path.points[path.points.len() / 2].orientation;
     let near = path.joints[path.joints.len() / 2];
-    let teaching_deg = [Vector3::new(-40.0, 0.0, 0.0), Vector3::new(40.0, 0.0, 0.0), Vector3::new(0.0, 60.0, 0.0)]
-        .iter()
-        .map(|p| {
-            let point = Point3::from(*p);
-            let tip = Pose::from_parts(point.coords.into(), orientation);
-            let flange = object * tip * surface.tool.flange_from_tool.inverse();
-            let joints = inverse.solve_near(&flange, &near)?.joints;
-            Ok(std::array::from_fn(|i| joints[i].to_degrees()))
-        })
-        .collect::<anyhow::Result<Vec<[f64; 6]>>>()?;
+    let teaching_deg =
+        [Vector3::new(-40.0, 0.0, 0.0), Vector3::new(40.0, 0.0, 0.0), Vector3::new(0.0, 60.0, 0.0)]
+            .iter()
+            .map(|p| {
+                let point = Point3::from(*p);
+                let tip = Pose::from_parts(point.coords.into(), orientation);
+                let flange = object * tip * surface.tool.flange_from_tool.inverse();
+                let joints = inverse.solve_near(&flange, &near)?.joints;
+                Ok(std::array::from_fn(|i| joints[i].to_degrees()))
+            })
+            .collect::<anyhow::Result<Vec<[f64; 6]>>>()?;
     Ok(Cell {
         tool: vec![CellFrame {
             name: surface.tool.name.clone(),

@@ -52,7 +52,10 @@ impl Batch {
         for output in outputs.iter().filter(|o| **o != Path::new("-")) {
             for input in inputs {
                 if same(output, input) {
-                    bail!("{} is an input: an input is never overwritten; name another output", output.display());
+                    bail!(
+                        "{} is an input: an input is never overwritten; name another output",
+                        output.display()
+                    );
                 }
             }
             let folder = parent(output);

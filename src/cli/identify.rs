@@ -101,7 +101,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = options(arguments)?;
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
-    let found = on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
+    let found =
+        on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
     drop(work);
     for note in &dataset.notes {
         eprintln!("note: {note}");

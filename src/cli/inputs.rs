@@ -57,7 +57,10 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let arm = Estimated::from_toml(&text)
         .map_err(|e| anyhow!("{argument}: {e}; a model file is what `truegrind identify -o` writes"))?;
     if arm.verdict.status == Judgement::Fail {
-        bail!("{argument}: the fit behind this model failed ({}); it is not used", arm.verdict.reasons.join("; "));
+        bail!(
+            "{argument}: the fit behind this model failed ({}); it is not used",
+            arm.verdict.reasons.join("; ")
+        );
     }
     let hash = hash(text.as_bytes());
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })

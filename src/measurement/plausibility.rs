@@ -2,6 +2,8 @@
 use super::dataset::Dataset;
 use crate::kinematics::model::Model;
 /// temp
-pub fn plausibility(_: &Dataset, _: &Model) -> Vec<String> { Vec::new() }
+pub fn plausibility(_: &Dataset, _: &Model) -> Vec<String> {
+    Vec::new()
+}
 /// temp
 pub fn from_dh_angles(_: &mut Dataset, _: &Model) {}

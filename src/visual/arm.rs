@@ -80,8 +80,12 @@ pub(super) fn draw(
         body(store, &path, link, &poses[0].inverse(), model, length, paint)?;
     }
     path = format!("{path}/flange");
-    store.fixed(path.as_str(), &transform(&model.flange))?;
-    let disc = Cylinder { from: Vector3::z() * (-FLANGE * length), to: Vector3::zeros(), radius: GIRTH[5] * length * 1.3 };
+    still(store, &path, &model.flange)?;
+    let disc = Cylinder {
+        from: Vector3::z() * (-FLANGE * length),
+        to: Vector3::zeros(),
+        radius: GIRTH[5] * length * 1.3,
+    };
     cylinders(store, &format!("{path}/plate"), &[disc], paint.joint)?;
     // The tool: logged where it changes.
     path = format!("{path}/tool");
@@ -139,11 +143,12 @@ pub(super) fn motion(
     store.over(path, (axis, times), columns)
 }
 
-fn transform(pose: &Pose) -> Transform3D {
-    Transform3D::from_translation_rotation(
-        translation(&pose.translation.vector),
-        rerun::Quaternion::from_xyzw(pose.rotation.coords.map(|c| c as f32).into()),
-    )
+/// A pose that does not change.
+pub(super) fn still(store: &mut Store, path: &str, pose: &Pose) -> Result<(), VisualError> {
+    let placed = Transform3D::new()
+        .with_translation(translation(&pose.translation.vector))
+        .with_quaternion(quaternion(&pose.rotation));
+    store.fixed(path, &placed)
 }
 
 fn translation(v: &Vector3<f64>) -> Translation3D {
@@ -241,9 +246,12 @@ fn tool(
         ];
         cylinders(store, &format!("{path}/body"), &bars, paint.tool)?;
     }
-    let tip = Points3D::new([[0.0f32; 3]])
-        .with_radii([(0.5 * radius) as f32])
-        .with_colors([Color::from([paint.tool[0], paint.tool[1], paint.tool[2], 255])]);
+    let tip = Points3D::new([[0.0f32; 3]]).with_radii([(0.5 * radius) as f32]).with_colors([Color::from([
+        paint.tool[0],
+        paint.tool[1],
+        paint.tool[2],
+        255,
+    ])]);
     store.fixed(format!("{path}/tcp"), &tip)
 }
 

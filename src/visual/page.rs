@@ -5,8 +5,8 @@
 
 use nalgebra::{Point3, Vector3};
 use rerun::blueprint::components::{
-    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Enabled, Fps, IncludedContent, PanelState,
-    PlayState, RootContainer, RowShare, TimelineName, ViewClass,
+    ActiveTab, BackgroundKind, ColumnShare, ContainerKind, Corner2D, Enabled, Fps, IncludedContent,
+    PanelState, PlayState, RootContainer, RowShare, TimelineName, ViewClass,
 };
 use rerun::components::{Color, Name, Position3D, Range1D, Vector3D};
 use rerun::datatypes::{self, Float32, Float64, Range2D};
@@ -78,7 +78,8 @@ impl View {
 
     /// A flat drawing over `x` and `y`, y downwards.
     pub(super) fn flat(name: impl Into<String>, shows: &[&str], x: [f64; 2], y: [f64; 2]) -> Self {
-        let bounds = rerun::blueprint::components::VisualBounds2D(Range2D { x_range: x.into(), y_range: y.into() });
+        let bounds =
+            rerun::blueprint::components::VisualBounds2D(Range2D { x_range: x.into(), y_range: y.into() });
         Self::new("2D", name, shows).with("VisualBounds2D", &VisualBounds2D::new(bounds)).with(
             "Background",
             &Background::new(BackgroundKind::SolidColor).with_color(Color::from(BACKGROUND)),

@@ -30,6 +30,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::arm::{self, Paint, Stand};
 use super::colour::{self, BEFORE, Scale};
+use super::legend;
 use super::page::{Eye, Pane, View, bounds, page};
 use super::recording::{Recording, Store, VisualError};
 use crate::compensation::deviation::{Deviation, PathPoint, PathReport};
@@ -231,7 +232,8 @@ fn arms(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(),
 
 fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> {
     let factor = plan.factor();
-    let mut part: Vec<Point3<f64>> = plan.first.points.iter().filter(|p| plan.cuts(p)).map(intended).collect();
+    let mut part: Vec<Point3<f64>> =
+        plan.first.points.iter().filter(|p| plan.cuts(p)).map(intended).collect();
     if let Some(work) = &scene.workpiece {
         part.extend(work.triangles.vertices_mm.iter().map(|v| work.base_from_object * v));
     }
@@ -263,14 +265,13 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
         &["+ /workpiece", "+ /path/**", "+ /tool_axes", "+ /marks/**", "+ /arm/after/**", "+ /arm/before/**"],
         &part_eye,
     );
-    let legend = View::flat("Colour: size of the deviation [mm]", &["+ /legend/**"], [-6.0, 106.0], [-4.0, 8.5]);
     let upper = Pane::Row(vec![
         (1.0, Pane::View(cell_view)),
         (
             1.0,
             Pane::Column(vec![
                 (6.0, Pane::Tabs(vec![Pane::View(drawn), Pane::View(true_scale)])),
-                (1.0, Pane::View(legend)),
+                (1.0, legend::pane("Colour: size of the deviation [mm]")),
             ]),
         ),
     ]);

@@ -46,7 +46,9 @@ pub enum VisualError {
         problem: String,
     },
     /// No viewer answers.
-    #[error("no Rerun viewer takes the recording at {url} ({problem}); start one with `rerun`, or write an .rrd file")]
+    #[error(
+        "no Rerun viewer takes the recording at {url} ({problem}); start one with `rerun`, or write an .rrd file"
+    )]
     Viewer {
         /// Where it was looked for.
         url: String,
@@ -81,9 +83,8 @@ impl Recording {
     /// # Errors
     /// [`VisualError::Address`] and [`VisualError::Viewer`].
     pub fn connect(&self, url: &str) -> Result<(), VisualError> {
-        let address = url
-            .parse()
-            .map_err(|e| VisualError::Address { url: url.to_owned(), problem: format!("{e}") })?;
+        let address =
+            url.parse().map_err(|e| VisualError::Address { url: url.to_owned(), problem: format!("{e}") })?;
         let sink = GrpcSink::new(address);
         sink.send_all(self.messages.clone());
         sink.flush_blocking(PATIENCE)
@@ -201,8 +202,8 @@ impl Store {
         let time = TimeColumn::new_sequence(axis, times.iter().copied());
         let timelines = std::iter::once((*time.timeline().name(), time)).collect();
         let components = columns.into_iter().map(|c| (c.descriptor, c.list_array)).collect();
-        let chunk = Chunk::from_auto_row_ids(self.next_id(), path.into(), timelines, components)
-            .map_err(encoding)?;
+        let chunk =
+            Chunk::from_auto_row_ids(self.next_id(), path.into(), timelines, components).map_err(encoding)?;
         self.chunks.push(chunk);
         Ok(())
     }

@@ -1,31 +1,13 @@
 //! Curves over the path: deviation along the normal, its size, the angle, and the change of the joints.
 
-use rerun::components::{Color, MarkerShape};
-use rerun::{Scalars, SeriesLines, SeriesPoints};
+use rerun::components::MarkerShape;
 
 use super::{AXIS, PathScene, Plan};
 use crate::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
-use crate::visual::colour::{BEFORE, FLAGGED, REFUSED, Rgba, SIGMA, after};
+use crate::visual::colour::{BEFORE, FLAGGED, JOINTS, REFUSED, SIGMA, after};
+use crate::visual::curve::{self, Pen, curve};
 use crate::visual::page::{Pane, View};
 use crate::visual::recording::{Store, VisualError};
-
-/// Colours of the six joints: hues of the palette of Okabe and Ito.
-const JOINTS: [Rgba; 6] = [
-    [0x56, 0xb4, 0xe9, 255],
-    [0xe6, 0x9f, 0x00, 255],
-    [0x00, 0x9e, 0x73, 255],
-    [0xf0, 0xe4, 0x42, 255],
-    [0xd5, 0x5e, 0x00, 255],
-    [0xcc, 0x79, 0xa7, 255],
-];
-
-/// How a curve is drawn.
-#[derive(Clone, Copy)]
-pub(in crate::visual) struct Pen<'a> {
-    pub(in crate::visual) name: &'a str,
-    pub(in crate::visual) colour: Rgba,
-    pub(in crate::visual) width: f32,
-}
 
 /// A figure of a deviation.
 type Figure = fn(&Deviation) -> Option<f64>;
@@ -57,9 +39,8 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     sigma(store, scene)?;
     marks(store, plan)?;
     for (joint, colour) in JOINTS.into_iter().enumerate() {
-        let change = over(plan.first, |p| {
-            Some((p.joints_after?[joint] - p.joints_before?[joint]).to_degrees())
-        });
+        let change =
+            over(plan.first, |p| Some((p.joints_after?[joint] - p.joints_before?[joint]).to_degrees()));
         let name = format!("joint {}", joint + 1);
         let pen = Pen { name: &name, colour, width: 1.4 };
         curve(store, &format!("joints/change/{}", joint + 1), AXIS, pen, &change)?;
@@ -95,13 +76,7 @@ fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
             continue;
         }
         let path = format!("deviation/size/{name}");
-        let style = SeriesPoints::new()
-            .with_names([name])
-            .with_colors([Color::from(colour)])
-            .with_markers([shape])
-            .with_marker_sizes([3.0]);
-        store.fixed(path.as_str(), &style)?;
-        values(store, &path, AXIS, &marked)?;
+        curve::points(store, &path, AXIS, (name, colour, shape), &marked)?;
     }
     Ok(())
 }
@@ -122,33 +97,6 @@ fn has_normals(report: &PathReport) -> bool {
 fn over(report: &PathReport, figure: impl Fn(&PathPoint) -> Option<f64>) -> Vec<(i64, f64)> {
     let at = |p: &PathPoint| figure(p).filter(|v| v.is_finite()).map(|v| (p.index as i64, v));
     report.points.iter().filter_map(at).collect()
-}
-
-/// A curve with its name and colour; nothing where it has no values.
-pub(in crate::visual) fn curve(
-    store: &mut Store,
-    path: &str,
-    axis: &'static str,
-    pen: Pen<'_>,
-    points: &[(i64, f64)],
-) -> Result<(), VisualError> {
-    if points.is_empty() {
-        return Ok(());
-    }
-    let style = SeriesLines::new()
-        .with_names([pen.name])
-        .with_colors([Color::from(pen.colour)])
-        .with_widths([pen.width]);
-    store.fixed(path, &style)?;
-    values(store, path, axis, points)
-}
-
-fn values(store: &mut Store, path: &str, axis: &'static str, points: &[(i64, f64)]) -> Result<(), VisualError> {
-    let times: Vec<i64> = points.iter().map(|(t, _)| *t).collect();
-    let columns = Scalars::new(points.iter().map(|(_, v)| *v))
-        .columns_of_unit_batches()
-        .map_err(|e| VisualError::Encoding(e.to_string()))?;
-    store.over(path, (axis, &times), columns)
 }
 
 /// The curves' part of the page.

@@ -2,13 +2,12 @@
 
 use nalgebra::Point3;
 use rerun::components::{Color, Radius};
-use rerun::{Arrows3D, LineStrips2D, LineStrips3D, Mesh3D, Points2D, Points3D};
+use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 
 use super::{PathScene, Plan, intended, reached};
 use crate::compensation::deviation::{Deviation, PathPoint, PathReport, Status};
-use crate::visual::colour::{
-    BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, STEPS, TOOL, TRAVEL, WORKPIECE, after,
-};
+use crate::visual::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
+use crate::visual::legend;
 use crate::visual::recording::{Store, VisualError};
 
 /// Tool axes that are drawn at most.
@@ -37,7 +36,7 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     }
     tool_axes(store, plan)?;
     marks(store, plan)?;
-    legend(store, plan)
+    legend::draw(store, &plan.scale)
 }
 
 fn workpiece(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError> {
@@ -72,9 +71,10 @@ fn run(
         if coloured.is_empty() {
             continue;
         }
-        let lines = LineStrips3D::new(coloured.iter().map(|(_, strip)| strip.iter().map(xyz).collect::<Vec<_>>()))
-            .with_colors(coloured.iter().map(|(step, _)| Color::from(plan.scale.colour(*step))))
-            .with_radii([Radius::new_ui_points(width)]);
+        let lines =
+            LineStrips3D::new(coloured.iter().map(|(_, strip)| strip.iter().map(xyz).collect::<Vec<_>>()))
+                .with_colors(coloured.iter().map(|(step, _)| Color::from(plan.scale.colour(*step))))
+                .with_radii([Radius::new_ui_points(width)]);
         store.fixed(format!("{folder}/{name}"), &lines)?;
         let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
         let Some((point, deviation)) = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm())) else {
@@ -197,25 +197,6 @@ fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
     };
     let reason = first.reason.as_deref().map(|r| format!(": {r}")).unwrap_or_default();
     (intended(middle), format!("{place} {status}{reason}"))
-}
-
-/// A bar of all colours over 0 to 100, with its figures below.
-fn legend(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
-    let edge = |step: usize| 100.0 * step as f32 / STEPS as f32;
-    let bar = LineStrips2D::new((0..STEPS).map(|s| [[edge(s), 0.0], [edge(s + 1), 0.0]]))
-        .with_colors((0..STEPS).map(|s| Color::from(plan.scale.colour(s))))
-        .with_radii([2.0f32]);
-    store.fixed("legend/bar", &bar)?;
-    let ticks = [0.0, 0.25, 0.5, 0.75, 1.0];
-    let figures = Points2D::new(ticks.map(|t| [100.0 * t, 2.0]))
-        .with_radii([Radius::new_ui_points(1.0)])
-        .with_colors([Color::from(INTENDED)])
-        .with_labels(ticks.map(|t| {
-            let figure = f64::from(t) * plan.scale.top_mm;
-            format!("{}", (figure * 1e6).round() / 1e6)
-        }))
-        .with_show_labels(true);
-    store.fixed("legend/figures", &figures)
 }
 
 fn xyz(p: &Point3<f64>) -> [f32; 3] {

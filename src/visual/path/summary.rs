@@ -6,6 +6,7 @@ use rerun::TextDocument;
 
 use super::{PathScene, Plan};
 use crate::compensation::deviation::{After, Block, PathReport, Status};
+use crate::visual::markdown::{cell, line, number};
 use crate::visual::recording::{Store, VisualError};
 
 pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
@@ -33,7 +34,8 @@ fn block(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
     for report in scene.reports {
         columns.push((format!("after · {}", report.model), report.block(|p| p.after)));
     }
-    let normal = plan.first.points.iter().any(|p| p.before.or(p.after).is_some_and(|d| d.normal_mm.is_some()));
+    let normal =
+        plan.first.points.iter().any(|p| p.before.or(p.after).is_some_and(|d| d.normal_mm.is_some()));
     let what = if normal { "along the normal" } else { "in size" };
     let _ = writeln!(text, "## Deviation {what} [mm]\n");
     let heads: Vec<String> = columns.iter().map(|(name, _)| cell(name)).collect();
@@ -113,7 +115,11 @@ fn fate(text: &mut String, report: &PathReport) {
 fn colours(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
     let factor = plan.factor();
     let _ = writeln!(text, "## What is drawn\n");
-    let ghost = if plan.exaggerated.is_empty() { "" } else { " Orange, see-through: the same arm before, its deviation " };
+    let ghost = if plan.exaggerated.is_empty() {
+        ""
+    } else {
+        " Orange, see-through: the same arm before, its deviation "
+    };
     let ghost = if ghost.is_empty() { String::new() } else { format!("{ghost}{factor}.") };
     let _ = writeln!(
         text,
@@ -136,26 +142,4 @@ fn colours(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
          Lengths are mm, in space too, in the base of the arm with z up. Time counts path points from 0.",
         after = if scene.reports.len() > 1 { "other colours after, by model" } else { "blue after" }
     );
-}
-
-/// A figure in mm, or a dash where there is none.
-pub(in crate::visual) fn number(value: Option<f64>) -> String {
-    value.filter(|v| v.is_finite()).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
-}
-
-/// Text from outside as one line of Markdown.
-pub(in crate::visual) fn line(text: &str) -> String {
-    let mut out = String::new();
-    for c in text.chars() {
-        if matches!(c, '*' | '_' | '`' | '#' | '<' | '[' | '\\') {
-            out.push('\\');
-        }
-        out.push(if c.is_control() { ' ' } else { c });
-    }
-    out
-}
-
-/// The same, in a table.
-pub(in crate::visual) fn cell(text: &str) -> String {
-    line(text).replace('|', "\\|")
 }

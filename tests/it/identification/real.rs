@@ -19,8 +19,8 @@ fn data(name: &str) -> Option<(String, Vec<u8>)> {
 }
 
 fn shuffled(dataset: &Dataset, seed: u64) -> (Vec<usize>, Vec<usize>) {
-    use rand::seq::SliceRandom;
     use rand::SeedableRng;
+    use rand::seq::SliceRandom;
     let mut all: Vec<usize> = (0..dataset.rows.len()).collect();
     all.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
     let test = all.split_off(all.len() * 8 / 10);

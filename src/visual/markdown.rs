@@ -1,0 +1,32 @@
+//! Figures and foreign text in Markdown.
+
+/// A figure in mm, or a dash where there is none.
+pub(super) fn number(value: Option<f64>) -> String {
+    value.filter(|v| v.is_finite()).map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
+}
+
+/// Text from outside as one line of Markdown.
+pub(super) fn line(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        if matches!(c, '*' | '_' | '`' | '#' | '<' | '[' | '\\') {
+            out.push('\\');
+        }
+        out.push(if c.is_control() { ' ' } else { c });
+    }
+    out
+}
+
+/// The same, in a table.
+pub(super) fn cell(text: &str) -> String {
+    line(text).replace('|', "\\|")
+}
+
+/// A value with its standard deviation, to two digits of that.
+pub(super) fn with_sigma(value: f64, sigma: f64) -> String {
+    if !(sigma > 0.0) || !sigma.is_finite() {
+        return format!("{value:.4}");
+    }
+    let decimals = (1.0 - sigma.log10().floor()).clamp(0.0, 7.0) as usize;
+    format!("{value:.decimals$} ± {sigma:.decimals$}")
+}
