@@ -76,9 +76,8 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
             let contact = task.surface.and_then(|s| s.foot(&Point3::from(first.told.translation.vector)));
             let on_surface = contact.as_ref().is_some_and(|f| f.normal_mm.abs() < ON_SURFACE_MM);
             let normal: Option<Vector3<f64>> = contact.map(|f| f.contact.normal.into_inner());
-            let deviation = |reached: &Pose| {
-                Deviation::between(&first.told, reached, &Pose::identity(), normal.as_ref())
-            };
+            let deviation =
+                |reached: &Pose| Deviation::between(&first.told, reached, &Pose::identity(), normal.as_ref());
             let second = match (&after, &partners) {
                 (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
                 _ => None,
@@ -99,7 +98,9 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 joints_after: second.map(|s| s.joints),
                 before: Some(deviation(&first.reached)),
                 after: second.map(|s| deviation(&s.reached)),
-                sigma_mm: acting.knowledge.map(|k| k.position_sigma_mm(&posed, &joints, &first.flange_from_tool)),
+                sigma_mm: acting
+                    .knowledge
+                    .map(|k| k.position_sigma_mm(&posed, &joints, &first.flange_from_tool)),
                 outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,

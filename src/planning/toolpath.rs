@@ -76,9 +76,8 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     let first = points.first().ok_or_else(|| ToolpathError::Empty { name: file.name.clone() })?;
     let inverse = Inverse::new(nominal, &Condition::default(), nominal);
     let tool = file.tool.flange_from_tool;
-    let flange = |p: &PathPoint| {
-        file.work_object.base_from_work_object * p.work_object_from_tool() * tool.inverse()
-    };
+    let flange =
+        |p: &PathPoint| file.work_object.base_from_work_object * p.work_object_from_tool() * tool.inverse();
     let flanges: Vec<Pose> = points.iter().map(flange).collect();
     let mut best: Option<(f64, Vec<Joints>)> = None;
     let mut farthest: (usize, InverseError) = (0, InverseError::Unreachable { beyond_mm: f64::NAN });
@@ -163,7 +162,8 @@ fn draft(
             let cutting = point.kind == PointKind::Cut;
             let next = points.get(i + 1).map(|p| (p.kind, p.pass));
             let comes_down = next.is_some_and(|(kind, _)| kind == PointKind::Cut) && !cutting;
-            let pass_begins = cutting && points.get(i.wrapping_sub(1)).is_none_or(|p| p.kind != PointKind::Cut);
+            let pass_begins =
+                cutting && points.get(i.wrapping_sub(1)).is_none_or(|p| p.kind != PointKind::Cut);
             Step {
                 kind: if i == 0 { MotionKind::Joint } else { MotionKind::Linear },
                 to: TargetValue::Cartesian(target),
