@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::cell::{Cell, FrameOrigin, taught_frame, taught_tcp};
 use crate::kinematics::model::{Joints, Posed};
-use crate::math::se3::Pose;
+use crate::kinematics::estimated::{Carried, Estimated};
+use crate::math::se3::{Pose, difference};
 use crate::program::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
 
 /// Frames between flange and target, for either kind of cell.
@@ -55,6 +56,8 @@ pub struct Mounted {
     pub told: Mounting,
     /// As it is, as far as is known.
     pub real: Mounting,
+    /// How a taught work object moves with the arm's parameters; absent for any other.
+    pub carried: Option<Carried>,
     /// What was assumed, one sentence each.
     pub notes: Vec<String>,
 }
@@ -69,6 +72,7 @@ pub fn mount(
     cell: &Cell,
     nominal: &Posed<'_>,
     estimated: &Posed<'_>,
+    knowledge: Option<&Estimated>,
     usual: &Joints,
 ) -> Mounted {
     let told = Mounting {
@@ -78,6 +82,7 @@ pub fn mount(
     };
     let mut real = told;
     let mut notes = Vec::new();
+    let mut carried = None;
     let radians = |deg: &[[f64; 6]]| -> Vec<Joints> {
         deg.iter().map(|q| Joints::from_fn(|i, _| q[i].to_radians())).collect()
     };
@@ -115,6 +120,8 @@ pub fn mount(
                     let shift = (pose.translation.vector - told.object.translation.vector).norm();
                     let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
                     real.object = pose;
+                    carried = knowledge
+                        .and_then(|k| carried_frame(k, estimated, &teaching, &points, &pose, &real.tool));
                     notes.push(format!(
                         "work object {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"
                     ));
@@ -134,7 +141,34 @@ pub fn mount(
             object_estimate(&told, nominal, estimated, usual)
         )),
     }
-    Mounted { told, real, notes }
+    Mounted { told, real, carried, notes }
+}
+
+/// How a frame through three taught points moves with each parameter of the arm: the points' velocities, carried
+/// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
+fn carried_frame(
+    knowledge: &Estimated,
+    estimated: &Posed<'_>,
+    teaching: &[Joints],
+    points: &[Point3<f64>; 3],
+    frame: &Pose,
+    tool: &Pose,
+) -> Option<Carried> {
+    const STEP: f64 = 1e-4;
+    let jacobians: Vec<_> =
+        teaching.iter().take(3).map(|q| knowledge.position_jacobian(estimated, q, tool)).collect();
+    let twists = (0..knowledge.order.len())
+        .map(|k| {
+            let moved_by = |step: f64| {
+                taught_frame(&std::array::from_fn(|i| {
+                    let j = &jacobians[i];
+                    points[i] + Vector3::new(j[(0, k)], j[(1, k)], j[(2, k)]) * step
+                }))
+            };
+            Some(difference(&moved_by(-STEP)?, &moved_by(STEP)?) / (2.0 * STEP))
+        })
+        .collect::<Option<Vec<_>>>()?;
+    Some(Carried { origin_mm: frame.translation.vector, twists })
 }
 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model.

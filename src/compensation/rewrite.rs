@@ -200,7 +200,7 @@ impl Mountings {
             let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else { continue };
             let nominal = arms.nominal.arm();
             let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
-            out.list.push(mount((t, tv), (o, ov), cell, nominal, arms.estimated.arm(), &usual));
+            out.list.push(mount((t, tv), (o, ov), cell, nominal, arms.estimated.arm(), arms.knowledge, &usual));
             out.pairs.push((tool, object));
         }
         out
@@ -410,7 +410,9 @@ fn solve_target(
     let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
     let (sigma_mm, outside) = match arms.knowledge {
         Some(knowledge) => {
-            (knowledge.position_sigma_mm(acting, &after, &flange_from_tool), knowledge.region.outside(&after))
+            let carried = mounted.carried.as_ref();
+            let sigma = knowledge.position_sigma_mm(acting, &after, &flange_from_tool, carried);
+            (sigma, knowledge.region.outside(&after))
         }
         None => (0.0, None),
     };

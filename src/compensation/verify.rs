@@ -10,7 +10,7 @@ use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use super::rewrite::{Arms, Mountings, configured, monitored};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
-use crate::kinematics::estimated::Estimated;
+use crate::kinematics::estimated::{Carried, Estimated};
 use crate::kinematics::model::{Joints, Model};
 use crate::math::se3::Pose;
 use crate::program::motion::{Listing, MotionKind, Reason, TargetValue};
@@ -27,6 +27,7 @@ struct Run {
     reached: Pose,
     base_from_object: Pose,
     flange_from_tool: Pose,
+    carried: Option<Carried>,
 }
 
 /// The arm that runs a program.
@@ -63,7 +64,8 @@ pub struct Judged<'a> {
 
 /// Runs a program on an arm.
 pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
-    let arms = Arms::simulated(acting.nominal, acting.model, &acting.condition);
+    let mut arms = Arms::simulated(acting.nominal, acting.model, &acting.condition);
+    arms.knowledge = acting.knowledge;
     let before = run(task.original, &arms, task.cell);
     let after = task.rewritten.map(|listing| (listing, run(listing, &arms, task.cell)));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
@@ -100,7 +102,7 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 after: second.map(|s| deviation(&s.reached)),
                 sigma_mm: acting
                     .knowledge
-                    .map(|k| k.position_sigma_mm(&posed, &joints, &first.flange_from_tool)),
+                    .map(|k| k.position_sigma_mm(&posed, &joints, &first.flange_from_tool, first.carried.as_ref())),
                 outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,
@@ -166,6 +168,7 @@ fn run_motion(
         reached: mounted.real.target_of(&flange),
         base_from_object: mounted.real.base_from_object(&flange),
         flange_from_tool: mounted.real.flange_from_tool(&flange),
+        carried: mounted.carried.clone(),
     })
 }
 

@@ -128,6 +128,15 @@ pub struct Estimated {
     pub condition: Condition,
 }
 
+/// A frame that was taught with the arm, so that it moves with the arm's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carried {
+    /// Its origin in the base [mm].
+    pub origin_mm: Vector3<f64>,
+    /// Its twist in the base per unit of each parameter of the covariance: velocity of the origin, angular velocity.
+    pub twists: Vec<Vector6<f64>>,
+}
+
 impl Estimated {
     /// Covariance of the position of a point on the flange [mm²], 3 × 3 in the base.
     pub fn position_covariance(
@@ -143,7 +152,15 @@ impl Estimated {
 
     /// Predicted standard deviation of the position of a point on the flange [mm]: √trace(J Σ Jᵀ), the double sum of
     /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
-    pub fn position_sigma_mm(&self, arm: &Posed<'_>, q: &Joints, flange_from_tool: &Pose) -> f64 {
+    ///
+    /// With `carried`, relative to a frame that the arm itself placed: what moves point and frame alike does not count.
+    pub fn position_sigma_mm(
+        &self,
+        arm: &Posed<'_>,
+        q: &Joints,
+        flange_from_tool: &Pose,
+        carried: Option<&Carried>,
+    ) -> f64 {
         let frames = arm.frames(q);
         let flange = frames.last() * arm.model.flange;
         let point: [f64; 3] = (flange * flange_from_tool).translation.vector.into();
@@ -161,7 +178,13 @@ impl Estimated {
             };
             twist.fixed_rows::<3>(0).into_owned()
         };
-        let velocities: Vec<Vector3<f64>> = self.order.iter().map(velocity).collect();
+        let mut velocities: Vec<Vector3<f64>> = self.order.iter().map(velocity).collect();
+        if let Some(carried) = carried {
+            let lever = Vector3::from(point) - carried.origin_mm;
+            for (v, twist) in velocities.iter_mut().zip(&carried.twists) {
+                *v -= twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
+            }
+        }
         let mut variance = 0.0;
         for (i, v) in velocities.iter().enumerate() {
             variance += self.covariance[(i, i)] * v.norm_squared();

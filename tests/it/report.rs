@@ -3,6 +3,10 @@
 mod compensation;
 mod deviation;
 mod examples;
+mod formats;
 mod identification;
+mod numbers;
+mod page;
+mod plots;
 mod robots;
 mod study;

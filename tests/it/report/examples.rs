@@ -7,6 +7,7 @@ use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::start::starts;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::measurement::dataset::Dataset;
+use truegrind::measurement::split::Split;
 use truegrind::measurement::import;
 use truegrind::report::document::Document;
 use truegrind::report::format::html;
@@ -15,8 +16,9 @@ use truegrind::robots;
 const ROUNDED: &[u8] = include_bytes!("../../data/irb120-rounded.csv");
 
 /// Every fifth row is held out.
-pub(super) fn fifth(dataset: &Dataset) -> (Vec<usize>, Vec<usize>) {
-    (0..dataset.rows.len()).partition(|i| i % 5 != 2)
+pub(super) fn fifth(dataset: &Dataset) -> Split {
+    let (train, test) = (0..dataset.rows.len()).partition(|i| i % 5 != 2);
+    Split { train, test }
 }
 
 /// The shipped, coarsely rounded rows of an IRB 120.
