@@ -100,7 +100,13 @@ fn the_json_is_the_contract_field_by_field() {
             assert_eq!(
                 keys(motion),
                 BTreeSet::from([
-                    "line", "instruction", "status", "reason", "before_mm", "after_mm", "sigma_mm"
+                    "line",
+                    "instruction",
+                    "status",
+                    "reason",
+                    "before_mm",
+                    "after_mm",
+                    "sigma_mm"
                 ])
             );
             assert!(["changed", "left", "refused", "flagged"].contains(&motion["status"].as_str().unwrap()));
@@ -153,7 +159,10 @@ fn the_table_has_a_row_for_each_motion_and_dashes_for_what_is_not_known() {
     assert_eq!(table.rows.len(), 7);
     let text = terminal::table(&table, 220);
     let line = text.lines().find(|line| line.contains("MoveAbsJ")).unwrap();
-    assert!(line.starts_with("grind.mod     5  MoveAbsJ     ○ left             –                         –"), "{line}");
+    assert!(
+        line.starts_with("grind.mod     5  MoveAbsJ     ○ left             –                         –"),
+        "{line}"
+    );
     let line = text.lines().find(|line| line.contains("MoveJ")).unwrap();
     assert!(line.contains("✓ changed        1.500                    0.0004               0.120"), "{line}");
     // One file needs no column for it.
@@ -167,7 +176,9 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
         view::coverage(&plan),
         "7 motions: 1 changed (14.3 %), 2 flagged (28.6 %), 2 refused (28.6 %), 2 left (28.6 %)"
     );
-    plan.outcomes = (0..100_000).map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None)).collect();
+    plan.outcomes = (0..100_000)
+        .map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None))
+        .collect();
     assert_eq!(
         view::coverage(&plan),
         "100000 motions: 99999 changed (> 99.9 %), 0 flagged (0 %), 1 refused (< 0.1 %), 0 left (0 %)"
