@@ -142,28 +142,55 @@ pub fn short_table(report: &PathReport) -> Table {
     table
 }
 
-/// Points that were refused, flagged or left, in the order of the path.
+/// Points that were refused, flagged or left, in the order of the path. Neighbours with the same fate and the same kind
+/// of reason share a row, which gives the reason of the first.
 pub fn flag_table(report: &PathReport) -> Table {
     let mut table = Table::new(
         "Points to look at",
         vec![
-            Column::count("line", "Line"),
-            Column::count("index", "Point"),
-            Column::text("instruction", "Instruction"),
+            Column::text("lines", "Lines"),
+            Column::text("points", "Points"),
+            Column::count("count", "Count"),
             Column::text("status", "Status"),
             Column::text("reason", "Reason"),
         ],
     );
-    for point in report.points.iter().filter(|point| point.status != Fate::Changed) {
+    let kind = |point: &PathPoint| (point.status, point.reason.as_deref().map(without_figures));
+    for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
+        let [first, ..] = run else { continue };
+        if first.status == Fate::Changed {
+            continue;
+        }
+        let reason = first.reason.as_ref().map(|reason| {
+            let same = run.iter().all(|point| point.reason.as_ref() == Some(reason));
+            if same { reason.clone() } else { format!("{reason} (the first)") }
+        });
+        let lines = run.iter().map(|point| point.line as usize).filter(|line| *line > 0);
         table.push([
-            line(point),
-            point.index.into(),
-            point.instruction.as_str().into(),
-            fate(point.status),
-            point.reason.clone().into(),
+            range(lines).into(),
+            range(run.iter().map(|point| point.index)).into(),
+            run.len().into(),
+            fate(first.status),
+            reason.into(),
         ]);
     }
     table
+}
+
+/// First and last of rising numbers; `None` of none.
+fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
+    let (low, high) = numbers.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
+    match low.cmp(&high) {
+        std::cmp::Ordering::Less => Some(format!("{low}–{high}")),
+        std::cmp::Ordering::Equal => Some(low.to_string()),
+        std::cmp::Ordering::Greater => None,
+    }
+}
+
+/// A reason without its measured figures, which have a decimal point; numbers of joints stay.
+fn without_figures(reason: &str) -> String {
+    let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
+    reason.split(' ').filter(plain).collect::<Vec<_>>().join(" ")
 }
 
 /// The page: one section per program. Reports of one program with several models stand together.
@@ -495,7 +522,10 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
 fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     let mut figures = Vec::new();
     let note = |report: &PathReport, side: Side, what: &str| match report.block(side) {
-        Some(block) => format!("{what}, mean |d| {:.3} mm", block.all.mean_absolute),
+        Some(block) => {
+            let decimals = if what == meaning(After::PredictedRemainder) { 4 } else { 3 };
+            format!("{what}, mean |d| {:.decimals$} mm", block.all.mean_absolute)
+        }
         None => what.to_owned(),
     };
     let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);

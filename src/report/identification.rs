@@ -111,7 +111,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             .observability
             .iter()
             .enumerate()
-            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank == report.parameters).then_some(value))))
+            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank > 0).then_some(value))))
             .collect();
         let combinations: Vec<Value> = report
             .combinations
@@ -124,6 +124,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             "parameters": report.parameters,
             "rank": report.rank,
             "condition": report.condition,
+            "determined_condition": report.determined_condition,
             "singular_values": report.singular_values,
             "observability": observability,
             "held_by_priors": report.held_by_priors,
@@ -181,16 +182,11 @@ fn is_of_arm(parameter: &EstimatedParameter) -> bool {
     parameter.name.starts_with("link") || parameter.name.starts_with("effect")
 }
 
-/// A parameter in the unit that people read: degrees for radians.
-fn readable(parameter: &EstimatedParameter) -> EstimatedParameter {
-    let (factor, unit) = if parameter.unit == "rad" {
-        (1f64.to_degrees(), "°".to_owned())
-    } else {
-        (1.0, parameter.unit.clone())
-    };
+/// A parameter with all its numbers times `factor`.
+fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
     EstimatedParameter {
         name: parameter.name.clone(),
-        unit,
+        unit: unit.to_owned(),
         nominal: parameter.nominal * factor,
         value: parameter.value * factor,
         sigma: parameter.sigma * factor,
@@ -199,13 +195,27 @@ fn readable(parameter: &EstimatedParameter) -> EstimatedParameter {
     }
 }
 
+/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
+fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
+    let (factor, unit) = match parameter.unit.as_str() {
+        "rad" => (1f64.to_degrees(), "°"),
+        "1" => (1e6, "ppm"),
+        "1/K" => (1e6, "ppm/K"),
+        "rad/(N m)" => (1e6, "µrad/(N m)"),
+        unit => (1.0, unit),
+    };
+    in_unit(parameter, factor, unit)
+}
+
 fn parameter_json(parameter: &EstimatedParameter) -> Value {
-    let shown = readable(parameter);
-    let unit = if shown.unit == "°" { "deg" } else { &shown.unit };
+    let shown = match parameter.unit.as_str() {
+        "rad" => in_unit(parameter, 1f64.to_degrees(), "deg"),
+        unit => in_unit(parameter, 1.0, unit),
+    };
     let of_arm = is_of_arm(parameter);
     json!({
         "name": shown.name,
-        "unit": unit,
+        "unit": shown.unit,
         "nominal": of_arm.then_some(shown.nominal),
         "value": shown.value,
         "sigma": shown.sigma,

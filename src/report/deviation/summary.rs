@@ -20,23 +20,31 @@ pub fn registered_table(reports: &[PathReport]) -> Table {
 
 /// [`block_table`], with a column for the program where there are several.
 pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
+    // The unit stands in the title, so that the figures and what they must be seen beside fit one line.
+    let remainders = reports.iter().all(|report| report.after == After::PredictedRemainder);
+    let decimals = if remainders && reports.iter().any(|report| has(report, AFTER)) { 4 } else { 3 };
+    let number = |key: &str, heading: &str, decimals| Column::number(key, heading, "", decimals);
     let mut columns = first_columns(programs);
-    columns.extend((1..=5).map(|point| Column::number(format!("p{point}_mm"), format!("P{point}"), "mm", 3)));
+    let kind = columns.pop();
+    columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"), decimals)));
     columns.extend([
-        Column::number("mean_mm", "mean", "mm", 3),
-        Column::number("mean_absolute_mm", "mean |d|", "mm", 3),
-        Column::number("standard_deviation_mm", "SD", "mm", 3),
-        Column::number("max_mm", "max", "mm", 3),
-        Column::number("sigma_mm", "1σ", "mm", 3),
-        Column::number("model_held_out_rmse_mm", "held-out", "mm", 3),
+        number("mean_mm", "mean", decimals),
+        number("mean_absolute_mm", "mean |d|", decimals),
+        number("standard_deviation_mm", "SD", decimals),
+        number("max_mm", "max", decimals),
+        number("sigma_mm", "1σ", 3),
+        number("model_held_out_rmse_mm", "held-out", 3),
     ]);
-    let mut table = Table::new("Deviation of path points", columns);
+    columns.extend(kind);
+    let mut table = Table::new("Deviation of path points [mm]", columns);
     for row in rows(reports, |report, side| report.block(side)) {
         let Block { five_mm, all } = row.value;
         let mut cells = row.first_cells(programs);
+        let kind = cells.pop();
         cells.extend(five_mm.map(Cell::from));
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
         cells.extend([sigma_rms(row.report).into(), row.report.held_out_mm.into()]);
+        cells.extend(kind);
         table.push(cells);
     }
     let (mut with, mut without) = (0, 0);
@@ -138,7 +146,7 @@ fn rows<'a, T: PartialEq>(
             let path = if agreed {
                 "before compensation".to_owned()
             } else {
-                format!("before compensation, under {}", report.model)
+                format!("before, under {}", report.model)
             };
             let kind = match report.after {
                 After::PredictedRemainder => "predicted",
