@@ -39,7 +39,7 @@ pub(super) struct CellArguments {
     /// The surface that is ground, for deviations along its normal.
     #[arg(long, value_name = "SURFACE.toml")]
     pub(super) surface: Option<PathBuf>,
-    /// Mass at the flange while the program runs [kg].
+    /// Mass at the flange while the program runs (kg).
     #[arg(long, value_name = "KG")]
     pub(super) payload: Option<f64>,
 }
@@ -81,10 +81,10 @@ pub(super) struct Arguments {
     /// Moved robtargets or joint targets.
     #[arg(long, value_enum, default_value_t = EmitArgument::Targets)]
     emit: EmitArgument,
-    /// How far the path between two targets may leave the intended line [mm].
+    /// How far the path between two targets may leave the intended line (mm).
     #[arg(long, value_name = "MM", default_value_t = 0.05)]
     tolerance: f64,
-    /// Largest correction that is written [mm]; a larger one is refused.
+    /// Largest correction that is written (mm); a larger one is refused.
     #[arg(long, value_name = "MM", default_value_t = 10.0)]
     max_correction: f64,
     /// Rewrite joint targets (MoveAbsJ) too.

@@ -134,7 +134,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     batch.add(place("deviation.csv"), format::csv::table(&deviation_view::table(&reports[0])));
     batch.add(place("deviation.md"), format::markdown::document(&page));
     batch.add(place("deviation.html"), format::html::document(&page));
-    batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))? + "\n");
+    batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))?);
     let identification = identification_view::document(&found[0], &dataset);
     batch.add(place("identification.html"), format::html::document(&identification));
     #[cfg(feature = "visual")]

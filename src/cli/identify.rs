@@ -75,13 +75,13 @@ pub(super) struct Arguments {
     /// Do not sharpen rounded angles by the controller's read-out.
     #[arg(long)]
     raw_columns: bool,
-    /// The fit passes only with a held-out RMSE up to this [mm].
+    /// The fit passes only with a held-out RMSE up to this (mm).
     #[arg(long, value_name = "MM")]
     limit_rmse: Option<f64>,
-    /// The fit passes only with a held-out maximum up to this [mm].
+    /// The fit passes only with a held-out maximum up to this (mm).
     #[arg(long, value_name = "MM")]
     limit_max: Option<f64>,
-    /// Tolerance of link lengths [mm], as a prior.
+    /// Tolerance of link lengths (mm), as a prior.
     #[arg(long, value_name = "MM")]
     tolerance_length: Option<f64>,
     /// Tolerance of link angles and joint offsets [°], as a prior.

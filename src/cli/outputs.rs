@@ -52,7 +52,7 @@ impl Outputs {
         json: &serde_json::Value,
     ) -> anyhow::Result<()> {
         if let Some(path) = &self.json {
-            batch.add(path, format::json::text(json)? + "\n");
+            batch.add(path, format::json::text(json)?);
         }
         if let Some(path) = &self.csv {
             batch.add(path, format::csv::table(table));

@@ -15,11 +15,11 @@ use crate::program::motion::MotionKind;
 /// How far the tool is off at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// Reached minus intended, in the axes of the work object [mm].
+    /// Reached minus intended, in the axes of the work object (mm).
     pub vector_mm: Vector3<f64>,
-    /// Angle between reached and intended orientation [rad].
+    /// Angle between reached and intended orientation (rad).
     pub angle_rad: f64,
-    /// Signed along the outward surface normal [mm]; `None` where no surface is known.
+    /// Signed along the outward surface normal (mm); `None` where no surface is known.
     pub normal_mm: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ impl Deviation {
         }
     }
 
-    /// Length of the vector [mm].
+    /// Length of the vector (mm).
     pub fn norm_mm(&self) -> f64 {
         self.vector_mm.norm()
     }
@@ -95,7 +95,7 @@ pub struct PathPoint {
     pub before: Option<Deviation>,
     /// Where the arm goes with the rewritten program.
     pub after: Option<Deviation>,
-    /// Predicted standard deviation of the position [mm], from the covariance of the estimate.
+    /// Predicted standard deviation of the position (mm), from the covariance of the estimate.
     pub sigma_mm: Option<f64>,
     /// How the point leaves the region in which the arm was measured.
     pub outside: Option<Outside>,
@@ -133,9 +133,9 @@ pub struct PathReport {
 /// The summary block of ltlm-2024 Table 8: five points, mean, SD; TRAPS of that table: its mean is signed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Block {
-    /// Signed deviations at five points spread evenly over the cut [mm].
+    /// Signed deviations at five points spread evenly over the cut (mm).
     pub five_mm: [f64; 5],
-    /// Over all cut points: signed mean, mean absolute, standard deviation (n − 1), maximum [mm].
+    /// Over all cut points: signed mean, mean absolute, standard deviation (n − 1), maximum (mm).
     pub all: ErrorSummary,
 }
 
@@ -160,7 +160,7 @@ impl PathReport {
     }
 
     /// What remains of the deviations after the rigid motion that fits them best: the shape error of the path, when
-    /// the base was not measured in the work object. RMS [mm] of the vectors; `None` for fewer than three points.
+    /// the base was not measured in the work object. RMS (mm) of the vectors; `None` for fewer than three points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
         let pairs: Vec<(Point3<f64>, Point3<f64>)> = self
             .points

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cell::{Cell, FrameOrigin, taught_frame, taught_tcp};
-use crate::kinematics::model::{Joints, Posed};
 use crate::kinematics::estimated::{Carried, Estimated};
+use crate::kinematics::model::{Joints, Posed};
 use crate::math::se3::{Pose, difference};
 use crate::program::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
 

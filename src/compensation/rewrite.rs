@@ -43,11 +43,11 @@ pub enum Emit {
 pub struct Options {
     /// What is written.
     pub emit: Emit,
-    /// How far the path between two targets may leave the intended line [mm].
+    /// How far the path between two targets may leave the intended line (mm).
     pub tolerance_mm: f64,
-    /// Largest correction of a position that is written [mm].
+    /// Largest correction of a position that is written (mm).
     pub max_correction_mm: f64,
-    /// Largest correction of an orientation that is written [rad].
+    /// Largest correction of an orientation that is written (rad).
     pub max_turn_rad: f64,
     /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
     pub min_singularity: f64,
@@ -83,13 +83,13 @@ pub struct MotionOutcome {
     pub status: Status,
     /// Why.
     pub reason: Option<Why>,
-    /// Deviation of its end before and after [mm].
+    /// Deviation of its end before and after (mm).
     pub before_mm: Option<f64>,
     /// See `before_mm`; a predicted remainder.
     pub after_mm: Option<f64>,
-    /// Predicted standard deviation [mm].
+    /// Predicted standard deviation (mm).
     pub sigma_mm: Option<f64>,
-    /// Largest bend of the path to this end that is left between targets [mm].
+    /// Largest bend of the path to this end that is left between targets (mm).
     pub bend_mm: Option<f64>,
     /// Targets put in before it.
     pub inserted: usize,
@@ -200,7 +200,15 @@ impl Mountings {
             let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else { continue };
             let nominal = arms.nominal.arm();
             let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
-            out.list.push(mount((t, tv), (o, ov), cell, nominal, arms.estimated.arm(), arms.knowledge, &usual));
+            out.list.push(mount(
+                (t, tv),
+                (o, ov),
+                cell,
+                nominal,
+                arms.estimated.arm(),
+                arms.knowledge,
+                &usual,
+            ));
             out.pairs.push((tool, object));
         }
         out
@@ -673,7 +681,7 @@ pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit) -> Extra {
     }
 }
 
-/// Distance between two positions [mm].
+/// Distance between two positions (mm).
 pub(super) fn gap(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     (a - b).norm()
 }

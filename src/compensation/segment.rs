@@ -51,10 +51,10 @@ fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, arms: &Arms<'_>, emit: Emit) -
     }
 }
 
-/// Longest piece of a line that is judged by three samples [mm].
+/// Longest piece of a line that is judged by three samples (mm).
 const PIECE_MM: f64 = 100.0;
 
-/// Largest distance from the intended line between two ends [mm]: the middle first, the quarters where the middle is
+/// Largest distance from the intended line between two ends (mm): the middle first, the quarters where the middle is
 /// not clearly straight, and more samples on long lines.
 pub(super) fn straight_bend(from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>, emit: Emit) -> f64 {
     let length = gap(&from.meant.translation.vector, &to.meant.translation.vector);

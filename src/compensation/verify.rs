@@ -100,9 +100,9 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 joints_after: second.map(|s| s.joints),
                 before: Some(deviation(&first.reached)),
                 after: second.map(|s| deviation(&s.reached)),
-                sigma_mm: acting
-                    .knowledge
-                    .map(|k| k.position_sigma_mm(&posed, &joints, &first.flange_from_tool, first.carried.as_ref())),
+                sigma_mm: acting.knowledge.map(|k| {
+                    k.position_sigma_mm(&posed, &joints, &first.flange_from_tool, first.carried.as_ref())
+                }),
                 outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,
@@ -118,7 +118,7 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
     }
 }
 
-/// A point nearer to the surface than this is a cut [mm].
+/// A point nearer to the surface than this is a cut (mm).
 const ON_SURFACE_MM: f64 = 0.5;
 
 fn run(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Vec<Run> {

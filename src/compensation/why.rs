@@ -21,7 +21,7 @@ pub enum Why {
     },
     /// The correction of the position is larger than the stated bound.
     TooFar {
-        /// The correction [mm].
+        /// The correction (mm).
         mm: f64,
     },
     /// The correction of the orientation is larger than the stated bound.
@@ -35,7 +35,7 @@ pub enum Why {
     OtherBranch,
     /// The path between two targets leaves the intended one by more than the tolerance.
     Bend {
-        /// By how much [mm].
+        /// By how much (mm).
         mm: f64,
     },
     /// A joint stands outside the range in which it was measured.
@@ -52,7 +52,7 @@ pub enum Why {
     },
     /// The model is much less certain here than where the arm was measured.
     Uncertain {
-        /// Predicted σ [mm].
+        /// Predicted σ (mm).
         sigma_mm: f64,
     },
 }

@@ -38,9 +38,9 @@ pub struct Frames {
     pub base_from_sensor: Pose,
     /// What the sensor touches, on the flange: hook, reflector or target. It is not the TCP.
     pub flange_from_target: Pose,
-    /// Outlet of each cable in the base [mm].
+    /// Outlet of each cable in the base (mm).
     pub outlets_mm: Vec<Vector3<f64>>,
-    /// What must be added to each cable's free length to give its reading [mm].
+    /// What must be added to each cable's free length to give its reading (mm).
     pub zeros_mm: Vec<f64>,
 }
 
@@ -177,7 +177,7 @@ impl Calibration {
         out
     }
 
-    /// The size of each row's position error at `x` [mm]: signed for a cable, the norm otherwise.
+    /// The size of each row's position error at `x` (mm): signed for a cable, the norm otherwise.
     pub fn errors_mm(&self, x: &[f64]) -> Vec<f64> {
         let plain = self.plain_residuals(x);
         match self.sensor {

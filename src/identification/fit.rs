@@ -84,9 +84,9 @@ pub struct Fitted {
     pub model: Model,
     /// The frames.
     pub frames: Frames,
-    /// Standard deviation of a reading that the fit leaves [mm], angles' rounding not included.
+    /// Standard deviation of a reading that the fit leaves (mm), angles' rounding not included.
     pub sigma_mm: f64,
-    /// The same for an orientation [rad].
+    /// The same for an orientation (rad).
     pub sigma_rad: f64,
     /// The task at its last weights, for whoever wants to look closer.
     pub task: Calibration,
@@ -105,7 +105,7 @@ pub struct Start<'a> {
     pub frames: &'a Frames,
 }
 
-/// Smallest standard deviation of a reading that is believed [mm]: below it weights would only amplify rounding.
+/// Smallest standard deviation of a reading that is believed (mm): below it weights would only amplify rounding.
 const SMALLEST_SIGMA_MM: f64 = 1e-4;
 const SMALLEST_SIGMA_RAD: f64 = 1e-6;
 

@@ -35,9 +35,9 @@ pub struct Options {
     pub seed: u64,
     /// Whether rounded angles may be sharpened by the read-out.
     pub sharpen: bool,
-    /// Largest held-out RMSE with which the fit passes [mm].
+    /// Largest held-out RMSE with which the fit passes (mm).
     pub limit_rmse_mm: Option<f64>,
-    /// Largest held-out error with which the fit passes [mm].
+    /// Largest held-out error with which the fit passes (mm).
     pub limit_max_mm: Option<f64>,
     /// Frames that were measured by other means; then raw errors exist.
     pub stated_frames: Option<Frames>,
@@ -76,7 +76,7 @@ pub enum IdentifyError {
         file: String,
         /// Robot.
         robot: String,
-        /// RMS [mm].
+        /// RMS (mm).
         rmse_mm: f64,
     },
 }
@@ -100,13 +100,13 @@ pub struct Identification {
     pub sharpening: Result<Sharpening, NotSharpened>,
     /// Rows set aside.
     pub outliers: Outliers,
-    /// Data rows that were held out, with the error before (registered) and after (geometry) [mm].
+    /// Data rows that were held out, with the error before (registered) and after (geometry) (mm).
     pub held_out: Vec<(usize, f64, f64)>,
     /// Names and values ± σ of everything that was free, of the measurement too.
     pub parameters: Vec<EstimatedParameter>,
 }
 
-/// More than this with frames fitted is no tolerance but a mistake [mm].
+/// More than this with frames fitted is no tolerance but a mistake (mm).
 const WRONG_ARM_MM: f64 = 25.0;
 
 /// A parameter farther than this many prior standard deviations from nominal makes the fit fail.
@@ -294,7 +294,18 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
     let priors = Tolerance::default().priors(&parameters, nominal);
     let rounds = vec![estimate.trace.clone()];
-    Fitted { parameters, priors, estimate, model, frames, sigma_mm, sigma_rad: 1e-3, task, evaluations, rounds }
+    Fitted {
+        parameters,
+        priors,
+        estimate,
+        model,
+        frames,
+        sigma_mm,
+        sigma_rad: 1e-3,
+        task,
+        evaluations,
+        rounds,
+    }
 }
 
 fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {
@@ -359,7 +370,7 @@ fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     }
 }
 
-/// What repeated poses scatter by [mm], or else what the rounding of angles alone leaves in a row; `None` where
+/// What repeated poses scatter by (mm), or else what the rounding of angles alone leaves in a row; `None` where
 /// neither is known.
 fn noise_floor(observed: &Observed, fitted: &Fitted) -> Option<f64> {
     if let Some(floor) = split::noise_floor(&observed.dataset) {

@@ -27,13 +27,13 @@ pub fn logged_covariance(dataset: &Dataset) -> AngleCovariance {
 /// What sharpening did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sharpening {
-    /// The point whose position the controller read out, on the flange [mm].
+    /// The point whose position the controller read out, on the flange (mm).
     pub readout_point_mm: Vector3<f64>,
-    /// RMS difference of read-out and nominal forward map before [mm].
+    /// RMS difference of read-out and nominal forward map before (mm).
     pub before_mm: f64,
-    /// The same with sharpened angles [mm].
+    /// The same with sharpened angles (mm).
     pub after_mm: f64,
-    /// What rounding alone would leave before [mm].
+    /// What rounding alone would leave before (mm).
     pub expected_mm: f64,
     /// Factor by which the angles' standard deviation shrank, on average over rows and joints.
     pub narrowed: f64,
@@ -46,9 +46,9 @@ pub enum NotSharpened {
     Nothing,
     /// The read-out does not belong to these angles under the nominal model.
     Mismatch {
-        /// RMS difference [mm].
+        /// RMS difference (mm).
         found_mm: f64,
-        /// What rounding alone would leave [mm].
+        /// What rounding alone would leave (mm).
         expected_mm: f64,
     },
 }

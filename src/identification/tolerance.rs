@@ -11,17 +11,17 @@ use crate::kinematics::parameter::Parameter;
 /// Standard deviations of the priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Link lengths and offsets [mm].
+    /// Link lengths and offsets (mm).
     pub length_mm: f64,
-    /// Twists and joint offsets [rad].
+    /// Twists and joint offsets (rad).
     pub angle_rad: f64,
-    /// The touched point on the flange about its starting value [mm]: a hook or reflector stands off.
+    /// The touched point on the flange about its starting value (mm): a hook or reflector stands off.
     pub target_mm: f64,
-    /// Orientation of a full-pose target about its starting value [rad].
+    /// Orientation of a full-pose target about its starting value (rad).
     pub target_rad: f64,
-    /// Sensor frame, outlet and cable zero about their starting values [mm]; wide.
+    /// Sensor frame, outlet and cable zero about their starting values (mm); wide.
     pub frame_mm: f64,
-    /// Orientation of the sensor frame about its starting value [rad]; wide.
+    /// Orientation of the sensor frame about its starting value (rad); wide.
     pub frame_rad: f64,
 }
 

@@ -14,9 +14,9 @@ use crate::math::se3::Pose;
 pub struct LinkFile {
     /// Which parameters are free.
     pub model: LinkModel,
-    /// a [mm].
+    /// a (mm).
     pub a_mm: f64,
-    /// d [mm].
+    /// d (mm).
     pub d_mm: f64,
     /// alpha [°].
     pub alpha_deg: f64,
@@ -42,7 +42,7 @@ pub struct ArmFile {
     pub speed_deg_s: Option<[f64; 6]>,
     /// Direction of gravity in the base.
     pub gravity: [f64; 3],
-    /// Position of the flange in the last DH frame [mm].
+    /// Position of the flange in the last DH frame (mm).
     pub flange_mm: [f64; 3],
     /// Orientation of the flange in the last DH frame, scalar first.
     pub flange_wxyz: [f64; 4],

@@ -10,7 +10,7 @@ use super::model::{Joints, Posed};
 use crate::math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
 use crate::math::se3::{Pose, rotation_from_matrix};
 
-/// Controller angles of many rows [rad], one column per joint.
+/// Controller angles of many rows (rad), one column per joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointColumns {
     /// The columns, all of one length.
@@ -44,7 +44,7 @@ impl JointColumns {
 /// Poses of the flange in the base of many rows, one column per number.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PoseColumns {
-    /// x, y and z of the origin [mm].
+    /// x, y and z of the origin (mm).
     pub position_mm: [Vec<f64>; 3],
     /// Rotation matrix, column by column: x axis (x, y, z), y axis, z axis.
     pub axes: [Vec<f64>; 9],

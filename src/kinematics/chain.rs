@@ -47,7 +47,7 @@ pub struct Chain<R> {
     pub y: [[R; 3]; 6],
     /// z axis of frame i, the axis of joint i+1.
     pub z: [[R; 3]; 7],
-    /// Origin of frame i [mm].
+    /// Origin of frame i (mm).
     pub origin: [[R; 3]; 7],
     /// x axis of the last frame.
     pub x: [R; 3],
@@ -121,7 +121,7 @@ pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R
 pub struct End<R> {
     /// x, y and z axis.
     pub axes: [[R; 3]; 3],
-    /// Origin [mm].
+    /// Origin (mm).
     pub origin: [R; 3],
 }
 

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Condition {
-    /// Time since the arm was switched on [h].
+    /// Time since the arm was switched on (h).
     pub time_h: Option<f64>,
     /// Temperature of the arm [°C].
     pub temperature_c: Option<f64>,
-    /// Mass at the flange [kg].
+    /// Mass at the flange (kg).
     pub payload_kg: Option<f64>,
-    /// Centre of the payload in the last frame of the arm [mm].
+    /// Centre of the payload in the last frame of the arm (mm).
     pub payload_centre_mm: [f64; 3],
     /// The side from which each joint came to rest: −1 from below, +1 from above, 0 not known.
     pub approach: [i8; 6],

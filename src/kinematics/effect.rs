@@ -98,12 +98,12 @@ impl Effect {
         each!(self, e => e.set(index, value))
     }
 
-    /// What each parameter adds to the joint rotations, per unit, at mapped joint angles `u` [rad].
+    /// What each parameter adds to the joint rotations, per unit, at mapped joint angles `u` (rad).
     pub fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
         each!(self, e => e.regressors(statics, u, condition))
     }
 
-    /// What the effect adds to the joint rotations [rad].
+    /// What the effect adds to the joint rotations (rad).
     pub fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
         each!(self, e => e.rotation(statics, u, condition))
     }

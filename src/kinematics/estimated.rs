@@ -87,7 +87,7 @@ pub struct Provenance {
     pub version: String,
 }
 
-/// Errors of one stage, on the rows it was fitted to and on rows it never saw [mm].
+/// Errors of one stage, on the rows it was fitted to and on rows it never saw (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageErrors {
@@ -118,7 +118,7 @@ pub struct Estimated {
     pub registered: StageErrors,
     /// Errors with geometry.
     pub geometry: StageErrors,
-    /// What the sensor and the rounding leave [mm]; absent where it cannot be told.
+    /// What the sensor and the rounding leave (mm); absent where it cannot be told.
     pub noise_floor_mm: Option<f64>,
     /// The judgement.
     pub verdict: Verdict,
@@ -131,7 +131,7 @@ pub struct Estimated {
 /// A frame that was taught with the arm, so that it moves with the arm's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
-    /// Its origin in the base [mm].
+    /// Its origin in the base (mm).
     pub origin_mm: Vector3<f64>,
     /// Its twist in the base per unit of each parameter of the covariance: velocity of the origin, angular velocity.
     pub twists: Vec<Vector6<f64>>,
@@ -150,7 +150,7 @@ impl Estimated {
         product.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// Predicted standard deviation of the position of a point on the flange [mm]: √trace(J Σ Jᵀ), the double sum of
+    /// Predicted standard deviation of the position of a point on the flange (mm): √trace(J Σ Jᵀ), the double sum of
     /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
     ///
     /// With `carried`, relative to a frame that the arm itself placed: what moves point and frame alike does not count.

@@ -4,7 +4,7 @@
 //! gives up to eight branches as seeds; Newton's method carries each to the estimated arm, whose perturbed links have
 //! no closed form and whose effects depend on the joints. Without a closed form the seeds are spread over the joint
 //! ranges. Along a path no closed form is needed: each target starts from its neighbour, eight in lanes.
-//! Shapes: one target, a pose of the flange in the base [mm]; solutions in controller angles [rad].
+//! Shapes: one target, a pose of the flange in the base (mm); solutions in controller angles (rad).
 //! Stops: at 1e-9 mm and 1e-12 rad, see [`newton`]; how it ended otherwise is an [`InverseError`].
 //! Checked against: `forward(inverse(pose)) = pose` for every arm of the catalogue, nominal and perturbed.
 
@@ -35,12 +35,12 @@ use crate::math::se3::Pose;
 pub use self::solution::{InverseError, Singularity, SingularityDistances, Solution};
 pub use self::structure::Branch;
 
-/// A joint angle may lie beyond its limit by rounding [rad].
+/// A joint angle may lie beyond its limit by rounding (rad).
 const LIMIT_SLACK_RAD: f64 = 1e-9;
 
-/// A solution farther from its seed than this is found by way of all branches [rad].
+/// A solution farther from its seed than this is found by way of all branches (rad).
 const FARTHEST_RAD: f64 = 0.9 * PI;
-/// The same for an arm whose branches cannot be told apart [rad].
+/// The same for an arm whose branches cannot be told apart (rad).
 const FARTHEST_WITHOUT_BRANCHES_RAD: f64 = 0.5;
 
 /// The inverse map of one estimated arm under one condition. Prepare once, use for many targets.
@@ -84,7 +84,7 @@ impl<'a> Inverse<'a> {
         &self.arm
     }
 
-    /// Characteristic length by which translations are divided: half of the link lengths behind axis 1 [mm].
+    /// Characteristic length by which translations are divided: half of the link lengths behind axis 1 (mm).
     pub fn length_mm(&self) -> f64 {
         self.kernel.length_mm
     }

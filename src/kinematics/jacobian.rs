@@ -52,9 +52,9 @@ pub fn joint_jacobian(arm: &Posed<'_>, q: &Joints, frames: &Chain<f64>, point: &
 /// An arm between a base frame and a tool frame, both given by translation and rotation vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ends {
-    /// The arm's base in the world: x, y, z [mm], rotation vector [rad].
+    /// The arm's base in the world: x, y, z (mm), rotation vector (rad).
     pub world_from_base: [f64; 6],
-    /// The tool on the flange: x, y, z [mm], rotation vector [rad].
+    /// The tool on the flange: x, y, z (mm), rotation vector (rad).
     pub flange_from_tool: [f64; 6],
 }
 

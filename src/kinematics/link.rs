@@ -23,15 +23,15 @@ pub enum LinkModel {
 pub struct Link {
     /// Which parameters are free.
     pub model: LinkModel,
-    /// Link length a [mm], along x after the joint's rotation.
+    /// Link length a (mm), along x after the joint's rotation.
     pub a_mm: f64,
-    /// Link offset d [mm], along the joint axis.
+    /// Link offset d (mm), along the joint axis.
     pub d_mm: f64,
-    /// Twist alpha [rad], about x.
+    /// Twist alpha (rad), about x.
     pub alpha_rad: f64,
-    /// Joint offset theta [rad], added to the joint angle.
+    /// Joint offset theta (rad), added to the joint angle.
     pub theta_rad: f64,
-    /// Second twist beta [rad], about y; 0 for a DH link.
+    /// Second twist beta (rad), about y; 0 for a DH link.
     pub beta_rad: f64,
 }
 

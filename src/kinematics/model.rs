@@ -10,15 +10,15 @@ use super::link::Link;
 use crate::math::lanes::{Real, SinCos, sin_cos};
 use crate::math::se3::Pose;
 
-/// Joint angles of the controller [rad].
+/// Joint angles of the controller (rad).
 pub type Joints = Vector6<f64>;
 
 /// Range and speed of the joints, in the controller's angles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Lowest angle [rad].
+    /// Lowest angle (rad).
     pub min_rad: [f64; 6],
-    /// Highest angle [rad].
+    /// Highest angle (rad).
     pub max_rad: [f64; 6],
     /// Highest speed [rad/s], where published.
     pub speed_rad_s: Option<[f64; 6]>,
@@ -34,9 +34,9 @@ impl Limits {
 /// Mass of one link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Body {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass_kg: f64,
-    /// Centre of mass in the frame at the end of the link [mm].
+    /// Centre of mass in the frame at the end of the link (mm).
     pub centre_mm: [f64; 3],
 }
 

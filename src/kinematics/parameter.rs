@@ -11,15 +11,15 @@ use super::model::Model;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LinkCoordinate {
-    /// Length a [mm].
+    /// Length a (mm).
     A,
-    /// Offset d [mm]; a DH link's.
+    /// Offset d (mm); a DH link's.
     D,
-    /// Twist alpha [rad].
+    /// Twist alpha (rad).
     Alpha,
-    /// Joint offset theta [rad].
+    /// Joint offset theta (rad).
     Theta,
-    /// Second twist beta [rad]; a Hayati link's.
+    /// Second twist beta (rad); a Hayati link's.
     Beta,
 }
 
@@ -30,7 +30,7 @@ impl LinkCoordinate {
     }
 }
 
-/// A coordinate of a frame: x, y, z [mm], then the rotation vector [rad].
+/// A coordinate of a frame: x, y, z (mm), then the rotation vector (rad).
 pub const FRAME_COORDINATES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 /// One number that identification may move. Joints, effects and anchors count from 0.
@@ -61,7 +61,7 @@ pub enum Parameter {
         /// x, y or z.
         axis: usize,
     },
-    /// Zero of a cable's length [mm].
+    /// Zero of a cable's length (mm).
     Zero {
         /// Cable.
         anchor: usize,

@@ -16,7 +16,7 @@ pub struct Region {
     pub samples_deg: Vec<[f64; 6]>,
     /// How far a measured pose may lie from its nearest neighbour among the samples [°, Euclidean in joint space].
     pub spacing_deg: f64,
-    /// Largest predicted standard deviation of the flange's position over the measured poses [mm].
+    /// Largest predicted standard deviation of the flange's position over the measured poses (mm).
     pub sigma_mm: f64,
 }
 
@@ -51,7 +51,7 @@ fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 }
 
 impl Region {
-    /// The region of measured joint vectors [rad]; `sigma_mm` as in the field. Cost: 200 n distances.
+    /// The region of measured joint vectors (rad); `sigma_mm` as in the field. Cost: 200 n distances.
     pub fn of(joints: &[Joints], sigma_mm: f64) -> Self {
         let degrees: Vec<[f64; 6]> =
             joints.iter().map(|q| std::array::from_fn(|i| q[i].to_degrees())).collect();
@@ -94,7 +94,7 @@ impl Region {
         Self { min_deg, max_deg, samples_deg, spacing_deg: spacing_deg.copied().unwrap_or(0.0), sigma_mm }
     }
 
-    /// Whether a joint vector [rad] leaves the region: the joint that leaves its range farthest, else coverage.
+    /// Whether a joint vector (rad) leaves the region: the joint that leaves its range farthest, else coverage.
     pub fn outside(&self, q: &Joints) -> Option<Outside> {
         let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
         let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);

@@ -14,7 +14,7 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// The twist, in the frame in which both poses are given, that carries `from` to `to`: translation of the origin
-/// [mm] first, then the rotation vector [rad] of `to.rotation * from.rotation⁻¹`.
+/// (mm) first, then the rotation vector (rad) of `to.rotation * from.rotation⁻¹`.
 pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
     let translation = to.translation.vector - from.translation.vector;
     let rotation = (to.rotation * from.rotation.inverse()).scaled_axis();
@@ -27,7 +27,7 @@ pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
     Pose::from_parts((pose.translation.vector + twist.fixed_rows::<3>(0)).into(), rotation * pose.rotation)
 }
 
-/// A pose from x, y, z [mm] and a rotation vector [rad].
+/// A pose from x, y, z (mm) and a rotation vector (rad).
 pub fn pose_from_vector(v: &[f64; 6]) -> Pose {
     Pose::new(Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
 }

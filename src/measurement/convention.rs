@@ -28,7 +28,7 @@ impl AngleConvention {
         }
     }
 
-    /// The controller's angles [rad] for angles of the file [rad]: the inverse of `θ = joint_map · q + offset`.
+    /// The controller's angles (rad) for angles of the file (rad): the inverse of `θ = joint_map · q + offset`.
     /// `None` when the arm's joint map cannot be inverted.
     pub fn controller_angles(self, model: &Model, file: &Joints) -> Option<Joints> {
         match self {

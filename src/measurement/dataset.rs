@@ -22,11 +22,11 @@ pub enum Sensor {
 /// One reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reading {
-    /// Cable length [mm], its zero unknown.
+    /// Cable length (mm), its zero unknown.
     Cable(f64),
-    /// Position in the sensor's frame [mm].
+    /// Position in the sensor's frame (mm).
     Position(Vector3<f64>),
-    /// Pose in the sensor's frame [mm].
+    /// Pose in the sensor's frame (mm).
     Pose(Pose),
 }
 
@@ -37,11 +37,11 @@ pub struct Row {
     pub number: usize,
     /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
     pub line: usize,
-    /// Logged joint angles of the controller [rad].
+    /// Logged joint angles of the controller (rad).
     pub joints: Joints,
     /// What the sensor read.
     pub reading: Reading,
-    /// The controller's own Cartesian read-out [mm], where logged.
+    /// The controller's own Cartesian read-out (mm), where logged.
     pub readout_mm: Option<Vector3<f64>>,
     /// Time, temperature, payload and approach sides, where logged.
     pub condition: Condition,
@@ -70,16 +70,16 @@ pub struct Dataset {
     pub other_columns: Vec<String>,
     /// What a reader should know: columns skipped, blank rows dropped.
     pub notes: Vec<String>,
-    /// Step to which the angles are rounded [rad], where all are multiples of one.
+    /// Step to which the angles are rounded (rad), where all are multiples of one.
     pub angle_step_rad: Option<f64>,
-    /// Step to which the read-out is rounded [mm], where all are multiples of one.
+    /// Step to which the read-out is rounded (mm), where all are multiples of one.
     pub readout_step_mm: Option<f64>,
-    /// Step to which the sensor's lengths are rounded [mm], where all are multiples of one.
+    /// Step to which the sensor's lengths are rounded (mm), where all are multiples of one.
     pub reading_step_mm: Option<f64>,
 }
 
 impl Row {
-    /// A row of nothing but joint angles [rad] and a reading, line `number + 2` of a file with a header.
+    /// A row of nothing but joint angles (rad) and a reading, line `number + 2` of a file with a header.
     pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
         Self {
             number,

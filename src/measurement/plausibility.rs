@@ -119,7 +119,7 @@ pub struct UnitSuspicion {
 /// How badly a meaning fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeaningError {
-    /// Root mean square of what the registered nominal arm leaves [mm].
+    /// Root mean square of what the registered nominal arm leaves (mm).
     pub rmse_mm: f64,
     /// The same as a share of the flange's travel, its root mean square distance from its mean position.
     pub share: f64,

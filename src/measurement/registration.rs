@@ -32,7 +32,7 @@ const LEVER_MM: f64 = 300.0;
 pub struct FrameRegistration {
     /// The sensor's frame in the arm's base.
     pub base_from_sensor: Pose,
-    /// Root mean square of the distances that remain [mm].
+    /// Root mean square of the distances that remain (mm).
     pub rmse_mm: f64,
 }
 
@@ -41,9 +41,9 @@ pub struct FrameRegistration {
 pub struct PointRegistration {
     /// The sensor's frame in the arm's base.
     pub base_from_sensor: Pose,
-    /// The point on the flange [mm].
+    /// The point on the flange (mm).
     pub on_flange_mm: Vector3<f64>,
-    /// Root mean square of the distances that remain [mm].
+    /// Root mean square of the distances that remain (mm).
     pub rmse_mm: f64,
 }
 
@@ -54,20 +54,20 @@ pub struct PoseRegistration {
     pub base_from_sensor: Pose,
     /// The target on the flange.
     pub flange_from_target: Pose,
-    /// Root mean square of the distances that remain [mm].
+    /// Root mean square of the distances that remain (mm).
     pub rmse_mm: f64,
-    /// Root mean square of the rotations that remain [rad].
+    /// Root mean square of the rotations that remain (rad).
     pub rmse_rad: f64,
 }
 
 /// A cable's outlet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CableRegistration {
-    /// The outlet in the arm's base [mm].
+    /// The outlet in the arm's base (mm).
     pub outlet_mm: Vector3<f64>,
-    /// Reading at length zero [mm].
+    /// Reading at length zero (mm).
     pub zero_mm: f64,
-    /// Root mean square of the lengths that remain [mm].
+    /// Root mean square of the lengths that remain (mm).
     pub rmse_mm: f64,
     /// The best other outlet, where another valley of the cost lies within twice the error: the poses hardly tell
     /// the two apart.

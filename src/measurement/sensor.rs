@@ -10,18 +10,18 @@ use crate::math::se3::{Pose, difference};
 pub enum Rig {
     /// Draw-wires: reading = distance from outlet to hook + zero.
     Cable {
-        /// Outlets in the arm's base [mm].
+        /// Outlets in the arm's base (mm).
         outlets_mm: Vec<Vector3<f64>>,
-        /// Reading of each at distance zero [mm].
+        /// Reading of each at distance zero (mm).
         zeros_mm: Vec<f64>,
-        /// The hook on the flange [mm].
+        /// The hook on the flange (mm).
         hook_mm: Vector3<f64>,
     },
     /// A tracker and its reflector.
     Position {
         /// The tracker's frame in the arm's base.
         base_from_sensor: Pose,
-        /// The reflector on the flange [mm].
+        /// The reflector on the flange (mm).
         reflector_mm: Vector3<f64>,
     },
     /// A tracker and its six-dimensional target.
@@ -36,9 +36,9 @@ pub enum Rig {
 /// When a sensor sees its target.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sight {
-    /// Shortest and longest distance [mm].
+    /// Shortest and longest distance (mm).
     pub distance_mm: Option<[f64; 2]>,
-    /// Largest angle between the flange's z axis and the line from the target to the sensor [rad].
+    /// Largest angle between the flange's z axis and the line from the target to the sensor (rad).
     pub tilt_rad: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ impl Rig {
         }
     }
 
-    /// The point on the flange that the sensor touches [mm].
+    /// The point on the flange that the sensor touches (mm).
     pub fn touched_mm(&self) -> Vector3<f64> {
         match self {
             Rig::Cable { hook_mm, .. } => *hook_mm,
@@ -61,7 +61,7 @@ impl Rig {
         }
     }
 
-    /// Where the sensor stands in the base [mm]; for a cable its outlet `anchor`, `None` if there is no such outlet.
+    /// Where the sensor stands in the base (mm); for a cable its outlet `anchor`, `None` if there is no such outlet.
     pub fn origin_mm(&self, anchor: usize) -> Option<Vector3<f64>> {
         match self {
             Rig::Cable { outlets_mm, .. } => outlets_mm.get(anchor).copied(),
@@ -71,7 +71,7 @@ impl Rig {
         }
     }
 
-    /// Distance from the sensor to what it touches [mm].
+    /// Distance from the sensor to what it touches (mm).
     pub fn distance_mm(&self, base_from_flange: &Pose, anchor: usize) -> Option<f64> {
         let at = base_from_flange * Point3::from(self.touched_mm());
         self.origin_mm(anchor).map(|origin| (at.coords - origin).norm())
@@ -105,7 +105,7 @@ impl Rig {
     }
 }
 
-/// Measured minus predicted: one number [mm] for a cable, three for a position, six (mm, then rotation vector in rad)
+/// Measured minus predicted: one number (mm) for a cable, three for a position, six (mm, then rotation vector in rad)
 /// for a pose; all in the sensor's frame. Nothing where the two are of different sensors.
 pub fn residual(measured: &Reading, predicted: &Reading) -> Vec<f64> {
     match (measured, predicted) {

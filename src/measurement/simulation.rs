@@ -44,7 +44,7 @@ pub struct Simulation {
 /// One row as it really was.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedRow {
-    /// Angles of the encoders [rad].
+    /// Angles of the encoders (rad).
     pub joints: Joints,
     /// The circumstances of the actual arm, logged or not.
     pub condition: Condition,

@@ -27,7 +27,7 @@ impl From<Split> for (Vec<usize>, Vec<usize>) {
     }
 }
 
-/// Difference of every joint up to which two rows are the same pose [rad]: below the step of a rounded log, or what an
+/// Difference of every joint up to which two rows are the same pose (rad): below the step of a rounded log, or what an
 /// encoder read back at rest scatters by.
 fn same_rad(data: &Dataset) -> f64 {
     if data.angle_step_rad.is_some() { 0.000_5f64.to_radians() } else { 0.003f64.to_radians() }
@@ -156,7 +156,7 @@ fn complements(rows: usize, tests: Vec<Vec<usize>>) -> Vec<Split> {
 /// What repeated poses scatter by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFloor {
-    /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) [mm].
+    /// Pooled standard deviation of a length, or of the position (root of the sum over the coordinates) (mm).
     pub sigma_mm: f64,
     /// Poses that were measured more than once.
     pub poses: usize,

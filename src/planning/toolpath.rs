@@ -43,11 +43,11 @@ pub enum ToolpathError {
         count: usize,
         /// Work object.
         object: String,
-        /// Position in the work object [mm].
+        /// Position in the work object (mm).
         x: f64,
-        /// Position in the work object [mm].
+        /// Position in the work object (mm).
         y: f64,
-        /// Position in the work object [mm].
+        /// Position in the work object (mm).
         z: f64,
         /// Why, on the branch that came farthest.
         error: InverseError,

@@ -32,7 +32,7 @@ pub struct Step {
     pub via: Option<RobTarget>,
     /// Speed of the TCP [mm/s].
     pub speed_mm_s: f64,
-    /// Corner zone [mm]; `None` stops at the end.
+    /// Corner zone (mm); `None` stops at the end.
     pub zone_mm: Option<f64>,
     /// A comment line before it.
     pub comment: Option<String>,

@@ -44,7 +44,7 @@ pub struct Place {
 /// A frame as a program writes it: position and scalar-first quaternion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
-    /// Position [mm].
+    /// Position (mm).
     pub position_mm: [f64; 3],
     /// Quaternion w, x, y, z as written.
     pub quaternion: [f64; 4],
@@ -74,7 +74,7 @@ impl Frame {
 /// A Cartesian target: where the tool frame shall be in the work object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobTarget {
-    /// Position of the TCP in the object frame [mm].
+    /// Position of the TCP in the object frame (mm).
     pub position_mm: [f64; 3],
     /// Orientation, w, x, y, z, as written.
     pub quaternion: [f64; 4],
@@ -239,9 +239,9 @@ pub struct ToolValue {
     pub robhold: bool,
     /// The TCP in the flange (wrist) frame, or in the world for a standing tool.
     pub frame: Frame,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass_kg: f64,
-    /// Centre of gravity [mm] in the flange frame.
+    /// Centre of gravity (mm) in the flange frame.
     pub centre_of_gravity_mm: [f64; 3],
 }
 
@@ -307,9 +307,9 @@ pub struct Zone {
 pub struct ZoneValue {
     /// Whether the robot stops at the target.
     pub fine: bool,
-    /// Size for the TCP [mm].
+    /// Size for the TCP (mm).
     pub tcp_mm: f64,
-    /// Size for reorientation [mm].
+    /// Size for reorientation (mm).
     pub orientation_mm: f64,
     /// Reorientation size [degrees].
     pub orientation_deg: f64,

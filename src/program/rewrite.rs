@@ -14,7 +14,7 @@ pub enum NewTarget {
     Keep,
     /// A new pose; external axes stay.
     Cartesian {
-        /// Position in the object frame [mm].
+        /// Position in the object frame (mm).
         position_mm: [f64; 3],
         /// Quaternion w, x, y, z; the sign is chosen to agree with the old one.
         quaternion: [f64; 4],

@@ -87,7 +87,10 @@ pub fn summary(found: &Identification) -> Document {
     let mut page = Document::new(format!("Identification of {}", estimated.robot));
     page.subtitle = format!(
         "{}, {} rows, sensor {}, method {}",
-        estimated.provenance.file, estimated.provenance.rows, estimated.provenance.sensor, estimated.provenance.method
+        estimated.provenance.file,
+        estimated.provenance.rows,
+        estimated.provenance.sensor,
+        estimated.provenance.method
     );
     page.push(verdict(found));
     page.push(key_figures(found));
@@ -132,8 +135,12 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             "sentences": words::combinations(found, report),
         })
     });
-    let rounds: Vec<Vec<f64>> =
-        found.geometry.rounds.iter().map(|trace| trace.iter().map(|iteration| iteration.cost).collect()).collect();
+    let rounds: Vec<Vec<f64>> = found
+        .geometry
+        .rounds
+        .iter()
+        .map(|trace| trace.iter().map(|iteration| iteration.cost).collect())
+        .collect();
     json!({
         "schema": "truegrind.identification/1",
         "dataset": {
@@ -244,9 +251,10 @@ fn verdict(found: &Identification) -> Verdict {
     let (status, headline) = match estimated.verdict.status {
         Judgement::Pass => (Status::Good, format!("The model meets the stated limits: {errors}")),
         Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
-        Judgement::NotEvaluated => {
-            (Status::NotEvaluated, format!("Nothing speaks against the model, but no limits were stated: {errors}"))
-        }
+        Judgement::NotEvaluated => (
+            Status::NotEvaluated,
+            format!("Nothing speaks against the model, but no limits were stated: {errors}"),
+        ),
     };
     Verdict::new(status, headline, estimated.verdict.reasons.iter().cloned())
 }
@@ -262,7 +270,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Held-out RMSE", after.rmse, 3, "mm")
             .note(format!("{}: {:.3} mm", "registered frames alone", before.rmse)),
         KeyFigure::new("Gain of the model", gain, 0, "%").note("registered frames to geometry, held out"),
-        KeyFigure::new("Largest held-out error", after.max, 3, "mm").note(format!("registered: {:.3} mm", before.max)),
+        KeyFigure::new("Largest held-out error", after.max, 3, "mm")
+            .note(format!("registered: {:.3} mm", before.max)),
         match estimated.noise_floor_mm {
             Some(_) => floor.note("what the rounding of the angles alone leaves"),
             None => floor.note("nothing is known to be rounded"),
@@ -273,10 +282,12 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
             found.held_out.len()
         )),
         KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
-        KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(match rank {
-            Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
-            None => String::new(),
-        }),
+        KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
+            match rank {
+                Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
+                None => String::new(),
+            },
+        ),
     ]
 }
 
@@ -286,7 +297,10 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     let mut remarks = vec![
         remark("Robot", found.estimated.robot.clone()),
         remark("Sensor", from.sensor.clone()),
-        remark("Split", format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out))),
+        remark(
+            "Split",
+            format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out)),
+        ),
         remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
     ];
     if let Some(sheet) = &dataset.sheet {
@@ -303,7 +317,8 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         ("Payload", condition.payload_kg, "kg"),
     ] {
         if let Some(value) = value {
-            remarks.push(remark(name, format!("{} {unit} (median)", Precision::Significant(4).format(value))));
+            remarks
+                .push(remark(name, format!("{} {unit} (median)", Precision::Significant(4).format(value))));
         }
     }
     Provenance {

@@ -18,7 +18,7 @@
 //!     series: vec![Series::line("LM", [[0.0, 2.1], [1.0, 0.6], [2.0, 0.46]])],
 //!     ..Graph::default()
 //! };
-//! assert!(graph.svg().contains(">RMSE [mm]</text>"));
+//! assert!(graph.svg().contains(">RMSE (mm)</text>"));
 //! ```
 
 mod letters;
@@ -68,7 +68,7 @@ impl Axis {
         Self { log: true, ..Self::new(label, unit) }
     }
 
-    /// Label with unit, `RMSE [mm]`.
+    /// Label with unit, `RMSE (mm)`.
     pub fn text(&self) -> String {
         match (self.label.as_str(), self.unit.as_str()) {
             (label, "") => label.to_owned(),

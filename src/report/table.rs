@@ -16,7 +16,7 @@ use super::status::Status;
 /// table.push(["LTLM".into(), Cell::Missing]);
 /// assert_eq!(terminal::table(&table, 80), "\
 /// Deviation
-/// method  RMSE [mm]
+/// method  RMSE (mm)
 /// ──────  ─────────
 /// before       1.62
 /// LTLM            –
@@ -195,7 +195,7 @@ impl Column {
         Self { precision: Precision::Significant(digits), ..Self::number(key, heading, unit, 0) }
     }
 
-    /// Heading with its unit, `RMSE [mm]`.
+    /// Heading with its unit, `RMSE (mm)`.
     pub fn label(&self) -> String {
         match &self.unit {
             Some(unit) => format!("{} [{unit}]", self.heading),

@@ -118,7 +118,7 @@ pub(super) fn frames(arm: &Posed<'_>, joints: &Joints) -> [Pose; 7] {
     })
 }
 
-/// Sum of the lengths and offsets of all links [mm].
+/// Sum of the lengths and offsets of all links (mm).
 pub(super) fn length_mm(model: &Model) -> f64 {
     model.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>().max(1.0)
 }

@@ -85,7 +85,7 @@ pub fn map(share: f64) -> Rgba {
 /// Which colour means which deviation: zero to a round figure, in [`STEPS`] steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// The deviation at the upper end [mm].
+    /// The deviation at the upper end (mm).
     pub top_mm: f64,
 }
 
@@ -96,7 +96,7 @@ impl Scale {
         Self { top_mm: if largest > 0.0 { round_up(largest) } else { 1.0 } }
     }
 
-    /// The step, 0 to [`STEPS`] − 1, of a deviation [mm].
+    /// The step, 0 to [`STEPS`] − 1, of a deviation (mm).
     pub fn step(&self, size_mm: f64) -> usize {
         ((size_mm / self.top_mm * STEPS as f64) as usize).min(STEPS - 1)
     }
@@ -106,7 +106,7 @@ impl Scale {
         map(step as f64 / (STEPS - 1) as f64)
     }
 
-    /// The colour of a deviation [mm]; grey where it is no number.
+    /// The colour of a deviation (mm); grey where it is no number.
     pub fn of(&self, size_mm: f64) -> Rgba {
         if size_mm.is_nan() { TRAVEL } else { self.colour(self.step(size_mm)) }
     }

@@ -49,7 +49,7 @@ const TOP_QUANTILE: f64 = 0.98;
 pub struct Residuals {
     /// The stage: "frames fitted", "geometry fitted".
     pub stage: String,
-    /// Data row and error [mm]: signed for a cable (model minus reading), the length of the difference otherwise.
+    /// Data row and error (mm): signed for a cable (model minus reading), the length of the difference otherwise.
     pub rows: Vec<(usize, f64)>,
 }
 
@@ -66,7 +66,7 @@ pub struct MeasuredScene<'a> {
     pub frames: Option<&'a Frames>,
     /// What each stage leaves, the best one last; may be empty.
     pub residuals: &'a [Residuals],
-    /// Errors of rows that the last stage had not seen: data row, error [mm].
+    /// Errors of rows that the last stage had not seen: data row, error (mm).
     pub held_out: &'a [(usize, f64)],
     /// Data rows that were set aside as outliers.
     pub set_aside: &'a [usize],

@@ -48,7 +48,7 @@ const POINTS_PER_SECOND: f64 = 15.0;
 /// Exaggerated deviations shall reach this part of the size of the path.
 const REACH: f64 = 0.15;
 
-/// No joint of the exaggerated arm turns farther than this from the arm after [rad].
+/// No joint of the exaggerated arm turns farther than this from the arm after (rad).
 const FARTHEST_RAD: f64 = 1.0;
 
 /// A part in the cell.
@@ -106,7 +106,7 @@ struct Plan<'a> {
     scale: Scale,
     /// Scale factor of exaggerated deviations.
     times: f64,
-    /// Size of the intended path [mm].
+    /// Size of the intended path (mm).
     extent_mm: f64,
     /// Joints along the path: after, before, exaggerated.
     after: Vec<Stand>,

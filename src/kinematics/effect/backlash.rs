@@ -14,7 +14,7 @@ use crate::math::lanes::Real;
 pub struct Backlash {
     /// Joint, 0-based.
     pub joint: usize,
-    /// Play between the flanks b [rad].
+    /// Play between the flanks b (rad).
     pub play_rad: f64,
 }
 

@@ -19,19 +19,19 @@ pub struct Harmonic {
     pub joint: usize,
     /// Periods per turn of the joint.
     pub order: f64,
-    /// Factor of the sine [rad].
+    /// Factor of the sine (rad).
     pub sine_rad: f64,
-    /// Factor of the cosine [rad].
+    /// Factor of the cosine (rad).
     pub cosine_rad: f64,
 }
 
 impl Harmonic {
-    /// Amplitude [rad].
+    /// Amplitude (rad).
     pub fn amplitude_rad(&self) -> f64 {
         self.sine_rad.hypot(self.cosine_rad)
     }
 
-    /// Phase φ [rad] with δθ = amplitude · sin(n u + φ).
+    /// Phase φ (rad) with δθ = amplitude · sin(n u + φ).
     pub fn phase_rad(&self) -> f64 {
         self.cosine_rad.atan2(self.sine_rad)
     }

@@ -15,7 +15,7 @@ use crate::kinematics::model::Joints;
 pub struct Thermal {
     /// Relative growth of a warm arm over a cold one g, by the clock.
     pub growth: f64,
-    /// Time constant of warming up T [h].
+    /// Time constant of warming up T (h).
     pub time_constant_h: f64,
     /// Relative growth per kelvin, by the thermometer.
     pub growth_per_k: f64,

@@ -3,7 +3,7 @@
 //! Method: with all joint rotations at zero, joint i turns about the line (point pᵢ, direction hᵢ), and the motion of
 //! the last frame is e₁ e₂ … e₆ with eᵢ the turn about line i (product of exponentials). Because the lines are read off
 //! the DH table, every sign of alpha and every offset of theta is covered by one solution.
-//! Shapes: six lines; angles are DH joint rotations [rad], not the controller's.
+//! Shapes: six lines; angles are DH joint rotations (rad), not the controller's.
 //! Source: Elias and Wen 2022, "IK-Geo" (arXiv 2211.05737), subproblems 1 and 4. Departure: where no exact solution
 //! exists the nearest one is returned and counted as inexact, for it is only a seed.
 //! Checked against: the forward map, in `tests/it/kinematics/inverse.rs`.
@@ -17,13 +17,13 @@ use crate::math::se3::Pose;
 /// Axes of an arm with all joint rotations at zero, in the base.
 #[derive(Debug, Clone)]
 pub(super) struct Axes {
-    /// A point on each axis [mm].
+    /// A point on each axis (mm).
     pub(super) point: [Vector3<f64>; 6],
     /// Unit direction of each axis.
     pub(super) direction: [Vector3<f64>; 6],
     /// Inverse of the last frame's pose.
     pub(super) home_inverse: Pose,
-    /// Sum of the link lengths [mm].
+    /// Sum of the link lengths (mm).
     pub(super) extent_mm: f64,
     /// +1 or −1 for each joint: whether the controller counts its angle along or against the axis.
     pub(super) sense: [f64; 6],
@@ -58,7 +58,7 @@ impl Axes {
         self.direction[i].cross(&self.direction[j]).norm() < PARALLEL
     }
 
-    /// The point nearest to both axes, and how far they pass each other [mm]; `None` for parallel ones.
+    /// The point nearest to both axes, and how far they pass each other (mm); `None` for parallel ones.
     pub(super) fn meeting(&self, i: usize, j: usize) -> Option<(Vector3<f64>, f64)> {
         let (u, v) = (self.direction[i], self.direction[j]);
         let (a, b) = (self.point[i], self.point[j]);
@@ -73,12 +73,12 @@ impl Axes {
         Some(((on_i + on_j) * 0.5, (on_j - on_i).norm()))
     }
 
-    /// Distance of a point from axis `j` [mm].
+    /// Distance of a point from axis `j` (mm).
     pub(super) fn distance(&self, j: usize, x: &Vector3<f64>) -> f64 {
         (x - self.point[j]).cross(&self.direction[j]).norm()
     }
 
-    /// Length below which two lines count as meeting [mm].
+    /// Length below which two lines count as meeting (mm).
     pub(super) fn meeting_tolerance_mm(&self) -> f64 {
         1e-3 * self.extent_mm
     }

@@ -7,7 +7,7 @@ use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::model::{Joints, Limits};
 
-/// Solutions nearer than this are one [rad].
+/// Solutions nearer than this are one (rad).
 const SAME_RAD: f64 = 1e-6;
 /// Spread seeds for an arm without a closed form.
 const SPREAD: usize = 64;

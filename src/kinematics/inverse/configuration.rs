@@ -43,14 +43,14 @@ impl fmt::Display for Configuration {
 /// Axes (0-based) whose quarter turns a configuration states.
 pub(super) const QUARTER_AXES: [usize; 3] = [0, 3, 5];
 
-/// How far a solution may lie outside a requested quarter [rad]: an estimated arm stands some tenths of a degree
+/// How far a solution may lie outside a requested quarter (rad): an estimated arm stands some tenths of a degree
 /// beside the nominal one, more near the wrist singularity, while other branches are a quarter turn away and more.
 const QUARTER_TOLERANCE_RAD: f64 = 0.09;
 
 /// How near to its border a branch may be taken for its neighbour (see [`Structure::margins`]).
 pub(super) const BRANCH_TOLERANCE: f64 = 0.02;
 
-/// Configuration of an arm at controller angles [rad]; cfx is 0 for an arm without a closed form. For the nominal arm,
+/// Configuration of an arm at controller angles (rad); cfx is 0 for an arm without a closed form. For the nominal arm,
 /// or for an estimated one without its effects; [`Inverse::configuration`](super::Inverse::configuration) counts them in.
 pub fn configuration(model: &Model, joints: &Joints) -> Configuration {
     let frames = model.under(&Condition::default()).frames(joints);
@@ -69,7 +69,7 @@ impl Configuration {
         [self.cf1, self.cf4, self.cf6]
     }
 
-    /// The largest angle by which axes 1, 4 and 6 lie outside the stated quarters [rad].
+    /// The largest angle by which axes 1, 4 and 6 lie outside the stated quarters (rad).
     pub fn overshoot_rad(&self, joints: &Joints) -> f64 {
         let mut out: f64 = 0.0;
         for (axis, cf) in QUARTER_AXES.into_iter().zip(self.quarters()) {

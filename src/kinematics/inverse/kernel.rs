@@ -5,7 +5,7 @@
 //! A⁻¹ and the inverse of the Schur complement S = D − C A⁻¹ B follow from cross products: no pivoting. The slope σ of
 //! the effects enters as Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is left out and costs at most
 //! one step more.
-//! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u [rad].
+//! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u (rad).
 //! Stops: a row stands still once it is within [`TOLERANCE_MM`](super::newton::TOLERANCE_MM) and
 //! [`TOLERANCE_RAD`](super::newton::TOLERANCE_RAD), so it gets the same bits whatever its neighbours do; a row whose step is longer than
 //! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`].
@@ -19,24 +19,24 @@ use crate::math::lanes::{SinCos, sin_cos};
 
 /// Most steps of a row.
 const STEPS: usize = 8;
-/// Longest step of a joint [rad].
+/// Longest step of a joint (rad).
 const LONGEST_STEP_RAD: f64 = 0.5;
 
 /// What the kernel needs to know of an arm.
 #[derive(Debug, Clone)]
 pub(super) struct Kernel {
-    /// The wrist point in the last frame [mm].
+    /// The wrist point in the last frame (mm).
     pub(super) wrist_mm: [f64; 3],
-    /// The flange in the last frame [mm].
+    /// The flange in the last frame (mm).
     pub(super) flange_mm: [f64; 3],
-    /// Characteristic length [mm].
+    /// Characteristic length (mm).
     pub(super) length_mm: f64,
 }
 
 /// Where a row ended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solved<R> {
-    /// Mapped joint angles [rad].
+    /// Mapped joint angles (rad).
     pub(super) mapped: [R; 6],
     pub(super) residual_mm: R,
     pub(super) residual_rad: R,

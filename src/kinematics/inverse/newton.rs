@@ -16,12 +16,12 @@ use crate::kinematics::model::{Joints, Posed};
 use crate::kinematics::parameter::LinkCoordinate;
 use crate::math::se3::Pose;
 
-/// A solution misses its target by less [mm].
+/// A solution misses its target by less (mm).
 pub const TOLERANCE_MM: f64 = 5e-10;
-/// A solution misses its target by less [rad].
+/// A solution misses its target by less (rad).
 pub const TOLERANCE_RAD: f64 = 5e-13;
 
-/// Longest step of a joint [rad].
+/// Longest step of a joint (rad).
 const LONGEST_STEP_RAD: f64 = 0.6;
 const EVALUATIONS: usize = 80;
 

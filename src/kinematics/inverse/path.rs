@@ -9,9 +9,9 @@ use crate::kinematics::model::Joints;
 use crate::math::lanes::{Lanes, SinCos, WIDTH, vectorised};
 use crate::math::se3::Pose;
 
-/// Neighbours on a path that stand farther apart are solved one after the other, not in lanes [rad].
+/// Neighbours on a path that stand farther apart are solved one after the other, not in lanes (rad).
 const LONGEST_STRIDE_RAD: f64 = 0.35;
-/// Strides up to here are continued into the next eight seeds [rad].
+/// Strides up to here are continued into the next eight seeds (rad).
 const STEADY_STRIDE_RAD: f64 = 0.05;
 /// Targets that one thread takes at a time; the results do not depend on it.
 const PORTION: usize = 1024;

@@ -6,11 +6,11 @@ use crate::kinematics::model::Joints;
 /// Joints that reach a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
-    /// Controller angles [rad].
+    /// Controller angles (rad).
     pub joints: Joints,
-    /// What the flange still misses the target by [mm].
+    /// What the flange still misses the target by (mm).
     pub residual_mm: f64,
-    /// What the flange still misses the target by [rad].
+    /// What the flange still misses the target by (rad).
     pub residual_rad: f64,
     /// Newton steps taken.
     pub iterations: usize,
@@ -87,7 +87,7 @@ pub enum InverseError {
     /// No branch reaches the target.
     #[error("target is out of reach by {beyond_mm:.3} mm")]
     Unreachable {
-        /// How far the target's wrist centre lies outside the nominal arm's reach, on the nearest branch [mm].
+        /// How far the target's wrist centre lies outside the nominal arm's reach, on the nearest branch (mm).
         beyond_mm: f64,
     },
     /// The target needs an angle that a joint does not have.
@@ -98,11 +98,11 @@ pub enum InverseError {
     OutsideLimits {
         /// Joint, 0-based.
         joint: usize,
-        /// The angle it would need [rad].
+        /// The angle it would need (rad).
         angle_rad: f64,
-        /// Lower limit [rad].
+        /// Lower limit (rad).
         min_rad: f64,
-        /// Upper limit [rad].
+        /// Upper limit (rad).
         max_rad: f64,
     },
     /// The arm is so close to a singularity that no joints were found.
@@ -132,9 +132,9 @@ pub enum InverseError {
     /// Newton's method did not arrive.
     #[error("no solution found: {residual_mm:.3e} mm and {residual_rad:.3e} rad remain")]
     NotConverged {
-        /// Remaining distance [mm].
+        /// Remaining distance (mm).
         residual_mm: f64,
-        /// Remaining angle [rad].
+        /// Remaining angle (rad).
         residual_rad: f64,
     },
     /// The target or the seed holds NaN or an infinity.

@@ -4,7 +4,7 @@
 //! Method: let w be the wrist centre and w′ where the target puts it. Turns about the parallel axes 2 and 3 keep the
 //! part of w along them, which gives q1 (two solutions); the distance of w′ from axis 2 gives q3 (two), then q2
 //! follows; the angle between axes 4 and 6 gives q5 (two), then q4 and q6 follow.
-//! Shapes: eight seeds, in DH joint rotations [rad].
+//! Shapes: eight seeds, in DH joint rotations (rad).
 //! Source: Pieper 1968 for the decoupling; the subproblems of [`super::axes`].
 //! Checked against: the forward map for every arm of the catalogue.
 
@@ -67,7 +67,7 @@ pub(super) fn about(axis: &Vector3<f64>, matrix: &nalgebra::Matrix3<f64>) -> f64
     sine.atan2(0.5 * (matrix.trace() - 1.0))
 }
 
-/// Turns about the parallel axes 2 and 3 that carry `from` to `to`: q2, q3 and how far `to` lies out of reach [mm].
+/// Turns about the parallel axes 2 and 3 that carry `from` to `to`: q2, q3 and how far `to` lies out of reach (mm).
 pub(super) fn two_links(
     axes: &Axes,
     from: &Vector3<f64>,

@@ -12,18 +12,18 @@ use crate::math::se3::Pose;
 /// Where Newton's method starts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seed {
-    /// DH joint rotations [rad].
+    /// DH joint rotations (rad).
     pub(super) rotations: [f64; 6],
-    /// How far the target lies beyond the nominal arm's reach on this branch [mm]; 0 within.
+    /// How far the target lies beyond the nominal arm's reach on this branch (mm); 0 within.
     pub(super) beyond_mm: f64,
 }
 
 /// The family of an arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Family {
-    /// Axes 4, 5 and 6 meet in this point (all rotations at zero) [mm].
+    /// Axes 4, 5 and 6 meet in this point (all rotations at zero) (mm).
     Spherical(Vector3<f64>),
-    /// Axes 2, 3 and 4 are parallel; axes 5 and 6 meet in this point [mm].
+    /// Axes 2, 3 and 4 are parallel; axes 5 and 6 meet in this point (mm).
     Parallel(Vector3<f64>),
     /// Neither: only Newton's method.
     Other,
@@ -69,7 +69,7 @@ impl Structure {
         }
     }
 
-    /// The point that joints 4 to 6 move least, in the last frame [mm]: where the twist is taken.
+    /// The point that joints 4 to 6 move least, in the last frame (mm): where the twist is taken.
     pub(super) fn wrist_in_last(&self) -> [f64; 3] {
         match self.family {
             Family::Spherical(point) | Family::Parallel(point) => {

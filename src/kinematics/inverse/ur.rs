@@ -3,7 +3,7 @@
 //! Method: let w be the point where axes 5 and 6 meet. Its part along the parallel axes is kept by their turns, which
 //! gives q1 (two solutions); the angle between axis 6 and the parallel axes gives q5 (two), then q6 follows; what
 //! is left is a turn in the plane, q2 + q3 + q4, and the two-link problem of axis 4 (two).
-//! Shapes: eight seeds, in DH joint rotations [rad].
+//! Shapes: eight seeds, in DH joint rotations (rad).
 //! Source: the derivation of Hawkins 2013 ("Analytic inverse kinematics for the UR-5/UR-10 arms"), written with the
 //! subproblems of [`super::axes`].
 //! Checked against: the forward map for the UR arms of the catalogue.

@@ -288,7 +288,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
     Ok(())
 }
 
-/// Largest range of any coordinate of the readings [mm].
+/// Largest range of any coordinate of the readings (mm).
 fn spread(rows: &[Row]) -> Option<f64> {
     let mut low = [f64::MAX; 3];
     let mut high = [f64::MIN; 3];

@@ -16,14 +16,14 @@ pub enum Fault {
     SensorZeroShift {
         /// First and last row.
         rows: [usize; 2],
-        /// Added to the reading [mm].
+        /// Added to the reading (mm).
         offset_mm: f64,
     },
     /// The sensor, or a cable's outlet, stood elsewhere in some rows.
     SensorFrameShift {
         /// First and last row.
         rows: [usize; 2],
-        /// Shift in the base [mm].
+        /// Shift in the base (mm).
         shift_mm: [f64; 3],
         /// Rotation vector in the base, about the sensor [°]; not for a cable.
         #[serde(default)]
@@ -33,7 +33,7 @@ pub enum Fault {
     ToolShift {
         /// First and last row.
         rows: [usize; 2],
-        /// Shift on the flange [mm].
+        /// Shift on the flange (mm).
         shift_mm: [f64; 3],
     },
     /// The sensor's millimetre is not one.
@@ -51,21 +51,21 @@ pub enum Fault {
     Outliers {
         /// Rows.
         row_list: Vec<usize>,
-        /// Added to the reading, or to each coordinate in turn [mm].
+        /// Added to the reading, or to each coordinate in turn (mm).
         size_mm: f64,
     },
     /// The controller's read-out belongs to another pose in some rows.
     ReadoutMismatch {
         /// Rows.
         row_list: Vec<usize>,
-        /// Added to x, y, z [mm].
+        /// Added to x, y, z (mm).
         shift_mm: [f64; 3],
     },
     /// The arm carries another payload in some rows than the log says.
     PayloadChange {
         /// First and last row.
         rows: [usize; 2],
-        /// The payload [kg].
+        /// The payload (kg).
         payload_kg: f64,
     },
 }

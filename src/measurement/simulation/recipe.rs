@@ -109,10 +109,10 @@ pub struct Deviations {
 pub struct RandomDeviations {
     /// Seed of the arm.
     pub seed: u64,
-    /// Of a [mm].
+    /// Of a (mm).
     #[serde(default)]
     pub a_mm: f64,
-    /// Of d [mm].
+    /// Of d (mm).
     #[serde(default)]
     pub d_mm: f64,
     /// Of alpha [°].
@@ -132,10 +132,10 @@ pub struct RandomDeviations {
 pub struct LinkDeviation {
     /// Link, from 0.
     pub joint: usize,
-    /// Of a [mm].
+    /// Of a (mm).
     #[serde(default)]
     pub a_mm: f64,
-    /// Of d [mm].
+    /// Of d (mm).
     #[serde(default)]
     pub d_mm: f64,
     /// Of alpha [°].
@@ -202,9 +202,9 @@ fn one() -> usize {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {
-    /// Box for the touched point, in the arm's base: lower and upper corner [mm].
+    /// Box for the touched point, in the arm's base: lower and upper corner (mm).
     pub box_mm: Option<[[f64; 3]; 2]>,
-    /// Shortest and longest distance from the sensor [mm].
+    /// Shortest and longest distance from the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
     /// Largest angle between the flange's z axis and the line to the sensor [°].
     pub tilt_deg: Option<f64>,
@@ -236,14 +236,14 @@ pub enum Approach {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Circumstances {
-    /// Length of the whole run [h]; rows follow evenly from 0.
+    /// Length of the whole run (h); rows follow evenly from 0.
     pub hours: Option<f64>,
     /// Temperature over the run; needs `hours`.
     pub temperature: Option<WarmUp>,
-    /// Payloads [kg], taken in turn row by row.
+    /// Payloads (kg), taken in turn row by row.
     #[serde(default)]
     pub payload_kg: Vec<f64>,
-    /// Centre of the payload in the last frame [mm].
+    /// Centre of the payload in the last frame (mm).
     #[serde(default)]
     pub payload_centre_mm: [f64; 3],
     /// From which side the joints come.
@@ -262,7 +262,7 @@ pub struct WarmUp {
     pub start_c: f64,
     /// In the end [°C].
     pub end_c: f64,
-    /// Time constant [h].
+    /// Time constant (h).
     pub time_constant_h: f64,
 }
 
@@ -270,7 +270,7 @@ pub struct WarmUp {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// Position [mm].
+    /// Position (mm).
     pub position_mm: [f64; 3],
     /// Orientation; made a unit quaternion.
     #[serde(default = "upright")]
@@ -299,12 +299,12 @@ impl Frame {
 pub enum SensorSetup {
     /// Draw-wires. With several outlets each pose is measured with one after the other.
     Cable {
-        /// Outlets in the base [mm].
+        /// Outlets in the base (mm).
         outlets_mm: Vec<[f64; 3]>,
-        /// Readings at distance zero [mm]; 0 where left out.
+        /// Readings at distance zero (mm); 0 where left out.
         #[serde(default)]
         zeros_mm: Vec<f64>,
-        /// The hook on the flange [mm].
+        /// The hook on the flange (mm).
         #[serde(default)]
         hook_mm: [f64; 3],
     },
@@ -312,7 +312,7 @@ pub enum SensorSetup {
     Position {
         /// The tracker's frame in the base.
         frame: Frame,
-        /// The reflector on the flange [mm].
+        /// The reflector on the flange (mm).
         #[serde(default)]
         reflector_mm: [f64; 3],
     },
@@ -356,7 +356,7 @@ impl SensorSetup {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
-    /// Of a length or coordinate [mm].
+    /// Of a length or coordinate (mm).
     #[serde(default)]
     pub sigma_mm: f64,
     /// What each metre from the sensor adds [mm/m].
@@ -378,9 +378,9 @@ pub struct Noise {
 pub struct Rounding {
     /// Of the logged angles [°].
     pub angles_deg: Option<f64>,
-    /// Of the controller's read-out [mm].
+    /// Of the controller's read-out (mm).
     pub readout_mm: Option<f64>,
-    /// Of the sensor's lengths [mm].
+    /// Of the sensor's lengths (mm).
     pub reading_mm: Option<f64>,
 }
 

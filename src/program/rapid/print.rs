@@ -11,7 +11,7 @@ use crate::program::edit::Edits;
 use crate::program::motion::{JointTarget, RobTarget, TargetValue};
 use crate::program::rewrite::RewriteOptions;
 
-/// Changes smaller than this are numerical noise, whatever the decimals of the source [mm].
+/// Changes smaller than this are numerical noise, whatever the decimals of the source (mm).
 const POSITION_NOISE_MM: f64 = 1e-7;
 /// The same for quaternions.
 const QUATERNION_NOISE: f64 = 1e-10;

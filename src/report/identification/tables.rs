@@ -48,7 +48,8 @@ pub fn stage_table(found: &Identification) -> Table {
     }
     if found.raw.is_none() {
         table.notes.push(
-            "raw: no sensor frame was stated, and an error against a fitted frame is no raw error.".to_owned(),
+            "raw: no sensor frame was stated, and an error against a fitted frame is no raw error."
+                .to_owned(),
         );
     }
     table.notes.push(
@@ -138,11 +139,7 @@ pub fn frame_table(found: &Identification) -> Table {
     if table.rows.is_empty() {
         let frames = &found.geometry.frames;
         let touched = frames.flange_from_target.translation.vector;
-        let fixed = [
-            ("tool.x", touched.x, "mm"),
-            ("tool.y", touched.y, "mm"),
-            ("tool.z", touched.z, "mm"),
-        ];
+        let fixed = [("tool.x", touched.x, "mm"), ("tool.y", touched.y, "mm"), ("tool.z", touched.z, "mm")];
         for (name, value, unit) in fixed {
             table.push([name.into(), meaning(name).into(), value.into(), unit.into()]);
         }
@@ -243,7 +240,11 @@ pub fn observability_table(report: &Identifiability) -> Table {
             Column::text("meaning", "What it is"),
         ],
     );
-    table.push(["rank".into(), report.rank.into(), format!("of {} parameters, data alone", report.parameters).into()]);
+    table.push([
+        "rank".into(),
+        report.rank.into(),
+        format!("of {} parameters, data alone", report.parameters).into(),
+    ]);
     table.push([
         "condition".into(),
         report.condition.into(),
@@ -274,7 +275,11 @@ pub fn observability_table(report: &Identifiability) -> Table {
     ]);
     table.notes.push(format!(
         "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013{}.",
-        if full { "" } else { ", over the combinations that the data determine: over all parameters they would be 0" }
+        if full {
+            ""
+        } else {
+            ", over the combinations that the data determine: over all parameters they would be 0"
+        }
     ));
     table
 }

@@ -41,10 +41,7 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
         Precision::Significant(3).format(found.geometry.sigma_mm)
     ));
     if let Some(step) = dataset.angle_step_rad {
-        out.push(format!(
-            "Logged angles are multiples of {}°.",
-            (step.to_degrees() * 1e6).round() / 1e6
-        ));
+        out.push(format!("Logged angles are multiples of {}°.", (step.to_degrees() * 1e6).round() / 1e6));
     }
     out
 }
@@ -101,7 +98,9 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
         [] => "a combination without a part worth naming goes unseen".to_owned(),
         [one] => format!("{one} goes unseen"),
         [first, other] => format!("{first} goes unseen when {other} follows"),
-        [first, others @ .., last] => format!("{first} goes unseen when {} and {last} follow", others.join(", ")),
+        [first, others @ .., last] => {
+            format!("{first} goes unseen when {} and {last} follow", others.join(", "))
+        }
     }
 }
 
@@ -187,10 +186,8 @@ pub(super) fn outliers(found: &Identification) -> Block {
 
 /// Caption of the picture of convergence.
 pub(super) fn convergence(found: &Identification) -> String {
-    let mut text = format!(
-        "Cost of the final fit over its iterations; it ended \"{}\".",
-        found.geometry.termination()
-    );
+    let mut text =
+        format!("Cost of the final fit over its iterations; it ended \"{}\".", found.geometry.termination());
     if found.geometry.rounds.len() > 1 {
         text.push_str(
             " Each round fits with the weights that the round before led to, so costs of different rounds do not share \

@@ -15,7 +15,7 @@ use truegrind::kinematics::link::{Link, LinkModel};
 use truegrind::kinematics::model::{Body, Joints, Limits, Model};
 use truegrind::math::se3::Pose;
 
-/// One data sheet: a [mm], d [mm], alpha [°], theta [°] of each link.
+/// One data sheet: a (mm), d (mm), alpha [°], theta [°] of each link.
 pub(crate) struct Sheet {
     pub(crate) name: &'static str,
     links: [[f64; 4]; 6],

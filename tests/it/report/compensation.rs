@@ -100,7 +100,13 @@ fn the_json_is_the_contract_field_by_field() {
             assert_eq!(
                 keys(motion),
                 BTreeSet::from([
-                    "line", "instruction", "status", "reason", "before_mm", "after_mm", "sigma_mm"
+                    "line",
+                    "instruction",
+                    "status",
+                    "reason",
+                    "before_mm",
+                    "after_mm",
+                    "sigma_mm"
                 ])
             );
             assert!(["changed", "left", "refused", "flagged"].contains(&motion["status"].as_str().unwrap()));
@@ -171,7 +177,9 @@ fn coverage_counts_and_never_rounds_to_all_or_nothing() {
         view::coverage(&plan),
         "7 motions: 1 changed (14.3 %), 2 flagged (28.6 %), 2 refused (28.6 %), 2 left (28.6 %)"
     );
-    plan.outcomes = (0..100_000).map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None)).collect();
+    plan.outcomes = (0..100_000)
+        .map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None))
+        .collect();
     assert_eq!(
         view::coverage(&plan),
         "100000 motions: 99999 changed (> 99.9 %), 0 flagged (0 %), 1 refused (< 0.1 %), 0 left (0 %)"

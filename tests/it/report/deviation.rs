@@ -24,7 +24,13 @@ fn deviation(vector_mm: [f64; 3], surface: bool) -> Deviation {
     Deviation { vector_mm, angle_rad: 0.1_f64.to_radians(), normal_mm: surface.then_some(vector_mm.z) }
 }
 
-fn point(index: usize, at: [f64; 3], before: Option<[f64; 3]>, after: Option<[f64; 3]>, surface: bool) -> PathPoint {
+fn point(
+    index: usize,
+    at: [f64; 3],
+    before: Option<[f64; 3]>,
+    after: Option<[f64; 3]>,
+    surface: bool,
+) -> PathPoint {
     PathPoint {
         index,
         line: 10 + index as u32,
@@ -89,7 +95,8 @@ fn raster(model: &str, after: After, remains: f64) -> PathReport {
             point.sigma_mm = Some(0.09 + 0.0006 * x);
             if pass == 13 && step > 25 {
                 point.status = Status::Flagged;
-                point.reason = Some("no measured pose is near: 1.4 times the distance of measured poses".to_owned());
+                point.reason =
+                    Some("no measured pose is near: 1.4 times the distance of measured poses".to_owned());
             }
             points.push(point);
         }
@@ -113,7 +120,9 @@ fn the_table_stands_in_the_work_object_with_every_column() {
         Cell::Number(value) => value,
         ref other => panic!("{other:?}"),
     };
-    for (column, expected) in [(3, 1.0), (4, 2.0), (5, 3.0), (6, 0.3), (7, -0.4), (8, 1.2), (9, 1.3), (10, 1.2)] {
+    for (column, expected) in
+        [(3, 1.0), (4, 2.0), (5, 3.0), (6, 0.3), (7, -0.4), (8, 1.2), (9, 1.3), (10, 1.2)]
+    {
         assert!((number(0, column) - expected).abs() < 1e-12, "column {column}");
     }
     assert!((number(1, 14) - 0.005).abs() < 1e-12);
@@ -152,20 +161,68 @@ fn the_block_is_that_of_table_8() {
     let lines: Vec<&str> = text.lines().collect();
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines[0], "Deviation of path points [mm]");
-    assert_eq!(lines[1].split("  ").map(str::trim).filter(|w| !w.is_empty()).collect::<Vec<_>>(), [
-        "Path", "P1", "P2", "P3", "P4", "P5", "mean", "mean |d|", "SD", "max", "1σ", "held-out", "Figures are"
-    ]);
+    assert_eq!(
+        lines[1].split("  ").map(str::trim).filter(|w| !w.is_empty()).collect::<Vec<_>>(),
+        [
+            "Path",
+            "P1",
+            "P2",
+            "P3",
+            "P4",
+            "P5",
+            "mean",
+            "mean |d|",
+            "SD",
+            "max",
+            "1σ",
+            "held-out",
+            "Figures are"
+        ]
+    );
     // Values −2 … 6: mean 2, mean size (2 + 1 + 0 + … + 6)/9 = 24/9, SD √7.5.
-    assert_eq!(words(lines[3]), [
-        "before", "compensation", "-2.0000", "0.0000", "2.0000", "3.0000", "5.0000", "2.0000", "2.6667", "2.7386",
-        "6.0000", "0.120", "0.460", "predicted"
-    ]);
-    assert_eq!(words(lines[4]), [
-        "lm.toml", "-0.2000", "0.0000", "0.2000", "0.3000", "0.5000", "0.2000", "0.2667", "0.2739", "0.6000", "0.120",
-        "0.460", "predicted", "remainder"
-    ]);
+    assert_eq!(
+        words(lines[3]),
+        [
+            "before",
+            "compensation",
+            "-2.0000",
+            "0.0000",
+            "2.0000",
+            "3.0000",
+            "5.0000",
+            "2.0000",
+            "2.6667",
+            "2.7386",
+            "6.0000",
+            "0.120",
+            "0.460",
+            "predicted"
+        ]
+    );
+    assert_eq!(
+        words(lines[4]),
+        [
+            "lm.toml",
+            "-0.2000",
+            "0.0000",
+            "0.2000",
+            "0.3000",
+            "0.5000",
+            "0.2000",
+            "0.2667",
+            "0.2739",
+            "0.6000",
+            "0.120",
+            "0.460",
+            "predicted",
+            "remainder"
+        ]
+    );
     let notes = table.notes.join(" ");
-    assert!(notes.contains("along the outward surface normal") && notes.contains("mean is signed"), "{notes}");
+    assert!(
+        notes.contains("along the outward surface normal") && notes.contains("mean is signed"),
+        "{notes}"
+    );
 }
 
 #[test]
@@ -173,18 +230,14 @@ fn models_that_agree_about_the_path_before_share_its_row() {
     let one = three(true);
     let mut two = three(true);
     two.model = "other.toml".to_owned();
-    let path = |row: &Vec<Cell>| if let Cell::Text(text) = &row[0] { text.clone() } else { panic!("{row:?}") };
+    let path =
+        |row: &Vec<Cell>| if let Cell::Text(text) = &row[0] { text.clone() } else { panic!("{row:?}") };
     let names = |reports: &[PathReport]| view::block_table(reports).rows.iter().map(path).collect::<Vec<_>>();
     assert_eq!(names(&[one.clone(), two.clone()]), ["before compensation", "model.toml", "other.toml"]);
     two.points[0].before = Some(deviation([0.0, 0.0, 2.0], true));
     assert_eq!(
         names(&[one.clone(), two.clone()]),
-        [
-            "before, under model.toml",
-            "before, under other.toml",
-            "model.toml",
-            "other.toml"
-        ]
+        ["before, under model.toml", "before, under other.toml", "model.toml", "other.toml"]
     );
     // A second program brings a column for the program, and a path that nobody rewrote has no row after.
     two.program = "other.mod".to_owned();
@@ -214,7 +267,8 @@ fn a_shift_of_the_whole_path_is_no_shape_error() {
         .map(|(k, at)| point(k, *at, Some([3.0, 4.0, 0.0]), Some([0.0, 0.0, 0.0]), false))
         .collect();
     let table = view::registered_table(&[report("m", points)]);
-    let (Cell::Number(as_it_stands), Cell::Number(registered)) = (&table.rows[0][2], &table.rows[0][3]) else {
+    let (Cell::Number(as_it_stands), Cell::Number(registered)) = (&table.rows[0][2], &table.rows[0][3])
+    else {
         panic!("{:?}", table.rows)
     };
     assert!((as_it_stands - 5.0).abs() < 1e-12 && *registered < 1e-9);
@@ -229,20 +283,26 @@ fn flags_are_listed_by_line_with_their_reasons() {
     let rows = |report: &PathReport| -> Vec<String> {
         csv::table(&view::flag_table(report)).lines().skip(1).map(str::to_owned).collect()
     };
-    assert_eq!(rows(&three(true)), [
-        "11,1,1,flagged,joint 5 is 5.0° outside the range in which the arm was measured",
-        ",2,1,refused,target is out of reach",
-    ]);
+    assert_eq!(
+        rows(&three(true)),
+        [
+            "11,1,1,flagged,joint 5 is 5.0° outside the range in which the arm was measured",
+            ",2,1,refused,target is out of reach",
+        ]
+    );
     // Neighbours of a kind share a row; another joint or another fate does not.
     let mut long = report("m", (0..6).map(|k| point(k, [k as f64, 0.0, 0.0], None, None, false)).collect());
     for (k, (joint, by)) in [(5, "5.0"), (5, "5.5"), (5, "6.0"), (6, "6.0"), (6, "6.0")].iter().enumerate() {
         long.points[k].status = Status::Flagged;
         long.points[k].reason = Some(format!("joint {joint} is {by}° outside"));
     }
-    assert_eq!(rows(&long), [
-        "10–12,0–2,3,flagged,joint 5 is 5.0° outside (the first)",
-        "13–14,3–4,2,flagged,joint 6 is 6.0° outside",
-    ]);
+    assert_eq!(
+        rows(&long),
+        [
+            "10–12,0–2,3,flagged,joint 5 is 5.0° outside (the first)",
+            "13–14,3–4,2,flagged,joint 6 is 6.0° outside",
+        ]
+    );
 }
 
 #[test]
@@ -273,7 +333,11 @@ fn one_file_holds_all_programs_and_models() {
     second.held_out_mm = None;
     let text = csv::table(&view::whole_table(&[three(true), second]));
     let lines: Vec<&str> = text.lines().collect();
-    assert!(lines[0].starts_with("program,model,after_is,model_held_out_rmse_mm,index,line,"), "{}", lines[0]);
+    assert!(
+        lines[0].starts_with("program,model,after_is,model_held_out_rmse_mm,index,line,"),
+        "{}",
+        lines[0]
+    );
     assert!(lines[0].contains(",after_norm_mm,"), "{}", lines[0]);
     assert_eq!(lines.len(), 7);
     assert!(lines[1].starts_with("blade.mod,model.toml,predicted remainder,0.46,0,10,"), "{}", lines[1]);
@@ -295,11 +359,14 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     ]);
     let text = leave("deviation-several.html", &several);
     assert!(text.contains("with ltlm; predicted 1σ"), "the best speaks for all");
-    assert_eq!(several, view::document(&[
-        raster("lm", After::Achieved, 0.12),
-        raster("ltlm", After::Achieved, 0.11),
-        raster("lm-as-printed", After::Achieved, 0.3),
-    ]));
+    assert_eq!(
+        several,
+        view::document(&[
+            raster("lm", After::Achieved, 0.12),
+            raster("ltlm", After::Achieved, 0.11),
+            raster("lm-as-printed", After::Achieved, 0.3),
+        ])
+    );
     // A program of which no point is known, and no program at all.
     let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
     assert!(empty.contains("not known"), "{empty}");
@@ -312,5 +379,8 @@ fn a_correction_that_makes_it_worse_is_called_so() {
     worse.after = After::Achieved;
     worse.points[0].after = Some(deviation([0.0, 0.0, 3.0], true));
     let text = terminal::document(&view::document(&[worse]), 200);
-    assert!(text.contains("[failed] The largest deviation goes from 1.200 mm to 3.000 mm (achieved)"), "{text}");
+    assert!(
+        text.contains("[failed] The largest deviation goes from 1.200 mm to 3.000 mm (achieved)"),
+        "{text}"
+    );
 }

@@ -30,7 +30,14 @@ fn by_hand() -> Identification {
     let mut found = identification().0.clone();
     found.parameters = vec![
         parameter("link1.a", "mm", 0.0, 0.25, 0.02, 1.0),
-        parameter("link2.alpha", "rad", -0.5_f64.to_radians(), 0.25_f64.to_radians(), 0.005_f64.to_radians(), 0.3_f64.to_radians()),
+        parameter(
+            "link2.alpha",
+            "rad",
+            -0.5_f64.to_radians(),
+            0.25_f64.to_radians(),
+            0.005_f64.to_radians(),
+            0.3_f64.to_radians(),
+        ),
         parameter("link6.alpha", "rad", 0.0, 0.0, 0.3_f64.to_radians(), 0.3_f64.to_radians()),
         parameter("effect1.1", "rad/(N m)", 0.0, 2.5e-6, 1e-7, 1e-4),
         parameter("tool.x", "mm", 0.0, 12.5, 0.4, 50.0),
@@ -96,11 +103,16 @@ link2.alpha  -0.500000   0.2500 ± 0.0050     0.7500  °                0.30    
 link6.alpha          0       0.00 ± 0.30     0.0000  °                0.30               0  ⚠\u{fe0e} held by prior
 effect1.1            0       2.50 ± 0.10     2.5000  µrad/(N m)        100             100  data
 ";
-    let trimmed = |text: &str| text.lines().take(7).map(|l| l.trim_end().replace('─', "")).collect::<Vec<_>>();
+    let trimmed =
+        |text: &str| text.lines().take(7).map(|l| l.trim_end().replace('─', "")).collect::<Vec<_>>();
     assert_eq!(trimmed(&text), trimmed(expected), "{text}");
     assert_eq!(table.rows.len(), 4, "frames stand in a table of their own");
     let file = csv::table(&table);
-    assert!(file.starts_with("name,nominal,value,sigma_value,deviation,unit") || file.starts_with("name,nominal,value,sigma,deviation,unit"), "{file}");
+    assert!(
+        file.starts_with("name,nominal,value,sigma_value,deviation,unit")
+            || file.starts_with("name,nominal,value,sigma,deviation,unit"),
+        "{file}"
+    );
 }
 
 #[test]
@@ -156,8 +168,12 @@ fn combinations_are_sentences_in_mm_and_degrees() {
 fn what_makes_up_for_an_unseen_link_is_named() {
     let (found, dataset) = identification();
     let json = view::json(found, dataset);
-    let sentences: Vec<&str> =
-        json["identifiability"]["sentences"].as_array().unwrap().iter().map(|s| s.as_str().unwrap()).collect();
+    let sentences: Vec<&str> = json["identifiability"]["sentences"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s.as_str().unwrap())
+        .collect();
     // A longer first link lifts everything, the outlet of the cable too; a longer last link takes the hook along; a turn of
     // the first joint turns the outlet about the base.
     let with = |name: &str| sentences.iter().find(|s| s.starts_with(name)).copied().unwrap_or_default();
@@ -175,11 +191,17 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
     for (status, badge, sentence) in [
         (Judgement::Pass, "[ok]", "The model meets the stated limits"),
         (Judgement::Fail, "[failed]", "The fit may not be used as a model"),
-        (Judgement::NotEvaluated, "[not evaluated]", "Nothing speaks against the model, but no limits were stated"),
+        (
+            Judgement::NotEvaluated,
+            "[not evaluated]",
+            "Nothing speaks against the model, but no limits were stated",
+        ),
     ] {
         found.estimated.verdict.status = status;
         let text = head(&found);
-        let line = format!("{badge} {sentence}: held-out error 0.500 mm RMSE, where registered frames alone leave 2.100 mm");
+        let line = format!(
+            "{badge} {sentence}: held-out error 0.500 mm RMSE, where registered frames alone leave 2.100 mm"
+        );
         assert!(text.contains(&line), "{text}");
         assert!(text.contains("  - because"));
     }

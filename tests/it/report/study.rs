@@ -16,7 +16,13 @@ fn row(solver: Option<&'static Solver>, rmse: &[f64], passes: f64, failed: usize
         solver,
         held_out: rmse
             .iter()
-            .map(|&rmse| ErrorSummary { count: 24, rmse, mean_absolute: 0.8 * rmse, max: 2.5 * rmse, ..Default::default() })
+            .map(|&rmse| ErrorSummary {
+                count: 24,
+                rmse,
+                mean_absolute: 0.8 * rmse,
+                max: 2.5 * rmse,
+                ..Default::default()
+            })
             .collect(),
         terminations: (0..count)
             .map(|i| if i < failed { Termination::IterationLimit } else { Termination::Cost })
@@ -41,16 +47,31 @@ fn the_table_states_mean_and_deviation_over_splits() {
     let text = terminal::table(&table, 200);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "Held-out errors over 3 splits");
-    assert_eq!(lines[3].trim_end(), "frames registered  2.100 ± 0.100  1.680 ± 0.080  5.250 ± 0.250                –  –");
-    assert_eq!(lines[4], "lm                 0.460 ± 0.020  0.368 ± 0.016  1.150 ± 0.050              9.0  3 of 3");
-    assert_eq!(lines[6], "lm-as-printed      0.550 ± 0.036  0.440 ± 0.029  1.375 ± 0.090            200.0  1 of 3");
+    assert_eq!(
+        lines[3].trim_end(),
+        "frames registered  2.100 ± 0.100  1.680 ± 0.080  5.250 ± 0.250                –  –"
+    );
+    assert_eq!(
+        lines[4],
+        "lm                 0.460 ± 0.020  0.368 ± 0.016  1.150 ± 0.050              9.0  3 of 3"
+    );
+    assert_eq!(
+        lines[6],
+        "lm-as-printed      0.550 ± 0.036  0.440 ± 0.029  1.375 ± 0.090            200.0  1 of 3"
+    );
 }
 
 #[test]
 fn notes_say_who_reached_the_same_optimum_and_what_a_literal_form_is() {
     let notes = view::table(&rows()).notes.join("\n");
-    assert!(notes.contains("lm and ltlm reach the same optimum on every split (held-out RMSE within 2.0e-5 mm)"), "{notes}");
-    assert!(notes.contains("lm-as-printed as the paper prints: fixed μ = 5, no scaling, no priors"), "{notes}");
+    assert!(
+        notes.contains("lm and ltlm reach the same optimum on every split (held-out RMSE within 2.0e-5 mm)"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("lm-as-printed as the paper prints: fixed μ = 5, no scaling, no priors"),
+        "{notes}"
+    );
     // Without a literal form nothing is said of one, and two methods that differ are not said to agree.
     let mut others = rows();
     others.truncate(3);
