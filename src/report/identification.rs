@@ -273,8 +273,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Largest held-out error", after.max, 3, "mm")
             .note(format!("registered: {:.3} mm", before.max)),
         match estimated.noise_floor_mm {
-            Some(_) => floor.note("what the rounding of the angles alone leaves"),
-            None => floor.note("nothing is known to be rounded"),
+            Some(_) => floor.note("scatter of repeated poses, else what rounding leaves"),
+            None => floor.note("no pose repeated, nothing known to be rounded"),
         },
         KeyFigure::new("Rows used", used, 0, "").note(format!(
             "{} fitted and {} held out to state errors; the model is fitted to all",

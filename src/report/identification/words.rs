@@ -7,6 +7,7 @@ use crate::identification::identify::Identification;
 use crate::identification::rounding::NotSharpened;
 use crate::kinematics::parameter::Parameter;
 use crate::measurement::dataset::Dataset;
+use crate::measurement::split;
 use crate::report::document::{Block, Verdict};
 use crate::report::number::Precision;
 use crate::report::status::Status;
@@ -24,16 +25,21 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
         ));
     }
     if let Some(floor) = found.estimated.noise_floor_mm {
-        out.push(if held < 1.5 * floor {
-            format!(
+        out.push(match (split::noise_floor(dataset).is_some(), held < 1.5 * floor) {
+            (true, true) => format!(
+                "Repeated poses scatter by {floor:.3} mm: a better model cannot show much more in these rows."
+            ),
+            (true, false) => format!(
+                "Repeated poses scatter by {floor:.3} mm; the rest of the {held:.3} mm is what the model does not explain."
+            ),
+            (false, true) => format!(
                 "The rounding of the angles alone leaves {floor:.3} mm: what is left is mostly rounding, and a better \
                  model cannot show in these rows. Log angles with more decimals."
-            )
-        } else {
-            format!(
+            ),
+            (false, false) => format!(
                 "The rounding of the angles alone leaves {floor:.3} mm; the rest of the {held:.3} mm is the sensor, and \
                  what geometry does not explain."
-            )
+            ),
         });
     }
     out.push(format!(

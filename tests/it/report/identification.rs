@@ -96,12 +96,12 @@ fn parameters_are_shown_in_millimetres_and_degrees() {
     let text = terminal::table(&table, 140);
     let expected = "\
 Estimated parameters
-Parameter      Nominal     Estimated ± σ  Deviation  Unit        Tolerance  Determined [%]  Held by
-───────────  ─────────  ────────────────  ─────────  ──────────  ─────────  ──────────────  ───────────────
-link1.a              0     0.250 ± 0.020     0.2500  mm                1.0             100  data
-link2.alpha  -0.500000   0.2500 ± 0.0050     0.7500  °                0.30             100  data
-link6.alpha          0       0.00 ± 0.30     0.0000  °                0.30               0  ⚠\u{fe0e} held by prior
-effect1.1            0       2.50 ± 0.10     2.5000  µrad/(N m)        100             100  data
+Parameter      Nominal    Estimated ± σ  Deviation  Unit        Tolerance  Determined [%]  Held by
+───────────  ─────────  ───────────────  ─────────  ──────────  ─────────  ──────────────  ───────────────
+link1.a              0    0.250 ± 0.020     0.2500  mm                1.0             100  data
+link2.alpha  -0.500000  0.2500 ± 0.0050     0.7500  °                0.30             100  data
+link6.alpha          0      0.00 ± 0.30     0.0000  °                0.30               0  ⚠\u{fe0e} held by prior
+effect1.1            0      2.50 ± 0.10     2.5000  µrad/(N m)        100             100  data
 ";
     let trimmed =
         |text: &str| text.lines().take(7).map(|l| l.trim_end().replace('─', "")).collect::<Vec<_>>();
