@@ -297,10 +297,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     let mut remarks = vec![
         remark("Robot", found.estimated.robot.clone()),
         remark("Sensor", from.sensor.clone()),
-        remark(
-            "Split",
-            format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out)),
-        ),
+        remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
         remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
     ];
     if let Some(sheet) = &dataset.sheet {

@@ -1,6 +1,6 @@
 //! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
 
-use super::{AFTER, BEFORE, Side, by_program, cut, has, meaning, sigma_rms};
+use super::{AFTER, BEFORE, REMAINDER, Side, by_program, cut, has, meaning, sigma_rms};
 use crate::compensation::deviation::{After, Block, PathReport};
 use crate::report::table::{Cell, Column, Table};
 
@@ -36,7 +36,7 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
         number("model_held_out_rmse_mm", "held-out", 3),
     ]);
     columns.extend(kind);
-    let mut table = Table::new("Deviation of path points [mm]", columns);
+    let mut table = Table::new("Deviation of path points before and after compensation [mm]", columns);
     for row in rows(reports, |report, side| report.block(side)) {
         let Block { five_mm, all } = row.value;
         let mut cells = row.first_cells(programs);
@@ -70,6 +70,9 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
          the covariance (RMS over the cut), held-out is the model's RMSE on rows it never saw."
             .to_owned(),
     );
+    if reports.iter().any(|report| report.after == After::PredictedRemainder && has(report, AFTER)) {
+        table.notes.push(REMAINDER.to_owned());
+    }
     table
 }
 
@@ -117,7 +120,7 @@ impl<T> Row<'_, T> {
 }
 
 fn first_columns(programs: bool) -> Vec<Column> {
-    let mut columns = vec![Column::text("path", "Path"), Column::text("kind", "Figures are")];
+    let mut columns = vec![Column::text("path", "Path"), Column::text("kind", "Figures")];
     if programs {
         columns.insert(0, Column::text("program", "Program"));
     }
@@ -144,11 +147,7 @@ fn rows<'a, T: PartialEq>(
         let agreed = before.windows(2).all(|pair| pair[0].1 == pair[1].1);
         let shown = if agreed { 1 } else { before.len() };
         for (report, value) in before.into_iter().take(shown) {
-            let path = if agreed {
-                "before compensation".to_owned()
-            } else {
-                format!("before, under {}", report.model)
-            };
+            let path = if agreed { "before".to_owned() } else { format!("before, under {}", report.model) };
             let kind = match report.after {
                 After::PredictedRemainder => "predicted",
                 After::Achieved => "achieved",

@@ -160,31 +160,16 @@ fn the_block_is_that_of_table_8() {
     let text = terminal::table(&table, 200);
     let lines: Vec<&str> = text.lines().collect();
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(lines[0], "Deviation of path points [mm]");
+    assert_eq!(lines[0], "Deviation of path points before and after compensation [mm]");
     assert_eq!(
         lines[1].split("  ").map(str::trim).filter(|w| !w.is_empty()).collect::<Vec<_>>(),
-        [
-            "Path",
-            "P1",
-            "P2",
-            "P3",
-            "P4",
-            "P5",
-            "mean",
-            "mean |d|",
-            "SD",
-            "max",
-            "1σ",
-            "held-out",
-            "Figures are"
-        ]
+        ["Path", "P1", "P2", "P3", "P4", "P5", "mean", "mean |d|", "SD", "max", "1σ", "held-out", "Figures"]
     );
     // Values −2 … 6: mean 2, mean size (2 + 1 + 0 + … + 6)/9 = 24/9, SD √7.5.
     assert_eq!(
         words(lines[3]),
         [
             "before",
-            "compensation",
             "-2.0000",
             "0.0000",
             "2.0000",
@@ -233,7 +218,7 @@ fn models_that_agree_about_the_path_before_share_its_row() {
     let path =
         |row: &Vec<Cell>| if let Cell::Text(text) = &row[0] { text.clone() } else { panic!("{row:?}") };
     let names = |reports: &[PathReport]| view::block_table(reports).rows.iter().map(path).collect::<Vec<_>>();
-    assert_eq!(names(&[one.clone(), two.clone()]), ["before compensation", "model.toml", "other.toml"]);
+    assert_eq!(names(&[one.clone(), two.clone()]), ["before", "model.toml", "other.toml"]);
     two.points[0].before = Some(deviation([0.0, 0.0, 2.0], true));
     assert_eq!(
         names(&[one.clone(), two.clone()]),
@@ -358,7 +343,8 @@ fn pages_of_one_model_of_several_and_of_nothing() {
         raster("lm-as-printed", After::Achieved, 0.3),
     ]);
     let text = leave("deviation-several.html", &several);
-    assert!(text.contains("with ltlm; predicted 1σ"), "the best speaks for all");
+    assert!(text.contains("depending on the model"));
+    assert_eq!(text.matches("<figure>").count(), 4);
     assert_eq!(
         several,
         view::document(&[
@@ -371,6 +357,18 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
     assert!(empty.contains("not known"), "{empty}");
     assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
+}
+
+#[test]
+fn a_correction_smaller_than_its_sigma_is_called_so() {
+    let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
+    unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    let page = |report: &PathReport| terminal::document(&view::document(std::slice::from_ref(report)), 200);
+    assert!(page(&unsure).contains("[ok] The largest deviation goes from"));
+    unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
+    let text = page(&unsure);
+    assert!(text.contains("[warning] The largest deviation goes from"), "{text}");
+    assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
 }
 
 #[test]
