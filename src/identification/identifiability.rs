@@ -23,9 +23,11 @@ pub struct Identifiability {
     pub rank: usize,
     /// Largest over smallest singular value; infinite without full rank.
     pub condition: f64,
+    /// The same over the combinations that the data determine, the first `rank` singular values.
+    pub determined_condition: f64,
     /// Singular values, falling.
     pub singular_values: Vec<f64>,
-    /// O1 to O5; zero without full rank.
+    /// O1 to O5 over the combinations that the data determine: over all parameters with full rank.
     pub observability: [f64; 5],
     /// Combinations of parameters that the data cannot separate, in units of the priors: each moves no reading.
     pub combinations: Vec<Vec<(Parameter, f64)>>,
@@ -47,35 +49,53 @@ pub fn identifiability(task: &Calibration, x: &[f64], scale: &[f64]) -> Option<I
     let full = analysis.rank == count && count > 0;
     let poses = (task.rows() / task.rows_per_observation()) as f64;
     let (first, last) = (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
-    let observability = if full {
-        let mean_log = values.iter().map(|v| v.ln()).sum::<f64>() / count as f64;
-        let harmonic = values.iter().map(|v| 1.0 / v).sum::<f64>();
-        [mean_log.exp() / poses.sqrt(), last / first, last, last * last / first, 1.0 / harmonic]
-    } else {
+    let determined = &values[..analysis.rank.min(count)];
+    let least = determined.last().copied().unwrap_or(0.0);
+    let observability = if determined.is_empty() {
         [0.0; 5]
+    } else {
+        let mean_log = determined.iter().map(|v| v.ln()).sum::<f64>() / determined.len() as f64;
+        let harmonic = determined.iter().map(|v| 1.0 / v).sum::<f64>();
+        [mean_log.exp() / poses.sqrt(), least / first, least, least * least / first, 1.0 / harmonic]
     };
+    let determined_condition = if determined.is_empty() { f64::INFINITY } else { first / least };
     let combinations = sparse_basis(analysis.null_space())
         .into_iter()
-        .map(|vector| {
-            let peak = vector.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            vector
-                .iter()
-                .zip(task.parameters_list())
-                .filter(|(v, _)| v.abs() > SHOWN_SHARE * peak)
-                .map(|(v, p)| (*p, v / peak))
-                .collect()
-        })
+        .map(|vector| combination(&vector, task.parameters_list(), scale))
         .collect();
     Some(Identifiability {
         parameters: count,
         rank: analysis.rank,
         condition: if full { first / last } else { f64::INFINITY },
+        determined_condition,
         held_by_priors: values.iter().filter(|v| **v < 1.0).count(),
         singular_values: values,
         observability,
         combinations,
     })
 }
+
+/// The parts of a null vector that are worth naming: large in units of the priors, or large in mm or radians. A frame's
+/// prior is so wide that the millimetre by which it makes up for a link is a small share of it.
+fn combination(vector: &[f64], parameters: &[Parameter], scale: &[f64]) -> Vec<(Parameter, f64)> {
+    let peak = vector.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let amount = |k: usize| (vector[k] * scale[k]).abs();
+    let largest = |unit: &str| {
+        let of_unit = (0..vector.len()).filter(|&k| parameters[k].unit() == unit);
+        of_unit.map(amount).fold(0.0_f64, f64::max)
+    };
+    (0..vector.len())
+        .filter(|&k| {
+            let share = vector[k].abs() / peak;
+            let beside = amount(k) > SHOWN_SHARE * largest(parameters[k].unit());
+            share > SHOWN_SHARE || (share > FAINTEST_SHARE && beside)
+        })
+        .map(|k| (parameters[k], vector[k] / peak))
+        .collect()
+}
+
+/// Shares of a null vector below this are rounding.
+const FAINTEST_SHARE: f64 = 1e-5;
 
 /// Singular values below this share of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-9;

@@ -38,9 +38,9 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         Column::text("instruction", "Instruction"),
         Column::text("status", "Status"),
         Column::number("before_mm", "before", "mm", 3),
-        Column::number("after_mm", "predicted remainder", "mm", 4),
-        Column::number("sigma_mm", "predicted 1σ", "mm", 3),
-        Column::number("bend_mm", "bend between targets", "mm", 3),
+        Column::number("after_mm", "remainder", "mm", 4),
+        Column::number("sigma_mm", "1σ", "mm", 3),
+        Column::number("bend_mm", "bend", "mm", 3),
         Column::count("inserted", "Inserted"),
         Column::text("reason", "Reason"),
     ];
@@ -67,12 +67,26 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         table.push(row);
     }
     table.notes.push(
-        "before: how far the tool is off at the end of the motion as programmed. predicted remainder: what rounding and \
-         inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. 1σ is \
-         predicted from the covariance of the model."
+        "before: how far the tool is off at the end of the motion as programmed. remainder: the predicted remainder, what \
+         rounding and inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. \
+         1σ is predicted from the covariance of the model. bend: how far the path to this end leaves the intended one \
+         between targets; inserted: targets put in before it."
             .to_owned(),
     );
     table
+}
+
+/// [`table`] for a page: not too long, and without columns in which nothing stands.
+fn page_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
+    let mut table = table(plan, listing, files);
+    table.title.clear();
+    for column in (0..table.columns.len()).rev() {
+        if table.rows.iter().all(|row| row[column] == Cell::Missing) {
+            table.columns.remove(column);
+            table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+        }
+    }
+    table.excerpt(ROWS_ON_PAGE)
 }
 
 /// Reasons why motions were left, refused or flagged, with counts and first lines; the most frequent first within each
@@ -183,7 +197,7 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
         page.blocks.extend(sections(&of, 3));
     }
     page.heading(2, "Motions");
-    page.push(table(plan, listing, files).excerpt(ROWS_ON_PAGE));
+    page.push(page_table(plan, listing, files));
     if !listing.opaque.is_empty() {
         page.heading(2, "What could not be read");
         page.paragraph(

@@ -21,6 +21,9 @@ pub use summary::{block_table, registered_table};
 /// Rows of a point table on a page; the whole table belongs in the CSV file.
 const ROWS_ON_PAGE: usize = 150;
 
+/// Models with a key figure of their own.
+const MODELS_IN_FIGURES: usize = 7;
+
 /// Which side of the correction.
 type Side = fn(&PathPoint) -> Option<Deviation>;
 const BEFORE: Side = |point| point.before;
@@ -153,28 +156,55 @@ pub fn short_table(report: &PathReport) -> Table {
     table
 }
 
-/// Points that were refused, flagged or left, in the order of the path.
+/// Points that were refused, flagged or left, in the order of the path. Neighbours with the same fate and the same kind
+/// of reason share a row, which gives the reason of the first.
 pub fn flag_table(report: &PathReport) -> Table {
     let mut table = Table::new(
         "Points to look at",
         vec![
-            Column::count("line", "Line"),
-            Column::count("index", "Point"),
-            Column::text("instruction", "Instruction"),
+            Column::text("lines", "Lines"),
+            Column::text("points", "Points"),
+            Column::count("count", "Count"),
             Column::text("status", "Status"),
             Column::text("reason", "Reason"),
         ],
     );
-    for point in report.points.iter().filter(|point| point.status != Fate::Changed) {
+    let kind = |point: &PathPoint| (point.status, point.reason.as_deref().map(without_figures));
+    for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
+        let [first, ..] = run else { continue };
+        if first.status == Fate::Changed {
+            continue;
+        }
+        let reason = first.reason.as_ref().map(|reason| {
+            let same = run.iter().all(|point| point.reason.as_ref() == Some(reason));
+            if same { reason.clone() } else { format!("{reason} (the first)") }
+        });
+        let lines = run.iter().map(|point| point.line as usize).filter(|line| *line > 0);
         table.push([
-            line(point),
-            point.index.into(),
-            point.instruction.as_str().into(),
-            fate(point.status),
-            point.reason.clone().into(),
+            range(lines).into(),
+            range(run.iter().map(|point| point.index)).into(),
+            run.len().into(),
+            fate(first.status),
+            reason.into(),
         ]);
     }
     table
+}
+
+/// First and last of rising numbers; `None` of none.
+fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
+    let (low, high) = numbers.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
+    match low.cmp(&high) {
+        std::cmp::Ordering::Less => Some(format!("{low}–{high}")),
+        std::cmp::Ordering::Equal => Some(low.to_string()),
+        std::cmp::Ordering::Greater => None,
+    }
+}
+
+/// A reason without its measured figures, which have a decimal point; numbers of joints stay.
+fn without_figures(reason: &str) -> String {
+    let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
+    reason.split(' ').filter(plain).collect::<Vec<_>>().join(" ")
 }
 
 /// The page: one section per program. Reports of one program with several models stand together.
@@ -217,9 +247,6 @@ pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
     page.push(verdict(reports));
     page.push(key_figures(reports));
     page.push(summary::block(reports, false));
-    if reports.iter().any(|r| r.after == After::PredictedRemainder && has(r, AFTER)) {
-        page.paragraph(REMAINDER);
-    }
     page.push(summary::registered(reports, false));
     page.heading(level, "Along the path");
     for figure in pictures::all(reports) {
@@ -467,46 +494,82 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             reasons.push(format!("{points} {} {text}", if points == 1 { "point" } else { "points" }));
         }
     }
-    // The model that leaves the least speaks for all.
-    let size = |report: &&PathReport, side: Side| report.block(side).map(|block| block.all.max);
-    let told = reports.iter().filter(|r| has(r, AFTER) && has(r, BEFORE)).min_by(|a, b| {
-        size(a, AFTER).unwrap_or(f64::INFINITY).total_cmp(&size(b, AFTER).unwrap_or(f64::INFINITY))
-    });
+    let size = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
     let known = |value: Option<f64>| value.map_or("not known".to_owned(), |mm| format!("{mm:.3} mm"));
-    let headline = match told {
-        Some(report) => {
-            let (before, after) = (size(report, BEFORE), size(report, AFTER));
-            if after > before {
-                status = Status::Bad;
-            }
-            let under = if reports.len() > 1 { format!(" with {}", report.model) } else { String::new() };
-            format!(
-                "The largest deviation goes from {} to {} ({}){under}; predicted 1σ {}, held-out error of the model {}",
-                known(before),
-                match (after, report.after) {
-                    (Some(mm), After::PredictedRemainder) => format!("{mm:.4} mm"),
-                    (mm, _) => known(mm),
-                },
-                meaning(report.after),
-                known(sigma_rms(report)),
-                known(report.held_out_mm),
-            )
+    let judged: Vec<(&PathReport, f64, f64)> = reports
+        .iter()
+        .filter_map(|report| Some((*report, size(report, BEFORE)?, size(report, AFTER)?)))
+        .collect();
+    for (report, before, after) in &judged {
+        if after > before {
+            status = if judged.iter().all(|(_, before, after)| after > before) {
+                Status::Bad
+            } else {
+                Status::Warning
+            };
+            reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
         }
-        None => {
+        if let (Some(sigma), Some(rms)) = (sigma_rms(report), before_rms(report))
+            && sigma > rms
+        {
+            if status == Status::Good {
+                status = Status::Warning;
+            }
+            reasons.push(format!(
+                "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
+                 model does not know enough here to say that the correction helps",
+                report.model
+            ));
+        }
+    }
+    let headline = match judged.as_slice() {
+        [] => {
             if status == Status::Good {
                 status = Status::NotEvaluated;
             }
-            let worst = reports.iter().filter_map(|r| size(r, BEFORE)).reduce(f64::max);
+            let worst = reports.iter().filter_map(|report| size(report, BEFORE)).reduce(f64::max);
             format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
+        }
+        [(report, before, after)] => format!(
+            "The largest deviation goes from {before:.3} mm to {after:.*} mm ({}); predicted 1σ {}, held-out error of the \
+             model {}",
+            decimals(report.after),
+            meaning(report.after),
+            known(sigma_rms(report)),
+            known(report.held_out_mm),
+        ),
+        [(first, ..), ..] => {
+            let spread = |values: Vec<f64>, decimals: usize| {
+                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let (low, high) = (format!("{low:.decimals$}"), format!("{high:.decimals$}"));
+                if low == high { format!("{low} mm") } else { format!("{low} to {high} mm") }
+            };
+            format!(
+                "The largest deviation goes from {} to {} ({}), depending on the model",
+                spread(judged.iter().map(|j| j.1).collect(), 3),
+                spread(judged.iter().map(|j| j.2).collect(), decimals(first.after)),
+                meaning(first.after),
+            )
         }
     };
     Verdict::new(status, headline, reasons)
 }
 
+/// Root mean square of the sizes of the deviations of the cut as programmed (mm).
+fn before_rms(report: &PathReport) -> Option<f64> {
+    let squares: Vec<f64> =
+        cut(report).filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
 fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     let mut figures = Vec::new();
     let note = |report: &PathReport, side: Side, what: &str| match report.block(side) {
-        Some(block) => format!("{what}, mean |d| {:.3} mm", block.all.mean_absolute),
+        Some(block) => {
+            let decimals = if what == meaning(After::PredictedRemainder) { 4 } else { 3 };
+            format!("{what}, mean |d| {:.decimals$} mm", block.all.mean_absolute)
+        }
         None => what.to_owned(),
     };
     let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
@@ -517,7 +580,7 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             "as programmed",
         )));
     }
-    for report in reports.iter().filter(|report| has(report, AFTER)).take(3) {
+    for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
         let label = if reports.len() > 1 {
             format!("Largest after, {}", report.model)
         } else {

@@ -114,9 +114,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             .observability
             .iter()
             .enumerate()
-            .map(|(k, value)| {
-                (format!("o{}", k + 1), json!((report.rank == report.parameters).then_some(value)))
-            })
+            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank > 0).then_some(value))))
             .collect();
         let combinations: Vec<Value> = report
             .combinations
@@ -129,6 +127,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             "parameters": report.parameters,
             "rank": report.rank,
             "condition": report.condition,
+            "determined_condition": report.determined_condition,
             "singular_values": report.singular_values,
             "observability": observability,
             "held_by_priors": report.held_by_priors,
@@ -190,16 +189,11 @@ fn is_of_arm(parameter: &EstimatedParameter) -> bool {
     parameter.name.starts_with("link") || parameter.name.starts_with("effect")
 }
 
-/// A parameter in the unit that people read: degrees for radians.
-fn readable(parameter: &EstimatedParameter) -> EstimatedParameter {
-    let (factor, unit) = if parameter.unit == "rad" {
-        (1f64.to_degrees(), "°".to_owned())
-    } else {
-        (1.0, parameter.unit.clone())
-    };
+/// A parameter with all its numbers times `factor`.
+fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
     EstimatedParameter {
         name: parameter.name.clone(),
-        unit,
+        unit: unit.to_owned(),
         nominal: parameter.nominal * factor,
         value: parameter.value * factor,
         sigma: parameter.sigma * factor,
@@ -208,13 +202,27 @@ fn readable(parameter: &EstimatedParameter) -> EstimatedParameter {
     }
 }
 
+/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
+fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
+    let (factor, unit) = match parameter.unit.as_str() {
+        "rad" => (1f64.to_degrees(), "°"),
+        "1" => (1e6, "ppm"),
+        "1/K" => (1e6, "ppm/K"),
+        "rad/(N m)" => (1e6, "µrad/(N m)"),
+        unit => (1.0, unit),
+    };
+    in_unit(parameter, factor, unit)
+}
+
 fn parameter_json(parameter: &EstimatedParameter) -> Value {
-    let shown = readable(parameter);
-    let unit = if shown.unit == "°" { "deg" } else { &shown.unit };
+    let shown = match parameter.unit.as_str() {
+        "rad" => in_unit(parameter, 1f64.to_degrees(), "deg"),
+        unit => in_unit(parameter, 1.0, unit),
+    };
     let of_arm = is_of_arm(parameter);
     json!({
         "name": shown.name,
-        "unit": unit,
+        "unit": shown.unit,
         "nominal": of_arm.then_some(shown.nominal),
         "value": shown.value,
         "sigma": shown.sigma,
@@ -265,8 +273,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Largest held-out error", after.max, 3, "mm")
             .note(format!("registered: {:.3} mm", before.max)),
         match estimated.noise_floor_mm {
-            Some(_) => floor.note("what the rounding of the angles alone leaves"),
-            None => floor.note("nothing is known to be rounded"),
+            Some(_) => floor.note("scatter of repeated poses, else what rounding leaves"),
+            None => floor.note("no pose repeated, nothing known to be rounded"),
         },
         KeyFigure::new("Rows used", used, 0, "").note(format!(
             "{} fitted and {} held out to state errors; the model is fitted to all",
@@ -289,10 +297,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     let mut remarks = vec![
         remark("Robot", found.estimated.robot.clone()),
         remark("Sensor", from.sensor.clone()),
-        remark(
-            "Split",
-            format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out)),
-        ),
+        remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
         remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
     ];
     if let Some(sheet) = &dataset.sheet {

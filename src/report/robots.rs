@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Verdict};
+use super::document::{Document, KeyFigure, Verdict};
 use super::number::MISSING;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -226,34 +226,34 @@ pub fn document(robot: &Robot) -> Document {
         );
     }
     page.heading(2, "Links");
-    page.push(link_table(robot));
+    page.push(untitled(link_table(robot)));
     if let Some(flange) = &sheet.flange {
         page.paragraph(format!(
-            "The flange lies in the last link frame at {} mm, turned by the quaternion {} (w, x, y, z).",
+            "The flange lies in the last link frame at ({}) mm, turned by the quaternion ({}), w first.",
             list(&flange.position_mm),
             list(&flange.quaternion_wxyz)
         ));
     }
     page.heading(2, "Joints");
-    page.push(joint_table(robot));
+    page.push(untitled(joint_table(robot)));
     page.heading(2, "Mounting and masses");
     page.paragraph(format!(
-        "Gravity points along {} in the base; the mounting face is at {} mm.",
+        "Gravity points along ({}) in the base; the mounting face is at ({}) mm.",
         list(&sheet.mounting.gravity),
         list(&sheet.mounting.plate_mm)
     ));
     match mass_table(robot) {
-        Some(table) => page.push(table),
+        Some(table) => page.push(untitled(table)),
         None => page.paragraph("No masses are stated, so gravity bends this arm only through its payload."),
     }
     page.heading(2, "Published poses");
     if sheet.published.is_empty() {
         page.paragraph("None is stated, so nothing checks the links.");
     } else {
-        page.push(published_table(robot));
+        page.push(untitled(published_table(robot)));
     }
     page.heading(2, "Sources");
-    page.push(Block::Table(Table { title: String::new(), ..source_table(robot) }));
+    page.push(untitled(source_table(robot)));
     page
 }
 
@@ -279,6 +279,11 @@ pub fn json(robot: &Robot) -> Value {
 /// The catalogue for programs; schema `truegrind.robots/1`.
 pub fn catalogue_json(robots: &[Robot]) -> Value {
     json!({ "schema": "truegrind.robots/1", "robots": super::format::json::Rows(&catalogue_table(robots)) })
+}
+
+/// A table right under a heading that says the same.
+fn untitled(table: Table) -> Table {
+    Table { title: String::new(), ..table }
 }
 
 fn words(text: &str) -> Cell {

@@ -29,13 +29,10 @@ pub fn table(rows: &[MethodRow]) -> Table {
             Column::number("max_mm", "max", "mm", 3),
             Column::number("jacobian_passes", "Jacobian passes", "", 1),
             Column::text("converged", "Converged"),
-            Column::text("about", "What it is"),
         ],
     );
     for row in rows {
         let cell = |figure: fn(&ErrorSummary) -> f64| over_splits(row, figure);
-        let about =
-            row.solver.map_or("nominal links; base or outlet, zero and touched point fitted", |s| s.about);
         table.push([
             name(row).into(),
             cell(|s| s.rmse),
@@ -43,7 +40,6 @@ pub fn table(rows: &[MethodRow]) -> Table {
             cell(|s| s.max),
             passes(row).into(),
             converged(row).map(|(yes, of)| format!("{yes} of {of}")).into(),
-            about.into(),
         ]);
     }
     table.notes = notes(rows);
@@ -178,13 +174,22 @@ fn best(rows: &[MethodRow]) -> Option<(&'static str, f64, Option<f64>)> {
 }
 
 fn notes(rows: &[MethodRow]) -> Vec<String> {
-    let mut notes = vec![
+    let mut notes: Vec<String> = rows
+        .iter()
+        .map(|row| {
+            let about = row
+                .solver
+                .map_or("nominal links; base or outlet, zero and touched point fitted", |s| s.about);
+            format!("{}: {about}.", name(row))
+        })
+        .collect();
+    notes.extend([
         "mean |e| is what the papers print as \"STD\" (ltlm-2024 eq. 20). ± is the standard deviation over the splits."
             .to_owned(),
         "A Jacobian pass takes all rows once, with derivatives; all rounds of a fit count. LTLM takes two in each \
          iteration: compare methods by passes, not by iterations."
             .to_owned(),
-    ];
+    ]);
     let literal: Vec<&str> =
         rows.iter().filter(|row| row.solver.is_some_and(|s| s.literal)).map(name).collect();
     if !literal.is_empty() {

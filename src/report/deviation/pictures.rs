@@ -3,7 +3,9 @@
 use super::{AFTER, BEFORE, Side, cut, has, intended, meaning};
 use crate::compensation::deviation::{PathPoint, PathReport, Status};
 use crate::report::document::Figure;
-use crate::report::plot::{Axis, ColorMap, Graph, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span};
+use crate::report::plot::{
+    Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
+};
 
 /// More points than a picture can show make a page heavy; of each group the largest is kept.
 const POINTS: usize = 2000;
@@ -15,6 +17,9 @@ const MODELS: usize = 5;
 pub(super) fn all(reports: &[&PathReport]) -> Vec<Figure> {
     let mut out = vec![along(reports)];
     out.push(frequency(reports));
+    if reports.len() > 1 {
+        out.push(strips(reports));
+    }
     out.extend(plan(reports));
     out
 }
@@ -49,9 +54,11 @@ fn shown<'a>(reports: &[&'a PathReport]) -> Vec<Shown<'a>> {
     out
 }
 
+const SIGNED: &str = "deviation along the normal";
+
 fn quantity(reports: &[&PathReport]) -> &'static str {
     let signed = reports.iter().flat_map(|report| cut(report)).all(|point| point.normal.is_some());
-    if signed { "deviation along the normal" } else { "size of the deviation" }
+    if signed { SIGNED } else { "size of the deviation" }
 }
 
 fn along(reports: &[&PathReport]) -> Figure {
@@ -98,23 +105,48 @@ fn along(reports: &[&PathReport]) -> Figure {
 }
 
 fn frequency(reports: &[&PathReport]) -> Figure {
-    let samples = shown(reports)
+    // More than two would only hide each other.
+    let one = &reports[..reports.len().min(1)];
+    let samples = shown(one)
         .into_iter()
         .map(|s| Sample { ink: s.ink, ..Sample::new(s.name, s.report.signed_mm(s.side)) })
         .collect();
     let histogram = Histogram {
         title: "How often each deviation occurs".to_owned(),
-        x: Axis::new(quantity(reports), "mm"),
+        x: Axis::new(quantity(one), "mm"),
         samples,
         bins: None,
     };
-    Figure::new(histogram.svg(), "Deviations of the points of the cut, before and after.")
+    let mut caption = "Deviations of the points of the cut, before and after".to_owned();
+    if let ([report], true) = (one, reports.len() > 1) {
+        caption.push_str(&format!(" with {}", report.model));
+    }
+    Figure::new(histogram.svg(), caption + ".")
+}
+
+fn strips(reports: &[&PathReport]) -> Figure {
+    let signed = quantity(reports) == SIGNED;
+    let strips = shown(reports)
+        .into_iter()
+        .map(|Shown { name, report, side, .. }| Strip { name, values: report.signed_mm(side) })
+        .collect();
+    let strip = HeatStrip {
+        title: "Model by model".to_owned(),
+        x: Axis::new("point of the cut", ""),
+        value: Axis::new(quantity(reports), "mm"),
+        colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
+        strips,
+    };
+    Figure::new(
+        strip.svg(),
+        "Deviation along the cut, one strip per model on a common scale: strips that look alike are alike.",
+    )
 }
 
 fn plan(reports: &[&PathReport]) -> Option<Figure> {
     let first = reports.first()?;
     let axes = widest(first)?;
-    let signed = quantity(reports) == "deviation along the normal";
+    let signed = quantity(reports) == SIGNED;
     let names = ["x", "y", "z"];
     let cuts = first.points.iter().any(|point| point.cutting);
     let paths: Vec<PlanPath> = shown(reports)

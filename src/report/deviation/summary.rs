@@ -1,6 +1,6 @@
 //! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
 
-use super::{AFTER, BEFORE, Side, by_program, cut, has, meaning, sigma_rms};
+use super::{AFTER, BEFORE, REMAINDER, Side, by_program, cut, has, meaning, sigma_rms};
 use crate::compensation::deviation::{After, Block, PathReport};
 use crate::report::table::{Cell, Column, Table};
 
@@ -20,23 +20,31 @@ pub fn registered_table(reports: &[PathReport]) -> Table {
 
 /// [`block_table`], with a column for the program where there are several.
 pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
+    // The unit stands in the title, so that the figures and what they must be seen beside fit one line.
+    let remainders = reports.iter().all(|report| report.after == After::PredictedRemainder);
+    let decimals = if remainders && reports.iter().any(|report| has(report, AFTER)) { 4 } else { 3 };
+    let number = |key: &str, heading: &str, decimals| Column::number(key, heading, "", decimals);
     let mut columns = first_columns(programs);
-    columns.extend((1..=5).map(|point| Column::number(format!("p{point}_mm"), format!("P{point}"), "mm", 3)));
+    let kind = columns.pop();
+    columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"), decimals)));
     columns.extend([
-        Column::number("mean_mm", "mean", "mm", 3),
-        Column::number("mean_absolute_mm", "mean |d|", "mm", 3),
-        Column::number("standard_deviation_mm", "SD", "mm", 3),
-        Column::number("max_mm", "max", "mm", 3),
-        Column::number("sigma_mm", "1σ", "mm", 3),
-        Column::number("model_held_out_rmse_mm", "held-out", "mm", 3),
+        number("mean_mm", "mean", decimals),
+        number("mean_absolute_mm", "mean |d|", decimals),
+        number("standard_deviation_mm", "SD", decimals),
+        number("max_mm", "max", decimals),
+        number("sigma_mm", "1σ", 3),
+        number("model_held_out_rmse_mm", "held-out", 3),
     ]);
-    let mut table = Table::new("Deviation of path points", columns);
+    columns.extend(kind);
+    let mut table = Table::new("Deviation of path points before and after compensation [mm]", columns);
     for row in rows(reports, |report, side| report.block(side)) {
         let Block { five_mm, all } = row.value;
         let mut cells = row.first_cells(programs);
+        let kind = cells.pop();
         cells.extend(five_mm.map(Cell::from));
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
         cells.extend([sigma_rms(row.report).into(), row.report.held_out_mm.into()]);
+        cells.extend(kind);
         table.push(cells);
     }
     let (mut with, mut without) = (0, 0);
@@ -62,6 +70,9 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
          the covariance (RMS over the cut), held-out is the model's RMSE on rows it never saw."
             .to_owned(),
     );
+    if reports.iter().any(|report| report.after == After::PredictedRemainder && has(report, AFTER)) {
+        table.notes.push(REMAINDER.to_owned());
+    }
     table
 }
 
@@ -109,7 +120,7 @@ impl<T> Row<'_, T> {
 }
 
 fn first_columns(programs: bool) -> Vec<Column> {
-    let mut columns = vec![Column::text("path", "Path"), Column::text("kind", "Figures are")];
+    let mut columns = vec![Column::text("path", "Path"), Column::text("kind", "Figures")];
     if programs {
         columns.insert(0, Column::text("program", "Program"));
     }
@@ -136,11 +147,7 @@ fn rows<'a, T: PartialEq>(
         let agreed = before.windows(2).all(|pair| pair[0].1 == pair[1].1);
         let shown = if agreed { 1 } else { before.len() };
         for (report, value) in before.into_iter().take(shown) {
-            let path = if agreed {
-                "before compensation".to_owned()
-            } else {
-                format!("before compensation, under {}", report.model)
-            };
+            let path = if agreed { "before".to_owned() } else { format!("before, under {}", report.model) };
             let kind = match report.after {
                 After::PredictedRemainder => "predicted",
                 After::Achieved => "achieved",

@@ -1,6 +1,6 @@
 //! Pictures of an identification.
 
-use super::{held_by_prior, is_of_arm, readable, signed, tables};
+use super::{handy, held_by_prior, is_of_arm, signed, tables};
 use crate::identification::identifiability::Identifiability;
 use crate::identification::identify::Identification;
 use crate::report::plot::{Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series};
@@ -52,7 +52,7 @@ pub(super) fn by_row(found: &Identification) -> String {
 /// Parameters of the arm in units of their priors.
 pub(super) fn parameters(found: &Identification) -> String {
     let rows = found.parameters.iter().filter(|parameter| is_of_arm(parameter)).filter_map(|parameter| {
-        let shown = readable(parameter);
+        let shown = handy(parameter);
         let mut row = Interval::new(
             shown.name,
             shown.unit,
@@ -63,7 +63,7 @@ pub(super) fn parameters(found: &Identification) -> String {
         row.determined = !held_by_prior(parameter);
         Some(row)
     });
-    Intervals { title: "Parameters of the arm".to_owned(), rows: rows.collect() }.svg()
+    Intervals { title: "Change from the data sheet".to_owned(), rows: rows.collect() }.svg()
 }
 
 /// Singular values, falling.
@@ -102,7 +102,7 @@ pub(super) fn convergence(found: &Identification) -> String {
         })
         .collect();
     Graph {
-        title: "Convergence".to_owned(),
+        title: "Cost of the final fit".to_owned(),
         x: Axis::new("iteration", ""),
         y: Axis::log("cost, ½ Σ r² with priors", ""),
         series,

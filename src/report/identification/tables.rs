@@ -1,6 +1,6 @@
 //! Tables of an identification.
 
-use super::{cell, held_by_prior, is_of_arm, readable, row_number, signed};
+use super::{cell, handy, held_by_prior, is_of_arm, row_number, signed};
 use crate::identification::identifiability::Identifiability;
 use crate::identification::identify::Identification;
 use crate::identification::solver;
@@ -77,16 +77,16 @@ pub fn parameter_table(found: &Identification) -> Table {
             Column::text("name", "Parameter"),
             Column::significant("nominal", "Nominal", "", 6),
             Column::significant("value", "Estimated ± σ", "", 2),
-            Column::significant("deviation", "Deviation", "", 3),
+            Column::number("deviation", "Deviation", "", 4),
             Column::text("unit", "Unit"),
             Column::significant("prior_sigma", "Tolerance", "", 2),
-            Column::number("determined_percent", "Determined by the data", "%", 0),
+            Column::number("determined_percent", "Determined", "%", 0),
             Column::text("held", "Held by"),
         ],
     );
     let literal = solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.literal);
     for parameter in found.parameters.iter().filter(|parameter| is_of_arm(parameter)) {
-        let shown = readable(parameter);
+        let shown = handy(parameter);
         table.push([
             shown.name.as_str().into(),
             shown.nominal.into(),
@@ -103,8 +103,8 @@ pub fn parameter_table(found: &Identification) -> Table {
         ]);
     }
     table.notes.push(
-        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined by the data: \
-         1 − (σ / tolerance)²; a parameter below 50 % stays near its nominal value because the prior holds it there, not \
+        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined: the \
+         share that the data brought, 1 − (σ / tolerance)²; a parameter below 50 % stays near its nominal value because the prior holds it there, not \
          because it was seen there."
             .to_owned(),
     );
@@ -128,7 +128,7 @@ pub fn frame_table(found: &Identification) -> Table {
         ],
     );
     for parameter in found.parameters.iter().filter(|parameter| !is_of_arm(parameter)) {
-        let shown = readable(parameter);
+        let shown = handy(parameter);
         table.push([
             shown.name.as_str().into(),
             meaning(&shown.name).into(),
@@ -245,8 +245,19 @@ pub fn observability_table(report: &Identifiability) -> Table {
         report.rank.into(),
         format!("of {} parameters, data alone", report.parameters).into(),
     ]);
-    table.push(["condition".into(), report.condition.into(), "largest over smallest singular value".into()]);
+    table.push([
+        "condition".into(),
+        report.condition.into(),
+        "largest over smallest singular value, all parameters".into(),
+    ]);
     let full = report.rank == report.parameters;
+    if !full {
+        table.push([
+            "condition, seen".into(),
+            report.determined_condition.into(),
+            "the same over the combinations that the data determine".into(),
+        ]);
+    }
     let meanings = [
         "geometric mean of the singular values over √poses",
         "smallest over largest singular value",
@@ -255,16 +266,20 @@ pub fn observability_table(report: &Identifiability) -> Table {
         "1 / Σ 1/σ",
     ];
     for (index, (value, meaning)) in report.observability.iter().zip(meanings).enumerate() {
-        table.push([format!("O{}", index + 1).into(), cell(*value, full), meaning.into()]);
+        table.push([format!("O{}", index + 1).into(), cell(*value, report.rank > 0), meaning.into()]);
     }
     table.push([
         "below 1".into(),
         report.held_by_priors.into(),
         "singular values below 1: the prior knows more than the data".into(),
     ]);
-    table.notes.push(
-        "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013; they need full rank."
-            .to_owned(),
-    );
+    table.notes.push(format!(
+        "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013{}.",
+        if full {
+            ""
+        } else {
+            ", over the combinations that the data determine: over all parameters they would be 0"
+        }
+    ));
     table
 }

@@ -7,6 +7,7 @@ use crate::identification::identify::Identification;
 use crate::identification::rounding::NotSharpened;
 use crate::kinematics::parameter::Parameter;
 use crate::measurement::dataset::Dataset;
+use crate::measurement::split;
 use crate::report::document::{Block, Verdict};
 use crate::report::number::Precision;
 use crate::report::status::Status;
@@ -24,16 +25,21 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
         ));
     }
     if let Some(floor) = found.estimated.noise_floor_mm {
-        out.push(if held < 1.5 * floor {
-            format!(
+        out.push(match (split::noise_floor(dataset).is_some(), held < 1.5 * floor) {
+            (true, true) => format!(
+                "Repeated poses scatter by {floor:.3} mm: a better model cannot show much more in these rows."
+            ),
+            (true, false) => format!(
+                "Repeated poses scatter by {floor:.3} mm; the rest of the {held:.3} mm is what the model does not explain."
+            ),
+            (false, true) => format!(
                 "The rounding of the angles alone leaves {floor:.3} mm: what is left is mostly rounding, and a better \
                  model cannot show in these rows. Log angles with more decimals."
-            )
-        } else {
-            format!(
+            ),
+            (false, false) => format!(
                 "The rounding of the angles alone leaves {floor:.3} mm; the rest of the {held:.3} mm is the sensor, and \
                  what geometry does not explain."
-            )
+            ),
         });
     }
     out.push(format!(
@@ -41,10 +47,7 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
         Precision::Significant(3).format(found.geometry.sigma_mm)
     ));
     if let Some(step) = dataset.angle_step_rad {
-        out.push(format!(
-            "Logged angles are multiples of {}°.",
-            Precision::Significant(3).format(step.to_degrees())
-        ));
+        out.push(format!("Logged angles are multiples of {}°.", (step.to_degrees() * 1e6).round() / 1e6));
     }
     out
 }
@@ -52,10 +55,11 @@ pub(super) fn remarks(found: &Identification, dataset: &Dataset) -> Vec<String> 
 /// Judgement of rank, with a sentence for each combination that moves no reading.
 pub(super) fn identifiability(found: &Identification, report: &Identifiability) -> Block {
     let missing = report.parameters.saturating_sub(report.rank);
+    let rank = format!("Rank {} of {}", report.rank, report.parameters);
     if missing == 0 {
         return Verdict::new(
             Status::Good,
-            format!("The data determine all {} parameters", report.parameters),
+            format!("{rank}: no combination of parameters goes unseen"),
             [format!(
                 "condition number {}; {} combinations are known better from the priors than from the data",
                 Precision::Significant(3).format(report.condition),
@@ -64,17 +68,12 @@ pub(super) fn identifiability(found: &Identification, report: &Identifiability) 
         )
         .into();
     }
-    Verdict::new(
-        Status::Warning,
-        format!(
-            "The data determine {} of {} parameters; {missing} {} no reading and stay where the priors hold them",
-            report.rank,
-            report.parameters,
-            if missing == 1 { "combination moves" } else { "combinations move" }
-        ),
-        combinations(found, report),
-    )
-    .into()
+    let what = if missing == 1 {
+        "one combination of parameters moves no reading and stays where the priors hold it".to_owned()
+    } else {
+        format!("{missing} combinations of parameters move no reading and stay where the priors hold them")
+    };
+    Verdict::new(Status::Warning, format!("{rank}: {what}"), combinations(found, report)).into()
 }
 
 /// One sentence for each combination of parameters that moves no reading, in mm and degrees.
@@ -98,13 +97,16 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
             unit => format!("{parameter} {} {unit}", number(amount)),
         }
     };
+    let mut terms = terms.to_vec();
+    terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     let moves: Vec<String> = terms.iter().map(moved).collect();
     match moves.as_slice() {
-        [] => "a combination with no part of its own worth naming moves no reading".to_owned(),
-        [one] => format!(
-            "{one} moves no reading, at most with others that follow by less than a twentieth of their tolerances"
-        ),
-        several => format!("{} together move no reading", several.join(", ")),
+        [] => "a combination without a part worth naming goes unseen".to_owned(),
+        [one] => format!("{one} goes unseen"),
+        [first, other] => format!("{first} goes unseen when {other} follows"),
+        [first, others @ .., last] => {
+            format!("{first} goes unseen when {} and {last} follow", others.join(", "))
+        }
     }
 }
 

@@ -159,18 +159,49 @@ fn the_block_is_that_of_table_8() {
     let table = view::block_table(&[report("lm.toml", points)]);
     let text = terminal::table(&table, 200);
     let lines: Vec<&str> = text.lines().collect();
+    let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(lines[0], "Deviation of path points before and after compensation [mm]");
     assert_eq!(
-        lines[1],
-        "Path                 Figures are          P1 [mm]  P2 [mm]  P3 [mm]  P4 [mm]  P5 [mm]  mean [mm]  mean |d| [mm]  SD [mm]  max [mm]  1σ [mm]  held-out [mm]"
+        lines[1].split("  ").map(str::trim).filter(|w| !w.is_empty()).collect::<Vec<_>>(),
+        ["Path", "P1", "P2", "P3", "P4", "P5", "mean", "mean |d|", "SD", "max", "1σ", "held-out", "Figures"]
     );
     // Values −2 … 6: mean 2, mean size (2 + 1 + 0 + … + 6)/9 = 24/9, SD √7.5.
     assert_eq!(
-        lines[3],
-        "before compensation  predicted             -2.000    0.000    2.000    3.000    5.000      2.000          2.667    2.739     6.000    0.120          0.460"
+        words(lines[3]),
+        [
+            "before",
+            "-2.0000",
+            "0.0000",
+            "2.0000",
+            "3.0000",
+            "5.0000",
+            "2.0000",
+            "2.6667",
+            "2.7386",
+            "6.0000",
+            "0.120",
+            "0.460",
+            "predicted"
+        ]
     );
     assert_eq!(
-        lines[4],
-        "lm.toml              predicted remainder   -0.200    0.000    0.200    0.300    0.500      0.200          0.267    0.274     0.600    0.120          0.460"
+        words(lines[4]),
+        [
+            "lm.toml",
+            "-0.2000",
+            "0.0000",
+            "0.2000",
+            "0.3000",
+            "0.5000",
+            "0.2000",
+            "0.2667",
+            "0.2739",
+            "0.6000",
+            "0.120",
+            "0.460",
+            "predicted",
+            "remainder"
+        ]
     );
     let notes = table.notes.join(" ");
     assert!(
@@ -187,16 +218,11 @@ fn models_that_agree_about_the_path_before_share_its_row() {
     let path =
         |row: &Vec<Cell>| if let Cell::Text(text) = &row[0] { text.clone() } else { panic!("{row:?}") };
     let names = |reports: &[PathReport]| view::block_table(reports).rows.iter().map(path).collect::<Vec<_>>();
-    assert_eq!(names(&[one.clone(), two.clone()]), ["before compensation", "model.toml", "other.toml"]);
+    assert_eq!(names(&[one.clone(), two.clone()]), ["before", "model.toml", "other.toml"]);
     two.points[0].before = Some(deviation([0.0, 0.0, 2.0], true));
     assert_eq!(
         names(&[one.clone(), two.clone()]),
-        [
-            "before compensation, under model.toml",
-            "before compensation, under other.toml",
-            "model.toml",
-            "other.toml"
-        ]
+        ["before, under model.toml", "before, under other.toml", "model.toml", "other.toml"]
     );
     // A second program brings a column for the program, and a path that nobody rewrote has no row after.
     two.program = "other.mod".to_owned();
@@ -239,13 +265,29 @@ fn a_shift_of_the_whole_path_is_no_shape_error() {
 
 #[test]
 fn flags_are_listed_by_line_with_their_reasons() {
-    let text = terminal::table(&view::flag_table(&three(true)), 120);
-    let lines: Vec<&str> = text.lines().collect();
+    let rows = |report: &PathReport| -> Vec<String> {
+        csv::table(&view::flag_table(report)).lines().skip(1).map(str::to_owned).collect()
+    };
     assert_eq!(
-        lines[3],
-        "  11      1  MoveL        ⚠\u{fe0e} flagged  joint 5 is 5.0° outside the range in which the arm was measured"
+        rows(&three(true)),
+        [
+            "11,1,1,flagged,joint 5 is 5.0° outside the range in which the arm was measured",
+            ",2,1,refused,target is out of reach",
+        ]
     );
-    assert_eq!(lines[4], "   –      2  MoveL        ✗ refused   target is out of reach");
+    // Neighbours of a kind share a row; another joint or another fate does not.
+    let mut long = report("m", (0..6).map(|k| point(k, [k as f64, 0.0, 0.0], None, None, false)).collect());
+    for (k, (joint, by)) in [(5, "5.0"), (5, "5.5"), (5, "6.0"), (6, "6.0"), (6, "6.0")].iter().enumerate() {
+        long.points[k].status = Status::Flagged;
+        long.points[k].reason = Some(format!("joint {joint} is {by}° outside"));
+    }
+    assert_eq!(
+        rows(&long),
+        [
+            "10–12,0–2,3,flagged,joint 5 is 5.0° outside (the first)",
+            "13–14,3–4,2,flagged,joint 6 is 6.0° outside",
+        ]
+    );
 }
 
 #[test]
@@ -292,7 +334,7 @@ fn one_file_holds_all_programs_and_models() {
 fn pages_of_one_model_of_several_and_of_nothing() {
     let one = view::document(&[raster("model.toml", After::PredictedRemainder, 2e-4)]);
     let text = leave("deviation-one.html", &one);
-    assert_eq!(text.matches("<svg").count(), 3);
+    assert_eq!(text.matches("<figure>").count(), 3);
     assert!(text.contains("16 points flagged: rewritten with a warning"), "one count per point");
     assert!(!text.contains("NaN"));
     let several = view::document(&[
@@ -301,7 +343,8 @@ fn pages_of_one_model_of_several_and_of_nothing() {
         raster("lm-as-printed", After::Achieved, 0.3),
     ]);
     let text = leave("deviation-several.html", &several);
-    assert!(text.contains("with ltlm; predicted 1σ"), "the best speaks for all");
+    assert!(text.contains("depending on the model"));
+    assert_eq!(text.matches("<figure>").count(), 4);
     assert_eq!(
         several,
         view::document(&[
@@ -314,6 +357,18 @@ fn pages_of_one_model_of_several_and_of_nothing() {
     let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
     assert!(empty.contains("not known"), "{empty}");
     assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
+}
+
+#[test]
+fn a_correction_smaller_than_its_sigma_is_called_so() {
+    let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
+    unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    let page = |report: &PathReport| terminal::document(&view::document(std::slice::from_ref(report)), 200);
+    assert!(page(&unsure).contains("[ok] The largest deviation goes from"));
+    unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
+    let text = page(&unsure);
+    assert!(text.contains("[warning] The largest deviation goes from"), "{text}");
+    assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
 }
 
 #[test]

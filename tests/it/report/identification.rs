@@ -93,24 +93,19 @@ geometry           held out     24      0.500          0.400    0.450     1.000 
 fn parameters_are_shown_in_millimetres_and_degrees() {
     let found = by_hand();
     let table = view::parameter_table(&found);
-    let lines: Vec<String> =
-        terminal::table(&table, 140).lines().take(7).map(|l| l.trim_end().to_owned()).collect();
-    assert_eq!(
-        lines[1],
-        "Parameter    Nominal              Estimated ± σ  Deviation  Unit       Tolerance  Determined by the data [%]  Held by"
-    );
-    assert_eq!(
-        lines[3],
-        "link1.a            0              0.250 ± 0.020      0.250  mm              1.0                         100  data"
-    );
-    assert_eq!(
-        lines[4],
-        "link2.alpha  -0.500000            0.2500 ± 0.0050      0.750  °              0.30                         100  data"
-    );
-    assert_eq!(
-        lines[5],
-        "link6.alpha        0                0.00 ± 0.30          0  °              0.30                           0  ⚠\u{fe0e} held by prior"
-    );
+    let text = terminal::table(&table, 140);
+    let expected = "\
+Estimated parameters
+Parameter      Nominal    Estimated ± σ  Deviation  Unit        Tolerance  Determined [%]  Held by
+───────────  ─────────  ───────────────  ─────────  ──────────  ─────────  ──────────────  ───────────────
+link1.a              0    0.250 ± 0.020     0.2500  mm                1.0             100  data
+link2.alpha  -0.500000  0.2500 ± 0.0050     0.7500  °                0.30             100  data
+link6.alpha          0      0.00 ± 0.30     0.0000  °                0.30               0  ⚠\u{fe0e} held by prior
+effect1.1            0      2.50 ± 0.10     2.5000  µrad/(N m)        100             100  data
+";
+    let trimmed =
+        |text: &str| text.lines().take(7).map(|l| l.trim_end().replace('─', "")).collect::<Vec<_>>();
+    assert_eq!(trimmed(&text), trimmed(expected), "{text}");
     assert_eq!(table.rows.len(), 4, "frames stand in a table of their own");
     let file = csv::table(&table);
     assert!(
@@ -150,24 +145,42 @@ fn combinations_are_sentences_in_mm_and_degrees() {
         rank: 29,
         condition: f64::INFINITY,
         singular_values: (0..31).map(|k| if k < 29 { 1e4 / 2f64.powi(k) } else { 0.0 }).collect(),
-        observability: [0.0; 5],
-        combinations: vec![vec![(theta, 1.0), (length, -0.5)], vec![(length, 1.0)]],
+        determined_condition: 1e6,
+        observability: [0.1, 0.2, 0.3, 0.4, 0.5],
+        combinations: vec![vec![(length, -0.5), (theta, 1.0)], vec![(length, 1.0)]],
         held_by_priors: 17,
     });
     let json = view::json(&found, identification().1);
     let told = &json["identifiability"];
-    assert_eq!(told["sentences"][0], "link1.theta +0.30°, link1.d −0.50 mm together move no reading");
-    assert!(told["sentences"][1].as_str().unwrap().starts_with("link1.d +1.0 mm moves no reading"));
-    assert_eq!(told["combinations"][0][1]["parameter"], "link1.d");
-    assert_eq!(told["combinations"][0][1]["share"], -0.5);
+    assert_eq!(told["sentences"][0], "link1.theta +0.30° goes unseen when link1.d −0.50 mm follows");
+    assert_eq!(told["sentences"][1], "link1.d +1.0 mm goes unseen");
+    assert_eq!(told["combinations"][0][0]["parameter"], "link1.d");
+    assert_eq!(told["combinations"][0][0]["share"], -0.5);
     assert!(told["condition"].is_null(), "infinity is no number of JSON");
-    assert!(told["observability"]["o1"].is_null(), "without full rank there is none");
+    assert_eq!(told["determined_condition"], 1e6);
+    assert_eq!(told["observability"]["o3"], 0.3);
     let text = terminal::document(&view::document(&found, identification().1), 120);
-    assert!(
-        text.contains("The data determine 29 of 31 parameters; 2 combinations move no reading"),
-        "{text}"
-    );
+    assert!(text.contains("[warning] Rank 29 of 31: 2 combinations of parameters move no reading"), "{text}");
     assert!(text.contains("O1") && text.contains('∞'));
+}
+
+#[test]
+fn what_makes_up_for_an_unseen_link_is_named() {
+    let (found, dataset) = identification();
+    let json = view::json(found, dataset);
+    let sentences: Vec<&str> = json["identifiability"]["sentences"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s.as_str().unwrap())
+        .collect();
+    // A longer first link lifts everything, the outlet of the cable too; a longer last link takes the hook along; a turn of
+    // the first joint turns the outlet about the base.
+    let with = |name: &str| sentences.iter().find(|s| s.starts_with(name)).copied().unwrap_or_default();
+    assert_eq!(with("link1.d"), "link1.d +1.0 mm goes unseen when outlet.z +1.0 mm follows", "{sentences:?}");
+    assert!(with("link6.d").contains("tool.z −1.0 mm"), "{sentences:?}");
+    assert!(with("link1.theta").contains("outlet.y"), "{sentences:?}");
+    assert!(json["identifiability"]["observability"]["o1"].as_f64().unwrap() > 0.0);
 }
 
 #[test]
@@ -291,7 +304,7 @@ fn the_page_is_whole() {
     ] {
         assert!(text.contains(&format!(">{heading}</h2>")), "no {heading}");
     }
-    assert_eq!(text.matches("<svg").count(), 5);
+    assert_eq!(text.matches("<figure>").count(), 5);
     assert!(text.contains(&found.estimated.provenance.sha256));
     assert!(!text.contains("NaN"));
     assert_eq!(text, leave("identification.html", &view::document(found, dataset)), "same input, same bytes");
