@@ -294,7 +294,18 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
     let priors = Tolerance::default().priors(&parameters, nominal);
     let rounds = vec![estimate.trace.clone()];
-    Fitted { parameters, priors, estimate, model, frames, sigma_mm, sigma_rad: 1e-3, task, evaluations, rounds }
+    Fitted {
+        parameters,
+        priors,
+        estimate,
+        model,
+        frames,
+        sigma_mm,
+        sigma_rad: 1e-3,
+        task,
+        evaluations,
+        rounds,
+    }
 }
 
 fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {

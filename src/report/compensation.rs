@@ -186,7 +186,9 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     page.push(table(plan, listing, files).excerpt(ROWS_ON_PAGE));
     if !listing.opaque.is_empty() {
         page.heading(2, "What could not be read");
-        page.paragraph("These regions are in the output as they were, byte for byte; motions inside them, if any, too.");
+        page.paragraph(
+            "These regions are in the output as they were, byte for byte; motions inside them, if any, too.",
+        );
         page.push(opaque_table(listing, files));
     }
     page
@@ -275,7 +277,9 @@ fn verdict(plan: &Plan) -> Verdict {
     }
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
     if inserted > 0 {
-        reasons.push(format!("{inserted} targets put in, so that straight lines stay straight within the tolerance"));
+        reasons.push(format!(
+            "{inserted} targets put in, so that straight lines stay straight within the tolerance"
+        ));
     }
     Verdict::new(status, headline, reasons)
 }
@@ -296,7 +300,9 @@ fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
             if all > 0 { figure.note(format!("{} of {all} motions", share(found, all))) } else { figure }
         })
         .collect();
-    figures.push(KeyFigure::new("Largest before", worst(|o| o.before_mm, |_| true), 3, "mm").note("all motions"));
+    figures.push(
+        KeyFigure::new("Largest before", worst(|o| o.before_mm, |_| true), 3, "mm").note("all motions"),
+    );
     figures.push(
         KeyFigure::new("Predicted remainder", worst(|o| o.after_mm, rewritten), 4, "mm")
             .note("largest of the rewritten motions"),
@@ -344,7 +350,9 @@ fn grouped(plan: &Plan) -> Vec<Group<'_>> {
                     (a, _) => a,
                 };
             }
-            None => groups.push(Group { fate: outcome.status, reason, worst: figure, outcomes: vec![outcome] }),
+            None => {
+                groups.push(Group { fate: outcome.status, reason, worst: figure, outcomes: vec![outcome] })
+            }
         }
     }
     let rank = |fate: Fate| [Fate::Refused, Fate::Flagged, Fate::Left].iter().position(|f| *f == fate);
@@ -360,11 +368,17 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
         Why::Inverse(InverseError::Unreachable { beyond_mm }) => {
             sized("target is out of reach".to_owned(), beyond_mm, "mm")
         }
-        Why::Inverse(InverseError::OtherConfiguration { .. }) => plain("target is not reachable in its configuration"),
-        Why::Inverse(InverseError::OtherBranch { .. }) => plain("target is reachable only in another configuration"),
+        Why::Inverse(InverseError::OtherConfiguration { .. }) => {
+            plain("target is not reachable in its configuration")
+        }
+        Why::Inverse(InverseError::OtherBranch { .. }) => {
+            plain("target is reachable only in another configuration")
+        }
         Why::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
         Why::TooFar { mm } => sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm"),
-        Why::TooMuchTurn { deg } => sized("correction of the orientation exceeds the bound".to_owned(), deg, "°"),
+        Why::TooMuchTurn { deg } => {
+            sized("correction of the orientation exceeds the bound".to_owned(), deg, "°")
+        }
         Why::Bend { mm } => sized("the path between targets leaves the intended one".to_owned(), mm, "mm"),
         Why::JointNotMeasured { joint, by_deg } => sized(
             format!("joint {} is outside the range in which the arm was measured", joint + 1),

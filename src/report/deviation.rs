@@ -75,8 +75,14 @@ fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
         Column::number("z_mm", "z", "mm", 3),
     ];
     for (side, key, decimals) in [("before", "before", 3), (word, key, decimals)] {
-        for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")] {
-            columns.push(Column::number(format!("{key}_{part}_mm"), format!("{side} {name}"), "mm", decimals));
+        for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")]
+        {
+            columns.push(Column::number(
+                format!("{key}_{part}_mm"),
+                format!("{side} {name}"),
+                "mm",
+                decimals,
+            ));
         }
     }
     columns.extend([
@@ -120,7 +126,12 @@ pub fn short_table(report: &PathReport) -> Table {
     for (side, key, decimals) in [("before", "before", 3), (word, key, decimals(report.after))] {
         columns.push(Column::number(format!("{key}_norm_mm"), format!("{side} |d|"), "mm", decimals));
         if normals {
-            columns.push(Column::number(format!("{key}_normal_mm"), format!("{side} normal"), "mm", decimals));
+            columns.push(Column::number(
+                format!("{key}_normal_mm"),
+                format!("{side} normal"),
+                "mm",
+                decimals,
+            ));
         }
     }
     columns.push(Column::number("sigma_mm", "1σ", "mm", 3));
@@ -500,16 +511,23 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     };
     let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
-        figures.push(
-            KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(first, BEFORE, "as programmed")),
-        );
+        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(
+            first,
+            BEFORE,
+            "as programmed",
+        )));
     }
     for report in reports.iter().filter(|report| has(report, AFTER)).take(3) {
-        let label = if reports.len() > 1 { format!("Largest after, {}", report.model) } else { "Largest after".into() };
-        figures.push(
-            KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm")
-                .note(note(report, AFTER, meaning(report.after))),
-        );
+        let label = if reports.len() > 1 {
+            format!("Largest after, {}", report.model)
+        } else {
+            "Largest after".into()
+        };
+        figures.push(KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm").note(note(
+            report,
+            AFTER,
+            meaning(report.after),
+        )));
     }
     if let [report] = reports {
         figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));

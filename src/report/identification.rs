@@ -87,7 +87,10 @@ pub fn summary(found: &Identification) -> Document {
     let mut page = Document::new(format!("Identification of {}", estimated.robot));
     page.subtitle = format!(
         "{}, {} rows, sensor {}, method {}",
-        estimated.provenance.file, estimated.provenance.rows, estimated.provenance.sensor, estimated.provenance.method
+        estimated.provenance.file,
+        estimated.provenance.rows,
+        estimated.provenance.sensor,
+        estimated.provenance.method
     );
     page.push(verdict(found));
     page.push(key_figures(found));
@@ -111,7 +114,9 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             .observability
             .iter()
             .enumerate()
-            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank == report.parameters).then_some(value))))
+            .map(|(k, value)| {
+                (format!("o{}", k + 1), json!((report.rank == report.parameters).then_some(value)))
+            })
             .collect();
         let combinations: Vec<Value> = report
             .combinations
@@ -131,8 +136,12 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             "sentences": words::combinations(found, report),
         })
     });
-    let rounds: Vec<Vec<f64>> =
-        found.geometry.rounds.iter().map(|trace| trace.iter().map(|iteration| iteration.cost).collect()).collect();
+    let rounds: Vec<Vec<f64>> = found
+        .geometry
+        .rounds
+        .iter()
+        .map(|trace| trace.iter().map(|iteration| iteration.cost).collect())
+        .collect();
     json!({
         "schema": "truegrind.identification/1",
         "dataset": {
@@ -234,9 +243,10 @@ fn verdict(found: &Identification) -> Verdict {
     let (status, headline) = match estimated.verdict.status {
         Judgement::Pass => (Status::Good, format!("The model meets the stated limits: {errors}")),
         Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
-        Judgement::NotEvaluated => {
-            (Status::NotEvaluated, format!("Nothing speaks against the model, but no limits were stated: {errors}"))
-        }
+        Judgement::NotEvaluated => (
+            Status::NotEvaluated,
+            format!("Nothing speaks against the model, but no limits were stated: {errors}"),
+        ),
     };
     Verdict::new(status, headline, estimated.verdict.reasons.iter().cloned())
 }
@@ -252,7 +262,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
         KeyFigure::new("Held-out RMSE", after.rmse, 3, "mm")
             .note(format!("{}: {:.3} mm", "registered frames alone", before.rmse)),
         KeyFigure::new("Gain of the model", gain, 0, "%").note("registered frames to geometry, held out"),
-        KeyFigure::new("Largest held-out error", after.max, 3, "mm").note(format!("registered: {:.3} mm", before.max)),
+        KeyFigure::new("Largest held-out error", after.max, 3, "mm")
+            .note(format!("registered: {:.3} mm", before.max)),
         match estimated.noise_floor_mm {
             Some(_) => floor.note("what the rounding of the angles alone leaves"),
             None => floor.note("nothing is known to be rounded"),
@@ -263,10 +274,12 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
             found.held_out.len()
         )),
         KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
-        KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(match rank {
-            Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
-            None => String::new(),
-        }),
+        KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
+            match rank {
+                Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
+                None => String::new(),
+            },
+        ),
     ]
 }
 
@@ -276,7 +289,10 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     let mut remarks = vec![
         remark("Robot", found.estimated.robot.clone()),
         remark("Sensor", from.sensor.clone()),
-        remark("Split", format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out))),
+        remark(
+            "Split",
+            format!("{} % of the rows held out", Precision::Significant(3).format(100.0 * from.held_out)),
+        ),
         remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
     ];
     if let Some(sheet) = &dataset.sheet {
@@ -293,7 +309,8 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         ("Payload", condition.payload_kg, "kg"),
     ] {
         if let Some(value) = value {
-            remarks.push(remark(name, format!("{} {unit} (median)", Precision::Significant(4).format(value))));
+            remarks
+                .push(remark(name, format!("{} {unit} (median)", Precision::Significant(4).format(value))));
         }
     }
     Provenance {

@@ -103,9 +103,13 @@ pub fn joint_table(robot: &Robot) -> Table {
     }
     match joints.angles {
         Angles::Logged => {
-            table.notes.push("Angles as the controller shows and logs them, without the offsets θ.".to_owned());
+            table
+                .notes
+                .push("Angles as the controller shows and logs them, without the offsets θ.".to_owned());
         }
-        Angles::Dh => table.notes.push("Logged angles are DH angles: the offsets θ are in them already.".to_owned()),
+        Angles::Dh => {
+            table.notes.push("Logged angles are DH angles: the offsets θ are in them already.".to_owned())
+        }
     }
     for (joint, sum) in couplings(joints.map) {
         table.notes.push(format!("The rotation of joint {joint} is {sum} of the controller's angles."));
@@ -117,9 +121,10 @@ pub fn joint_table(robot: &Robot) -> Table {
 pub fn mass_table(robot: &Robot) -> Option<Table> {
     let masses = robot.sheet.masses.as_ref()?;
     let mut columns = vec![Column::count("link", "Link"), Column::number("mass_kg", "Mass", "kg", 2)];
-    columns.extend(["x", "y", "z"].map(|axis| {
-        Column::number(format!("centre_{axis}_mm"), format!("centre {axis}"), "mm", 1)
-    }));
+    columns.extend(
+        ["x", "y", "z"]
+            .map(|axis| Column::number(format!("centre_{axis}_mm"), format!("centre {axis}"), "mm", 1)),
+    );
     let mut table = Table::new("Masses", columns);
     for (link, (mass, centre)) in masses.mass_kg.iter().zip(&masses.centre_mm).enumerate() {
         table.push([(link + 1).into(), (*mass).into(), centre[0].into(), centre[1].into(), centre[2].into()]);
@@ -201,7 +206,8 @@ pub fn document(robot: &Robot) -> Document {
             robot.warnings.iter().cloned(),
         ));
     }
-    let figure = |label: &str, value: Option<f64>, decimals, unit: &str| KeyFigure::new(label, value, decimals, unit);
+    let figure =
+        |label: &str, value: Option<f64>, decimals, unit: &str| KeyFigure::new(label, value, decimals, unit);
     let payload = KeyFigure {
         precision: super::number::Precision::Significant(3),
         ..figure("Payload", sheet.payload_kg, 0, "kg")
@@ -316,7 +322,13 @@ fn couplings(map: Option<[[f64; 6]; 6]>) -> Vec<(usize, String)> {
         .map(|(joint, row)| {
             let mut sum = String::new();
             for (k, factor) in row.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
-                let sign = if *factor < 0.0 { "−" } else if sum.is_empty() { "" } else { "+" };
+                let sign = if *factor < 0.0 {
+                    "−"
+                } else if sum.is_empty() {
+                    ""
+                } else {
+                    "+"
+                };
                 let gap = if sum.is_empty() { "" } else { " " };
                 let size = if factor.abs() == 1.0 { String::new() } else { format!("{} · ", factor.abs()) };
                 sum.push_str(&format!("{gap}{sign}{gap}{size}q{}", k + 1));

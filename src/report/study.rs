@@ -34,7 +34,8 @@ pub fn table(rows: &[MethodRow]) -> Table {
     );
     for row in rows {
         let cell = |figure: fn(&ErrorSummary) -> f64| over_splits(row, figure);
-        let about = row.solver.map_or("nominal links; base or outlet, zero and touched point fitted", |s| s.about);
+        let about =
+            row.solver.map_or("nominal links; base or outlet, zero and touched point fitted", |s| s.about);
         table.push([
             name(row).into(),
             cell(|s| s.rmse),
@@ -55,7 +56,8 @@ pub fn document(rows: &[MethodRow], robot: &str, dataset: &Dataset) -> Document 
     let mut page = Document::new(format!("Methods compared on {}", dataset.file));
     page.subtitle = format!("{robot}, {} rows, {splits} seeded splits", dataset.rows.len());
     if let Some((best, rmse, spread)) = best(rows) {
-        let registered = rows.iter().find(|row| row.solver.is_none()).map(|row| row.over_splits(|s| s.rmse).0);
+        let registered =
+            rows.iter().find(|row| row.solver.is_none()).map(|row| row.over_splits(|s| s.rmse).0);
         let headline = match registered {
             Some(registered) => format!(
                 "{best} leaves the least on held-out rows: {rmse:.3} mm RMSE, where registered frames alone leave \
@@ -183,7 +185,8 @@ fn notes(rows: &[MethodRow]) -> Vec<String> {
          iteration: compare methods by passes, not by iterations."
             .to_owned(),
     ];
-    let literal: Vec<&str> = rows.iter().filter(|row| row.solver.is_some_and(|s| s.literal)).map(name).collect();
+    let literal: Vec<&str> =
+        rows.iter().filter(|row| row.solver.is_some_and(|s| s.literal)).map(name).collect();
     if !literal.is_empty() {
         notes.push(format!(
             "{} as the paper prints: fixed μ = 5, no scaling, no priors. What the data cannot see moves freely, so \
@@ -202,11 +205,14 @@ fn same_optimum(rows: &[MethodRow]) -> Vec<String> {
         rows.iter().filter(|row| row.solver.is_some() && !row.held_out.is_empty()).collect();
     let gap = |a: &MethodRow, b: &MethodRow| {
         let pairs = a.held_out.iter().zip(&b.held_out);
-        pairs.map(|(a, b)| ((a.rmse - b.rmse).abs(), a.rmse.min(b.rmse))).fold((0.0_f64, 0.0_f64), |worst, (gap, of)| {
-            let share = if gap == 0.0 { 0.0 } else { gap / of };
-            // NaN counts as different.
-            (worst.0.max(gap), if share.is_nan() { f64::INFINITY } else { worst.1.max(share) })
-        })
+        pairs.map(|(a, b)| ((a.rmse - b.rmse).abs(), a.rmse.min(b.rmse))).fold(
+            (0.0_f64, 0.0_f64),
+            |worst, (gap, of)| {
+                let share = if gap == 0.0 { 0.0 } else { gap / of };
+                // NaN counts as different.
+                (worst.0.max(gap), if share.is_nan() { f64::INFINITY } else { worst.1.max(share) })
+            },
+        )
     };
     let mut grouped = vec![false; methods.len()];
     let mut notes = Vec::new();
@@ -248,16 +254,20 @@ fn bars(rows: &[MethodRow]) -> String {
         title: "Held-out errors".to_owned(),
         y: Axis::new("error", "mm"),
         names: rows.iter().map(|row| name(row).to_owned()).collect(),
-        groups: vec![group("RMSE", |s| s.rmse), group("mean |e|", |s| s.mean_absolute), group("max", |s| s.max)],
+        groups: vec![
+            group("RMSE", |s| s.rmse),
+            group("mean |e|", |s| s.mean_absolute),
+            group("max", |s| s.max),
+        ],
         labels: Some(Precision::Decimals(2)),
     }
     .svg()
 }
 
 fn by_split(rows: &[MethodRow]) -> String {
-    let series = rows.iter().map(|row| {
-        Series::sequence(name(row), &row.held_out.iter().map(|s| s.rmse).collect::<Vec<_>>())
-    });
+    let series = rows
+        .iter()
+        .map(|row| Series::sequence(name(row), &row.held_out.iter().map(|s| s.rmse).collect::<Vec<_>>()));
     Graph {
         title: "Held-out RMSE of each split".to_owned(),
         x: Axis::new("seed of the split", ""),

@@ -3,9 +3,7 @@
 use super::{AFTER, BEFORE, Side, cut, has, intended, meaning};
 use crate::compensation::deviation::{PathPoint, PathReport, Status};
 use crate::report::document::Figure;
-use crate::report::plot::{
-    Axis, ColorMap, Graph, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span,
-};
+use crate::report::plot::{Axis, ColorMap, Graph, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span};
 
 /// More points than a picture can show make a page heavy; of each group the largest is kept.
 const POINTS: usize = 2000;
@@ -87,7 +85,8 @@ fn along(reports: &[&PathReport]) -> Figure {
     };
     let mut caption = String::from("Deviation at each point of the path, approaches and links included.");
     if band {
-        caption.push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
+        caption
+            .push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
@@ -125,7 +124,11 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
             let points = kept.iter().map(|point| axes.map(|axis| intended(point)[axis])).collect();
             let value = |point: &&PathPoint| match side(point) {
                 Some(d) if point.cutting || !cuts => {
-                    if signed { d.signed_mm() } else { d.norm_mm() }
+                    if signed {
+                        d.signed_mm()
+                    } else {
+                        d.norm_mm()
+                    }
                 }
                 _ => f64::NAN,
             };

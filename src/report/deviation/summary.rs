@@ -129,7 +129,8 @@ fn rows<'a, T: PartialEq>(
     }
     let mut out = Vec::new();
     for program in programs {
-        let of: Vec<&'a PathReport> = reports.iter().copied().filter(|report| report.program == program).collect();
+        let of: Vec<&'a PathReport> =
+            reports.iter().copied().filter(|report| report.program == program).collect();
         let before: Vec<(&'a PathReport, T)> =
             of.iter().filter_map(|report| Some((*report, value(report, BEFORE)?))).collect();
         let agreed = before.windows(2).all(|pair| pair[0].1 == pair[1].1);

@@ -3,9 +3,7 @@
 use super::{held_by_prior, is_of_arm, readable, signed, tables};
 use crate::identification::identifiability::Identifiability;
 use crate::identification::identify::Identification;
-use crate::report::plot::{
-    Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series,
-};
+use crate::report::plot::{Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series};
 
 const BEFORE: &str = "frames registered";
 const AFTER: &str = "geometry";

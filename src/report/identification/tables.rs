@@ -48,7 +48,8 @@ pub fn stage_table(found: &Identification) -> Table {
     }
     if found.raw.is_none() {
         table.notes.push(
-            "raw: no sensor frame was stated, and an error against a fitted frame is no raw error.".to_owned(),
+            "raw: no sensor frame was stated, and an error against a fitted frame is no raw error."
+                .to_owned(),
         );
     }
     table.notes.push(
@@ -138,11 +139,7 @@ pub fn frame_table(found: &Identification) -> Table {
     if table.rows.is_empty() {
         let frames = &found.geometry.frames;
         let touched = frames.flange_from_target.translation.vector;
-        let fixed = [
-            ("tool.x", touched.x, "mm"),
-            ("tool.y", touched.y, "mm"),
-            ("tool.z", touched.z, "mm"),
-        ];
+        let fixed = [("tool.x", touched.x, "mm"), ("tool.y", touched.y, "mm"), ("tool.z", touched.z, "mm")];
         for (name, value, unit) in fixed {
             table.push([name.into(), meaning(name).into(), value.into(), unit.into()]);
         }
@@ -243,12 +240,12 @@ pub fn observability_table(report: &Identifiability) -> Table {
             Column::text("meaning", "What it is"),
         ],
     );
-    table.push(["rank".into(), report.rank.into(), format!("of {} parameters, data alone", report.parameters).into()]);
     table.push([
-        "condition".into(),
-        report.condition.into(),
-        "largest over smallest singular value".into(),
+        "rank".into(),
+        report.rank.into(),
+        format!("of {} parameters, data alone", report.parameters).into(),
     ]);
+    table.push(["condition".into(), report.condition.into(), "largest over smallest singular value".into()]);
     let full = report.rank == report.parameters;
     let meanings = [
         "geometric mean of the singular values over √poses",
@@ -266,7 +263,8 @@ pub fn observability_table(report: &Identifiability) -> Table {
         "singular values below 1: the prior knows more than the data".into(),
     ]);
     table.notes.push(
-        "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013; they need full rank.".to_owned(),
+        "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013; they need full rank."
+            .to_owned(),
     );
     table
 }

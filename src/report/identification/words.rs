@@ -190,10 +190,8 @@ pub(super) fn outliers(found: &Identification) -> Block {
 
 /// Caption of the picture of convergence.
 pub(super) fn convergence(found: &Identification) -> String {
-    let mut text = format!(
-        "Cost of the final fit over its iterations; it ended \"{}\".",
-        found.geometry.termination()
-    );
+    let mut text =
+        format!("Cost of the final fit over its iterations; it ended \"{}\".", found.geometry.termination());
     if found.geometry.rounds.len() > 1 {
         text.push_str(
             " Each round fits with the weights that the round before led to, so costs of different rounds do not share \

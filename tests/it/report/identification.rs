@@ -30,7 +30,14 @@ fn by_hand() -> Identification {
     let mut found = identification().0.clone();
     found.parameters = vec![
         parameter("link1.a", "mm", 0.0, 0.25, 0.02, 1.0),
-        parameter("link2.alpha", "rad", -0.5_f64.to_radians(), 0.25_f64.to_radians(), 0.005_f64.to_radians(), 0.3_f64.to_radians()),
+        parameter(
+            "link2.alpha",
+            "rad",
+            -0.5_f64.to_radians(),
+            0.25_f64.to_radians(),
+            0.005_f64.to_radians(),
+            0.3_f64.to_radians(),
+        ),
         parameter("link6.alpha", "rad", 0.0, 0.0, 0.3_f64.to_radians(), 0.3_f64.to_radians()),
         parameter("effect1.1", "rad/(N m)", 0.0, 2.5e-6, 1e-7, 1e-4),
         parameter("tool.x", "mm", 0.0, 12.5, 0.4, 50.0),
@@ -86,14 +93,31 @@ geometry           held out     24      0.500          0.400    0.450     1.000 
 fn parameters_are_shown_in_millimetres_and_degrees() {
     let found = by_hand();
     let table = view::parameter_table(&found);
-    let lines: Vec<String> = terminal::table(&table, 140).lines().take(7).map(|l| l.trim_end().to_owned()).collect();
-    assert_eq!(lines[1], "Parameter    Nominal              Estimated ± σ  Deviation  Unit       Tolerance  Determined by the data [%]  Held by");
-    assert_eq!(lines[3], "link1.a            0              0.250 ± 0.020      0.250  mm              1.0                         100  data");
-    assert_eq!(lines[4], "link2.alpha  -0.500000            0.2500 ± 0.0050      0.750  °              0.30                         100  data");
-    assert_eq!(lines[5], "link6.alpha        0                0.00 ± 0.30          0  °              0.30                           0  ⚠\u{fe0e} held by prior");
+    let lines: Vec<String> =
+        terminal::table(&table, 140).lines().take(7).map(|l| l.trim_end().to_owned()).collect();
+    assert_eq!(
+        lines[1],
+        "Parameter    Nominal              Estimated ± σ  Deviation  Unit       Tolerance  Determined by the data [%]  Held by"
+    );
+    assert_eq!(
+        lines[3],
+        "link1.a            0              0.250 ± 0.020      0.250  mm              1.0                         100  data"
+    );
+    assert_eq!(
+        lines[4],
+        "link2.alpha  -0.500000            0.2500 ± 0.0050      0.750  °              0.30                         100  data"
+    );
+    assert_eq!(
+        lines[5],
+        "link6.alpha        0                0.00 ± 0.30          0  °              0.30                           0  ⚠\u{fe0e} held by prior"
+    );
     assert_eq!(table.rows.len(), 4, "frames stand in a table of their own");
     let file = csv::table(&table);
-    assert!(file.starts_with("name,nominal,value,sigma_value,deviation,unit") || file.starts_with("name,nominal,value,sigma,deviation,unit"), "{file}");
+    assert!(
+        file.starts_with("name,nominal,value,sigma_value,deviation,unit")
+            || file.starts_with("name,nominal,value,sigma,deviation,unit"),
+        "{file}"
+    );
 }
 
 #[test]
@@ -139,7 +163,10 @@ fn combinations_are_sentences_in_mm_and_degrees() {
     assert!(told["condition"].is_null(), "infinity is no number of JSON");
     assert!(told["observability"]["o1"].is_null(), "without full rank there is none");
     let text = terminal::document(&view::document(&found, identification().1), 120);
-    assert!(text.contains("The data determine 29 of 31 parameters; 2 combinations move no reading"), "{text}");
+    assert!(
+        text.contains("The data determine 29 of 31 parameters; 2 combinations move no reading"),
+        "{text}"
+    );
     assert!(text.contains("O1") && text.contains('∞'));
 }
 
@@ -151,11 +178,17 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
     for (status, badge, sentence) in [
         (Judgement::Pass, "[ok]", "The model meets the stated limits"),
         (Judgement::Fail, "[failed]", "The fit may not be used as a model"),
-        (Judgement::NotEvaluated, "[not evaluated]", "Nothing speaks against the model, but no limits were stated"),
+        (
+            Judgement::NotEvaluated,
+            "[not evaluated]",
+            "Nothing speaks against the model, but no limits were stated",
+        ),
     ] {
         found.estimated.verdict.status = status;
         let text = head(&found);
-        let line = format!("{badge} {sentence}: held-out error 0.500 mm RMSE, where registered frames alone leave 2.100 mm");
+        let line = format!(
+            "{badge} {sentence}: held-out error 0.500 mm RMSE, where registered frames alone leave 2.100 mm"
+        );
         assert!(text.contains(&line), "{text}");
         assert!(text.contains("  - because"));
     }

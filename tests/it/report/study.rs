@@ -16,7 +16,13 @@ fn row(solver: Option<&'static Solver>, rmse: &[f64], passes: f64, failed: usize
         solver,
         held_out: rmse
             .iter()
-            .map(|&rmse| ErrorSummary { count: 24, rmse, mean_absolute: 0.8 * rmse, max: 2.5 * rmse, ..Default::default() })
+            .map(|&rmse| ErrorSummary {
+                count: 24,
+                rmse,
+                mean_absolute: 0.8 * rmse,
+                max: 2.5 * rmse,
+                ..Default::default()
+            })
             .collect(),
         terminations: (0..count)
             .map(|i| if i < failed { Termination::IterationLimit } else { Termination::Cost })
@@ -43,7 +49,12 @@ fn the_table_states_mean_and_deviation_over_splits() {
     assert_eq!(lines[0], "Held-out errors over 3 splits");
     assert!(lines[3].starts_with("frames registered  2.100 ± 0.100"), "{text}");
     assert!(lines[3].contains("5.250 ± 0.250                –  –"), "{text}");
-    assert!(lines[4].starts_with("lm                 0.460 ± 0.020    0.368 ± 0.016  1.150 ± 0.050              9.0  3 of 3"), "{text}");
+    assert!(
+        lines[4].starts_with(
+            "lm                 0.460 ± 0.020    0.368 ± 0.016  1.150 ± 0.050              9.0  3 of 3"
+        ),
+        "{text}"
+    );
     assert!(lines[6].starts_with("lm-as-printed "), "{text}");
     assert!(lines[6].contains("200.0  1 of 3"), "{text}");
 }
@@ -51,8 +62,15 @@ fn the_table_states_mean_and_deviation_over_splits() {
 #[test]
 fn notes_say_who_reached_the_same_optimum_and_what_a_literal_form_is() {
     let notes = view::table(&rows()).notes.join("\n");
-    assert!(notes.contains("lm and ltlm reach the same optimum on every split (held-out RMSE within 0.000020 mm)"), "{notes}");
-    assert!(notes.contains("lm-as-printed as the paper prints: fixed μ = 5, no scaling, no priors"), "{notes}");
+    assert!(
+        notes
+            .contains("lm and ltlm reach the same optimum on every split (held-out RMSE within 0.000020 mm)"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("lm-as-printed as the paper prints: fixed μ = 5, no scaling, no priors"),
+        "{notes}"
+    );
     // Without a literal form nothing is said of one, and two methods that differ are not said to agree.
     let mut others = rows();
     others.truncate(3);
