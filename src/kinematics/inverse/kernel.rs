@@ -125,7 +125,7 @@ impl<R: SinCos> Factored<R> {
         [arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]]
     }
 
-    /// 1/‖J⁻¹‖ (Frobenius) at a point `lever` away from the wrist point, translations divided by `length`.
+    /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
     #[inline(always)]
     fn distance(&self, lever: &[R; 3], length: f64) -> R {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
@@ -135,7 +135,7 @@ impl<R: SinCos> Factored<R> {
             unit[k] = one;
             // A unit of scaled translation, and a turn about the point, which carries the wrist point along.
             let shift = self.solve(&unit, &[zero; 3]);
-            let turn = self.solve(&cross(lever, &unit), &unit);
+            let turn = self.solve(&cross(&unit, lever), &unit);
             for j in 0..6 {
                 let scaled = shift[j] * R::splat(length);
                 square += scaled * scaled + turn[j] * turn[j];
