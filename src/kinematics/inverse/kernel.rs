@@ -103,8 +103,8 @@ impl<R: SinCos> Factored<R> {
     fn of(frames: &Chain<R>, wrist: &[R; 3]) -> Self {
         let zero = R::splat(0.0);
         let mut shifts = [[zero; 3]; 6];
-        for j in 0..6 {
-            shifts[j] = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
+        for (j, shift) in shifts.iter_mut().enumerate() {
+            *shift = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
         }
         let first = inverse_rows(&[shifts[0], shifts[1], shifts[2]]);
         let turns = [frames.z[0], frames.z[1], frames.z[2]];
@@ -170,12 +170,12 @@ impl Kernel {
             let missing = minus(&goal_flange, &flange);
             let mut turn = [zero; 3];
             let mut trace = zero;
-            for k in 0..3 {
-                let c = cross(&axes[k], &goal.axes[k]);
+            for (here, there) in axes.iter().zip(&goal.axes) {
+                let c = cross(here, there);
                 for (t, c) in turn.iter_mut().zip(c) {
                     *t += R::splat(0.5) * c;
                 }
-                trace += dot(&axes[k], &goal.axes[k]);
+                trace += dot(here, there);
             }
             let residual_mm = dot(&missing, &missing).sqrt();
             let residual_rad = dot(&turn, &turn).sqrt();

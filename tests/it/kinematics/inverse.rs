@@ -35,7 +35,7 @@ fn every_branch_of_every_nominal_arm_reaches_the_pose_and_the_true_joints_are_am
         let model = sheet.model();
         let inverse = Inverse::new(&model, &condition, &model);
         let mut random = generator(1);
-        let poses = if sheet.name.starts_with("universal") { 15 } else { 60 };
+        let poses = if sheet.name.starts_with("universal") { 6 } else { 25 };
         for k in 0..poses {
             let joints = joints_within(&model, &mut random);
             let target = model.forward(&joints, &condition);
@@ -131,7 +131,7 @@ fn targets_are_found_from_their_configuration_alone() {
         let mut random = generator(3);
         let arm = with_effects(&perturbed(&nominal, &mut random, 0.5, 0.1), &mut random);
         let inverse = Inverse::new(&arm, &loaded(), &nominal);
-        for k in 0..30 {
+        for k in 0..12 {
             let joints = joints_within(&arm, &mut random);
             let target = arm.forward(&joints, &loaded());
             let wanted = inverse.configuration(&joints);
