@@ -40,7 +40,7 @@ fn batch(problem: &dyn Problem) -> Estimate {
 
 /// Distance from the batch result, in its own standard deviations.
 fn off(estimate: &Estimate, batch: &Estimate) -> f64 {
-    let sigmas = batch.sigmas().unwrap();
+    let sigmas = batch.sigmas().expect("batch least squares has a covariance");
     (0..4).map(|k| ((estimate.x[k] - batch.x[k]) / sigmas[k]).abs()).fold(0.0, f64::max)
 }
 
