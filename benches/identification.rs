@@ -2,6 +2,9 @@
 //!
 //! `cargo bench --no-default-features --bench identification`; one thread, so wall time is CPU time.
 
+// A benchmark says what it measured.
+#![allow(clippy::print_stderr)]
+
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -253,10 +253,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             batch.add(target, edits.edits.apply(source)?);
         }
     }
-    if !dry && programs.files.len() > 1 {
-        if let Some(folder) = &arguments.output {
-            files::make_folder(folder)?;
-        }
+    if !dry
+        && programs.files.len() > 1
+        && let Some(folder) = &arguments.output
+    {
+        files::make_folder(folder)?;
     }
     batch.write()?;
     let clean = planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));

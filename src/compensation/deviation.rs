@@ -162,7 +162,7 @@ impl PathReport {
     /// What remains of the deviations after the rigid motion that fits them best: the shape error of the path, when
     /// the base was not measured in the work object. RMS (mm) of the vectors; `None` for fewer than three points.
     pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
-        let pairs: Vec<(Point3<f64>, Point3<f64>)> = self
+        let pairs: Vec<Pair> = self
             .points
             .iter()
             .filter_map(|p| {
@@ -176,15 +176,17 @@ impl PathReport {
     }
 }
 
+/// Where a point should be, and where it is.
+type Pair = (Point3<f64>, Point3<f64>);
+
 /// The rigid motion that carries the second points onto the first best (Kabsch); `None` for fewer than three.
-fn best_motion(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Pose> {
+fn best_motion(pairs: &[Pair]) -> Option<Pose> {
     if pairs.len() < 3 {
         return None;
     }
     let n = pairs.len() as f64;
-    let mean = |side: fn(&(Point3<f64>, Point3<f64>)) -> Point3<f64>| {
-        pairs.iter().map(|p| side(p).coords).sum::<Vector3<f64>>() / n
-    };
+    let mean =
+        |side: fn(&Pair) -> Point3<f64>| pairs.iter().map(|p| side(p).coords).sum::<Vector3<f64>>() / n;
     let (to, from) = (mean(|p| p.0), mean(|p| p.1));
     let spread: Matrix3<f64> =
         pairs.iter().map(|p| (p.1.coords - from) * (p.0.coords - to).transpose()).sum();

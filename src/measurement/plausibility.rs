@@ -180,8 +180,8 @@ fn suspicion(
         others.into_iter().filter(|(_, e)| e.share <= 2.0 * lowest).min_by(|a, b| {
             a.0.changes(&stated).cmp(&b.0.changes(&stated)).then(a.1.share.total_cmp(&b.1.share))
         })?;
-    // An arm that stands still under the stated meaning has no share at all.
-    let better = !(likely_error.share * FACTOR >= stated_error.share);
+    // An arm that stands still under the stated meaning leaves an infinite share.
+    let better = likely_error.share * FACTOR < stated_error.share;
     (better && likely_error.share < USELESS).then(|| UnitSuspicion {
         file: data.file.clone(),
         evidence,

@@ -80,7 +80,7 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let svd = matrix.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let s = svd.singular_values;
-    if !(s[1] > 1e-9 * s[0]) {
+    if s[1].is_nan() || s[1] <= 1e-9 * s[0] {
         return None;
     }
     let sign = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant().signum()));

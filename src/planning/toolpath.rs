@@ -28,30 +28,32 @@ pub enum ToolpathError {
         name: String,
     },
     /// No branch of the arm follows the whole path.
-    #[error(
-        "{name}: point {point} of {count} at ({x:.1}, {y:.1}, {z:.1}) mm in {object} cannot be followed by {robot}: {error}; move \
-         the work object, shorten the tool, or change lead and tilt"
-    )]
-    NotFollowed {
-        /// Job.
-        name: String,
-        /// Robot.
-        robot: String,
-        /// Point, from 1.
-        point: usize,
-        /// Points.
-        count: usize,
-        /// Work object.
-        object: String,
-        /// Position in the work object (mm).
-        x: f64,
-        /// Position in the work object (mm).
-        y: f64,
-        /// Position in the work object (mm).
-        z: f64,
-        /// Why, on the branch that came farthest.
-        error: InverseError,
-    },
+    #[error(transparent)]
+    NotFollowed(Box<NotFollowed>),
+}
+
+/// The first point of a path that the branch which came farthest does not reach.
+#[derive(Debug, Error)]
+#[error(
+    "{name}: point {point} of {count} at ({x:.1}, {y:.1}, {z:.1}) mm in {object} cannot be followed by {robot}: {error}; \
+     move the work object, shorten the tool, or change lead and tilt",
+    x = position_mm[0], y = position_mm[1], z = position_mm[2]
+)]
+pub struct NotFollowed {
+    /// Job.
+    pub name: String,
+    /// Robot.
+    pub robot: String,
+    /// Point, from 1.
+    pub point: usize,
+    /// Points.
+    pub count: usize,
+    /// Work object.
+    pub object: String,
+    /// Position in the work object (mm).
+    pub position_mm: [f64; 3],
+    /// Why.
+    pub error: InverseError,
 }
 
 /// A program with the joints that its author had in mind.
@@ -100,17 +102,15 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     }
     let Some((singularity, joints)) = best else {
         let at = points.get(farthest.0).unwrap_or(first).position_mm;
-        return Err(ToolpathError::NotFollowed {
+        return Err(ToolpathError::NotFollowed(Box::new(NotFollowed {
             name: file.name.clone(),
             robot: robot.to_owned(),
             point: farthest.0 + 1,
             count: points.len(),
             object: file.work_object.name.clone(),
-            x: at.x,
-            y: at.y,
-            z: at.z,
+            position_mm: at.coords.into(),
             error: farthest.1,
-        });
+        })));
     };
     let draft = draft(file, robot, &points, &joints, &inverse);
     Ok(Toolpath { draft, points, joints, singularity })

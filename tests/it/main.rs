@@ -1,5 +1,8 @@
 //! The one integration-test binary; its modules mirror `src/`.
 
+// A test that cannot go on panics, and one without its data says so.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
 mod program;
 mod surface;
 mod estimation;

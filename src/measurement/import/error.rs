@@ -142,7 +142,7 @@ pub enum ImportError {
         /// The cell.
         place: Place,
         /// What is there.
-        found: String,
+        found: Box<str>,
         /// What should be there.
         expected: &'static str,
         /// What to do.
@@ -167,7 +167,7 @@ pub enum ImportError {
         /// The columns.
         place: Place,
         /// What looks wrong.
-        found: String,
+        found: Box<str>,
         /// The unit of the format.
         expected: &'static str,
         /// What to do.

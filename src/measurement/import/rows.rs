@@ -106,7 +106,7 @@ impl Reader<'_> {
     fn wrong(&self, line: &Line, column: usize, expected: &'static str, remedy: &'static str) -> ImportError {
         let found = match line.cells.get(column) {
             None | Some(Cell::Empty) => "an empty cell".into(),
-            Some(cell) => format!("`{cell}`"),
+            Some(cell) => format!("`{cell}`").into(),
         };
         ImportError::Cell { place: self.cell_place(line, column), found, expected, remedy }
     }
@@ -213,10 +213,10 @@ impl Reader<'_> {
         place.column = Some("measured_qw to measured_qz".into());
         Err(ImportError::Cell {
             place,
-            found: format!("a quaternion of length {:.4} ({}, {}, {}, {})", q.norm(), q.w, q.i, q.j, q.k),
-            expected: "a unit quaternion, scalar first",
-            remedy: "export unit quaternions; Euler angles or a rotation vector have to be converted first"
+            found: format!("a quaternion of length {:.4} ({}, {}, {}, {})", q.norm(), q.w, q.i, q.j, q.k)
                 .into(),
+            expected: "a unit quaternion, scalar first",
+            remedy: "export unit quaternions; Euler angles or a rotation vector have to be converted first",
         })
     }
 }
@@ -242,7 +242,7 @@ fn number_anchors(rows: &mut [Row]) -> Option<String> {
 fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), ImportError> {
     let units = |columns: &str, found: String, expected, remedy| {
         let place = Place { column: Some(columns.into()), ..reader.place() };
-        Err(ImportError::Units { place, found, expected, remedy })
+        Err(ImportError::Units { place, found: found.into(), expected, remedy })
     };
     let largest_deg = rows.iter().map(|r| r.joints.amax().to_degrees()).fold(0.0, f64::max);
     let spread_deg = (0..6)

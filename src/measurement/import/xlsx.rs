@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use calamine::{Data, Dimensions, Reader, Sheets, open_workbook_auto_from_rs};
+use calamine::{Data, Dimensions, Reader, Sheets, Xlsx, open_workbook_auto_from_rs};
 
 use super::cell::{Cell, Line, Table};
 use super::csv::number;
@@ -16,7 +16,15 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 /// All sheets of a workbook, in its order.
 pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     let fail = |message: String| ImportError::Format { place: Place::file(file), message };
-    let mut workbook = open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|e| fail(e.to_string()))?;
+    let mut workbook = match open_workbook_auto_from_rs(Cursor::new(bytes)) {
+        Ok(workbook) => workbook,
+        // The other formats are tried in vain; what is wrong with an archive only the XLSX reader says.
+        Err(error) => match Xlsx::new(Cursor::new(bytes)) {
+            Ok(workbook) => Sheets::Xlsx(workbook),
+            Err(archive) if bytes.starts_with(b"PK") => return Err(fail(archive.to_string())),
+            Err(_) => return Err(fail(error.to_string())),
+        },
+    };
     let mut out = Vec::new();
     for sheet in workbook.sheet_names().to_vec() {
         let range = workbook.worksheet_range(&sheet).map_err(|e| fail(format!("sheet {sheet}: {e}")))?;

@@ -89,7 +89,7 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
                 let own = max_deg.map_or(f64::MAX, |m| m[j].to_radians());
                 own.min(limits.max_rad[j] - margin)
             });
-            if let Some(j) = (0..6).find(|&j| !(low[j] <= high[j])) {
+            if let Some(j) = (0..6).find(|&j| (low[j]..=high[j]).is_empty()) {
                 return Err(RecipeError::Invalid {
                     key: format!("poses, joint {j}"),
                     found: format!("{:.3}° to {:.3}°", low[j].to_degrees(), high[j].to_degrees()),

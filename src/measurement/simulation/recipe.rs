@@ -407,17 +407,13 @@ impl Recipe {
         if let Some(bodies) = self.arm.body.as_ref().filter(|b| b.len() != 6) {
             return wrong("arm.body", format!("{} bodies", bodies.len()), "six");
         }
-        if let SensorSetup::Cable { outlets_mm, zeros_mm, .. } = &self.sensor {
-            if outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len() {
-                let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
-                return wrong(
-                    "sensor.outlets_mm",
-                    found,
-                    "one outlet at least, and no more zeros than outlets",
-                );
-            }
+        if let SensorSetup::Cable { outlets_mm, zeros_mm, .. } = &self.sensor
+            && (outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len())
+        {
+            let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
+            return wrong("sensor.outlets_mm", found, "one outlet at least, and no more zeros than outlets");
         }
-        if let Some(dof) = self.noise.student_t.filter(|dof| !(*dof > 2.0)) {
+        if let Some(dof) = self.noise.student_t.filter(|dof| dof.is_nan() || *dof <= 2.0) {
             return wrong("noise.student_t", dof.to_string(), "more than 2 degrees of freedom");
         }
         let sigmas = [

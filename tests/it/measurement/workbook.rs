@@ -43,6 +43,13 @@ fn workbook(sheets: &[(&str, usize, Vec<Vec<Cell>>)]) -> Vec<u8> {
         ));
     }
     files.push((
+        "_rels/.rels".into(),
+        format!(
+            "<Relationships xmlns=\"{PACKAGE}\"><Relationship Id=\"rId1\" Type=\"{OFFICE}/officeDocument\" \
+             Target=\"xl/workbook.xml\"/></Relationships>"
+        ),
+    ));
+    files.push((
         "xl/workbook.xml".into(),
         format!("<workbook xmlns=\"{MAIN}\" xmlns:r=\"{OFFICE}\"><sheets>{list}</sheets></workbook>"),
     ));
