@@ -84,7 +84,7 @@ pub(super) struct Arguments {
     /// Tolerance of link lengths (mm), as a prior.
     #[arg(long, value_name = "MM")]
     tolerance_length: Option<f64>,
-    /// Tolerance of link angles and joint offsets [°], as a prior.
+    /// Tolerance of link angles and joint offsets (°), as a prior.
     #[arg(long, value_name = "DEG")]
     tolerance_angle: Option<f64>,
     #[command(flatten)]

@@ -29,7 +29,7 @@ pub struct CellFrame {
     pub name: String,
     /// How it was obtained.
     pub origin: FrameOrigin,
-    /// Controller joint angles [°] of the teaching points. A tool: four or more poses with the TCP at one fixed
+    /// Controller joint angles (°) of the teaching points. A tool: four or more poses with the TCP at one fixed
     /// point. A work object: three poses, first and second on its x axis, the third on its y axis, with the tool
     /// named in `taught_with`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

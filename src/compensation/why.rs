@@ -26,7 +26,7 @@ pub enum Why {
     },
     /// The correction of the orientation is larger than the stated bound.
     TooMuchTurn {
-        /// The correction [°].
+        /// The correction (°).
         deg: f64,
     },
     /// Near a singularity small corrections become large joint motions.
@@ -42,7 +42,7 @@ pub enum Why {
     JointNotMeasured {
         /// Joint, 0-based.
         joint: usize,
-        /// By how much [°].
+        /// By how much (°).
         by_deg: f64,
     },
     /// No measured pose is near.

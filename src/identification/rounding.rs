@@ -15,7 +15,7 @@ use crate::kinematics::jacobian::joint_jacobian;
 use crate::kinematics::model::Model;
 use crate::measurement::dataset::{Dataset, Sensor};
 
-/// Covariance of the joint angles of each row [rad²].
+/// Covariance of the joint angles of each row (rad²).
 pub type AngleCovariance = Vec<Matrix6<f64>>;
 
 /// Angles as they are logged: h²/12 on the diagonal, 0 where no rounding shows.
@@ -152,7 +152,7 @@ pub fn weights(
         .collect()
 }
 
-/// Variance that the angles bring into each row's length [mm²] and orientation [rad²].
+/// Variance that the angles bring into each row's length (mm²) and orientation (rad²).
 pub fn angle_shares(
     dataset: &Dataset,
     model: &Model,

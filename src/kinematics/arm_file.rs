@@ -18,11 +18,11 @@ pub struct LinkFile {
     pub a_mm: f64,
     /// d (mm).
     pub d_mm: f64,
-    /// alpha [°].
+    /// alpha (°).
     pub alpha_deg: f64,
-    /// theta offset [°].
+    /// theta offset (°).
     pub theta_deg: f64,
-    /// beta [°]; Hayati links only.
+    /// beta (°); Hayati links only.
     #[serde(default)]
     pub beta_deg: f64,
 }
@@ -33,9 +33,9 @@ pub struct LinkFile {
 pub struct ArmFile {
     /// DH rotation = map · controller angle.
     pub joint_map: [[f64; 6]; 6],
-    /// Lowest controller angles [°].
+    /// Lowest controller angles (°).
     pub min_deg: [f64; 6],
-    /// Highest controller angles [°].
+    /// Highest controller angles (°).
     pub max_deg: [f64; 6],
     /// Highest joint speeds [°/s].
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -179,7 +179,7 @@ impl Statics {
         Self { tables: chain::tables(&model.links), bodies, gravity: model.gravity }
     }
 
-    /// Torque of gravity about each joint axis [N m] at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
+    /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
     /// symmetric because torque is the gradient of the potential energy.
     pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
         let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);

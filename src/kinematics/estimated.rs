@@ -110,7 +110,7 @@ pub struct Estimated {
     pub parameters: Vec<EstimatedParameter>,
     /// Parameters of the arm in the order of the covariance.
     pub order: Vec<Parameter>,
-    /// Covariance of the arm's parameters [mm, rad].
+    /// Covariance of the arm's parameters (mm, rad).
     pub covariance: DMatrix<f64>,
     /// Where the data came from.
     pub provenance: Provenance,
@@ -138,7 +138,7 @@ pub struct Carried {
 }
 
 impl Estimated {
-    /// Covariance of the position of a point on the flange [mm²], 3 × 3 in the base.
+    /// Covariance of the position of a point on the flange (mm²), 3 × 3 in the base.
     pub fn position_covariance(
         &self,
         arm: &Posed<'_>,

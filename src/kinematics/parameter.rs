@@ -137,7 +137,7 @@ pub fn link_parameters(model: &Model) -> Vec<Parameter> {
 }
 
 impl Link {
-    /// The value of a coordinate [mm or rad].
+    /// The value of a coordinate (mm or rad).
     pub fn get(&self, coordinate: LinkCoordinate) -> f64 {
         match coordinate {
             LinkCoordinate::A => self.a_mm,
@@ -148,7 +148,7 @@ impl Link {
         }
     }
 
-    /// Sets a coordinate [mm or rad].
+    /// Sets a coordinate (mm or rad).
     pub fn set(&mut self, coordinate: LinkCoordinate, value: f64) {
         let place = match coordinate {
             LinkCoordinate::A => &mut self.a_mm,

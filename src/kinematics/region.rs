@@ -8,11 +8,11 @@ use super::model::Joints;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// Lowest measured joint angles [°].
+    /// Lowest measured joint angles (°).
     pub min_deg: [f64; 6],
-    /// Highest measured joint angles [°].
+    /// Highest measured joint angles (°).
     pub max_deg: [f64; 6],
-    /// Measured joint vectors [°], thinned so that they are far from each other.
+    /// Measured joint vectors (°), thinned so that they are far from each other.
     pub samples_deg: Vec<[f64; 6]>,
     /// How far a measured pose may lie from its nearest neighbour among the samples [°, Euclidean in joint space].
     pub spacing_deg: f64,
@@ -27,7 +27,7 @@ pub enum Outside {
     Joint {
         /// Joint, 0-based.
         joint: usize,
-        /// By how much [°].
+        /// By how much (°).
         by_deg: f64,
     },
     /// All joints are in range, but no measured pose is near.
@@ -40,7 +40,7 @@ pub enum Outside {
 /// Poses kept in a region.
 const SAMPLES: usize = 200;
 
-/// A joint may leave its measured range by this much without a flag [°]: rounding of logs and programs.
+/// A joint may leave its measured range by this much without a flag (°): rounding of logs and programs.
 const SLACK_DEG: f64 = 0.5;
 
 /// A pose may lie this many spacings from its nearest measured neighbour without a flag.

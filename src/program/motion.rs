@@ -99,7 +99,7 @@ impl RobTarget {
 /// A target in joint angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointTarget {
-    /// Robot axes [degrees].
+    /// Robot axes (degrees).
     pub robot_deg: [f64; 6],
     /// External axes [mm or degrees]; `None` where not connected.
     pub external: [Option<f64>; 6],
@@ -311,7 +311,7 @@ pub struct ZoneValue {
     pub tcp_mm: f64,
     /// Size for reorientation (mm).
     pub orientation_mm: f64,
-    /// Reorientation size [degrees].
+    /// Reorientation size (degrees).
     pub orientation_deg: f64,
 }
 

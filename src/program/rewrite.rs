@@ -21,10 +21,10 @@ pub enum NewTarget {
         /// New configuration; `None` leaves the old.
         conf: Option<[i32; 4]>,
     },
-    /// New joint angles [degrees]; external axes stay. On an instruction with a Cartesian target this turns the
+    /// New joint angles (degrees); external axes stay. On an instruction with a Cartesian target this turns the
     /// instruction into its joint form (MoveL to MoveAbsJ).
     Joint {
-        /// Robot axes [degrees].
+        /// Robot axes (degrees).
         robot_deg: [f64; 6],
     },
 }

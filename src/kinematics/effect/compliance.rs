@@ -1,6 +1,6 @@
 //! Joint compliance: a joint and its reducer yield under the torque of gravity.
 //!
-//! δθⱼ = cⱼ τⱼ(u), with cⱼ the torsional compliance [rad/(N m)] and τⱼ the static torque about the axis.
+//! δθⱼ = cⱼ τⱼ(u), with cⱼ the torsional compliance (rad/(N m)) and τⱼ the static torque about the axis.
 //! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004), section 3.
 
 use nalgebra::Matrix6;
@@ -17,7 +17,7 @@ use crate::math::lanes::Real;
 pub struct Compliance {
     /// Joint, 0-based.
     pub joint: usize,
-    /// Torsional compliance [rad/(N m)].
+    /// Torsional compliance (rad/(N m)).
     pub compliance_rad_per_nm: f64,
 }
 

@@ -6,8 +6,8 @@
 //! the effects enters as Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is left out and costs at most
 //! one step more.
 //! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u (rad).
-//! Stops: a row stands still once it is within [`TOLERANCE_MM`](super::newton::TOLERANCE_MM) and
-//! [`TOLERANCE_RAD`](super::newton::TOLERANCE_RAD), so it gets the same bits whatever its neighbours do; a row whose step is longer than
+//! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
+//! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
 //! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`].
 //! Checked against: [`super::newton`], the forward map.
 

@@ -569,7 +569,7 @@ fn combined(left: &Value, operator: Token, right: &Value) -> Value {
     }
 }
 
-/// A rotation from Euler angles z, y, x [degrees] as `OrientZYX`: about z, the new y, the new x.
+/// A rotation from Euler angles z, y, x (degrees) as `OrientZYX`: about z, the new y, the new x.
 fn orient_zyx(z_deg: f64, y_deg: f64, x_deg: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), z_deg.to_radians())
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), y_deg.to_radians())

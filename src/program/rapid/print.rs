@@ -15,7 +15,7 @@ use crate::program::rewrite::RewriteOptions;
 const POSITION_NOISE_MM: f64 = 1e-7;
 /// The same for quaternions.
 const QUATERNION_NOISE: f64 = 1e-10;
-/// The same for joints [degrees].
+/// The same for joints (degrees).
 const JOINT_NOISE_DEG: f64 = 1e-9;
 
 /// A target with what shall be new; `None` keeps the old configuration.
