@@ -10,7 +10,7 @@
 //! - [`cable`]: outlet o and zero z with lᵢ = |pᵢ − o| + z; linear in (o, z, |o|² − z²) after squaring, and starts
 //!   all around, since poses near a plane cannot tell an outlet from its mirror image.
 //!
-//! Shapes: n poses of the flange in the base and as many readings, paired by index. Stops: [`mod@fit`]. Departures: none
+//! Shapes: n poses of the flange in the base and as many readings, paired by index. Stops: `fit`. Departures: none
 //! weights rows; every closed form has a second start beside it for the cases in which it is degenerate.
 //! Checked against: known truth, and the UR arms' residuals with frames alone.
 
