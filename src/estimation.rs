@@ -1,10 +1,11 @@
-//! Algorithms that fit a model to measurements. Nothing here knows a robot: each algorithm is tested on published
-//! problems (Moré–Garbow–Hillstrom, NIST StRD) and serves whatever implements [`problem::Problem`].
+//! Algorithms that fit a model to measurements. Nothing here knows a robot: each algorithm is tested on
+//! published problems (Moré–Garbow–Hillstrom, NIST StRD) and serves whatever implements [`problem::Problem`].
 //!
-//! Every algorithm file has the same two items: `Options` (with a `seed` and a `Default`) and
-//! `solve(&dyn Problem, start, &Options) -> Estimate`. A solver returns whatever the data: not a number, no rows, a
-//! singular matrix end in a [`estimate::Termination`] that says so, never in a panic. Where a paper prints a weak form of a
-//! method, [`least_squares::Form`] chooses between that form, to the letter, and a sound one; the default is sound.
+//! Every algorithm file has the same two items: `Options` (with a `seed` and a `Default`) and `solve(&dyn
+//! Problem, start, &Options) -> Estimate`. A solver returns whatever the data: not a number, no rows, a
+//! singular matrix end in a [`estimate::Termination`] that says so, never in a panic. Where a paper prints a
+//! weak form of a method, [`least_squares::Form`] chooses between that form, to the letter, and a sound one;
+//! the default is sound.
 //!
 //! - [`problem`] and [`estimate`]: what goes in and what comes out;
 //! - [`least_squares`]: all rows at once, with derivatives;

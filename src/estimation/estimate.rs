@@ -100,8 +100,8 @@ pub struct Iteration {
     pub step_norm: f64,
     /// Damping μ (Levenberg–Marquardt), step size (beetle, variable step size), forgetting factor, inertia.
     pub damping: Option<f64>,
-    /// Largest cosine between the residual vector and a column of the Jacobian, at the point the iteration began on
-    /// or ended on, as the method has it.
+    /// Largest cosine between the residual vector and a column of the Jacobian, at the point the iteration
+    /// began on or ended on, as the method has it.
     pub gradient_norm: Option<f64>,
     /// Everything evaluated up to the end of this iteration.
     pub evaluations: Evaluations,

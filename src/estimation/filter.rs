@@ -1,4 +1,5 @@
-//! Recursive estimation: one observation at a time, the parameters as a state that does not move (or drifts a little).
+//! Recursive estimation: one observation at a time, the parameters as a state that does not move (or drifts a
+//! little).
 //!
 //! | file | method | rows per observation of m rows, p parameters |
 //! |---|---|---|
@@ -8,10 +9,10 @@
 //! | [`pf`] | particle filter | at least one per particle |
 //! | [`rls`] | recursive least squares, square-root form (rls-2025 eq. 8 to 14) | m with derivatives, once |
 //!
-//! What a filter predicts for an observation is its residual at the present state, what it "measures" is zero, and the noise
-//! has variance 1, since residuals come divided by their standard deviation. A filter's first state is the mean of the prior
-//! where there is one and `start` elsewhere; its first covariance is diagonal, with the priors' variances, and
-//! `unknown_sigma²` for a parameter without a prior.
+//! What a filter predicts for an observation is its residual at the present state, what it "measures" is zero,
+//! and the noise has variance 1, since residuals come divided by their standard deviation. A filter's first
+//! state is the mean of the prior where there is one and `start` elsewhere; its first covariance is diagonal,
+//! with the priors' variances, and `unknown_sigma²` for a parameter without a prior.
 
 pub mod ekf;
 pub mod ukf;
@@ -36,7 +37,8 @@ pub struct Innovation {
     pub nis: f64,
 }
 
-/// The state that a filter begins with: mean and covariance of the priors, `start` and `unknown_sigma` where there is none.
+/// The state that a filter begins with: mean and covariance of the priors, `start` and `unknown_sigma` where
+/// there is none.
 pub fn prior_state(problem: &dyn Problem, start: &[f64], unknown_sigma: f64) -> (DVector<f64>, DMatrix<f64>) {
     let mut x = DVector::from_column_slice(start);
     let mut variances = DVector::from_element(start.len(), unknown_sigma * unknown_sigma);

@@ -39,7 +39,7 @@ pub enum Factorisation {
     /// Cholesky factorisation of the normal equations: one cheap pass over the rows, half of the digits.
     #[default]
     Cholesky,
-    /// QR factorisation of the stacked Jacobian: twice the arithmetic, all of the digits. For problems whose scaled
-    /// Jacobian has a condition number beyond some 1e6.
+    /// QR factorisation of the stacked Jacobian: twice the arithmetic, all of the digits. For problems whose
+    /// scaled Jacobian has a condition number beyond some 1e6.
     Qr,
 }

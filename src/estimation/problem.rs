@@ -1,12 +1,13 @@
 //! What a solver sees of a fitting task: weighted residuals by blocks of rows, and a prior.
 //!
-//! The task is: minimise ½ Σ r_i(x)² + ½ Σ ((x_k − m_k) / s_k)², the second sum over parameters that have a prior.
-//! Residuals come already divided by the standard deviation of their measurement (so that the covariance of the
-//! estimate is the inverse of the normal matrix), unless a problem states otherwise.
+//! The task is: minimise ½ Σ r_i(x)² + ½ Σ ((x_k − m_k) / s_k)², the second sum over parameters that have a
+//! prior. Residuals come already divided by the standard deviation of their measurement (so that the covariance
+//! of the estimate is the inverse of the normal matrix), unless a problem states otherwise.
 //!
-//! A problem speaks in *rows* (one scalar residual) that come in *observations* of [`Problem::rows_per_observation`]
-//! rows (1 for a cable length, 3 for a position, 6 for a pose). Batch solvers take the normal equations or stack
-//! all rows, filters take one observation at a time, swarms ask for the cost alone.
+//! A problem speaks in *rows* (one scalar residual) that come in *observations* of
+//! [`Problem::rows_per_observation`] rows (1 for a cable length, 3 for a position, 6 for a pose). Batch solvers
+//! take the normal equations or stack all rows, filters take one observation at a time, swarms ask for the cost
+//! alone.
 
 use std::ops::Range;
 
@@ -25,7 +26,8 @@ pub struct Prior {
 /// JᵀJ, Jᵀr and ½ rᵀr of a set of rows, priors not included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalEquations {
-    /// JᵀJ, p × p; only the lower triangle is guaranteed to be filled until [`NormalEquations::mirror`] is called.
+    /// JᵀJ, p × p; only the lower triangle is guaranteed to be filled until [`NormalEquations::mirror`] is
+    /// called.
     pub matrix: DMatrix<f64>,
     /// Jᵀr, p.
     pub gradient: DVector<f64>,
@@ -65,8 +67,8 @@ pub trait Problem: Sync {
         1
     }
 
-    /// Writes the residuals of `rows` at `x` into `out` (`out.len() == rows.len()`). `rows` starts and ends at an
-    /// observation's border.
+    /// Writes the residuals of `rows` at `x` into `out` (`out.len() == rows.len()`). `rows` starts and ends at
+    /// an observation's border.
     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]);
 
     /// Writes residuals and their derivatives: `jacobian` is `rows.len()` × p, column-major
@@ -88,8 +90,8 @@ pub trait Problem: Sync {
         parts.iter().sum()
     }
 
-    /// The normal equations of all rows at `x`, without priors. Chunks are summed in order, so the result does not
-    /// depend on the number of threads. A problem with a faster way (rows in SIMD lanes) overrides this.
+    /// The normal equations of all rows at `x`, without priors. Chunks are summed in order, so the result does
+    /// not depend on the number of threads. A problem with a faster way (rows in SIMD lanes) overrides this.
     fn normal_equations(&self, x: &[f64]) -> NormalEquations {
         let p = self.parameters();
         let parts = map_chunks(self, |rows| {

@@ -8,10 +8,11 @@
 //! | [`bas`] | beetle antennae search | 3 |
 //! | [`qibas`] | the same with quadratic interpolation | 4 |
 //!
-//! All search in a box around `start`: parameter k in start ± reach · σ_k of its prior, or ± `unknown_reach` where it has
-//! none, and all work in coordinates that go from −1 to 1 in that box. None has derivatives, so none has a covariance or a test of
-//! convergence: they end at the iteration limit, or where the cost has vanished. Next to a least-squares method their use is
-//! to show what the same budget of evaluations buys; nothing they find is a minimum until one of those has confirmed it.
+//! All search in a box around `start`: parameter k in start ± reach · σ_k of its prior, or ± `unknown_reach`
+//! where it has none, and all work in coordinates that go from −1 to 1 in that box. None has derivatives, so
+//! none has a covariance or a test of convergence: they end at the iteration limit, or where the cost has
+//! vanished. Next to a least-squares method their use is to show what the same budget of evaluations buys;
+//! nothing they find is a minimum until one of those has confirmed it.
 
 pub mod pso;
 pub mod de;

@@ -9,7 +9,7 @@
 //!
 //! The gain of a model is the step from registered to geometry, never from raw.
 //!
-//! Outliers are found on all rows before the split, by a robust fit of geometry (Cauchy weights, then rows beyond six
+//! Outliers are found on all rows before the split, by a robust fit of geometry (Cauchy weights, then rows beyond ten
 //! robust standard deviations), because a large residual may be physics that geometry explains. The sensor's standard
 //! deviation is estimated along with the fit: the value under which the whitened residuals have their degrees of
 //! freedom.
@@ -212,7 +212,7 @@ pub struct Outliers {
 }
 
 /// A row is an outlier beyond this many robust standard deviations of a geometry fit.
-const OUTLIER_CUT: f64 = 6.0;
+const OUTLIER_CUT: f64 = 10.0;
 
 /// No more than this share of the rows is ever set aside: more is structure, not accident.
 const OUTLIER_SHARE: f64 = 0.1;

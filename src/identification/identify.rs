@@ -458,7 +458,7 @@ fn judge(
     }
     if outliers.too_many > 0 {
         reasons.push(format!(
-            "{} rows lie beyond six robust standard deviations, too many to be accidents: none was set aside",
+            "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
             outliers.too_many
         ));
     }

@@ -110,8 +110,8 @@ impl Posed<'_> {
     fn end_lanes(&self, joints: &JointColumns, from: usize) -> End<Lanes> {
         let zero = Lanes::splat(0.0);
         let mut angle = [zero; 6];
-        for j in 0..6 {
-            angle[j] = Lanes::load(&joints.angle_rad[j], from);
+        for (lanes, column) in angle.iter_mut().zip(&joints.angle_rad) {
+            *lanes = Lanes::load(column, from);
         }
         let rotation = self.affected(&self.mapped(&angle));
         let (mut sin, mut cos) = ([zero; 6], [zero; 6]);

@@ -159,16 +159,16 @@ impl<R: Real> End<R> {
     pub fn then(&self, fixed: &End<f64>) -> Self {
         let carried = |v: &[f64; 3]| {
             let mut out = [R::splat(0.0); 3];
-            for k in 0..3 {
-                out[k] = R::splat(v[0]) * self.axes[0][k]
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = R::splat(v[0]) * self.axes[0][k]
                     + R::splat(v[1]) * self.axes[1][k]
                     + R::splat(v[2]) * self.axes[2][k];
             }
             out
         };
         let mut origin = carried(&fixed.origin);
-        for k in 0..3 {
-            origin[k] += self.origin[k];
+        for (carried, base) in origin.iter_mut().zip(self.origin) {
+            *carried += base;
         }
         Self { axes: [carried(&fixed.axes[0]), carried(&fixed.axes[1]), carried(&fixed.axes[2])], origin }
     }

@@ -205,8 +205,8 @@ impl SinCos for Lanes {
         for k in 0..WIDTH {
             (s[k], c[k]) = sin_cos_reduced(self.0[k]);
         }
-        // Written so that NaN takes this road too.
-        if !(self.max_abs() < LARGEST_REDUCED) || self.0.iter().any(|v| v.is_nan()) {
+        // The largest magnitude passes NaN by.
+        if self.max_abs() >= LARGEST_REDUCED || self.0.iter().any(|v| v.is_nan()) {
             for k in 0..WIDTH {
                 (s[k], c[k]) = sin_cos_one(self.0[k]);
             }
@@ -224,6 +224,7 @@ fn sin_cos_one(x: f64) -> (f64, f64) {
 }
 
 #[inline(always)]
+#[expect(clippy::excessive_precision, reason = "the constants as fdlibm prints them")]
 fn sin_cos_reduced(x: f64) -> (f64, f64) {
     const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
     // π/2 in parts of 33 bits, so that k times a part is exact (fdlibm, e_rem_pio2.c).

@@ -187,7 +187,7 @@ fn wrong_units_are_noticed_and_named() {
     let number = |c: &str| c.parse::<f64>().unwrap();
     let angles = ["q1", "q2", "q3", "q4", "q5", "q6"];
     refused(&changed(&angles, |_, c| format!("{:.6}", number(c).to_radians())), &["radian", "degree"]);
-    refused(&changed(&["L"], |_, c| format!("{:.6}", number(c) / 1000.0)), &["metre", "mm"]);
+    refused(&changed(&["L"], |_, c| format!("{:.6}", number(c) / 1000.0)), &["metres", "millimetres"]);
 }
 
 #[test]

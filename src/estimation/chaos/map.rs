@@ -7,20 +7,23 @@
 //! - Chebyshev u ← cos(k arccos u) on [−1, 1], k = 4, given out as (u + 1)/2;
 //! - Hénon (u, v) ← (1 − 1.4u² + v, 0.3u), given out as (u + 1.5)/3;
 //! - Bernoulli (doubling) x ← 2x mod 1;
-//! - logistic-tent (ltlm-2024 eq. 11): x ← (r x(1 − x) + (4 − r)x/2) mod 1 below ½, with 1 − x for x in the second term
-//!   from there.
+//! - logistic-tent (ltlm-2024 eq. 11): x ← (r x(1 − x) + (4 − r)x/2) mod 1 below ½, with 1 − x for x in the
+//!   second term from there.
 //!
-//! **Guards.** Doubling a binary number shifts its digits to the left, so that in floating point tent and Bernoulli
-//! reach 0 after some 53 steps from any start and stay there (logistic-tent with r = 0 is the tent). Exact arithmetic on
-//! an irrational start would bring a new digit in at the right: here it comes from SplitMix64 (Steele, Lea, Flood 2014),
-//! 2⁻⁵² in size. Any map that meets a fixed point, a cycle of two or a value outside its interval is started
-//! anew from the same source. Nothing is random: a sequence is determined by its map and start.
+//! **Guards.** Doubling a binary number shifts its digits to the left, so that in floating point tent and
+//! Bernoulli reach 0 after some 53 steps from any start and stay there (logistic-tent with r = 0 is the tent).
+//! Exact arithmetic on an irrational start would bring a new digit in at the right: here it comes from
+//! SplitMix64 (Steele, Lea, Flood 2014), 2⁻⁵² in size. Any map that meets a fixed point, a cycle of two or a
+//! value outside its interval is started anew from the same source. Nothing is random: a sequence is determined
+//! by its map and start.
 //!
-//! **Source and departures.** Liu et al. 2024, Table 2 and eq. 11; formulas of the six others from the literature
-//! (May 1976 logistic, Hénon 1976, …), since the paper prints none. All maps but tent, Bernoulli and (nearly) logistic-tent
-//! have densities that are far from uniform; they are given as they are, not transformed.
+//! **Source and departures.** Liu et al. 2024, Table 2 and eq. 11; formulas of the six others from the
+//! literature (May 1976 logistic, Hénon 1976, …), since the paper prints none. All maps but tent, Bernoulli and
+//! (nearly) logistic-tent have densities that are far from uniform; they are given as they are, not
+//! transformed.
 //!
-//! **Checked against** the first steps by hand, 100,000 steps without collapse, and the arcsine density of logistic.
+//! **Checked against** the first steps by hand, 100,000 steps without collapse, and the arcsine density of
+//! logistic.
 
 use std::f64::consts::PI;
 

@@ -1,14 +1,15 @@
 //! How evenly a chaotic sequence fills the unit interval, and whether a difference means anything.
 //!
-//! **Method.** The first m points of a sequence are counted in N bins, and the standard deviation of the counts is taken
-//! (ltlm-2024 eq. 12, with N − 1), once for each of many starts. Random points would give √(m/N · (1 − 1/N)) on average, and a
-//! sampling spread of that value about √(1/(2(N − 1))) of itself: differences below it are noise.
+//! **Method.** The first m points of a sequence are counted in N bins, and the standard deviation of the counts
+//! is taken (ltlm-2024 eq. 12, with N − 1), once for each of many starts. Random points would give √(m/N · (1 −
+//! 1/N)) on average, and a sampling spread of that value about √(1/(2(N − 1))) of itself: differences below it
+//! are noise.
 //!
-//! **Source and departures.** Liu et al. 2024, eq. 12, Figs 2 and 3: 50 bins, 1,000 points, one unstated start, r from 0 to
-//! 4; "r = 0.5 achieves the best uniformity". Here every r is given many starts and two lengths. At 1,000 points r = 0.5 and its
-//! neighbours cannot be told from each other or from random points; at 100,000 points the density of the map itself shows, and
-//! r = 0.5 is among the less uniform of the small r. The claim is sampling noise. It does no harm: the identification does not
-//! depend on the uniformity of some ten points.
+//! **Source and departures.** Liu et al. 2024, eq. 12, Figs 2 and 3: 50 bins, 1,000 points, one unstated start,
+//! r from 0 to 4; "r = 0.5 achieves the best uniformity". Here every r is given many starts and two lengths. At
+//! 1,000 points r = 0.5 and its neighbours cannot be told from each other or from random points; at 100,000
+//! points the density of the map itself shows, and r = 0.5 is among the less uniform of the small r. The claim
+//! is sampling noise. It does no harm: the identification does not depend on the uniformity of some ten points.
 //!
 //! **Checked against** random counts, and the figures just stated.
 
@@ -110,15 +111,18 @@ pub struct Verdict {
     pub best_short: f64,
     /// The r with the smallest deviation of the long sequence.
     pub best_long: f64,
-    /// How many r, the claimed one not counted, lie within one sampling spread of it or better in the short sequence.
+    /// How many r, the claimed one not counted, lie within one sampling spread of it or better in the short
+    /// sequence.
     pub indistinguishable_short: usize,
     /// How many r are better than the claimed one by more than one sampling spread in the long sequence.
     pub better_long: usize,
-    /// The claim is sampling noise: the short sequence cannot single the claimed r out, and the long one prefers another.
+    /// The claim is sampling noise: the short sequence cannot single the claimed r out, and the long one
+    /// prefers another.
     pub sampling_noise: bool,
 }
 
-/// Runs the study over `rs` (Fig. 2: 0 to 4), with sequences of `options.points` and of `long_points`, and judges `claimed`.
+/// Runs the study over `rs` (Fig. 2: 0 to 4), with sequences of `options.points` and of `long_points`, and
+/// judges `claimed`.
 pub fn study(rs: &[f64], claimed: f64, long_points: usize, options: &Options) -> Study {
     let long_options = Options { points: long_points, ..*options };
     let point = |r: f64| {

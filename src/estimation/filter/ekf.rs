@@ -3,18 +3,19 @@
 //! **Method.** For each observation with residual r and Jacobian J at x: S = JPJᵀ + R, K = PJᵀS⁻¹, x ← x − Kr,
 //! P ← (I − KJ)P(I − KJ)ᵀ + KRKᵀ (Joseph's form, multiplied out so that it costs p²m); before it P ← P + Q.
 //! `iterations` above 1 repeats the linearisation at the new state within one observation (iterated filter).
-//! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, P carried on: every row is counted as often as
-//!   there are sweeps, and the covariance is too small by that factor.
-//! - [`Form::Sound`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep only
-//!   corrects the linearisation of the earlier ones. One sweep by default.
+//! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, P carried on: every row is
+//!   counted as often as there are sweeps, and the covariance is too small by that factor.
+//! - [`Form::Sound`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep
+//!   only corrects the linearisation of the earlier ones. One sweep by default.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
 //!
-//! **Stops.** *DataProcessed* after the sweeps; *NotFinite* at the first observation whose update is not finite.
+//! **Stops.** *DataProcessed* after the sweeps; *NotFinite* at the first observation whose update is not
+//! finite.
 //!
-//! **Source and departures.** M2 of ltlm-2024 and M1 of ukf-vslm-2023, "the conventional extended Kalman filter", without equations;
-//! U's Table IX has it iterate 12 to 14 times, taken here as sweeps of the printed form. Equations: Simon, *Optimal State
-//! Estimation*, 2006, ch. 13.
+//! **Source and departures.** M2 of ltlm-2024 and M1 of ukf-vslm-2023, "the conventional extended Kalman
+//! filter", without equations; U's Table IX has it iterate 12 to 14 times, taken here as sweeps of the printed
+//! form. Equations: Simon, *Optimal State Estimation*, 2006, ch. 13.
 //!
 //! **Checked against** batch least squares with the same priors on linear problems (equal to rounding).
 
@@ -39,7 +40,8 @@ pub struct Options {
     pub sweeps: usize,
     /// Linearisations within one observation.
     pub iterations: usize,
-    /// Standard deviation of what a parameter drifts from one observation to the next: one for each, or none at all.
+    /// Standard deviation of what a parameter drifts from one observation to the next: one for each, or none at
+    /// all.
     pub process_sigma: Vec<f64>,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
@@ -84,8 +86,8 @@ impl Filter {
         }
     }
 
-    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened rows). The state
-    /// stays as it was and the answer is `None` where anything is not finite.
+    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened
+    /// rows). The state stays as it was and the answer is `None` where anything is not finite.
     pub fn update(
         &mut self,
         problem: &dyn Problem,

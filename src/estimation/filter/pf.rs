@@ -1,22 +1,27 @@
 //! Particle filter for constant parameters.
 //!
-//! **Method.** N particles are drawn from the prior; each observation multiplies their weights by its likelihood
-//! exp(−½‖r‖²); the estimate is the weighted mean, the covariance the weighted spread.
-//! - [`Form::AsPrinted`]: sampling, importance, resampling: where the effective number of particles 1/Σw² falls below N/2
-//!   they are resampled systematically. Nothing ever moves a particle, so that after some dozen precise observations
-//!   all of them are copies of the best of the first N draws: the filter searches no better than N random guesses.
-//! - [`Form::Sound`]: each likelihood is brought in by as many fractional powers as it takes to keep half of the particles
-//!   effective (tempering); after each power they are resampled and moved by a kernel that keeps their mean and covariance
-//!   (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the weighted covariance).
+//! **Method.** N particles are drawn from the prior; each observation multiplies their weights by its
+//! likelihood exp(−½‖r‖²); the estimate is the weighted mean, the covariance the weighted spread.
+//! - [`Form::AsPrinted`]: sampling, importance, resampling: where the effective number of particles 1/Σw² falls
+//!   below N/2 they are resampled systematically. Nothing ever moves a particle, so that after some dozen
+//!   precise observations all of them are copies of the best of the first N draws: the filter searches no
+//!   better than N random guesses.
+//! - [`Form::Sound`]: each likelihood is brought in by as many fractional powers as it takes to keep half of
+//!   the particles effective (tempering); after each power they are resampled and moved by a kernel that keeps
+//!   their mean and covariance (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the
+//!   weighted covariance).
 //!
-//! **Shapes.** x has p entries; N particles. An observation costs N evaluations of its rows, in the sound form for each power.
+//! **Shapes.** x has p entries; N particles. An observation costs N evaluations of its rows, in the sound form
+//! for each power.
 //!
-//! **Stops.** *DataProcessed* after the last observation; *NotFinite* where all weights vanish or are not numbers.
+//! **Stops.** *DataProcessed* after the last observation; *NotFinite* where all weights vanish or are not
+//! numbers.
 //!
-//! **Source and departures.** M3 of ltlm-2024, "particle filtering", without equations or numbers. Printed: Gordon, Salmond, Smith, "Novel
-//! approach to nonlinear/non-Gaussian Bayesian state estimation", 1993. Sound: Liu and West, "Combined parameter and state
-//! estimation in simulation-based filtering", 2001; Del Moral, Doucet, Jasra, "Sequential Monte Carlo samplers", 2006, for the
-//! tempering. The kernel is exact for normal posteriors only, and its spread carries a sampling error of about √(p/N).
+//! **Source and departures.** M3 of ltlm-2024, "particle filtering", without equations or numbers. Printed:
+//! Gordon, Salmond, Smith, "Novel approach to nonlinear/non-Gaussian Bayesian state estimation", 1993. Sound:
+//! Liu and West, "Combined parameter and state estimation in simulation-based filtering", 2001; Del Moral,
+//! Doucet, Jasra, "Sequential Monte Carlo samplers", 2006, for the tempering. The kernel is exact for normal
+//! posteriors only, and its spread carries a sampling error of about √(p/N).
 //!
 //! **Checked against** batch least squares within a few of its sigmas, and the collapse of the printed form.
 
@@ -188,7 +193,8 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     finish(&objective, &x, Some(covariance), end, trace)
 }
 
-/// The largest power of the likelihood, at most `left`, that keeps half of equally weighted particles effective.
+/// The largest power of the likelihood, at most `left`, that keeps half of equally weighted particles
+/// effective.
 fn tempered_power(log_likelihoods: &[f64], left: f64) -> f64 {
     let largest = log_likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
     let share = |power: f64| {

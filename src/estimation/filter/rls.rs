@@ -1,29 +1,32 @@
 //! Recursive least squares.
 //!
-//! **Method** (rls-2025 eq. 8 to 14). For each row with derivatives a and residual e: k = Pa / (ϕ + aᵀPa), x ← x − k e,
-//! P ← (P − k aᵀP)/ϕ, where ϕ ≤ 1 is the forgetting factor. Rows are linearised once, at the point of linearisation ξ: e = r(ξ) + aᵀ(x − ξ).
-//! - [`Memory::Covariance`]: P itself, by the formula of Sherman and Morrison as printed (eq. 14). Rounding can make it indefinite.
-//! - [`Memory::SquareRoot`]: S with SSᵀ = P (Potter): f = Sᵀa, d = ϕ + fᵀf, k = Sf/d,
-//!   S ← (S − Sf fᵀ/(d + √(ϕd)))/√ϕ. P cannot become indefinite.
+//! **Method** (rls-2025 eq. 8 to 14). For each row with derivatives a and residual e: k = Pa / (ϕ + aᵀPa), x ←
+//! x − k e, P ← (P − k aᵀP)/ϕ, where ϕ ≤ 1 is the forgetting factor. Rows are linearised once, at the point of
+//! linearisation ξ: e = r(ξ) + aᵀ(x − ξ).
+//! - [`Memory::Covariance`]: P itself, by the formula of Sherman and Morrison as printed (eq. 14). Rounding can
+//!   make it indefinite.
+//! - [`Memory::SquareRoot`]: S with SSᵀ = P (Potter): f = Sᵀa, d = ϕ + fᵀf, k = Sf/d, S ← (S − Sf fᵀ/(d +
+//!   √(ϕd)))/√ϕ. P cannot become indefinite.
 //!
-//! Without forgetting this *is* batch least squares of one linearisation, to rounding. `linearisations` above 1 begins again
-//! from the prior with ξ at the last result: Gauss–Newton, one row at a time.
+//! Without forgetting this *is* batch least squares of one linearisation, to rounding. `linearisations` above 1
+//! begins again from the prior with ξ at the last result: Gauss–Newton, one row at a time.
 //!
 //! **Shapes.** x has p entries, P is p × p; rows are taken in one by one.
 //!
-//! **Stops.** *DataProcessed* after the last linearisation; *Singular* where the first rows do not determine the parameters
-//! ([`Initial::FirstRows`]); *NotFinite*.
+//! **Stops.** *DataProcessed* after the last linearisation; *Singular* where the first rows do not determine
+//! the parameters ([`Initial::FirstRows`]); *NotFinite*.
 //!
-//! **Source and departures.** Qiao et al. 2025. The text at hand lost eq. 1 to 13: reconstructed from the definitions around them. The
-//! denominator of eq. 14 is a scalar, which holds for one row; a pose brings several, taken in one after the other, each
-//! divided by its own standard deviation. P₀ = (A₀ᵀA₀)⁻¹ from the first poses is near singular with few of them: `Initial::FirstRows`
-//! has it, the default starts from the prior. The paper has no forgetting factor in eq. 14; 1 by default. Forgetting without
-//! excitation lets P grow without bound (wind-up): use process noise per parameter in
-//! [`ekf`](crate::estimation::filter::ekf) where that can happen. Potter's form: Bierman, *Factorization Methods for
-//! Discrete Sequential Estimation*, 1977, ch. II.
+//! **Source and departures.** Qiao et al. 2025. The text at hand lost eq. 1 to 13: reconstructed from the
+//! definitions around them. The denominator of eq. 14 is a scalar, which holds for one row; a pose brings
+//! several, taken in one after the other, each divided by its own standard deviation. P₀ = (A₀ᵀA₀)⁻¹ from the
+//! first poses is near singular with few of them: `Initial::FirstRows` has it, the default starts from the
+//! prior. The paper has no forgetting factor in eq. 14; 1 by default. Forgetting without excitation lets P grow
+//! without bound (wind-up): use process noise per parameter in [`ekf`](crate::estimation::filter::ekf) where
+//! that can happen. Potter's form: Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
+//! ch. II.
 //!
-//! **Checked against** batch least squares of one linearisation (equal to rounding), and Bierman's example, where the
-//! printed form loses positive definiteness.
+//! **Checked against** batch least squares of one linearisation (equal to rounding), and Bierman's example,
+//! where the printed form loses positive definiteness.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -105,8 +108,8 @@ pub struct Recursion {
 }
 
 impl Recursion {
-    /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is not
-    /// positive definite.
+    /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is
+    /// not positive definite.
     pub fn new(x: DVector<f64>, covariance: DMatrix<f64>, memory: Memory) -> Option<Self> {
         let matrix = match memory {
             Memory::Covariance => covariance,
@@ -123,8 +126,8 @@ impl Recursion {
         }
     }
 
-    /// Takes in one row: derivatives `a` and residual `e` at the present `x`. Gives the variance ϕ + aᵀPa that the residual
-    /// was expected to have.
+    /// Takes in one row: derivatives `a` and residual `e` at the present `x`. Gives the variance ϕ + aᵀPa that
+    /// the residual was expected to have.
     pub fn update(&mut self, a: &DVector<f64>, e: f64, forgetting: f64) -> f64 {
         match self.memory {
             Memory::Covariance => {
@@ -154,8 +157,8 @@ impl Recursion {
         }
     }
 
-    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`; the square root is made anew (p³).
-    /// Not finite sigmas leave everything as it was.
+    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`; the square root is made
+    /// anew (p³). Not finite sigmas leave everything as it was.
     pub fn predict(&mut self, sigma: &[f64]) {
         let mut covariance = self.covariance();
         for (k, sigma) in sigma.iter().enumerate().take(self.x.len()) {

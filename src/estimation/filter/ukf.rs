@@ -1,25 +1,29 @@
 //! Unscented Kalman filter for constant or drifting parameters.
 //!
-//! **Method.** [`Form::Sound`]: for each observation P ← P + Q; with LLᵀ = P and c = α²(p + κ) the 2p + 1 sigma points x,
-//! x ± √c·L_j; weights W₀ᵐ = 1 − p/c, W₀ᶜ = W₀ᵐ + 1 − α² + β, W = 1/(2c) for the others; mean ŷ and covariance S = Σ W(y − ŷ)(y − ŷ)ᵀ + R
-//! of the residuals there, cross covariance P_xy, K = P_xy S⁻¹, x ← x − Kŷ, P ← P − KSKᵀ. No derivatives are needed.
+//! **Method.** [`Form::Sound`]: for each observation P ← P + Q; with LLᵀ = P and c = α²(p + κ) the 2p + 1 sigma
+//! points x, x ± √c·L_j; weights W₀ᵐ = 1 − p/c, W₀ᶜ = W₀ᵐ + 1 − α² + β, W = 1/(2c) for the others; mean ŷ and
+//! covariance S = Σ W(y − ŷ)(y − ŷ)ᵀ + R of the residuals there, cross covariance P_xy, K = P_xy S⁻¹, x ← x −
+//! Kŷ, P ← P − KSKᵀ. No derivatives are needed.
 //!
-//! [`Form::AsPrinted`] (ukf-vslm-2023 eq. 8 to 12, Algorithm 1): p + 2 points (the sums run from 0 to N + 1) with equal weights
-//! (W_i is not defined), no Q, no R, P set to a random number at the beginning of each sweep and the gain to zero. What it does:
-//! the points are not symmetric, so that their mean, which becomes the state, drifts along the columns of P even where the
-//! residual vanishes; without R each scalar observation is believed entirely and takes one dimension out of P, which after p rows is
-//! singular: from there on the filter no longer listens (S = 0, and its gain stays at the zero it was set to). What it
-//! reports is what the first p rows of the last sweep say.
+//! [`Form::AsPrinted`] (ukf-vslm-2023 eq. 8 to 12, Algorithm 1): p + 2 points (the sums run from 0 to N + 1)
+//! with equal weights (W_i is not defined), no Q, no R, P set to a random number at the beginning of each sweep
+//! and the gain to zero. What it does: the points are not symmetric, so that their mean, which becomes the
+//! state, drifts along the columns of P even where the residual vanishes; without R each scalar observation is
+//! believed entirely and takes one dimension out of P, which after p rows is singular: from there on the filter
+//! no longer listens (S = 0, and its gain stays at the zero it was set to). What it reports is what the first p
+//! rows of the last sweep say.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
 //!
 //! **Stops.** *DataProcessed* after the sweeps; *NotFinite* or *Singular* at the first update that fails.
 //!
-//! **Source and departures.** Sound: Wan and van der Merwe, "The unscented Kalman filter for nonlinear estimation", 2000, with the state
-//! transition the identity. Printed: Li et al. 2023; X₀ at index 0, columns of the Cholesky factor of (p + 1)P at 1 … p, minus the
-//! first of them at p + 1; the random number multiplies the variances of the priors, since it has no unit.
+//! **Source and departures.** Sound: Wan and van der Merwe, "The unscented Kalman filter for nonlinear
+//! estimation", 2000, with the state transition the identity. Printed: Li et al. 2023; X₀ at index 0, columns
+//! of the Cholesky factor of (p + 1)P at 1 … p, minus the first of them at p + 1; the random number multiplies
+//! the variances of the priors, since it has no unit.
 //!
-//! **Checked against** batch least squares on linear problems, and the extended filter on mildly nonlinear ones.
+//! **Checked against** batch least squares on linear problems, and the extended filter on mildly nonlinear
+//! ones.
 
 use std::ops::Range;
 
@@ -48,7 +52,8 @@ pub struct Options {
     pub beta: f64,
     /// κ (sound).
     pub kappa: f64,
-    /// Standard deviation of what a parameter drifts from one observation to the next (sound): one for each, or none at all.
+    /// Standard deviation of what a parameter drifts from one observation to the next (sound): one for each, or
+    /// none at all.
     pub process_sigma: Vec<f64>,
     /// First standard deviation of a parameter without a prior.
     pub unknown_sigma: f64,
@@ -101,8 +106,9 @@ impl Filter {
         }
     }
 
-    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened rows). The state
-    /// stays as it was and the answer is `None` where anything is not finite or P is no longer positive definite.
+    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened
+    /// rows). The state stays as it was and the answer is `None` where anything is not finite or P is no longer
+    /// positive definite.
     pub fn update(&mut self, problem: &dyn Problem, rows: Range<usize>, noise: f64) -> Option<Innovation> {
         let (p, m) = (self.x.len(), rows.len());
         let c = self.alpha * self.alpha * (p as f64 + self.kappa);
@@ -252,7 +258,8 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
     finish(&objective, &x, Some(covariance), end, trace)
 }
 
-/// Cholesky factor of a matrix that rounding may have made indefinite: what is left of a pivot below rounding is dropped.
+/// Cholesky factor of a matrix that rounding may have made indefinite: what is left of a pivot below rounding
+/// is dropped.
 fn semidefinite_root(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let p = matrix.nrows();
     let mut root = DMatrix::<f64>::zeros(p, p);

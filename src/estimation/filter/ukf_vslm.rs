@@ -1,16 +1,18 @@
 //! Unscented Kalman filter, then variable step-size Levenberg–Marquardt (UKF-VSLM).
 //!
-//! **Method** (ukf-vslm-2023, Algorithm 1). The filter goes through the data T₃ times; what it ends on is the start of T₉ iterations of
-//! eq. 15.
-//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and
-//!   [`vslm`]), with line 17, X₀ = x_ukf, inside the loop: each iteration begins
-//!   where the filter ended and undoes the one before it, while the step size has decayed further. Its result is one sweep of
-//!   tiny steps from the filter's result.
-//! - [`Form::Sound`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it converges.
+//! **Method** (ukf-vslm-2023, Algorithm 1). The filter goes through the data T₃ times; what it ends on is the
+//! start of T₉ iterations of eq. 15.
+//! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and [`vslm`]), with line 17, X₀ = x_ukf, inside
+//!   the loop: each iteration begins where the filter ended and undoes the one before it, while the step size
+//!   has decayed further. Its result is one sweep of tiny steps from the filter's result.
+//! - [`Form::Sound`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it
+//!   converges.
 //!
-//! **Shapes, stops.** Those of the two parts; the termination is the second one's, or the first one's where it failed.
+//! **Shapes, stops.** Those of the two parts; the termination is the second one's, or the first one's where it
+//! failed.
 //!
-//! **Source and departures.** Li et al. 2023, Algorithm 1. T₃ and T₉ are not stated; Table IX's two iterations of M9 are taken for both.
+//! **Source and departures.** Li et al. 2023, Algorithm 1. T₃ and T₉ are not stated; Table IX's two iterations
+//! of M9 are taken for both.
 //!
 //! **Checked against** the two parts, and batch least squares for the sound form.
 

@@ -1,8 +1,8 @@
 //! One damped step from a linearised problem, with all memory allocated beforehand.
 //!
 //! In scaled parameters z = D x the model of the cost is c + γᵀs + ½ sᵀSs with γ = D⁻¹g and S = D⁻¹AD⁻¹, whose
-//! diagonal is 1 where D is fresh. The step solves (S + μI) s = −γ; the parameters move by h = D⁻¹s. μ is thus a pure
-//! number, whatever the units of the parameters.
+//! diagonal is 1 where D is fresh. The step solves (S + μI) s = −γ; the parameters move by h = D⁻¹s. μ is thus
+//! a pure number, whatever the units of the parameters.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -89,13 +89,14 @@ pub(crate) struct DampedSystem {
     memory: MemBuffer,
 }
 
-/// A pivot (squared length of what is left of a unit column) below this means that the column depends on the others.
+/// A pivot (squared length of what is left of a unit column) below this means that the column depends on the
+/// others.
 fn negligible_pivot(p: usize) -> f64 {
     64.0 * p as f64 * f64::EPSILON
 }
 
-/// Damping, relative to the diagonal, that a singular system gets in addition, so that a step stays finite along its
-/// null space.
+/// Damping, relative to the diagonal, that a singular system gets in addition, so that a step stays finite
+/// along its null space.
 const SINGULAR_DAMPING: f64 = 1e-9;
 
 impl DampedSystem {
@@ -118,8 +119,8 @@ impl DampedSystem {
         Self { scale: vec![1.0; p], unscaled: true, ..Self::new(p) }
     }
 
-    /// Takes over scale and gradient of a new point. The answer is the largest cosine between the residual vector and
-    /// a column of the Jacobian: 0 at a stationary point.
+    /// Takes over scale and gradient of a new point. The answer is the largest cosine between the residual
+    /// vector and a column of the Jacobian: 0 at a stationary point.
     pub(crate) fn enter(&mut self, at: &Linearisation) -> f64 {
         let length = (2.0 * at.cost()).sqrt();
         let mut cosine = 0.0_f64;
@@ -188,8 +189,8 @@ impl DampedSystem {
         Some(())
     }
 
-    /// Cholesky factor of S + μI + extra · diag S; gives its smallest squared pivot against the diagonal (without μ), `None`
-    /// where it is not positive definite.
+    /// Cholesky factor of S + μI + extra · diag S; gives its smallest squared pivot against the diagonal
+    /// (without μ), `None` where it is not positive definite.
     fn factorise(&mut self, equations: &NormalEquations, mu: f64, extra: f64) -> Option<f64> {
         let p = self.p;
         for j in 0..p {

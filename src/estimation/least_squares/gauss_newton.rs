@@ -6,13 +6,15 @@
 //!
 //! **Shapes.** As in [`lm`](crate::estimation::least_squares::lm).
 //!
-//! **Stops.** As printed: after `max_iterations` steps (1), or *Singular* where JᵀJ cannot be inverted. Sound: *Cost*, *Gradient*
-//! and *SmallResidual* as in `lm`; *Stalled* where thirty halvings do not help.
+//! **Stops.** As printed: after `max_iterations` steps (1), or *Singular* where JᵀJ cannot be inverted. Sound:
+//! *Cost*, *Gradient* and *SmallResidual* as in `lm`; *Stalled* where thirty halvings do not help.
 //!
-//! **Source and departures.** Qiao et al. 2025, eq. 8 and 9 (the printed equations are lost in the text at hand and reconstructed
-//! from their definitions); Li et al. 2023, eq. 13. Sound: Nocedal and Wright, *Numerical Optimization*, 2nd ed., §10.3.
+//! **Source and departures.** Qiao et al. 2025, eq. 8 and 9 (the printed equations are lost in the text at hand
+//! and reconstructed from their definitions); Li et al. 2023, eq. 13. Sound: Nocedal and Wright, *Numerical
+//! Optimization*, 2nd ed., §10.3.
 //!
-//! **Checked against** linear problems (one step is exact) and the published minima that Gauss–Newton can reach.
+//! **Checked against** linear problems (one step is exact) and the published minima that Gauss–Newton can
+//! reach.
 
 use serde::{Deserialize, Serialize};
 

@@ -2,26 +2,28 @@
 //!
 //! **Method.** x ← x − (JᵀJ + μI)⁻¹ Jᵀr (ltlm-2024 eq. 10).
 //! - [`Form::AsPrinted`]: μ fixed (5 in the paper), parameters unscaled, every step taken.
-//! - [`Form::Sound`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ is a
-//!   pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A step is
-//!   accepted where it lowers the cost. An accepted step costs one pass over the rows, which brings cost and normal
-//!   equations together; after a refused step the next trial is first tried by its cost alone.
+//! - [`Form::Sound`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
+//!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A
+//!   step is accepted where it lowers the cost. An accepted step costs one pass over the rows, which brings
+//!   cost and normal equations together; after a refused step the next trial is first tried by its cost alone.
 //!
 //! **Shapes.** x has p entries, J is n × p and is never held: the normal equations (p × p) or, with
 //! [`Factorisation::Qr`], the triangular factor of J come from a pass over the rows. Priors are further rows.
 //!
-//! **Stops** (sound). *Cost*: the undamped model promises less than `cost_tolerance` · cost. *Gradient*: no column of
-//! J makes a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖. *SmallResidual*:
-//! cost below `small_cost`. As printed: relative change of cost or of x below tolerance, or the iteration limit
-//! ("the desired accuracy or the maximum number of iterations"); neither number is stated in the paper.
+//! **Stops** (sound). *Cost*: the undamped model promises less than `cost_tolerance` · cost. *Gradient*: no
+//! column of J makes a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖.
+//! *SmallResidual*: cost below `small_cost`. As printed: relative change of cost or of x below tolerance, or
+//! the iteration limit ("the desired accuracy or the maximum number of iterations"); neither number is stated
+//! in the paper.
 //!
-//! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: next to JᵀJ of parameters in
-//! radians it is nothing, next to some hundred rows of millimetres per degree it slows every step; damping slows, it is
-//! no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The Levenberg–Marquardt algorithm"
-//! (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear least squares problems* (2004), algorithm
-//! 3.16, for μ. Departures from the latter: μ starts near zero (`initial_damping`), since priors regularise here; a step
-//! with less damping than 10⁻³ must keep a quarter of its promise, and a refusal lifts μ to at least 10⁻³ at once; an
-//! almost perfect gain ratio divides μ by ten, not by three.
+//! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: next to JᵀJ of
+//! parameters in radians it is nothing, next to some hundred rows of millimetres per degree it slows every
+//! step; damping slows, it is no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The
+//! Levenberg–Marquardt algorithm" (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear
+//! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
+//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must keep a quarter of
+//! its promise, and a refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
+//! not by three.
 //!
 //! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
 
@@ -55,7 +57,8 @@ pub struct Options {
     pub gradient_tolerance: f64,
     /// Stop where the step is below this share of the parameters.
     pub step_tolerance: f64,
-    /// Stop where the cost itself is below this. Residuals are counted in their σ, so this is an absolute figure.
+    /// Stop where the cost itself is below this. Residuals are counted in their σ, so this is an absolute
+    /// figure.
     pub small_cost: f64,
     /// Not used: the method draws nothing. Here so that all methods are called alike.
     pub seed: u64,
@@ -135,8 +138,8 @@ impl Damping {
         Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
     }
 
-    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of its promise:
-    /// otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
+    /// its promise: otherwise one leap from a far start lands on a plateau from which nothing leads back.
     pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
         gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
     }
@@ -252,9 +255,9 @@ pub(crate) struct Search {
     pub(crate) step_tolerance: f64,
 }
 
-/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the promise
-/// is asked again almost without damping. Where the undamped model promises more than the problem keeps (large
-/// residuals), a small promise after refusals counts as converged if the gradient is small too.
+/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the
+/// promise is asked again almost without damping. Where the undamped model promises more than the problem keeps
+/// (large residuals), a small promise after refusals counts as converged if the gradient is small too.
 pub(crate) fn converged(
     system: &mut DampedSystem,
     here: &Point,

@@ -1,25 +1,27 @@
 //! Logistic-tent chaotic Levenberg–Marquardt (LTLM).
 //!
-//! **Method** (ltlm-2024, Algorithm I). Two Levenberg–Marquardt steps x_k → x₁ → x₂ (eq. 13, 14), midpoints
-//! a = (x_k + x₁)/2 and b = (x₁ + x₂)/2 (eq. 15), chaotic numbers N_1 … N_M in [0, 1) (eq. 11), candidates
-//! x₁ − (x₁ − a)N_m and x₁ + (x₂ − b)N_m (eq. 16, 17); the best of them and x₁ starts the next iteration (eq. 18).
+//! **Method** (ltlm-2024, Algorithm I). Two Levenberg–Marquardt steps x_k → x₁ → x₂ (eq. 13, 14), midpoints a =
+//! (x_k + x₁)/2 and b = (x₁ + x₂)/2 (eq. 15), chaotic numbers N_1 … N_M in [0, 1) (eq. 11), candidates x₁ − (x₁
+//! − a)N_m and x₁ + (x₂ − b)N_m (eq. 16, 17); the best of them and x₁ starts the next iteration (eq. 18).
 //!
-//! **What it is.** N_m is one scalar for a whole candidate, so this is a line search on the inner halves of [x_k, x₁] and
-//! [x₁, x₂]. Eq. 17 is right as printed: x₂ − b = b − x₁. x₂ itself is never a candidate, so that each iteration, at the price of
-//! two Jacobians, ends at best halfway between the first and the second Levenberg–Marquardt step: compare methods per
-//! Jacobian, not per iteration. An iteration asks for two Jacobian passes (the second brings the cost of x₁) and 2M passes
-//! of residuals, 2M + 1 evaluations in the paper's count.
+//! **What it is.** N_m is one scalar for a whole candidate, so this is a line search on the inner halves of
+//! [x_k, x₁] and [x₁, x₂]. Eq. 17 is right as printed: x₂ − b = b − x₁. x₂ itself is never a candidate, so that
+//! each iteration, at the price of two Jacobians, ends at best halfway between the first and the second
+//! Levenberg–Marquardt step: compare methods per Jacobian, not per iteration. An iteration asks for two
+//! Jacobian passes (the second brings the cost of x₁) and 2M passes of residuals, 2M + 1 evaluations in the
+//! paper's count.
 //!
 //! **Shapes.** As in [`lm`](crate::estimation::least_squares::lm).
 //!
 //! **Stops.** Those of `lm`; as printed, K iterations or no relative change of the cost.
 //!
-//! **Source and departures.** Liu et al. 2024. M, N₀ and K are not stated: here 10, 0.37 and 60 by default, and the sequence N runs on
-//! from iteration to iteration. Eq. 15 mixes k and k + 1 and Algorithm I writes J_{k+1} where J_{k,1} (at x₁) is meant; both are
-//! read that way. f in eq. 10, 13 is the residual vector, not the scalar of eq. 8. μ = 5 has no unit: see `lm`. The printed form
-//! does not compare with x_k and may rise. Sound form: both steps scaled and damped by Nielsen's rule as in `lm`, the iteration
-//! taken only if its best candidate lowers the cost, and x₂ a candidate too (`second_step`), without which the method
-//! throws away what its second Jacobian has bought.
+//! **Source and departures.** Liu et al. 2024. M, N₀ and K are not stated: here 10, 0.37 and 60 by default, and
+//! the sequence N runs on from iteration to iteration. Eq. 15 mixes k and k + 1 and Algorithm I writes J_{k+1}
+//! where J_{k,1} (at x₁) is meant; both are read that way. f in eq. 10, 13 is the residual vector, not the
+//! scalar of eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k and may rise. Sound
+//! form: both steps scaled and damped by Nielsen's rule as in `lm`, the iteration taken only if its best
+//! candidate lowers the cost, and x₂ a candidate too (`second_step`), without which the method throws away what
+//! its second Jacobian has bought.
 //!
 //! **Checked against** `lm` on the same published problems, and the counts above.
 

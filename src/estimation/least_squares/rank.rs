@@ -1,14 +1,15 @@
 //! Rank, condition and null space of a least-squares problem, read off its triangular factor.
 //!
-//! **Method.** Column-pivoted QR of R orders the parameters by what each adds to those before it; the singular value
-//! decomposition R = U Σ Vᵀ gives rank, condition number and, as the last columns of V, the combinations of parameters
-//! that the data cannot tell apart. Both act on R (p × p), since R and the Jacobian have the same singular values and
-//! right singular vectors.
+//! **Method.** Column-pivoted QR of R orders the parameters by what each adds to those before it; the singular
+//! value decomposition R = U Σ Vᵀ gives rank, condition number and, as the last columns of V, the combinations
+//! of parameters that the data cannot tell apart. Both act on R (p × p), since R and the Jacobian have the same
+//! singular values and right singular vectors.
 //!
 //! **Shapes.** R is p × p; `right_vectors` holds one direction in each column, strongest first.
 //!
-//! **Source.** Golub and Van Loan, *Matrix Computations*, 4th ed., §5.4 and §5.5. The scaling of the columns decides
-//! what "small" means: scale by prior sigmas or by column norms before asking, never by accident of units.
+//! **Source.** Golub and Van Loan, *Matrix Computations*, 4th ed., §5.4 and §5.5. The scaling of the columns
+//! decides what "small" means: scale by prior sigmas or by column norms before asking, never by accident of
+//! units.
 //!
 //! **Checked against** matrices made with a known null space, and a regression with a duplicated column.
 
@@ -45,9 +46,9 @@ impl RankAnalysis {
     }
 }
 
-/// Rank analysis of an upper triangular (or any) factor with p columns and at most p rows. Singular values below
-/// `tolerance` times the largest count as zero; without a tolerance p·ε is taken, which finds exact dependence only.
-/// `None` where the factor is not finite.
+/// Rank analysis of an upper triangular (or any) factor with p columns and at most p rows. Singular values
+/// below `tolerance` times the largest count as zero; without a tolerance p·ε is taken, which finds exact
+/// dependence only. `None` where the factor is not finite.
 pub fn analyse(r: &DMatrix<f64>, tolerance: Option<f64>) -> Option<RankAnalysis> {
     let p = r.ncols();
     if p == 0 || !r.iter().all(|v| v.is_finite()) {

@@ -2,16 +2,17 @@
 //!
 //! **Method.** x ← x − δ (JᵀJ + λI)⁻¹ Jᵀr with a step size δ that is adjusted as the search goes on.
 //! - [`Form::AsPrinted`]: δ decays once for each iteration, δ₀ = 0.8, factor 0.95 (ukf-vslm-2023 eq. 15).
-//! - [`Form::Sound`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0, its slope there and
-//!   the cost at 1, safeguarded to [0.1, 0.5] at each further trial until the cost falls enough (Armijo).
+//! - [`Form::Sound`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0,
+//!   its slope there and the cost at 1, safeguarded to [0.1, 0.5] at each further trial until the cost falls
+//!   enough (Armijo).
 //!
 //! **Shapes.** As in [`lm`](crate::estimation::least_squares::lm).
 //!
 //! **Stops.** As `lm`; *Stalled* where no step size along the direction lowers the cost.
 //!
-//! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step size", without an
-//! equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed form (the same recurrence as
-//! [`vslm`] with decay per iteration). What M6 ran exactly is not known. Sound:
+//! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step
+//! size", without an equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed
+//! form (the same recurrence as [`vslm`] with decay per iteration). What M6 ran exactly is not known. Sound:
 //! Nocedal and Wright, *Numerical Optimization*, 2nd ed., §3.5.
 //!
 //! **Checked against** published minima.

@@ -1,16 +1,18 @@
 //! The triangular factor of a tall Jacobian, without ever holding the Jacobian.
 //!
-//! **Method.** Tall-skinny QR: each block of rows [J | r] is reduced to a triangle by Householder reflections, and the
-//! triangles are stacked and reduced again, in order. The last triangle [R c; 0 ρ] has RᵀR = JᵀJ, Rᵀc = Jᵀr and
-//! ‖c‖² + ρ² = ‖r‖². Unlike the normal equations it keeps all digits of J, so that a rank can be read off it.
+//! **Method.** Tall-skinny QR: each block of rows [J | r] is reduced to a triangle by Householder reflections,
+//! and the triangles are stacked and reduced again, in order. The last triangle [R c; 0 ρ] has RᵀR = JᵀJ, Rᵀc =
+//! Jᵀr and ‖c‖² + ρ² = ‖r‖². Unlike the normal equations it keeps all digits of J, so that a rank can be read
+//! off it.
 //!
-//! **Shapes.** J is n × p, R is p × p upper triangular (diagonal of either sign), c has p entries. Memory is one
-//! triangle for each block of some 1500 rows.
+//! **Shapes.** J is n × p, R is p × p upper triangular (diagonal of either sign), c has p entries. Memory is
+//! one triangle for each block of some 1500 rows.
 //!
 //! **Source.** Demmel, Grigori, Hoemmen, Langou, "Communication-optimal parallel and sequential QR and LU
 //! factorizations", SIAM J. Sci. Comput. 34 (2012). The factorisation of a block is faer's.
 //!
-//! **Checked against** the normal equations and the singular values of the whole Jacobian, for any number of threads.
+//! **Checked against** the normal equations and the singular values of the whole Jacobian, for any number of
+//! threads.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
@@ -84,8 +86,8 @@ impl TriangularFactor {
     }
 }
 
-/// The triangular factor of the Jacobian at `x` with column k multiplied by `scale[k]` (priors not included): pass
-/// prior sigmas to ask what the data say beyond the priors, or ones for the plain factor.
+/// The triangular factor of the Jacobian at `x` with column k multiplied by `scale[k]` (priors not included):
+/// pass prior sigmas to ask what the data say beyond the priors, or ones for the plain factor.
 ///
 /// # Panics
 /// Where `x` or `scale` does not have one entry for each parameter.

@@ -1,22 +1,26 @@
 //! Levenberg–Marquardt with a variable step size (VSLM).
 //!
 //! **Method.** x ← x − δ_t (JᵀJ + λI)⁻¹ Jᵀr, δ_{t+1} = μ δ_t (ukf-vslm-2023 eq. 15), δ₀ = 0.8, μ = 0.95.
-//! - [`Form::AsPrinted`] with [`Decay::PerSample`]: Algorithm 1 to the letter. Inside each iteration a loop over the samples
-//!   applies eq. 15 to one sample after the other (its row of J, its residual) and δ decays at each: 0.95¹⁰⁰ = 0.006,
-//!   so that after one pass over 100 rows nothing moves any more, and the first rows decide.
-//! - [`Form::AsPrinted`] with [`Decay::PerIteration`]: eq. 15 with all rows, δ decaying once for each pass. The steps sum
-//!   to a finite length: what is left of a linear error after all of them is about e^(−δ₀/(1 − μ)) = e^(−16).
-//! - [`Form::Sound`]: scaled columns and Nielsen's damping as in [`lm`](crate::estimation::least_squares::lm); δ falls only
-//!   where a step is refused (halved) and grows back (÷ μ, at most 1) where one is taken.
+//! - [`Form::AsPrinted`] with [`Decay::PerSample`]: Algorithm 1 to the letter. Inside each iteration a loop
+//!   over the samples applies eq. 15 to one sample after the other (its row of J, its residual) and δ decays at
+//!   each: 0.95¹⁰⁰ = 0.006, so that after one pass over 100 rows nothing moves any more, and the first rows
+//!   decide.
+//! - [`Form::AsPrinted`] with [`Decay::PerIteration`]: eq. 15 with all rows, δ decaying once for each pass. The
+//!   steps sum to a finite length: what is left of a linear error after all of them is about e^(−δ₀/(1 − μ)) =
+//!   e^(−16).
+//! - [`Form::Sound`]: scaled columns and Nielsen's damping as in [`lm`](crate::estimation::least_squares::lm);
+//!   δ falls only where a step is refused (halved) and grows back (÷ μ, at most 1) where one is taken.
 //!
 //! **Shapes.** As in `lm`.
 //!
-//! **Stops.** Sound: as `lm`. As printed: relative change of cost below tolerance, or the iterations (20, Table IX).
+//! **Stops.** Sound: as `lm`. As printed: relative change of cost below tolerance, or the iterations (20, Table
+//! IX).
 //!
-//! **Source and departures.** Li et al. 2023, eq. 15, Algorithm 1 lines 16 to 21. λ is not stated; 5 is taken over from
-//! ltlm-2024, by the same group. The paper's sign is that of E = Z − Z′. Its line 17 (X₀ = x_ukf inside the loop) undoes
-//! each iteration: `restart` has it, off unless [`ukf_vslm`](crate::estimation::filter::ukf_vslm) turns it on.
-//! A fixed decay cannot be right for every problem: it fixes how far the method can travel before it starts.
+//! **Source and departures.** Li et al. 2023, eq. 15, Algorithm 1 lines 16 to 21. λ is not stated; 5 is taken
+//! over from ltlm-2024, by the same group. The paper's sign is that of E = Z − Z′. Its line 17 (X₀ = x_ukf
+//! inside the loop) undoes each iteration: `restart` has it, off unless
+//! [`ukf_vslm`](crate::estimation::filter::ukf_vslm) turns it on. A fixed decay cannot be right for every
+//! problem: it fixes how far the method can travel before it starts.
 //!
 //! **Checked against** the printed recurrence by hand, and published minima for the sound form.
 

@@ -1,17 +1,19 @@
 //! Beetle antennae search.
 //!
-//! **Method.** One beetle at u; in a random direction b of unit length its antennae smell f(u + d b) and f(u − d b), and it
-//! steps δ against the stronger smell: u ← u − δ b sign(f(u + d b) − f(u − d b)).
-//! - [`Form::AsPrinted`]: d ← 0.95 d + 0.01 and δ ← 0.95 δ at each iteration, whatever happened. As δ dies out geometrically the
-//!   beetle can travel at most δ₀/(1 − 0.95) = 20 δ₀ in all.
-//! - [`Form::Sound`]: the beetle moves only where that lowers the cost; δ shrinks after a failure and grows after a success, and d follows δ.
+//! **Method.** One beetle at u; in a random direction b of unit length its antennae smell f(u + d b) and f(u −
+//! d b), and it steps δ against the stronger smell: u ← u − δ b sign(f(u + d b) − f(u − d b)).
+//! - [`Form::AsPrinted`]: d ← 0.95 d + 0.01 and δ ← 0.95 δ at each iteration, whatever happened. As δ dies out
+//!   geometrically the beetle can travel at most δ₀/(1 − 0.95) = 20 δ₀ in all.
+//! - [`Form::Sound`]: the beetle moves only where that lowers the cost; δ shrinks after a failure and grows
+//!   after a success, and d follows δ.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box. Three evaluations for each iteration.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
-//! **Source and departures.** M2 of ukf-vslm-2023, without equations: Jiang and Li, "BAS: beetle antennae search algorithm for optimization problems",
-//! 2017. Its factor 0.95 and constants are kept; δ₀ = 1 is half of the box.
+//! **Source and departures.** M2 of ukf-vslm-2023, without equations: Jiang and Li, "BAS: beetle antennae
+//! search algorithm for optimization problems", 2017. Its factor 0.95 and constants are kept; δ₀ = 1 is half of
+//! the box.
 //!
 //! **Checked against** published problems of few parameters.
 
@@ -126,7 +128,8 @@ pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, inte
     search.finish()
 }
 
-/// Where the parabola through (−d, left), (0, middle), (d, right) has its lowest point, within twice the antennae.
+/// Where the parabola through (−d, left), (0, middle), (d, right) has its lowest point, within twice the
+/// antennae.
 fn vertex(d: f64, left: f64, middle: f64, right: f64) -> Option<f64> {
     let curvature = left - 2.0 * middle + right;
     let t = 0.5 * d * (left - right) / curvature;

@@ -1,18 +1,19 @@
 //! Differential evolution.
 //!
-//! **Method.** For each member i a mutant from others of the population, crossed with i coordinate by coordinate (CR, one
-//! coordinate always from the mutant); the better of the two stays.
+//! **Method.** For each member i a mutant from others of the population, crossed with i coordinate by
+//! coordinate (CR, one coordinate always from the mutant); the better of the two stays.
 //! - [`Form::AsPrinted`]: rand/1/bin, u_a + F(u_b − u_c), F = 0.5, CR = 0.9.
-//! - [`Form::Sound`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for each member
-//!   (dither), CR = 0.9; the start is a member.
+//! - [`Form::Sound`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for
+//!   each member (dither), CR = 0.9; the start is a member.
 //!
-//! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is put halfway between the wall and where it came from.
+//! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is put halfway between the wall and where it
+//! came from.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
-//! **Source and departures.** M7 of ukf-vslm-2023, without equations. Printed: Storn and Price, "Differential evolution", 1997; its advice of
-//! ten members for each parameter is the default (`population` 0). Sound: Das and Suganthan, "Differential evolution: a
-//! survey of the state-of-the-art", 2011.
+//! **Source and departures.** M7 of ukf-vslm-2023, without equations. Printed: Storn and Price, "Differential
+//! evolution", 1997; its advice of ten members for each parameter is the default (`population` 0). Sound: Das
+//! and Suganthan, "Differential evolution: a survey of the state-of-the-art", 2011.
 //!
 //! **Checked against** published problems of few parameters.
 

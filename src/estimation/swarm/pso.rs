@@ -1,16 +1,19 @@
 //! Particle swarm optimisation.
 //!
-//! **Method.** v ← ωv + c₁ρ₁(own best − u) + c₂ρ₂(best of all − u), u ← u + v, ρ uniform in [0, 1) for each coordinate.
+//! **Method.** v ← ωv + c₁ρ₁(own best − u) + c₂ρ₂(best of all − u), u ← u + v, ρ uniform in [0, 1) for each
+//! coordinate.
 //! - [`Form::AsPrinted`]: ω falls linearly from 0.9 to 0.4, c₁ = c₂ = 2, |v| at most 0.4 (a fifth of the box).
-//! - [`Form::Sound`]: Clerc's constriction (ω = 0.7298, c = 1.4962), for which a swarm is known to contract; the start is one of
-//!   the particles.
+//! - [`Form::Sound`]: Clerc's constriction (ω = 0.7298, c = 1.4962), for which a swarm is known to contract;
+//!   the start is one of the particles.
 //!
-//! **Shapes.** u in [−1, 1]ᵖ; a particle that leaves the box is put on its wall and loses that part of its velocity.
+//! **Shapes.** u in [−1, 1]ᵖ; a particle that leaves the box is put on its wall and loses that part of its
+//! velocity.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite* where no particle ever had a finite cost.
 //!
-//! **Source and departures.** M4 of ukf-vslm-2023, without equations. Printed: Shi and Eberhart, "A modified particle swarm optimizer", 1998.
-//! Sound: Clerc and Kennedy, "The particle swarm — explosion, stability, and convergence", 2002.
+//! **Source and departures.** M4 of ukf-vslm-2023, without equations. Printed: Shi and Eberhart, "A modified
+//! particle swarm optimizer", 1998. Sound: Clerc and Kennedy, "The particle swarm — explosion, stability, and
+//! convergence", 2002.
 //!
 //! **Checked against** published problems of few parameters.
 

@@ -1,13 +1,15 @@
 //! Quadratic interpolated beetle antennae search.
 //!
-//! **Method.** As [`bas`]; in addition the parabola through the costs at both antennae and at the beetle gives a
-//! fourth point, its vertex t = ½ d (f₋ − f₊)/(f₋ − 2f₀ + f₊) along the antennae, which is taken where it is better than the step.
+//! **Method.** As [`bas`]; in addition the parabola through the costs at both antennae and at the beetle gives
+//! a fourth point, its vertex t = ½ d (f₋ − f₊)/(f₋ − 2f₀ + f₊) along the antennae, which is taken where it is
+//! better than the step.
 //!
 //! **Shapes, stops.** As `bas`; four evaluations for each iteration.
 //!
-//! **Source and departures.** M5 of ltlm-2024, without equations: the quadratic interpolation that its reference applies to each coordinate is
-//! the same formula, since the three points lie on one line; here it is evaluated along that line, where it cannot divide
-//! by the difference of two equal coordinates. The vertex is kept within twice the antennae.
+//! **Source and departures.** M5 of ltlm-2024, without equations: the quadratic interpolation that its
+//! reference applies to each coordinate is the same formula, since the three points lie on one line; here it is
+//! evaluated along that line, where it cannot divide by the difference of two equal coordinates. The vertex is
+//! kept within twice the antennae.
 //!
 //! **Checked against** `bas` with the same draws on published problems.
 

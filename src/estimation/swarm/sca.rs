@@ -1,18 +1,18 @@
 //! Sine cosine algorithm.
 //!
-//! **Method.** u ← u + r₁ sin r₂ |r₃ P − u| or, with even odds, u + r₁ cos r₂ |r₃ P − u|, where P is the best position so far,
-//! r₂ uniform in [0, 2π), r₃ in [0, 2), and r₁ falls linearly from a = 2 to 0.
-//! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on where the origin is: the method is drawn to u = 0, which here is the
-//!   start. On deviations from a data sheet, most of which are small, that flatters it.
-//! - [`Form::Sound`]: r₃ = 1, so that only differences of positions count, and a member moves only where that lowers its cost; the start is a
-//!   member.
+//! **Method.** u ← u + r₁ sin r₂ |r₃ P − u| or, with even odds, u + r₁ cos r₂ |r₃ P − u|, where P is the best
+//! position so far, r₂ uniform in [0, 2π), r₃ in [0, 2), and r₁ falls linearly from a = 2 to 0.
+//! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on where the origin is: the method is drawn to u = 0,
+//!   which here is the start. On deviations from a data sheet, most of which are small, that flatters it.
+//! - [`Form::Sound`]: r₃ = 1, so that only differences of positions count, and a member moves only where that
+//!   lowers its cost; the start is a member.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box.
 //!
 //! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
 //!
-//! **Source and departures.** M4 of ltlm-2024, without equations: Mirjalili, "SCA: a sine cosine algorithm for solving optimization
-//! problems", 2016, eq. 3.1 to 3.4.
+//! **Source and departures.** M4 of ltlm-2024, without equations: Mirjalili, "SCA: a sine cosine algorithm for
+//! solving optimization problems", 2016, eq. 3.1 to 3.4.
 //!
 //! **Checked against** published problems of few parameters, and the pull towards the origin.
 

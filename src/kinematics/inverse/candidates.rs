@@ -9,6 +9,8 @@ use crate::kinematics::model::{Joints, Limits};
 
 /// Solutions nearer than this are one (rad).
 const SAME_RAD: f64 = 1e-6;
+/// Singular values below this belong to directions in which another solution may be near.
+const NEARLY_SINGULAR: f64 = 0.15;
 /// Spread seeds for an arm without a closed form.
 const SPREAD: usize = 64;
 /// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
@@ -22,12 +24,7 @@ impl Inverse<'_> {
         seed: &Joints,
         margins: &[f64; 3],
     ) -> Result<Solution, InverseError> {
-        let mut found = self.branches(goal, Some(seed))?;
-        let direct = newton::solve(&self.arm, goal, seed, self.kernel.length_mm);
-        let turned = on_turn_near(&direct.joints, seed);
-        if direct.converged() && (turned - direct.joints).amax() == 0.0 {
-            found.push(direct);
-        }
+        let found = self.branches(goal, Some(seed), margins, 0)?;
         let mut best: Option<(bool, f64, &Outcome)> = None;
         let mut other: Option<(f64, &Outcome)> = None;
         for outcome in &found {
@@ -70,7 +67,14 @@ impl Inverse<'_> {
         let mut best: Option<([f64; 2], Outcome)> = None;
         let mut nearest: Option<(f64, Joints)> = None;
         let mut outside = None;
-        for found in self.branches(goal, near)? {
+        let mut found = self.branches(goal, near, &[1.0; 3], 0)?;
+        let fits = |o: &Outcome| {
+            configuration.fits(&self.turned(goal, *o, &wanted).joints, &self.margins(&o.joints))
+        };
+        if !found.iter().any(fits) {
+            found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
+        }
+        for found in found {
             let outcome = self.turned(goal, found, &wanted);
             if !outcome.converged() {
                 continue;
@@ -107,7 +111,7 @@ impl Inverse<'_> {
     /// Every solution within the limits.
     pub(super) fn every_turn(&self, goal: &Goal) -> Vec<Solution> {
         let mut out: Vec<Solution> = Vec::new();
-        for outcome in self.branches(goal, None).unwrap_or_default() {
+        for outcome in self.branches(goal, None, &[1.0; 3], 0).unwrap_or_default() {
             for start in turns_within(&outcome.joints, &self.arm.model.limits) {
                 let outcome = newton::solve(&self.arm, goal, &start, self.kernel.length_mm);
                 let new = !out.iter().any(|s| (s.joints - outcome.joints).amax() < SAME_RAD);
@@ -120,21 +124,44 @@ impl Inverse<'_> {
     }
 
     /// Converged solutions on all branches, limits not looked at; each joint on the turn nearest to `near`, or to the
-    /// middle of its range. An error where there is none.
-    fn branches(&self, goal: &Goal, near: Option<&Joints>) -> Result<Vec<Outcome>, InverseError> {
+    /// middle of its range. An error where there is none. `margins` are those of `near`; `spread` more
+    /// seeds are spread over the joint ranges.
+    fn branches(
+        &self,
+        goal: &Goal,
+        near: Option<&Joints>,
+        margins: &[f64; 3],
+        spread: usize,
+    ) -> Result<Vec<Outcome>, InverseError> {
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
         let seeds = self.structure.seeds(&goal.last, &(self.arm.model.joint_map * around).into());
         let beyond_mm = seeds.iter().map(|s| s.beyond_mm).fold(f64::INFINITY, f64::min);
-        let mut search = Search { inverse: self, goal, around, found: Vec::with_capacity(8), closest: None };
+        let mut search =
+            Search { inverse: self, goal, around, found: Vec::with_capacity(8), stuck: Vec::new() };
+        if let Some(near) = near {
+            search.attempt(near);
+        }
         if let Some(map_inverse) = &self.map_inverse {
             for seed in &seeds {
                 search.attempt(&(map_inverse * Joints::from(seed.rotations)));
             }
         }
+        if self.structure.has_branches() {
+            // Near a fold two branches meet, and Newton may have taken both seeds to one of them, or to none.
+            if search.found.len() < seeds.len() && beyond_mm < 0.05 * self.kernel.length_mm {
+                let roots = search.found.iter().chain(&search.stuck).map(|o| o.joints).collect::<Vec<_>>();
+                roots.iter().for_each(|root| search.explore(root));
+            }
+            if let Some(near) = near
+                && !search.found.iter().any(|f| same_branch(margins, &self.margins(&f.joints)))
+            {
+                search.explore(near);
+            }
+        }
         let spread = match self.structure.has_branches() {
             false => SPREAD,
             true if search.found.is_empty() && beyond_mm < 0.05 * self.kernel.length_mm => SPREAD_RESCUE,
-            true => 0,
+            true => spread,
         };
         for k in 0..spread {
             search.attempt(&self.spread_seed(k));
@@ -142,7 +169,9 @@ impl Inverse<'_> {
         if !search.found.is_empty() {
             return Ok(search.found);
         }
-        let Some(closest) = search.closest else { return Err(InverseError::NotFinite) };
+        let miss = |o: &Outcome| o.residual_mm / self.kernel.length_mm + o.residual_rad;
+        let closest = search.stuck.into_iter().reduce(|a, b| if miss(&b) < miss(&a) { b } else { a });
+        let Some(closest) = closest else { return Err(InverseError::NotFinite) };
         if beyond_mm.is_finite() && beyond_mm > 0.0 {
             return Err(InverseError::Unreachable { beyond_mm });
         }
@@ -194,24 +223,38 @@ struct Search<'s, 'a> {
     goal: &'s Goal,
     around: Joints,
     found: Vec<Outcome>,
-    closest: Option<Outcome>,
+    stuck: Vec<Outcome>,
 }
 
 impl Search<'_, '_> {
     fn attempt(&mut self, seed: &Joints) {
-        let (inverse, length_mm) = (self.inverse, self.inverse.kernel.length_mm);
+        let inverse = self.inverse;
         let start = on_turn_near(seed, &self.around);
-        let outcome = newton::solve(&inverse.arm, self.goal, &start, length_mm);
+        let outcome = newton::solve(&inverse.arm, self.goal, &start, inverse.kernel.length_mm);
         if !outcome.converged() {
-            let miss = |o: &Outcome| o.residual_mm / length_mm + o.residual_rad;
-            if self.closest.as_ref().is_none_or(|c| miss(&outcome) < miss(c)) {
-                self.closest = Some(outcome);
-            }
+            self.stuck.push(outcome);
             return;
         }
         let outcome = inverse.turned(self.goal, outcome, &self.around);
         if outcome.converged() && !self.found.iter().any(|f| (f.joints - outcome.joints).amax() < SAME_RAD) {
             self.found.push(outcome);
+        }
+    }
+
+    /// Seeds on both sides of `root` along every direction in which the arm is nearly singular there: that is where
+    /// the partner of a solution lies near a fold.
+    fn explore(&mut self, root: &Joints) {
+        let arm = &self.inverse.arm;
+        let jacobian =
+            newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_slopes(root);
+        let svd = jacobian.svd(false, true);
+        let Some(directions) = svd.v_t else { return };
+        for k in (0..6).filter(|&k| svd.singular_values[k] < NEARLY_SINGULAR) {
+            let direction = directions.row(k).transpose();
+            for stride in [0.02, 0.06, 0.2, 0.6] {
+                self.attempt(&(root + direction * stride));
+                self.attempt(&(root - direction * stride));
+            }
         }
     }
 }

@@ -103,8 +103,8 @@ impl<R: SinCos> Factored<R> {
     fn of(frames: &Chain<R>, wrist: &[R; 3]) -> Self {
         let zero = R::splat(0.0);
         let mut shifts = [[zero; 3]; 6];
-        for j in 0..6 {
-            shifts[j] = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
+        for (j, shift) in shifts.iter_mut().enumerate() {
+            *shift = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
         }
         let first = inverse_rows(&[shifts[0], shifts[1], shifts[2]]);
         let turns = [frames.z[0], frames.z[1], frames.z[2]];
@@ -125,7 +125,7 @@ impl<R: SinCos> Factored<R> {
         [arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]]
     }
 
-    /// 1/‖J⁻¹‖ (Frobenius) at a point `lever` away from the wrist point, translations divided by `length`.
+    /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
     #[inline(always)]
     fn distance(&self, lever: &[R; 3], length: f64) -> R {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
@@ -135,7 +135,7 @@ impl<R: SinCos> Factored<R> {
             unit[k] = one;
             // A unit of scaled translation, and a turn about the point, which carries the wrist point along.
             let shift = self.solve(&unit, &[zero; 3]);
-            let turn = self.solve(&cross(lever, &unit), &unit);
+            let turn = self.solve(&cross(&unit, lever), &unit);
             for j in 0..6 {
                 let scaled = shift[j] * R::splat(length);
                 square += scaled * scaled + turn[j] * turn[j];
@@ -170,12 +170,12 @@ impl Kernel {
             let missing = minus(&goal_flange, &flange);
             let mut turn = [zero; 3];
             let mut trace = zero;
-            for k in 0..3 {
-                let c = cross(&axes[k], &goal.axes[k]);
+            for (here, there) in axes.iter().zip(&goal.axes) {
+                let c = cross(here, there);
                 for (t, c) in turn.iter_mut().zip(c) {
                     *t += R::splat(0.5) * c;
                 }
-                trace += dot(&axes[k], &goal.axes[k]);
+                trace += dot(here, there);
             }
             let residual_mm = dot(&missing, &missing).sqrt();
             let residual_rad = dot(&turn, &turn).sqrt();

@@ -47,7 +47,7 @@ impl Goal {
 }
 
 /// Where the iteration ended.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
     pub(super) joints: Joints,
     pub(super) residual_mm: f64,

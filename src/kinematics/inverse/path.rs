@@ -47,7 +47,7 @@ impl Inverse<'_> {
                 };
                 if let Ok(solution) = &result {
                     stride = solution.joints - last;
-                    if !(stride.amax() < STEADY_STRIDE_RAD) {
+                    if stride.amax() >= STEADY_STRIDE_RAD {
                         stride = Joints::zeros();
                     }
                     last = solution.joints;

@@ -43,7 +43,7 @@ pub(super) struct Columns {
 impl Columns {
     /// Finds the columns, or says which are missing, doubled or too many.
     pub(super) fn find(file: &str, table: &Table) -> Result<Self, ImportError> {
-        let mut place = Place { sheet: table.sheet.clone(), ..Place::file(file) };
+        let mut place = Place { sheet: table.sheet.as_deref().map(Into::into), ..Place::file(file) };
         let Some(header) = header_row(&table.rows) else {
             return Err(ImportError::Empty { place });
         };
@@ -62,7 +62,7 @@ impl Columns {
             let doubled = by_name.insert(name.as_str(), *index).is_some();
             if doubled && is_known(name) {
                 return Err(ImportError::DuplicateColumn {
-                    place: Place { column: Some(name.clone()), ..place },
+                    place: Place { column: Some(name.as_str().into()), ..place },
                 });
             }
         }

@@ -8,13 +8,13 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// File, as the caller named it.
-    pub file: String,
+    pub file: Box<str>,
     /// Sheet, in a workbook.
-    pub sheet: Option<String>,
+    pub sheet: Option<Box<str>>,
     /// Line of the file or row of the sheet, from 1.
     pub row: Option<usize>,
     /// Header of the column.
-    pub column: Option<String>,
+    pub column: Option<Box<str>>,
 }
 
 impl Place {
@@ -146,7 +146,7 @@ pub enum ImportError {
         /// What should be there.
         expected: &'static str,
         /// What to do.
-        remedy: String,
+        remedy: &'static str,
     },
     /// A row longer than the header.
     #[error(

@@ -95,20 +95,20 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn place(&self) -> Place {
-        Place { sheet: self.sheet.map(str::to_owned), ..Place::file(self.file) }
+        Place { sheet: self.sheet.map(Into::into), ..Place::file(self.file) }
     }
 
     fn cell_place(&self, line: &Line, column: usize) -> Place {
-        let column = self.header.cells.get(column).map(Cell::to_string);
+        let column = self.header.cells.get(column).map(|c| c.to_string().into());
         Place { row: Some(line.number), column, ..self.place() }
     }
 
-    fn wrong(&self, line: &Line, column: usize, expected: &'static str, remedy: &str) -> ImportError {
+    fn wrong(&self, line: &Line, column: usize, expected: &'static str, remedy: &'static str) -> ImportError {
         let found = match line.cells.get(column) {
             None | Some(Cell::Empty) => "an empty cell".into(),
             Some(cell) => format!("`{cell}`"),
         };
-        ImportError::Cell { place: self.cell_place(line, column), found, expected, remedy: remedy.into() }
+        ImportError::Cell { place: self.cell_place(line, column), found, expected, remedy }
     }
 
     /// A finite number that must be there.

@@ -91,7 +91,8 @@ fn the_paper_s_best_parameter_is_sampling_noise() {
 
 #[test]
 fn truly_uniform_counts_match_the_random_figure() {
-    // The tent map has the uniform density, but neighbours in its orbit are not independent: same size of scatter.
+    // The tent map has the uniform density, but neighbours in its orbit are not independent: same size of
+    // scatter.
     let tent = uniformity(Map::Tent, &Options { starts: 50, points: 20_000, ..Options::default() });
     assert!((tent.deviation / tent.random - 1.0).abs() < 0.25, "{} {}", tent.deviation, tent.random);
     let logistic =

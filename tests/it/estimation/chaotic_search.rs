@@ -27,8 +27,8 @@ fn an_iteration_costs_two_jacobians_and_twice_m_evaluations() {
     for candidates in [0, 1, 7] {
         let options = Options { candidates, max_iterations: 2, cost_tolerance: 0.0, ..Options::as_printed() };
         let estimate = solve(&problem, &[0.0; 28], &options);
-        // Each iteration brings J at x₁ and at the point it ends on, which the next one begins with: with no candidate
-        // that point is x₁ itself, and its Jacobian is not computed again.
+        // Each iteration brings J at x₁ and at the point it ends on, which the next one begins with: with no
+        // candidate that point is x₁ itself, and its Jacobian is not computed again.
         let per_iteration = if candidates == 0 { 1 } else { 2 };
         assert_eq!(estimate.evaluations.jacobians, 100 * (1 + 2 * per_iteration));
         assert_eq!(estimate.evaluations.residuals, 100 * 2 * 2 * candidates as u64);
@@ -38,8 +38,8 @@ fn an_iteration_costs_two_jacobians_and_twice_m_evaluations() {
 
 #[test]
 fn the_printed_candidates_stay_on_the_inner_halves() {
-    // One parameter, r = x − 1 (Jacobian 1), μ = 1: x₁ = ½, x₂ = ¾ from 0. The best candidate lies below b = 0.625,
-    // although x₂ is nearer: the defect that `second_step` removes.
+    // One parameter, r = x − 1 (Jacobian 1), μ = 1: x₁ = ½, x₂ = ¾ from 0. The best candidate lies below b =
+    // 0.625, although x₂ is nearer: the defect that `second_step` removes.
     let problem = rows(1, 1, |x: &[Dual], _| x[0] - 1.0);
     let options = Options { mu: 1.0, max_iterations: 1, candidates: 50, ..Options::as_printed() };
     let printed = solve(&problem, &[0.0], &options);

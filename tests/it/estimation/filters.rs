@@ -40,7 +40,7 @@ fn batch(problem: &dyn Problem) -> Estimate {
 
 /// Distance from the batch result, in its own standard deviations.
 fn off(estimate: &Estimate, batch: &Estimate) -> f64 {
-    let sigmas = batch.sigmas().unwrap();
+    let sigmas = batch.sigmas().expect("batch least squares has a covariance");
     (0..4).map(|k| ((estimate.x[k] - batch.x[k]) / sigmas[k]).abs()).fold(0.0, f64::max)
 }
 
@@ -77,7 +77,8 @@ fn on_a_linear_problem_every_exact_filter_is_batch_least_squares() {
 
 #[test]
 fn recursive_least_squares_is_batch_least_squares_of_one_linearisation() {
-    // Also where the problem is curved: without forgetting there is no difference in method, only in bookkeeping.
+    // Also where the problem is curved: without forgetting there is no difference in method, only in
+    // bookkeeping.
     let problem = curved(80, 0.4, 2);
     let one_step = gauss_newton::Options {
         form: Form::AsPrinted,
@@ -107,8 +108,8 @@ fn recursive_least_squares_is_batch_least_squares_of_one_linearisation() {
 
 #[test]
 fn the_square_root_stays_positive_definite_where_the_printed_form_does_not() {
-    // Bierman's example: a prior of variance 1/ε² and rows (1, ε), (1, 1) with 1 + ε² = 1 in double precision. The
-    // smaller eigenvalue of P is (3 − √5)/2 = 0.382.
+    // Bierman's example: a prior of variance 1/ε² and rows (1, ε), (1, 1) with 1 + ε² = 1 in double precision.
+    // The smaller eigenvalue of P is (3 − √5)/2 = 0.382.
     let tiny = 1e-9;
     let smallest = |memory| {
         let covariance = DMatrix::identity(2, 2) / (tiny * tiny);

@@ -55,7 +55,8 @@ fn agrees_with_the_certified_regressions() {
                 estimate.evaluations.jacobians / case.data.len() as u64
             );
             assert!(monotone(&estimate), "{}", case.name);
-            // From the far start these four end elsewhere or take thousands of steps, here as with most solvers.
+            // From the far start these four end elsewhere or take thousands of steps, here as with most
+            // solvers.
             if which == 0 && ["Lanczos3", "MGH10", "MGH17", "BoxBOD"].contains(&case.name) {
                 continue;
             }

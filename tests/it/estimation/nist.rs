@@ -1,5 +1,5 @@
-//! Nonlinear regressions of the NIST Statistical Reference Datasets (<https://www.itl.nist.gov/div898/strd/>), with their
-//! certified parameters, standard deviations and residual sums of squares.
+//! Nonlinear regressions of the NIST Statistical Reference Datasets (<https://www.itl.nist.gov/div898/strd/>),
+//! with their certified parameters, standard deviations and residual sums of squares.
 
 use super::residuals::Dual;
 

@@ -1,5 +1,5 @@
-//! Test problems of Moré, Garbow and Hillstrom, "Testing unconstrained optimization software", ACM TOMS 7 (1981),
-//! with the numbers of that paper.
+//! Test problems of Moré, Garbow and Hillstrom, "Testing unconstrained optimization software", ACM TOMS 7
+//! (1981), with the numbers of that paper.
 
 use truegrind::estimation::problem::Problem;
 

@@ -343,7 +343,7 @@ pub(crate) fn even(random: &mut ChaCha8Rng) -> f64 {
 
 impl Sheet {
     pub(crate) fn named(name: &str) -> Model {
-        SHEETS.iter().find(|s| s.name == name).unwrap().model()
+        SHEETS.iter().find(|s| s.name == name).expect("an arm of the list").model()
     }
 
     pub(crate) fn model(&self) -> Model {

@@ -29,7 +29,7 @@ fn comfortable(sheet: &Sheet, random: &mut rand_chacha::ChaCha8Rng) -> Joints {
         let q = joints_within(&model, random);
         let away =
             (0..6).all(|j| q[j] > model.limits.min_rad[j] + 0.2 && q[j] < model.limits.max_rad[j] - 0.2);
-        let distances = inverse.singularity_distances(&q).unwrap();
+        let distances = inverse.singularity_distances(&q).expect("a closed form");
         if away && distances.wrist > 0.35 && distances.elbow > 0.35 && distances.shoulder > 0.15 {
             return q;
         }
@@ -66,26 +66,26 @@ fn a_path_is_solved_on_its_branch_by_every_arm_with_effects() {
 #[test]
 fn seeded_targets_get_the_bits_of_one_by_one_whatever_the_threads() {
     let mut random = generator(72);
-    for sheet in SHEETS.iter().step_by(5) {
+    for sheet in SHEETS.iter().step_by(9) {
         let nominal = sheet.model();
         let arm = with_effects(&perturbed(&nominal, &mut random, 0.5, 0.1), &mut random);
         let inverse = Inverse::new(&arm, &condition(), &nominal);
-        let seeds: Vec<Joints> = (0..2100).map(|_| joints_within(&arm, &mut random)).collect();
+        let seeds: Vec<Joints> = (0..1032).map(|_| joints_within(&arm, &mut random)).collect();
         let mut targets: Vec<Pose> =
             seeds.iter().map(|q| inverse.arm().forward(&q.map(|q| q + 0.01 * even(&mut random)))).collect();
         // Some that cannot be reached, and one that is no pose.
-        for k in (0..targets.len()).step_by(97) {
+        for k in (0..targets.len()).step_by(275) {
             targets[k].translation.vector *= 40.0;
         }
         targets[50].translation.x = f64::NAN;
         let single: Vec<_> = targets.iter().zip(&seeds).map(|(t, q)| inverse.solve_near(t, q)).collect();
-        for threads in [1, 2, 3] {
+        for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let many = pool.install(|| inverse.solve_seeded(&targets, &seeds));
             assert_eq!(format!("{many:?}"), format!("{single:?}"));
         }
         assert_eq!(single[50], Err(InverseError::NotFinite));
-        assert!(matches!(single[97], Err(InverseError::Unreachable { .. })), "{:?}", single[97]);
+        assert!(matches!(single[275], Err(InverseError::Unreachable { .. })), "{:?}", single[275]);
     }
 }
 
