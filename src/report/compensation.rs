@@ -261,7 +261,8 @@ fn count(plan: &Plan, fate: Fate) -> usize {
 fn heading(files: &[ProgramFile]) -> Document {
     let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
     let mut page = Document::new(match names.as_slice() {
-        [name] => format!("Compensation of {name}"),
+        // The name alone: where it lies is in the tables and the JSON.
+        [name] => format!("Compensation of {}", name.rsplit(['/', '\\']).next().unwrap_or(name)),
         _ => format!("Compensation of {} files", names.len()),
     });
     let outputs: Vec<&str> = files.iter().filter_map(|file| file.output.as_deref()).collect();

@@ -253,15 +253,15 @@ pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
         page.push(figure);
     }
     page.heading(level, "Points to look at");
-    for report in reports {
+    let alike = reports.iter().all(|report| same_fates(first, report));
+    for report in reports.iter().take(if alike { 1 } else { reports.len() }) {
         let flags = flag_table(report);
+        let name = if reports.len() == 1 || alike { String::new() } else { report.model.clone() };
         if flags.rows.is_empty() {
-            page.paragraph(format!("{}: every point was rewritten without a flag.", report.model));
+            let of = if name.is_empty() { name } else { format!("{name}: ") };
+            page.paragraph(format!("{of}Every point was rewritten without a flag."));
         } else {
-            page.push(Table { title: report.model.clone(), ..flags.excerpt(60) });
-        }
-        if reports.iter().all(|r| same_fates(first, r)) {
-            break;
+            page.push(Table { title: name, ..flags.excerpt(60) });
         }
     }
     page.heading(level, "All points");
@@ -543,7 +543,7 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
                 let low = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let (low, high) = (format!("{low:.decimals$}"), format!("{high:.decimals$}"));
-                if low == high { format!("{low} mm") } else { format!("{low} to {high} mm") }
+                if low == high { format!("{low} mm") } else { format!("{low}–{high} mm") }
             };
             format!(
                 "The largest deviation goes from {} to {} ({}), depending on the model",

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Document, KeyFigure, Verdict};
+use super::document::{Block, Document, KeyFigure, Verdict};
 use super::number::MISSING;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -250,7 +250,23 @@ pub fn document(robot: &Robot) -> Document {
     if sheet.published.is_empty() {
         page.paragraph("None is stated, so nothing checks the links.");
     } else {
-        page.push(untitled(published_table(robot)));
+        // Words of any length stand better in a list.
+        let mut table = untitled(published_table(robot));
+        for key in ["source", "joints_deg", "point"] {
+            table.columns.iter().position(|column| column.key == key).into_iter().for_each(|place| {
+                table.columns.remove(place);
+                table.rows.iter_mut().for_each(|row| drop(row.remove(place)));
+            });
+        }
+        page.push(table);
+        page.push(Block::List(
+            robot
+                .sheet
+                .published
+                .iter()
+                .map(|pose| format!("{}: joints ({})°; {}", pose.what, list(&pose.joints_deg), pose.source))
+                .collect(),
+        ));
     }
     page.heading(2, "Sources");
     page.push(untitled(source_table(robot)));

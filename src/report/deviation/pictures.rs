@@ -77,6 +77,10 @@ fn along(reports: &[&PathReport]) -> Figure {
             if single && (after || !has(report, AFTER)) && kept.iter().any(|p| p.sigma_mm.is_some()) {
                 let sigmas: Vec<f64> = kept.iter().map(|p| p.sigma_mm.unwrap_or(0.0)).collect();
                 series = series.plus_minus(&sigmas);
+                if quantity(reports) != SIGNED {
+                    // A size is never negative.
+                    series.bounds.iter_mut().for_each(|bounds| bounds[0] = bounds[0].max(0.0));
+                }
                 band = true;
             }
             series

@@ -21,30 +21,24 @@ pub fn registered_table(reports: &[PathReport]) -> Table {
 /// [`block_table`], with a column for the program where there are several.
 pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
     // The unit stands in the title, so that the figures and what they must be seen beside fit one line.
-    let remainders = reports.iter().all(|report| report.after == After::PredictedRemainder);
-    let decimals = if remainders && reports.iter().any(|report| has(report, AFTER)) { 4 } else { 3 };
-    let number = |key: &str, heading: &str, decimals| Column::number(key, heading, "", decimals);
+    let number = |key: &str, heading: &str| Column::number(key, heading, "", 3);
     let mut columns = first_columns(programs);
-    let kind = columns.pop();
-    columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"), decimals)));
+    columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"))));
     columns.extend([
-        number("mean_mm", "mean", decimals),
-        number("mean_absolute_mm", "mean |d|", decimals),
-        number("standard_deviation_mm", "SD", decimals),
-        number("max_mm", "max", decimals),
-        number("sigma_mm", "1σ", 3),
-        number("model_held_out_rmse_mm", "held-out", 3),
+        number("mean_mm", "mean"),
+        number("mean_absolute_mm", "mean |d|"),
+        number("standard_deviation_mm", "SD"),
+        number("max_mm", "max"),
+        number("sigma_mm", "1σ"),
+        number("model_held_out_rmse_mm", "held-out"),
     ]);
-    columns.extend(kind);
     let mut table = Table::new("Deviation of path points before and after compensation [mm]", columns);
     for row in rows(reports, |report, side| report.block(side)) {
         let Block { five_mm, all } = row.value;
         let mut cells = row.first_cells(programs);
-        let kind = cells.pop();
         cells.extend(five_mm.map(Cell::from));
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
         cells.extend([sigma_rms(row.report).into(), row.report.held_out_mm.into()]);
-        cells.extend(kind);
         table.push(cells);
     }
     let (mut with, mut without) = (0, 0);
@@ -105,13 +99,12 @@ pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
 struct Row<'a, T> {
     report: &'a PathReport,
     path: String,
-    kind: &'static str,
     value: T,
 }
 
 impl<T> Row<'_, T> {
     fn first_cells(&self, programs: bool) -> Vec<Cell> {
-        let mut cells = vec![self.path.as_str().into(), self.kind.into()];
+        let mut cells = vec![self.path.as_str().into()];
         if programs {
             cells.insert(0, self.report.program.as_str().into());
         }
@@ -120,7 +113,7 @@ impl<T> Row<'_, T> {
 }
 
 fn first_columns(programs: bool) -> Vec<Column> {
-    let mut columns = vec![Column::text("path", "Path"), Column::text("kind", "Figures")];
+    let mut columns = vec![Column::text("path", "Path")];
     if programs {
         columns.insert(0, Column::text("program", "Program"));
     }
@@ -148,15 +141,12 @@ fn rows<'a, T: PartialEq>(
         let shown = if agreed { 1 } else { before.len() };
         for (report, value) in before.into_iter().take(shown) {
             let path = if agreed { "before".to_owned() } else { format!("before, under {}", report.model) };
-            let kind = match report.after {
-                After::PredictedRemainder => "predicted",
-                After::Achieved => "achieved",
-            };
-            out.push(Row { report, path, kind, value });
+            out.push(Row { report, path, value });
         }
         for report in of.into_iter().filter(|report| has(report, AFTER)) {
             if let Some(value) = value(report, AFTER) {
-                out.push(Row { report, path: report.model.clone(), kind: meaning(report.after), value });
+                let path = format!("{}, {}", report.model, meaning(report.after));
+                out.push(Row { report, path, value });
             }
         }
     }

@@ -4,6 +4,7 @@ use super::{cell, handy, held_by_prior, is_of_arm, row_number, signed};
 use crate::identification::identifiability::Identifiability;
 use crate::identification::identify::Identification;
 use crate::identification::solver;
+use crate::kinematics::estimated::EstimatedParameter;
 use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Dataset;
 use crate::report::status::Status;
@@ -95,17 +96,13 @@ pub fn parameter_table(found: &Identification) -> Table {
             shown.unit.as_str().into(),
             shown.prior_sigma.into(),
             (100.0 * shown.determined).into(),
-            match (held_by_prior(parameter), literal) {
-                (false, _) => "data".into(),
-                (true, false) => Cell::Judged(Status::Warning, "held by prior".to_owned()),
-                (true, true) => Cell::Judged(Status::Bad, "not determined".to_owned()),
-            },
+            held(parameter, literal),
         ]);
     }
     table.notes.push(
-        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined: the \
-         share that the data brought, 1 − (σ / tolerance)²; a parameter below 50 % stays near its nominal value because the prior holds it there, not \
-         because it was seen there."
+        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined: the share that \
+         the data brought, 1 − (σ / tolerance)². A parameter below 50 % is known from its prior more than from the data; \
+         where it moved all the same, the data saw a combination, and the priors shared it out among its parts."
             .to_owned(),
     );
     if literal {
@@ -114,6 +111,26 @@ pub fn parameter_table(found: &Identification) -> Table {
         );
     }
     table
+}
+
+/// More than so many tolerances from the data sheet is worth a word.
+const FAR: f64 = 3.0;
+
+/// What holds a parameter where it is, and whether that is far from the data sheet.
+fn held(parameter: &EstimatedParameter, literal: bool) -> Cell {
+    let (status, mut text) = match (held_by_prior(parameter), literal) {
+        (false, _) => (None, "data".to_owned()),
+        (true, false) => (Some(Status::Warning), "held by prior".to_owned()),
+        (true, true) => (Some(Status::Bad), "not determined".to_owned()),
+    };
+    let off = parameter.prior_sigma.map_or(0.0, |prior| (parameter.value - parameter.nominal).abs() / prior);
+    if off > FAR {
+        text.push_str(&format!(", {off:.1} tolerances off"));
+    }
+    match status.or((off > FAR).then_some(Status::Warning)) {
+        Some(status) => Cell::Judged(status, text),
+        None => Cell::Text(text),
+    }
 }
 
 /// Sensor frame, outlets, zeros and the touched point.

@@ -106,6 +106,11 @@ effect1.1            0      2.50 ± 0.10     2.5000  µrad/(N m)        100     
     let trimmed =
         |text: &str| text.lines().take(7).map(|l| l.trim_end().replace('─', "")).collect::<Vec<_>>();
     assert_eq!(trimmed(&text), trimmed(expected), "{text}");
+    // Far from the data sheet is said, whoever holds it there.
+    let mut far = by_hand();
+    far.parameters[0].value = 4.1;
+    let text = csv::table(&view::parameter_table(&far));
+    assert!(text.contains("\"data, 4.1 tolerances off\""), "{text}");
     assert_eq!(table.rows.len(), 4, "frames stand in a table of their own");
     let file = csv::table(&table);
     assert!(
