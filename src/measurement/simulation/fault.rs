@@ -25,7 +25,7 @@ pub enum Fault {
         rows: [usize; 2],
         /// Shift in the base (mm).
         shift_mm: [f64; 3],
-        /// Rotation vector in the base, about the sensor (°); not for a cable.
+        /// Rotation vector in the base, about the sensor [°]; not for a cable.
         #[serde(default)]
         turn_deg: [f64; 3],
     },

@@ -115,13 +115,13 @@ pub struct RandomDeviations {
     /// Of d (mm).
     #[serde(default)]
     pub d_mm: f64,
-    /// Of alpha (°).
+    /// Of alpha [°].
     #[serde(default)]
     pub alpha_deg: f64,
-    /// Of beta (°).
+    /// Of beta [°].
     #[serde(default)]
     pub beta_deg: f64,
-    /// Of theta (°).
+    /// Of theta [°].
     #[serde(default)]
     pub theta_deg: f64,
 }
@@ -138,13 +138,13 @@ pub struct LinkDeviation {
     /// Of d (mm).
     #[serde(default)]
     pub d_mm: f64,
-    /// Of alpha (°).
+    /// Of alpha [°].
     #[serde(default)]
     pub alpha_deg: f64,
-    /// Of beta (°).
+    /// Of beta [°].
     #[serde(default)]
     pub beta_deg: f64,
-    /// Of theta (°).
+    /// Of theta [°].
     #[serde(default)]
     pub theta_deg: f64,
 }
@@ -157,12 +157,12 @@ pub enum Poses {
     Random {
         /// Different poses.
         count: usize,
-        /// Distance kept from the joint limits (°).
+        /// Distance kept from the joint limits [°].
         #[serde(default = "five")]
         margin_deg: f64,
-        /// Lower corner of the box (°); the limits otherwise.
+        /// Lower corner of the box [°]; the limits otherwise.
         min_deg: Option<[f64; 6]>,
-        /// Upper corner of the box (°); the limits otherwise.
+        /// Upper corner of the box [°]; the limits otherwise.
         max_deg: Option<[f64; 6]>,
         /// Measurements of each pose, spread over the whole run.
         #[serde(default = "one")]
@@ -170,9 +170,9 @@ pub enum Poses {
     },
     /// All combinations of evenly spaced angles; joint 1 turns slowest.
     Grid {
-        /// Lowest angles (°).
+        /// Lowest angles [°].
         min_deg: [f64; 6],
-        /// Highest angles (°).
+        /// Highest angles [°].
         max_deg: [f64; 6],
         /// Angles of each joint.
         steps: [usize; 6],
@@ -182,7 +182,7 @@ pub enum Poses {
     },
     /// Stated poses.
     List {
-        /// Joint angles (°).
+        /// Joint angles [°].
         joints_deg: Vec<[f64; 6]>,
         /// Measurements of each pose, spread over the whole run.
         #[serde(default = "one")]
@@ -206,7 +206,7 @@ pub struct View {
     pub box_mm: Option<[[f64; 3]; 2]>,
     /// Shortest and longest distance from the sensor (mm).
     pub distance_mm: Option<[f64; 2]>,
-    /// Largest angle between the flange's z axis and the line to the sensor (°).
+    /// Largest angle between the flange's z axis and the line to the sensor [°].
     pub tilt_deg: Option<f64>,
 }
 
@@ -362,12 +362,12 @@ pub struct Noise {
     /// What each metre from the sensor adds [mm/m].
     #[serde(default)]
     pub per_metre_mm: f64,
-    /// Of a measured orientation, about each axis (°).
+    /// Of a measured orientation, about each axis [°].
     #[serde(default)]
     pub sigma_deg: f64,
     /// Degrees of freedom of Student's t, above 2, for a heavy tail; normal otherwise.
     pub student_t: Option<f64>,
-    /// Of the joints of the arm when it comes to rest (repeatability) (°).
+    /// Of the joints of the arm when it comes to rest (repeatability) [°].
     #[serde(default)]
     pub joints_deg: f64,
 }
@@ -376,7 +376,7 @@ pub struct Noise {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rounding {
-    /// Of the logged angles (°).
+    /// Of the logged angles [°].
     pub angles_deg: Option<f64>,
     /// Of the controller's read-out (mm).
     pub readout_mm: Option<f64>,
