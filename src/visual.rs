@@ -1,6 +1,6 @@
 //! Pictures in three dimensions and over time, for the Rerun viewer.
 //!
-//! The only module that names `rerun`. It turns results into a [`Recording`](recording::Recording), whose content is the
+//! The only module that names `rerun`. It turns results into a [`Recording`], whose content is the
 //! bytes of an `.rrd` file, or goes to a viewer that is running. Nothing of Rerun shows in what this module takes and
 //! returns.
 //!
