@@ -18,16 +18,6 @@ fn an_address_that_is_none_is_named() {
     assert!(error.to_string().contains(VIEWER), "{error}");
 }
 
-/// Two recordings made apart are the same file; another title is another recording.
-#[test]
-fn same_input_same_bytes() {
-    let parts = path::scene_parts();
-    let (first, second) = (path::recording(&parts).rrd().unwrap(), path::recording(&parts).rrd().unwrap());
-    assert_eq!(first, second);
-    let other = path::titled(&parts, "another").rrd().unwrap();
-    assert_ne!(Read::of(&first).name, Read::of(&other).name);
-}
-
 #[test]
 fn a_recording_holds_content_then_page_then_the_order_to_show_it() {
     let recording: Recording = path::recording(&path::scene_parts());

@@ -173,7 +173,11 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     if width == 0.0 || first.abs().max(last.abs()) > 1e15 {
         return vec![low, high];
     }
-    let count = (last - first).max(0.0) as usize;
+    if last < first {
+        // A step so wide that it passes over the whole range.
+        return linear_ticks(low, high, wanted + 1);
+    }
+    let count = (last - first) as usize;
     (0..=count).map(|i| place(first + i as f64) + 0.0).collect()
 }
 
