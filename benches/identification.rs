@@ -96,7 +96,7 @@ fn fit_28_parameters(bencher: divan::Bencher<'_, '_>, rows: usize) {
         &start,
         &lm::Options { cost_tolerance: 1e-15, gradient_tolerance: 0.0, ..lm::Options::default() },
     );
-    let options = lm::Options { cost_tolerance: 1e-9, ..lm::Options::default() };
+    let options = lm::Options::default();
     let found = lm::solve(&task, &start, &options);
     let best = cost(&task, &optimum.x);
     let gap = (cost(&task, &found.x) - best) / best;
