@@ -18,7 +18,7 @@
 //!     series: vec![Series::line("LM", [[0.0, 2.1], [1.0, 0.6], [2.0, 0.46]])],
 //!     ..Graph::default()
 //! };
-//! assert!(graph.svg().contains(">RMSE (mm)</text>"));
+//! assert!(graph.svg().contains(">RMSE [mm]</text>"));
 //! ```
 
 mod letters;

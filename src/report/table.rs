@@ -16,7 +16,7 @@ use super::status::Status;
 /// table.push(["LTLM".into(), Cell::Missing]);
 /// assert_eq!(terminal::table(&table, 80), "\
 /// Deviation
-/// method  RMSE (mm)
+/// method  RMSE [mm]
 /// ──────  ─────────
 /// before       1.62
 /// LTLM            –
