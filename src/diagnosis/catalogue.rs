@@ -156,16 +156,16 @@ impl Candidate {
             match regressor {
                 Regressor::Arm { rotation, growth } => {
                     for (joint, course) in rotation {
-                        add(course, &|s| design.by_joint[*joint][s]);
+                        add(course, &|s| design.slopes.by_joint[*joint][s]);
                     }
-                    add(growth, &|s| design.by_growth[s]);
+                    add(growth, &|s| design.slopes.by_growth[s]);
                 }
                 Regressor::Push { along, course } => match along {
-                    Along::Zero => add(course, &|s| design.by_zero[s]),
-                    Along::Frame(axis) => add(course, &|s| design.by_frame[(s, *axis)]),
-                    Along::Tool(axis) => add(course, &|s| design.by_tool[(s, *axis)]),
-                    Along::Scale => add(course, &|s| design.by_scale[s]),
-                    Along::Sag => add(course, &|s| design.by_sag[s]),
+                    Along::Zero => add(course, &|s| design.slopes.by_zero[s]),
+                    Along::Frame(axis) => add(course, &|s| design.slopes.by_frame[(s, *axis)]),
+                    Along::Tool(axis) => add(course, &|s| design.slopes.by_tool[(s, *axis)]),
+                    Along::Scale => add(course, &|s| design.slopes.by_scale[s]),
+                    Along::Sag => add(course, &|s| design.slopes.by_sag[s]),
                 },
             }
         }
@@ -217,8 +217,8 @@ impl Columns {
 const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
-/// Knots of an error map over a turn.
-const MAP_KNOTS: usize = 24;
+/// Knots of an error map over a turn: a smooth curve, and one that follows single teeth of a slow stage.
+const MAP_KNOTS: [usize; 2] = [24, 72];
 
 /// An axis that moved less than this shows nothing of itself (rad).
 pub const STILL_RAD: f64 = 0.02;
@@ -236,7 +236,9 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::GearEccentricity(harmonic), 1.0));
         }
         effects.push((Effect::GearRatio(Ratio { joint, error: 0.0 }), 1.0));
-        effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
+        for knots in MAP_KNOTS {
+            effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] }), 1.0));
+        }
     }
     if nominal.bodies.is_some() {
         for joint in 0..6 {

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::cause::Cause;
-use super::design::Design;
+use super::design::{Design, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{
     Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
@@ -13,7 +13,7 @@ use super::picture::{Picture, picture};
 use super::remaining::{self, Structure};
 use super::rows::{Prepared, prepare};
 use super::score::non_centrality;
-use super::selection::{self, Accepted, BLOCKS, Scored, Selection, scale_beside_growth};
+use super::selection::{self, Accepted, BLOCKS, Folds, Scored, Selection, scale_beside_growth};
 use super::validation::{StageError, Validation, nominal};
 use super::words;
 use crate::identification::calibration::Frames;
@@ -136,8 +136,16 @@ pub fn diagnose(
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
-    let context =
-        Context { subject: &subject, validation: &validation, extended: &extended, after: stages[2] };
+    let linear = Linear::of(&subject, &extended);
+    let whole = linear.design(&[]);
+    let context = Context {
+        subject: &subject,
+        extended: &extended,
+        linear: &linear,
+        whole: &whole,
+        splits: &split::folds(&prepared.observed.dataset, 5, options.selection.seed),
+        set_aside: &set_aside,
+    };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking at what is left");
     findings.extend(rounding_finding(dataset, &prepared, &subject, &validation, &geometric, &stages));
@@ -241,12 +249,19 @@ fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
 
 struct Context<'a> {
     subject: &'a Subject<'a>,
-    validation: &'a Validation,
     extended: &'a Extended,
-    after: StageError,
+    linear: &'a Linear,
+    whole: &'a Design,
+    splits: &'a [split::Split],
+    set_aside: &'a [usize],
 }
 
 impl Context<'_> {
+    /// Held-out error of a design, with columns added or not, to first order (mm).
+    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
+        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
+    }
+
     /// A finding for every story, and which finding each cause went into.
     fn findings(
         &self,
@@ -259,8 +274,12 @@ impl Context<'_> {
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
         for (index, own) in accepted.iter().enumerate() {
             let cause = &self.extended.causes[index];
-            let step = fit(self.subject, &self.extended.causes[..=index], Freedom::All, None);
-            steps.push(Step { added: told_short(cause), cv_rmse_mm: self.validation.random_rmse(&step) });
+            let later: Vec<usize> =
+                (index + 1..accepted.len()).flat_map(|k| self.extended.places(k)).collect();
+            steps.push(Step {
+                added: told_short(cause),
+                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
+            });
             let parameters = words::parameters(self.extended, index);
             let mergeable = cause.rows().is_none();
             let told = findings.iter().position(|f: &Finding| {
@@ -295,23 +314,21 @@ impl Context<'_> {
         parameters: Vec<FoundParameter>,
         last: usize,
     ) -> (Finding, Picture) {
-        let mut without = self.extended.causes.clone();
-        without.remove(index);
-        let before = fit(self.subject, &without, Freedom::All, None);
-        let before_mm = self.validation.random_rmse(&before);
+        let without = self.linear.design(&self.extended.places(index));
+        let folds = Folds::of(&without, self.splits);
+        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
         let mut alternatives: Vec<Alternative> = own
             .rivals
             .iter()
             .take(3)
             .map(|rival| {
-                let mut causes = without.clone();
-                causes.push(rival.candidate.cause.clone());
-                let swapped = fit(self.subject, &causes, Freedom::All, Some(&before));
+                let columns = rival.candidate.columns(&without);
+                let sizes = rival.candidate.cause.sizes();
                 Alternative {
                     effect: rival.candidate.cause.name().to_owned(),
                     joints: pendant(&rival.candidate.cause.joints()),
                     rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm: self.validation.random_rmse(&swapped),
+                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
                     beaten_by: own.own.merit - rival.score.merit,
                 }
             })
@@ -332,7 +349,7 @@ impl Context<'_> {
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
-        let picture = picture(self.subject, cause, &before, self.extended);
+        let picture = picture(self.subject, cause, &without, self.whole);
         let finding = Finding {
             effect: cause.name().to_owned(),
             cause: words::cause(cause, &parameters, last),
@@ -352,7 +369,7 @@ impl Context<'_> {
             parameters,
             p_value: own.log_p.exp(),
             non_centrality: Some(lambda),
-            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.after.random.rmse },
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.held_out(self.whole, None) },
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),
         };

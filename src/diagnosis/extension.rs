@@ -9,11 +9,11 @@ use nalgebra::DVector;
 
 use super::cause::Cause;
 use crate::estimation::estimate::Estimate;
+use crate::estimation::least_squares::lm;
 use crate::estimation::problem::{Prior, Problem};
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
 use crate::identification::rounding;
-use crate::identification::solver::SOLVERS;
 use crate::identification::tolerance::Tolerance;
 use crate::kinematics::model::Model;
 use crate::kinematics::parameter::{Parameter, link_parameters};
@@ -160,7 +160,9 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
             &priors,
             &trusted(&base, &trust),
         );
-        let estimate = SOLVERS[0].solve(&task, &x, 0);
+        // Weights still change: what is beyond a few steps would be thrown away.
+        let rough = lm::Options { max_iterations: 4, cost_tolerance: 1e-5, ..lm::Options::default() };
+        let estimate = lm::solve(&task, &x, &rough);
         x.clone_from(&estimate.x);
         (model, frames) = task.apply(&x);
         let plain = task.plain_residuals(&x);
@@ -230,7 +232,7 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
                 &priors,
                 &trusted(&weights, &trust),
             );
-            let estimate = SOLVERS[0].solve(&task, &x, 0);
+            let estimate = lm::solve(&task, &x, &lm::Options::default());
             let (model, frames) = task.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),

@@ -35,7 +35,6 @@ struct Sums {
     gradient: Vec<f64>,
     square: Vec<f64>,
     shared: Vec<f64>,
-    pull: Vec<f64>,
 }
 
 impl Sums {
@@ -47,7 +46,6 @@ impl Sums {
             gradient: vec![0.0; (n + 1) * k],
             square: vec![0.0; (n + 1) * k * k],
             shared: vec![0.0; (n + 1) * k * p],
-            pull: design.pull.iter().copied().collect(),
         };
         for i in 0..n {
             for a in 0..k {
@@ -88,13 +86,11 @@ impl Sums {
         }
         let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
         if k == 1 {
-            let g = self.gradient[high] - self.gradient[low] - dot(work, &self.pull);
+            let g = self.gradient[high] - self.gradient[low];
             let s = (self.square[high] - self.square[low] - dot(work, work)).max(0.0);
             return g * g / (s + 1.0) - (1.0 + s).ln();
         }
-        let g = DVector::from_fn(k, |a, _| {
-            self.gradient[high + a] - self.gradient[low + a] - dot(&work[a * p..][..p], &self.pull)
-        });
+        let g = DVector::from_fn(k, |a, _| self.gradient[high + a] - self.gradient[low + a]);
         let s = DMatrix::from_fn(k, k, |a, b| {
             self.square[(high + a) * k + b]
                 - self.square[(low + a) * k + b]

@@ -26,7 +26,7 @@ pub fn candidates(subject: &Subject<'_>, design: &Design) -> Vec<Candidate> {
     let strongest: Vec<(usize, usize)> = (0..6)
         .into_par_iter()
         .flat_map_iter(|joint| {
-            let theta = &design.by_joint[joint];
+            let theta = &design.slopes.by_joint[joint];
             let angles: Vec<f64> =
                 dataset.rows.iter().map(|r| (subject.nominal.joint_map * r.joints)[joint]).collect();
             let (low, high) =

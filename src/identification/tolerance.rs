@@ -97,7 +97,8 @@ pub fn effect_sigma(effect: &Effect) -> f64 {
         // A compliance of 1e-5 rad/(N m) times 30 kg.
         Effect::LumpedCompliance(_) => 3e-4,
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
-        Effect::GearMap(_) => 0.05_f64.to_radians(),
+        // The same curve over more knots, each of them smaller.
+        Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,
