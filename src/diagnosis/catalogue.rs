@@ -217,8 +217,16 @@ impl Columns {
 const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
-/// Knots of an error map over a turn: a smooth curve, and one that follows single teeth of a slow stage.
-const MAP_KNOTS: [usize; 2] = [24, 72];
+/// Knots of an error map over a turn: a smooth curve.
+const MAP_KNOTS: usize = 24;
+/// Knots of one that follows the periods of a reducer's stages, tried where lines of the joint stand out.
+const FINE_KNOTS: usize = 72;
+
+/// The finely resolved error map of a joint.
+pub fn fine_map(subject: &Subject<'_>, joint: usize) -> Candidate {
+    let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; FINE_KNOTS] });
+    Candidate::arm(effect, &subject.observed.dataset, subject.nominal)
+}
 
 /// An axis that moved less than this shows nothing of itself (rad).
 pub const STILL_RAD: f64 = 0.02;
@@ -236,9 +244,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::GearEccentricity(harmonic), 1.0));
         }
         effects.push((Effect::GearRatio(Ratio { joint, error: 0.0 }), 1.0));
-        for knots in MAP_KNOTS {
-            effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] }), 1.0));
-        }
+        effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
     }
     if nominal.bodies.is_some() {
         for joint in 0..6 {
