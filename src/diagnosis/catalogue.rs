@@ -252,26 +252,33 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::JointCompliance(compliance), 1.0));
         }
     }
+    let lump = |frame, axis, moment| Lump { frame, axis, moment, factor: 0.0 };
     for joint in 0..5 {
         let frames: &[usize] = match joint {
             0 | 1 => &[2, 4, 6],
             2 => &[4, 6],
             _ => &[6],
         };
-        let lump = frames.iter().map(|&frame| Lump { frame, axis: None, factor: 0.0 }).collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump }), 1.0));
+        let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        // With the first moments of the links between, the static torque of any masses is spanned.
+        if joint == 1 || joint == 2 {
+            let moments = (joint + 1..4).flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
+            let all = lumps.into_iter().chain(moments).collect();
+            effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+        }
     }
     // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
     for joint in 0..3 {
-        let lump = (0..3)
+        let tilted = (0..3)
             .filter(|&axis| axis != down)
             .flat_map(|axis| {
                 let frames: &[usize] = if joint < 2 { &[2, 4] } else { &[4] };
-                frames.iter().map(move |&frame| Lump { frame, axis: Some(axis), factor: 0.0 })
+                frames.iter().map(move |&frame| lump(frame, Some(axis), None))
             })
             .collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump }), 1.0));
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: tilted }), 1.0));
     }
     for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
         effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));

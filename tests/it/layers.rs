@@ -15,6 +15,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "measurement",
         "estimation",
         "identification",
+        "diagnosis",
         "compensation",
         "planning",
     ];
@@ -27,6 +28,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("measurement", vec!["math", "kinematics"]),
         ("estimation", vec!["math"]),
         ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
+        ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
         ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
         ("report", all_below_six.clone()),
