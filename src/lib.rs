@@ -11,6 +11,7 @@ pub mod estimation;
 pub mod identification;
 pub mod compensation;
 pub mod planning;
+pub mod comparison;
 pub mod report;
 #[cfg(feature = "visual")]
 pub mod visual;

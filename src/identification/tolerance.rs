@@ -69,5 +69,9 @@ fn effect_sigma(effect: &Effect) -> f64 {
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,
+        Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
+
+/// A smooth correction moves the wrist by tenths of a millimetre at half a metre.
+pub const SMOOTH_SIGMA_RAD: f64 = 6e-4;

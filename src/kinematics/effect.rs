@@ -10,6 +10,7 @@ pub mod ratio;
 pub mod coupling;
 pub mod backlash;
 pub mod thermal;
+pub mod smooth;
 
 use nalgebra::{Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,7 @@ use self::compliance::Compliance;
 use self::coupling::Coupling;
 use self::harmonic::Harmonic;
 use self::ratio::Ratio;
+use self::smooth::Smooth;
 use self::thermal::Thermal;
 use super::chain::{self, Chain, LinkTable, cross, dot};
 use super::condition::Condition;
@@ -43,6 +45,8 @@ pub enum Effect {
     Backlash(Backlash),
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
+    /// What a network learned of errors without a physical name.
+    SmoothCorrection(Smooth),
 }
 
 /// A parameter of an effect as the tables show it.
@@ -65,6 +69,7 @@ macro_rules! each {
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
             Effect::ThermalDrift($e) => $body,
+            Effect::SmoothCorrection($e) => $body,
         }
     };
 }
@@ -80,10 +85,11 @@ impl Effect {
             Effect::JointCoupling(_) => "joint-coupling",
             Effect::Backlash(_) => "backlash",
             Effect::ThermalDrift(_) => "thermal-drift",
+            Effect::SmoothCorrection(_) => "smooth-correction",
         }
     }
 
-    /// The joint (0-based) that the effect acts on; `None` where it acts on the links.
+    /// The joint (0-based) that the effect acts on; `None` where it acts on the links or on several joints.
     pub fn joint(&self) -> Option<usize> {
         each!(self, e => e.joint())
     }
@@ -117,6 +123,7 @@ impl Effect {
             Effect::GearRatio(e) => e.turn(u, out),
             Effect::JointCoupling(e) => e.turn(u, out),
             Effect::Backlash(e) => e.turn(condition, out),
+            Effect::SmoothCorrection(e) => e.turn(u, out),
             Effect::ThermalDrift(_) => {}
         }
     }
@@ -129,6 +136,7 @@ impl Effect {
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
             Effect::GearRatio(e) => e.carry(step, out),
             Effect::JointCoupling(e) => e.carry(step, out),
+            Effect::SmoothCorrection(e) => e.carry(u, step, out),
             Effect::JointCompliance(_) | Effect::Backlash(_) | Effect::ThermalDrift(_) => {}
         }
     }

@@ -17,6 +17,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "identification",
         "compensation",
         "planning",
+        "comparison",
     ];
     BTreeMap::from([
         ("math", vec![]),
@@ -29,6 +30,20 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
         ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
+        (
+            "comparison",
+            vec![
+                "math",
+                "kinematics",
+                "program",
+                "surface",
+                "measurement",
+                "estimation",
+                "identification",
+                "compensation",
+                "planning",
+            ],
+        ),
         ("report", all_below_six.clone()),
         ("visual", all_below_six),
     ])
