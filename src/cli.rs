@@ -12,6 +12,8 @@ mod progress;
 mod robots;
 mod simulate;
 mod identify;
+mod compare;
+mod track;
 mod path;
 mod compensate;
 mod deviation;
@@ -41,6 +43,10 @@ enum Verb {
     Simulate(simulate::Arguments),
     /// Fit the arm to measured poses: a model file, and what the data could tell.
     Identify(identify::Arguments),
+    /// Methods side by side under a paper's protocol.
+    Compare(compare::Arguments),
+    /// Keep a model accurate as measurements come in.
+    Track(track::Arguments),
     /// A surface to a RAPID program.
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
@@ -99,6 +105,8 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Robots(arguments) => robots::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
+        Verb::Compare(arguments) => compare::run(&arguments),
+        Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),

@@ -10,7 +10,7 @@
 //! - [`signed_rank`]: a paper's own test on its own figures (ukf-vslm-2023 Tables X and XI);
 //! - [`degradation`]: an arm that warms up and wears, calibrated now and then or all the time (rls-2025).
 //!
-//! [`statistics`] has the tests, [`distribution`] their
+//! [`tracking`] keeps a model accurate as measurements come in. [`statistics`] has the tests, [`distribution`] their
 //! distributions.
 //!
 //! A method may end in numbers that are none: that is a row of the table which says so, never a missing row.
@@ -27,3 +27,19 @@ pub mod uniformity;
 pub mod signed_rank;
 pub mod grinding;
 pub mod degradation;
+pub mod tracking;
+
+/// The result of an experiment, by its kind.
+#[derive(Debug, Clone)]
+pub enum Results {
+    /// Methods over splits of measured rows.
+    Methods(Box<protocol::Study>),
+    /// A ground surface.
+    Grinding(Box<grinding::GrindingResult>),
+    /// Uniformity of a chaotic map.
+    Uniformity(uniformity::UniformityResult),
+    /// A paper's own test on its own figures.
+    SignedRank(Vec<signed_rank::TableResult>),
+    /// An arm that degrades.
+    Degradation(Box<degradation::DegradationResult>),
+}

@@ -17,6 +17,8 @@ pub mod document;
 pub mod format;
 pub mod identification;
 pub mod study;
+pub mod comparison;
+pub mod tracking;
 pub mod deviation;
 pub mod compensation;
 pub mod robots;

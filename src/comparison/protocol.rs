@@ -11,8 +11,8 @@
 //! 3. *Sound*: links and frames together, rows weighed by what sensor and rounding leave, tolerances as priors. All
 //!    sound methods solve the very same problem.
 //! 4. Errors are stated on the held-out rows, signed for a cable, as the norm for a position.
-//! 5. Every least-squares method runs a second time without a limit that it could reach: what it then finds is its
-//!    problem's, what it found before also its budget's.
+//! 5. Every least-squares method is then continued until it has converged: what it finds in the end is its problem's,
+//!    what it found before also its budget's.
 //!
 //! "STD" of the papers is the mean of the absolute errors (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so.
 //! Results are the same for any number of threads; the seconds are not, and are kept apart.
@@ -32,6 +32,7 @@ use crate::comparison::parameters::{ParameterTable, parameter_table};
 use crate::comparison::rescaled::Rescaled;
 use crate::comparison::verdict::{Judgement, judge};
 use crate::estimation::estimate::{Estimate, Evaluations, Termination};
+use crate::estimation::least_squares::{Factorisation, lm};
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{Fitted, Observed, Start, errors_on, fit, frame_parameters, summary_on};
@@ -122,7 +123,7 @@ pub struct MethodResult {
     pub settings: toml::Table,
     /// One outcome for each case, as the experiment limits it.
     pub outcomes: Vec<Outcome>,
-    /// The same without limit, for least-squares methods.
+    /// The same continued until it has converged, for least-squares methods; counted from where it was stopped.
     pub converged: Option<Vec<Outcome>>,
 }
 
@@ -236,15 +237,12 @@ pub fn run(
             expected: "settings of that method".to_owned(),
         };
         let configured = solver.configured(&method.settings).map_err(fail)?;
-        let all = |run: &Run| -> Vec<Outcome> {
-            let task = |(case, seed): (&Prepared, &u64)| outcome(case, method, solver, treatment, run, *seed);
-            prepared.par_iter().zip(&seeds).map(task).collect()
-        };
-        let outcomes = all(&configured.run);
-        let converged = match to_convergence(method, solver) {
-            Some(settings) => Some(all(&solver.configured(&settings).map_err(fail)?.run)),
-            None => None,
-        };
+        let (outcomes, converged): (Vec<Outcome>, Vec<Option<Outcome>>) = prepared
+            .par_iter()
+            .zip(&seeds)
+            .map(|(case, seed)| outcome(case, method, solver, treatment, &configured.run, *seed))
+            .unzip();
+        let converged: Option<Vec<Outcome>> = converged.into_iter().collect();
         results.push(MethodResult {
             method: method.clone(),
             solver,
@@ -284,28 +282,19 @@ fn treatment_of(method: &Method, methods: &Methods) -> Treatment {
     method.treatment.unwrap_or(methods.protocol.treatment)
 }
 
-/// Settings without a limit that the method would reach before it converges.
-fn to_convergence(method: &Method, solver: &Solver) -> Option<toml::Table> {
-    if solver.family != Family::LeastSquares {
-        return None;
-    }
-    let mut settings = method.settings.clone();
-    let into = if solver.name.starts_with("ukf-vslm") {
-        let inner = settings.entry("search").or_insert_with(|| toml::Value::Table(toml::Table::new()));
-        inner.as_table_mut()?
-    } else {
-        &mut settings
+/// What the result of a least-squares method becomes when it is continued, on the same rows and the same cost, by steps
+/// that neither fixed damping nor a decaying step size slows. Both leave stationary points where they are, so this is
+/// where the method itself would end, thousands of its iterations later.
+fn continued(task: &Calibration, solver: &Solver, x: &[f64]) -> Estimate {
+    let options = lm::Options {
+        factorisation: Factorisation::Qr,
+        priors: !solver.literal,
+        max_iterations: 500,
+        cost_tolerance: 1e-13,
+        ..lm::Options::default()
     };
-    into.insert("max-iterations".to_owned(), toml::Value::Integer(CONVERGED_ITERATIONS));
-    if solver.name != "least-squares-as-printed" {
-        into.insert("cost-tolerance".to_owned(), toml::Value::Float(CONVERGED_TOLERANCE));
-    }
-    Some(settings)
+    lm::solve(task, x, &options)
 }
-
-/// Iterations of a run to convergence: as printed, the steps along what the data hardly see become slow, not small.
-const CONVERGED_ITERATIONS: i64 = 2_000;
-const CONVERGED_TOLERANCE: f64 = 1e-13;
 
 /// The rows with the part of the reading that the protocol uses.
 fn reading_used(
@@ -486,7 +475,7 @@ fn outcome(
     treatment: Treatment,
     run: &Run,
     seed: u64,
-) -> Outcome {
+) -> (Outcome, Option<Outcome>) {
     let (task, parameters) = task_of(case, solver, treatment);
     let start = vec![0.0; parameters.len()];
     let begun = Instant::now();
@@ -500,7 +489,11 @@ fn outcome(
         }
     };
     let seconds = begun.elapsed().as_secs_f64();
-    judged(case, &task, estimate, seconds)
+    let converged = (solver.family == Family::LeastSquares).then(|| {
+        let from = if estimate.x.iter().all(|x| x.is_finite()) { &estimate.x } else { &start };
+        judged(case, &task, continued(&task, solver, from), 0.0)
+    });
+    (judged(case, &task, estimate, seconds), converged)
 }
 
 fn judged(case: &Prepared, task: &Calibration, estimate: Estimate, seconds: f64) -> Outcome {
