@@ -89,6 +89,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(seconds) = arguments.follow.filter(|s| !(*s > 0.0 && s.is_finite())) {
         bail!("--follow {seconds}: expected seconds above 0");
     }
+    if let Some(date) = &arguments.date {
+        stamp(date)?;
+    }
     let mut flagged = false;
     loop {
         let seen = on_threads(arguments.common.threads, || {

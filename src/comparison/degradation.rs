@@ -13,8 +13,8 @@
 //! - *RLS*: rls-2025 eq. 14, row by row in square-root form, rows weighed by the sensor; the prior of the first group is
 //!   manufacturing tolerance; each pose is linearised at the state it meets. Without forgetting, as the paper has it.
 //! - *RLS, forgetting*: the same with a factor per pose.
-//! - *LM, converged*: the poses of the present group alone, rows weighed alike. No memory of earlier groups.
-//! - *LM, with memory*: the same with the last group's covariance as prior: RLS by another name.
+//! - *LM*: the poses of the present group alone, converged, rows weighed alike. No memory of earlier groups.
+//! - *LM, memory*: the same with the last group's covariance as prior: RLS by another name.
 //! - *LM, stopped*: as printed elsewhere in this literature: μ = 5, mm and radians unweighted, a few steps.
 //!
 //! **What to expect.** Without forgetting, RLS *is* batch least squares of one linearisation, to rounding. A gap
@@ -158,9 +158,9 @@ impl Way {
         match self {
             Way::Rls => "RLS",
             Way::RlsForgetting => "RLS, forgetting",
-            Way::Lm => "LM, converged",
-            Way::LmMemory => "LM, with memory",
-            Way::LmStopped => "LM, stopped, unweighted",
+            Way::Lm => "LM",
+            Way::LmMemory => "LM, memory",
+            Way::LmStopped => "LM, stopped",
         }
     }
 

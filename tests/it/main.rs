@@ -12,6 +12,7 @@ mod measurement;
 mod identification;
 mod compensation;
 mod planning;
+mod comparison;
 mod report;
 mod visual;
 mod command;
