@@ -137,7 +137,7 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
     let observed = subject.observed;
     let dataset = &observed.dataset;
     let (start_model, start_frames, parameters) = start(subject, causes, freedom);
-    let priors = subject.tolerance.priors(&parameters, &start_model, &start_frames);
+    let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
     let n = dataset.rows.len();
     let (lengths, angles) = components(dataset.sensor);
     let per = lengths + angles;

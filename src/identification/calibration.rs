@@ -337,7 +337,7 @@ impl Calibration {
             places.push(residuals);
         }
         let columns = if with_jacobian { p + 1 } else { 1 };
-        let mut buffer = vec![0.0; columns * c * BLOCK_LANES * WIDTH];
+        let mut buffer = vec![0.0; columns * c * BLOCK_LANES.min(last - first) * WIDTH];
         for from in (first..last).step_by(BLOCK_LANES) {
             let lanes = BLOCK_LANES.min(last - from);
             let rows = lanes * WIDTH;

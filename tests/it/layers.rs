@@ -18,6 +18,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "diagnosis",
         "compensation",
         "planning",
+        "comparison",
     ];
     BTreeMap::from([
         ("math", vec![]),
@@ -31,6 +32,20 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
         ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
+        (
+            "comparison",
+            vec![
+                "math",
+                "kinematics",
+                "program",
+                "surface",
+                "measurement",
+                "estimation",
+                "identification",
+                "compensation",
+                "planning",
+            ],
+        ),
         ("report", all_below_six.clone()),
         ("visual", all_below_six),
     ])
