@@ -6,6 +6,8 @@
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
 //! - [`draft`]: a program that does not exist yet, for a dialect to write.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
+//! - [`nc`]: G-code of five-axis machines: the same.
+//! - [`reading`]: a program in whichever of them it is written.
 //!
 //! ```
 //! use truegrind::program::motion::TargetValue;
@@ -31,3 +33,5 @@ pub mod motion;
 pub mod rewrite;
 pub mod draft;
 pub mod rapid;
+pub mod nc;
+pub mod reading;
