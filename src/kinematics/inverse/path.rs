@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::configuration::{self, Configuration};
 use super::kernel::Solved;
-use super::{Inverse, InverseError, Solution, same_branch};
+use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::chain::End;
 use crate::kinematics::model::Joints;
 use crate::math::lanes::{Lanes, SinCos, WIDTH, vectorised};
@@ -70,6 +71,35 @@ impl Inverse<'_> {
                 blocks.flat_map(|(targets, seeds)| self.solve_block(targets, seeds))
             })
             .collect()
+    }
+
+    /// [`Inverse::configuration`] of many joint vectors.
+    pub fn configurations(&self, joints: &[Joints]) -> Vec<Configuration> {
+        let branches = self.structure.has_branches();
+        let margins = self.margins_of_many(joints);
+        let branch = |m| branches.then(|| Branch::of(m));
+        joints.iter().zip(&margins).map(|(q, m)| configuration::of(branch(m), q)).collect()
+    }
+
+    /// Whether each joint vector is of the configuration that was asked for, borders counted to both sides as in
+    /// [`Inverse::solve_configured`].
+    pub fn fitting(&self, joints: &[Joints], wanted: &[Configuration]) -> Vec<bool> {
+        let margins = self.margins_of_many(joints);
+        joints.iter().zip(&margins).zip(wanted).map(|((q, m), wanted)| wanted.fits(q, m)).collect()
+    }
+
+    fn margins_of_many(&self, joints: &[Joints]) -> Vec<[f64; 3]> {
+        let mut out = Vec::with_capacity(joints.len());
+        for block in joints.chunks(WIDTH) {
+            let angles: [Lanes; 6] =
+                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| block[k.min(block.len() - 1)][i])));
+            let margins = vectorised(
+                #[inline(always)]
+                || self.kernel.margins(&self.arm, &self.structure, &angles),
+            );
+            out.extend((0..block.len()).map(|k| margins.map(|m| m.0[k])));
+        }
+        out
     }
 
     fn solve_block<'s>(
