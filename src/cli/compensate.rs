@@ -181,6 +181,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
         condition,
+        points: arguments.outputs.of_points(),
         ..Options::default()
     };
     let work = Work::start(format!("rewriting {} motions", task.listing.motions.len()));

@@ -38,6 +38,11 @@ impl Outputs {
             .collect()
     }
 
+    /// Whether any output shows the points of a path.
+    pub(super) fn of_points(&self) -> bool {
+        [&self.csv, &self.md, &self.html, &self.rrd].into_iter().any(Option::is_some)
+    }
+
     /// Whether stdout is taken by one of the outputs, so that the summary goes to stderr.
     pub(super) fn takes_stdout(&self) -> bool {
         self.files().contains(&Path::new("-"))

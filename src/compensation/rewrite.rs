@@ -60,6 +60,8 @@ pub struct Options {
     pub position_decimals: u8,
     /// What circumstances the program will run under.
     pub condition: Condition,
+    /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
+    pub points: bool,
 }
 
 impl Default for Options {
@@ -73,6 +75,7 @@ impl Default for Options {
             joint_targets: false,
             position_decimals: 4,
             condition: Condition::default(),
+            points: true,
         }
     }
 }
@@ -105,7 +108,7 @@ pub struct Plan {
     pub changes: Vec<Change>,
     /// One entry for each motion of the listing.
     pub outcomes: Vec<MotionOutcome>,
-    /// The ends of all motions that have a pose, in order.
+    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`].
     pub points: Vec<PathPoint>,
     /// What was assumed of tools and work objects.
     pub notes: Vec<String>,
@@ -413,7 +416,7 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
             outcome.before_mm = Some(to.deviation_before.norm_mm());
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
-            Some(path_point(motion, to))
+            options.points.then(|| path_point(motion, to, &job.mountings.list[to.mounted].real))
         }
         _ => None,
     };
@@ -535,16 +538,18 @@ fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: 
     }
 }
 
-fn path_point(motion: &Motion, solved: &Solved) -> PathPoint {
+fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
+    let flange = real.flange_for(&solved.meant);
+    let base_from_object = real.base_from_object(&flange);
     PathPoint {
         index: 0,
         line: motion.place.line,
         instruction: motion.instruction.to_string(),
         kind: motion.kind,
         cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
-        base_from_object: solved.base_from_object,
-        flange_from_tool: solved.flange_from_tool,
-        intended: solved.intended,
+        base_from_object,
+        flange_from_tool: real.flange_from_tool(&flange),
+        intended: base_from_object * solved.meant,
         normal: None,
         joints_before: Some(solved.before),
         joints_after: Some(solved.after),

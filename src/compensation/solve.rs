@@ -17,8 +17,12 @@ use crate::kinematics::region::Outside;
 use crate::math::se3::Pose;
 use crate::program::motion::{Listing, Motion, MotionTarget, Reason, RobTarget, Switch, TargetValue};
 
-/// Targets that one thread takes at a time.
+/// Motions that one thread takes at a time.
 const PORTION: usize = 256;
+
+/// Targets along which the program as it is is followed in one go: the first one has no neighbour and costs as much as
+/// hundreds of others.
+const STRETCH: usize = 4096;
 
 /// One target worked out.
 #[derive(Debug, Clone)]
@@ -35,22 +39,22 @@ pub(super) struct Solved {
     pub(super) sigma_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
-    pub(super) base_from_object: Pose,
-    pub(super) flange_from_tool: Pose,
-    pub(super) intended: Pose,
 }
 
 /// The targets of all motions.
 pub(super) struct SolvedTargets {
     /// Where the targets of each motion begin, and the end of the last.
     first: Vec<usize>,
-    targets: Vec<Result<Solved, Why>>,
+    /// The targets of so many motions each: one list of all would be copied together once more.
+    portions: Vec<Vec<Result<Solved, Why>>>,
 }
 
 impl SolvedTargets {
     /// The targets of one motion; none where the motion must be left.
     pub(super) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
-        &self.targets[self.first[motion]..self.first[motion + 1]]
+        let portion = motion / PORTION;
+        let begin = self.first[portion * PORTION];
+        &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
     }
 }
 
@@ -86,12 +90,16 @@ pub(super) fn solve_all(
     }
     first.push(asked.len());
     let starts = starts(listing, &first, &asked, arms, mountings);
-    let targets = asked
-        .par_chunks(PORTION)
-        .zip(starts.par_chunks(PORTION))
-        .flat_map_iter(|(asked, starts)| finish(asked, starts, arms, mountings, options))
+    let count = listing.motions.len();
+    let portions = (0..count)
+        .into_par_iter()
+        .step_by(PORTION)
+        .map(|begin| {
+            let targets = first[begin]..first[(begin + PORTION).min(count)];
+            finish(&asked[targets.clone()], &starts[targets], arms, mountings, options)
+        })
         .collect();
-    SolvedTargets { first, targets }
+    SolvedTargets { first, portions }
 }
 
 // ---- the program as it is ----
@@ -109,7 +117,7 @@ fn starts(
 ) -> Starts {
     let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
     let mut out: Starts = asked
-        .par_chunks(PORTION)
+        .par_chunks(STRETCH)
         .flat_map_iter(|asked| {
             let mut starts = Vec::with_capacity(asked.len());
             let mut near = None;
@@ -136,7 +144,7 @@ fn starts(
         while end < listing.motions.len()
             && chained(end)
             && listing.motions[end].previous == Some(end as u32 - 1)
-            && end - motion < PORTION
+            && end - motion < STRETCH
         {
             end += 1;
         }
@@ -372,7 +380,6 @@ fn finish(
         }
         let real = real(&w.start);
         let meant = w.start.meant;
-        let base_from_object = real.base_from_object(&w.flange);
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         out[w.index] = Ok(Solved {
             mounted: w.start.mounted,
@@ -387,9 +394,6 @@ fn finish(
             sigma_mm: sigmas[k],
             outside: arms.knowledge.and_then(|knowledge| knowledge.region.outside(&w.after)),
             singularity: w.singularity,
-            intended: base_from_object * meant,
-            base_from_object,
-            flange_from_tool: tools[k],
         });
     }
     out

@@ -79,6 +79,17 @@ impl Edits {
         self.entries.push(Entry { start: range.start, end: range.end, text_start, text_end });
     }
 
+    /// Makes room for lists that will be appended.
+    pub fn reserve<'e>(&mut self, others: impl Iterator<Item = &'e Edits>) {
+        let (mut entries, mut text) = (0, 0);
+        for other in others {
+            entries += other.entries.len();
+            text += other.text.len();
+        }
+        self.entries.reserve_exact(entries);
+        self.text.reserve_exact(text);
+    }
+
     /// Adds the edits of another list behind those of this one.
     pub fn append(&mut self, other: &Edits) {
         let shift = self.text.len();

@@ -150,10 +150,14 @@ impl Inverse<'_> {
     }
 
     /// Place of the last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
+    ///
+    /// The quaternion need not have length 1 to the last bit: an interpolated one seldom has, and axes that are longer
+    /// than 1 by 1e-11 ask for a place that no joints reach.
     #[inline(always)]
     fn place<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> End<R> {
         let [x, y, z, w] = *quaternion;
-        let (one, two) = (R::splat(1.0), R::splat(2.0));
+        let one = R::splat(1.0);
+        let two = R::splat(2.0) / (x * x + y * y + z * z + w * w);
         let columns = [
             [one - two * (y * y + z * z), two * (x * y + w * z), two * (x * z - w * y)],
             [two * (x * y - w * z), one - two * (x * x + z * z), two * (y * z + w * x)],
