@@ -181,6 +181,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
         condition,
+        points: arguments.outputs.of_points(),
         ..Options::default()
     };
     let work = Work::start(format!("rewriting {} motions", task.listing.motions.len()));
@@ -215,21 +216,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             output: target.as_ref().map(|t| t.display().to_string()),
         })
         .collect();
+    arguments.outputs.print(&view::summary(&planned, &task.listing, &files));
     let report = PathReport {
         program: programs.files.iter().map(|(p, _)| files::name(p)).collect::<Vec<_>>().join(", "),
         model: name.clone(),
         after: After::PredictedRemainder,
-        points: planned.points.clone(),
+        points: std::mem::take(&mut planned.points),
         held_out_mm: Some(arm.geometry.held_out.rmse),
     };
-    arguments.outputs.print(&view::summary(&planned, &task.listing, &files));
     let mut batch = Batch::sparing(&inputs_of);
     let reports = std::slice::from_ref(&report);
-    arguments.outputs.add_to(
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&planned, &task.listing, &files, reports),
-        &truegrind::report::deviation::table(&report),
-        &view::json(&planned, &task.listing, &files),
+        || view::document(&planned, &task.listing, &files, reports),
+        || truegrind::report::deviation::table(&report),
+        || view::json(&planned, &task.listing, &files),
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {

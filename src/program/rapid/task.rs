@@ -6,6 +6,8 @@ mod uses;
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::evaluate::{Context, Evaluator, Source};
 use super::flow::{CallSite, State, Surroundings, Visitor, walk};
 use super::instruction::{self, INSTRUCTIONS, Instruction, Slot};
@@ -49,7 +51,7 @@ pub(super) struct Statement {
 impl<'s> Task<'s> {
     /// Reads files, given by name and bytes, as one task. Never fails: what cannot be read is listed.
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
-        let trees: Vec<_> = files.iter().map(|(_, bytes)| parse(bytes)).collect();
+        let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
         let symbols = Symbols::gather(&trees);
         let (listing, statements) = Lister::new(&trees, &symbols).listing();
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
