@@ -132,6 +132,7 @@ fn task(sensor: Sensor, rows: usize) -> Calibration {
         flange_from_target: pose_from_vector(&[10.0, 20.0, 30.0, 0.01, -0.02, 0.05]),
         outlets_mm: vec![Vector3::new(500.0, -600.0, 50.0), Vector3::new(-300.0, 700.0, 90.0)],
         zeros_mm: vec![3.0, -4.0],
+        disturbances: Vec::new(),
     };
     let weights: Vec<Weight> =
         (0..rows).map(|i| Weight { per_mm: 2.0 + i as f64 * 0.01, per_rad: 300.0 }).collect();
