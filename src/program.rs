@@ -1,7 +1,7 @@
 //! Robot programs as bytes: read without loss, understood as motions, changed by edits. Knows no robot.
 //!
 //! - [`tree`]: a lossless syntax tree over bytes in flat arrays; reading never fails.
-//! - [`edit`]: sorted, disjoint edits; bytes outside them never change.
+//! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
 //! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
 //! - [`draft`]: a program that does not exist yet, for a dialect to write.
@@ -29,6 +29,7 @@
 
 pub mod tree;
 pub mod edit;
+pub mod diff;
 pub mod motion;
 pub mod rewrite;
 pub mod draft;
