@@ -14,6 +14,7 @@ mod simulate;
 mod identify;
 mod diagnose;
 mod path;
+mod programs;
 mod compensate;
 mod deviation;
 mod demo;

@@ -20,4 +20,5 @@ pub mod diagnosis;
 pub mod study;
 pub mod deviation;
 pub mod compensation;
+pub mod batch;
 pub mod robots;
