@@ -254,6 +254,9 @@ pub struct WorkObject {
     pub value: Result<WorkObjectValue, Reason>,
     /// Where it is declared; `None` for `wobj0` and for one that is declared nowhere.
     pub place: Option<Place>,
+    /// A displacement within it that the program sets (PDispSet, TRANS, ROT) and the text tells; the object frame of
+    /// `value` has it in it already.
+    pub displacement: Option<Frame>,
 }
 
 /// What a work object is. Targets stand in `user_frame * object_frame`.

@@ -249,7 +249,8 @@ impl Lister<'_, '_> {
             user_frame,
             object_frame: within,
         });
-        let work_object = WorkObject { name: name.clone(), value, place: None };
+        let displacement = self.state.programmable.as_ref().map(Frame::from_pose);
+        let work_object = WorkObject { name: name.clone(), value, place: None, displacement };
         let index = intern(&mut self.listing.work_objects, work_object);
         self.frame_index = Some((name, self.state.programmable, index));
         index
