@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use clap::Args;
 use truegrind::compensation::deviation::PathReport;
+use truegrind::diagnosis::diagnose::Diagnosed;
 use truegrind::identification::identify::Identification;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::model::Model;
@@ -56,4 +57,9 @@ pub(super) fn path(
 /// The recording of an identification.
 pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
     Ok(visual::dataset_recording(dataset, found)?.rrd()?)
+}
+
+/// The recording of a diagnosis.
+pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
+    Ok(visual::diagnosis_recording(dataset, found)?.rrd()?)
 }
