@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
     /// Most causes that are accepted.
-    #[arg(long, default_value_t = 12)]
+    #[arg(long, default_value_t = 20)]
     most: usize,
     /// Contiguous blocks that are held out in turn, beside five random folds.
     #[arg(long, default_value_t = 10)]
