@@ -12,6 +12,7 @@ mod progress;
 mod robots;
 mod simulate;
 mod identify;
+mod diagnose;
 mod compare;
 mod track;
 mod path;
@@ -43,6 +44,8 @@ enum Verb {
     Simulate(simulate::Arguments),
     /// Fit the arm to measured poses: a model file, and what the data could tell.
     Identify(identify::Arguments),
+    /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
+    Diagnose(diagnose::Arguments),
     /// Methods side by side under a paper's protocol.
     Compare(compare::Arguments),
     /// Keep a model accurate as measurements come in.
@@ -105,6 +108,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Robots(arguments) => robots::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
+        Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),

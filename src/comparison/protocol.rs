@@ -464,7 +464,7 @@ pub(super) fn task_of(
             (link_parameters(&model), vec![unit; train.rows.len()])
         }
     };
-    let priors = tolerance.priors(&parameters, &model);
+    let priors = tolerance.priors(&parameters, &model, frames);
     (Calibration::new(train, &model, frames, &parameters, &priors, &weights), parameters)
 }
 
