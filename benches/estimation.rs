@@ -148,7 +148,7 @@ mod arm {
         let sensing = frame_parameters(&dataset);
         let fitted = fit(&observed, start, &sensing, &Tolerance::default(), &SOLVERS[0], 0);
         let parameters = link_parameters(&model);
-        let priors = Tolerance::default().priors(&parameters, &model, &fitted.frames);
+        let priors = Tolerance::default().priors(&parameters, &model);
         let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows];
         Calibration::new(&dataset, &model, &fitted.frames, &parameters, &priors, &weights)
     }

@@ -7,9 +7,23 @@ use std::sync::LazyLock;
 
 use divan::Bencher;
 use divan::counter::BytesCount;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use truegrind::compensation::cell::Cell;
+use truegrind::compensation::rewrite::{Options, plan};
+use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
+use truegrind::kinematics::model::Joints;
+use truegrind::kinematics::parameter::{Parameter, link_parameters};
+use truegrind::kinematics::region::Region;
+use truegrind::math::statistics::ErrorSummary;
+use truegrind::planning::toolpath::toolpath;
+use truegrind::program::motion::MotionKind;
 use truegrind::program::rapid::Task;
 use truegrind::program::rapid::lexer::lex;
 use truegrind::program::rapid::parser::parse;
+use truegrind::program::rapid::writer;
 use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions, Rewritten};
 
 fn main() {
@@ -52,6 +66,82 @@ fn moved(task: &Task<'_>) -> Rewritten {
         })
         .collect();
     task.rewrite(&changes, &RewriteOptions::default()).expect("edits do not overlap")
+}
+
+/// A grinding path of so many MoveL: the cuts of the blade that ships with the project, over and over, inline.
+fn blade(moves: usize) -> (Vec<u8>, Vec<Joints>) {
+    let file = truegrind::surface::sample::BLADE.read().expect("ships with the project");
+    let nominal = truegrind::robots::load("abb-irb-120").expect("in the catalogue").model;
+    let path = toolpath(&file, &nominal, "abb-irb-120").expect("is reached");
+    let mut draft = path.draft.clone();
+    draft.named_targets = false;
+    let lines = path.draft.steps.iter().filter(|step| step.kind == MotionKind::Linear);
+    draft.steps.truncate(1);
+    draft.steps.extend(lines.cycle().take(moves).cloned());
+    (writer::write(&draft).expect("a draft that can be written"), path.joints)
+}
+
+/// An arm as a calibration leaves it: every link a little off, 24 parameters with a covariance, a measured region.
+fn estimated(joints: &[Joints]) -> Estimated {
+    let nominal = truegrind::robots::load("abb-irb-120").expect("in the catalogue").model;
+    let mut random = ChaCha8Rng::seed_from_u64(120);
+    let mut model = nominal.clone();
+    let order = link_parameters(&nominal);
+    for parameter in &order {
+        let Parameter::Link { joint, coordinate } = *parameter else { continue };
+        let size = if coordinate.is_length() { 0.4 } else { 0.002 };
+        let link = &mut model.links[joint];
+        link.set(coordinate, link.get(coordinate) + size * random.random_range(-1.0..1.0));
+    }
+    let n = order.len();
+    let factor = DMatrix::from_fn(n, n, |_, _| random.random_range(-1e-4..1e-4));
+    let still = StageErrors { fitted: ErrorSummary::default(), held_out: ErrorSummary::default() };
+    // Measured around the path, as a careful operator does.
+    let around = |q: &Joints| q.map(|v| v + random.random_range(-0.1..0.1));
+    let measured: Vec<Joints> = joints.iter().map(around).collect();
+    Estimated {
+        robot: "abb-irb-120".into(),
+        nominal,
+        model,
+        parameters: Vec::new(),
+        order,
+        covariance: &factor * factor.transpose(),
+        provenance: Provenance::default(),
+        registered: still,
+        geometry: still,
+        noise_floor_mm: None,
+        verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
+        region: Region::of(&measured, 1.0),
+        condition: Condition::default(),
+    }
+}
+
+static BLADE: LazyLock<(Vec<u8>, Estimated)> = LazyLock::new(|| {
+    let (module, joints) = blade(100_000);
+    let estimated = estimated(&joints);
+    (module, estimated)
+});
+
+/// The whole way of `compensate` but for reading and writing files: parse, solve every target, check between the
+/// points, predict σ, edit. All threads.
+#[divan::bench(sample_count = 10)]
+fn compensate_module(bencher: Bencher<'_, '_>) {
+    let (module, estimated) = &*BLADE;
+    bencher.counter(BytesCount::new(module.len())).bench_local(|| {
+        let task = Task::read(&[("path.mod", black_box(module))]);
+        let planned = plan(&task.listing, estimated, &Cell::default(), &Options::default());
+        let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).expect("disjoint edits");
+        assert!(planned.changes.len() > 99_000, "{} changes", planned.changes.len());
+        rewritten.files[0].edits.apply(module).expect("edits are within the file")
+    });
+}
+
+/// Of that, the kinematics: every target solved, checked and judged.
+#[divan::bench(sample_count = 10)]
+fn plan_module(bencher: Bencher<'_, '_>) {
+    let (module, estimated) = &*BLADE;
+    let task = Task::read(&[("path.mod", module)]);
+    bencher.bench_local(|| plan(&task.listing, estimated, &Cell::default(), &Options::default()));
 }
 
 #[divan::bench]

@@ -16,6 +16,7 @@ mod diagnose;
 mod compare;
 mod track;
 mod path;
+mod programs;
 mod compensate;
 mod deviation;
 mod demo;

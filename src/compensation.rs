@@ -10,5 +10,6 @@ pub mod cell;
 pub mod mounting;
 pub mod why;
 pub mod rewrite;
+mod solve;
 pub mod verify;
 mod segment;

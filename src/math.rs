@@ -4,5 +4,5 @@ pub mod lanes;
 pub mod se3;
 pub mod difference;
 pub mod statistics;
-pub mod radial;
 pub mod tail;
+pub mod radial;

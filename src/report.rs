@@ -22,4 +22,5 @@ pub mod comparison;
 pub mod tracking;
 pub mod deviation;
 pub mod compensation;
+pub mod batch;
 pub mod robots;

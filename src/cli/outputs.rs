@@ -38,9 +38,41 @@ impl Outputs {
             .collect()
     }
 
+    /// Whether any output shows the points of a path.
+    pub(super) fn of_points(&self) -> bool {
+        [&self.csv, &self.md, &self.html, &self.rrd].into_iter().any(Option::is_some)
+    }
+
     /// Whether stdout is taken by one of the outputs, so that the summary goes to stderr.
     pub(super) fn takes_stdout(&self) -> bool {
         self.files().contains(&Path::new("-"))
+    }
+
+    /// Adds what was asked for; what was not is not made.
+    pub(super) fn add_made(
+        &self,
+        batch: &mut Batch,
+        page: impl FnOnce() -> Document,
+        table: impl FnOnce() -> Table,
+        json: impl FnOnce() -> serde_json::Value,
+    ) -> anyhow::Result<()> {
+        if let Some(path) = &self.json {
+            batch.add(path, format::json::text(&json())?);
+        }
+        if let Some(path) = &self.csv {
+            batch.add(path, format::csv::table(&table()));
+        }
+        if self.md.is_none() && self.html.is_none() {
+            return Ok(());
+        }
+        let page = page();
+        if let Some(path) = &self.md {
+            batch.add(path, format::markdown::document(&page));
+        }
+        if let Some(path) = &self.html {
+            batch.add(path, format::html::document(&page));
+        }
+        Ok(())
     }
 
     /// Adds what was asked for.
@@ -51,19 +83,7 @@ impl Outputs {
         table: &Table,
         json: &serde_json::Value,
     ) -> anyhow::Result<()> {
-        if let Some(path) = &self.json {
-            batch.add(path, format::json::text(json)?);
-        }
-        if let Some(path) = &self.csv {
-            batch.add(path, format::csv::table(table));
-        }
-        if let Some(path) = &self.md {
-            batch.add(path, format::markdown::document(page));
-        }
-        if let Some(path) = &self.html {
-            batch.add(path, format::html::document(page));
-        }
-        Ok(())
+        self.add_made(batch, || page.clone(), || table.clone(), || json.clone())
     }
 
     /// Prints the summary, to stdout unless a result goes there.

@@ -404,7 +404,7 @@ struct State {
 impl State {
     fn new(arm: &Arm) -> Self {
         let parameters = link_parameters(&arm.nominal);
-        let priors = Tolerance::default().priors(&parameters, &arm.nominal, &arm.frames);
+        let priors = Tolerance::default().priors(&parameters, &arm.nominal);
         let variances = DVector::from_iterator(priors.len(), priors.iter().map(|p| p.sigma * p.sigma));
         Self {
             x: DVector::zeros(parameters.len()),

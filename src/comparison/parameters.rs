@@ -55,7 +55,7 @@ pub fn parameter_table(
     x: &[f64],
     variance: f64,
 ) -> ParameterTable {
-    let priors = Tolerance::default().priors(parameters, task.start(), task.starting_frames());
+    let priors = Tolerance::default().priors(parameters, task.start());
     let equations = task.normal_equations(x);
     let p = parameters.len();
     // In units of the priors, where the unit matrix is the prior's information.

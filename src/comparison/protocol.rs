@@ -464,7 +464,7 @@ pub(super) fn task_of(
             (link_parameters(&model), vec![unit; train.rows.len()])
         }
     };
-    let priors = tolerance.priors(&parameters, &model, frames);
+    let priors = tolerance.priors(&parameters, &model);
     (Calibration::new(train, &model, frames, &parameters, &priors, &weights), parameters)
 }
 

@@ -345,7 +345,7 @@ impl Tracker {
             frame_rad: 0.04,
             ..Tolerance::default()
         }
-        .priors(&parameters, &model.model, &frames);
+        .priors(&parameters, &model.model);
         let covariance = DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
             (true, _) => model.covariance[(i, j)] + if i == j { SMALLEST_VARIANCE } else { 0.0 },
             (false, true) => priors[i].sigma * priors[i].sigma,

@@ -8,13 +8,16 @@
 //! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
 //! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::cell::Cell;
-use super::deviation::{Deviation, PathPoint, Status};
+use super::deviation::{PathPoint, Status};
 use super::mounting::{Mounted, Mounting, mount};
-use super::segment::{Ends, circle_bend, insertions, straight_bend};
+use super::segment::{Ends, circle_bend, insertions, middles_off, straight_bend};
+use super::solve::{Solved, SolvedTargets, solve_all};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::Estimated;
@@ -57,6 +60,8 @@ pub struct Options {
     pub position_decimals: u8,
     /// What circumstances the program will run under.
     pub condition: Condition,
+    /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
+    pub points: bool,
 }
 
 impl Default for Options {
@@ -70,6 +75,7 @@ impl Default for Options {
             joint_targets: false,
             position_decimals: 4,
             condition: Condition::default(),
+            points: true,
         }
     }
 }
@@ -102,29 +108,10 @@ pub struct Plan {
     pub changes: Vec<Change>,
     /// One entry for each motion of the listing.
     pub outcomes: Vec<MotionOutcome>,
-    /// The ends of all motions that have a pose, in order.
+    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`].
     pub points: Vec<PathPoint>,
     /// What was assumed of tools and work objects.
     pub notes: Vec<String>,
-}
-
-/// One target worked out.
-#[derive(Debug, Clone)]
-struct Solved {
-    mounted: usize,
-    meant: Pose,
-    before: Joints,
-    after: Joints,
-    told: Pose,
-    conf: Configuration,
-    deviation_before: Deviation,
-    deviation_after: Deviation,
-    sigma_mm: f64,
-    outside: Option<Outside>,
-    singularity: f64,
-    base_from_object: Pose,
-    flange_from_tool: Pose,
-    intended: Pose,
 }
 
 /// The two arms and their inverses, shared by all targets.
@@ -160,40 +147,57 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     let arms = Arms::of(estimated, &options.condition);
     let mountings = Mountings::of(listing, &arms, cell);
     let solved = solve_all(listing, &arms, &mountings, options);
-    let ends: Vec<Option<Ends<'_>>> = solved.iter().map(|targets| ends_of(targets, &mountings)).collect();
-    let worked: Vec<Worked> = listing
-        .motions
-        .par_iter()
-        .enumerate()
-        .with_min_len(64)
-        .map(|(i, motion)| work(i, motion, listing, &solved, &ends, &arms, options))
+    let job = Job { listing, solved: &solved, mountings: &mountings, arms: &arms, options };
+    let portions: Vec<Portion> = (0..listing.motions.len())
+        .into_par_iter()
+        .step_by(PORTION)
+        .map(|first| job.portion(first..(first + PORTION).min(listing.motions.len())))
         .collect();
     let mut plan =
         Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes: mountings.notes() };
-    for (i, worked) in worked.into_iter().enumerate() {
-        plan.changes.extend(worked.change);
-        plan.outcomes.push(worked.outcome);
-        if let Some(mut point) = worked.point {
-            point.index = plan.points.len();
-            plan.points.push(point);
-        }
-        debug_assert_eq!(plan.outcomes.len(), i + 1);
+    plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
+    plan.outcomes.reserve_exact(listing.motions.len());
+    plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
+    for mut portion in portions {
+        plan.changes.append(&mut portion.changes);
+        plan.outcomes.append(&mut portion.outcomes);
+        plan.points.append(&mut portion.points);
     }
+    plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
     plan
+}
+
+/// Motions that one thread takes at a time.
+const PORTION: usize = 256;
+
+/// What the motions of a program are worked out from.
+struct Job<'a> {
+    listing: &'a Listing,
+    solved: &'a SolvedTargets,
+    mountings: &'a Mountings,
+    arms: &'a Arms<'a>,
+    options: &'a Options,
+}
+
+/// What became of some motions that follow each other.
+struct Portion {
+    changes: Vec<Change>,
+    outcomes: Vec<MotionOutcome>,
+    points: Vec<PathPoint>,
 }
 
 /// Mountings by (tool, work object) as motions use them.
 pub(super) struct Mountings {
-    pairs: Vec<(u32, u32)>,
+    places: HashMap<(u32, u32), usize>,
     pub(super) list: Vec<Mounted>,
 }
 
 impl Mountings {
     pub(super) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
-        let mut out = Self { pairs: Vec::new(), list: Vec::new() };
+        let mut out = Self { places: HashMap::new(), list: Vec::new() };
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
-            if out.pairs.contains(&(tool, object)) {
+            if out.places.contains_key(&(tool, object)) {
                 continue;
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
@@ -209,14 +213,13 @@ impl Mountings {
                 arms.knowledge,
                 &usual,
             ));
-            out.pairs.push((tool, object));
+            out.places.insert((tool, object), out.list.len() - 1);
         }
         out
     }
 
     pub(super) fn of_motion(&self, motion: &Motion) -> Option<usize> {
-        let pair = (motion.tool?, motion.work_object?);
-        self.pairs.iter().position(|p| *p == pair)
+        self.places.get(&(motion.tool?, motion.work_object?)).copied()
     }
 
     fn notes(&self) -> Vec<String> {
@@ -300,8 +303,6 @@ pub(super) fn configured(
     }
 }
 
-type SolvedTargets = Vec<Result<Solved, Why>>;
-
 /// Whether the controller checks the configuration of a motion.
 pub(super) fn monitored(motion: &Motion) -> Switch {
     match motion.kind {
@@ -310,150 +311,8 @@ pub(super) fn monitored(motion: &Motion) -> Switch {
     }
 }
 
-fn solve_all(
-    listing: &Listing,
-    arms: &Arms<'_>,
-    mountings: &Mountings,
-    options: &Options,
-) -> Vec<SolvedTargets> {
-    let independent = |motion: &Motion| monitored(motion) != Switch::Off;
-    let mut out: Vec<SolvedTargets> = listing
-        .motions
-        .par_chunks(256)
-        .flat_map_iter(|motions| {
-            let mut near: Option<Joints> = None;
-            motions
-                .iter()
-                .map(|motion| {
-                    if !independent(motion) {
-                        return Vec::new();
-                    }
-                    let solved = solve_motion(motion, arms, mountings, options, near.as_ref());
-                    if let Some(Ok(last)) = solved.last() {
-                        near = Some(last.before);
-                    }
-                    solved
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    for i in 0..listing.motions.len() {
-        let motion = &listing.motions[i];
-        if independent(motion) {
-            continue;
-        }
-        let before = |p: u32| out[p as usize].last().and_then(|t| t.as_ref().ok().map(|s| s.before));
-        let near = motion.previous.and_then(before);
-        out[i] = solve_motion(motion, arms, mountings, options, near.as_ref());
-    }
-    out
-}
-
-fn solve_motion(
-    motion: &Motion,
-    arms: &Arms<'_>,
-    mountings: &Mountings,
-    options: &Options,
-    near: Option<&Joints>,
-) -> SolvedTargets {
-    if motion.left.is_some() {
-        return Vec::new();
-    }
-    let mut near = near.copied();
-    motion
-        .targets
-        .iter()
-        .map(|target| {
-            let solved = solve_target(motion, target, arms, mountings, options, near.as_ref());
-            if let Ok(s) = &solved {
-                near = Some(s.before);
-            }
-            solved
-        })
-        .collect()
-}
-
-fn solve_target(
-    motion: &Motion,
-    target: &MotionTarget,
-    arms: &Arms<'_>,
-    mountings: &Mountings,
-    options: &Options,
-    near: Option<&Joints>,
-) -> Result<Solved, Why> {
-    let value = target.value.map_err(Why::Program)?;
-    let index = mountings.of_motion(motion).ok_or(Why::Program(Reason::ToolUnknown))?;
-    let mounted = &mountings.list[index];
-    let (nominal, acting) = (arms.nominal.arm(), arms.estimated.arm());
-    let (meant, before) = match value {
-        TargetValue::Cartesian(t) => {
-            let meant = t.pose();
-            let flange = mounted.told.flange_for(&meant);
-            (meant, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
-        }
-        TargetValue::Joint(t) => {
-            let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
-            if let Some(joint) = nominal.model.limits.violated(&joints) {
-                return Err(Why::OutsideLimits { joint });
-            }
-            (mounted.told.target_of(&nominal.forward(&joints)), joints)
-        }
-    };
-    let reached_before = mounted.real.target_of(&acting.forward(&before));
-    let flange = mounted.real.flange_for(&meant);
-    let solution = arms.estimated.solve_near(&flange, &before).map_err(Why::of_inverse)?;
-    let after = solution.joints;
-    let told = mounted.told.target_of(&nominal.forward(&after));
-    let joint_form = matches!(value, TargetValue::Joint(_)) || options.emit == Emit::Joints;
-    let replayed = if joint_form {
-        after
-    } else {
-        let rounded = rounded(&told, options.position_decimals);
-        let flange = mounted.told.flange_for(&rounded);
-        arms.nominal.solve_near(&flange, &after).map_err(Why::of_inverse)?.joints
-    };
-    let reached_after = mounted.real.target_of(&acting.forward(&replayed));
-    let base_from_object = mounted.real.base_from_object(&flange);
-    let flange_from_tool = mounted.real.flange_from_tool(&flange);
-    let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
-    let (sigma_mm, outside) = match arms.knowledge {
-        Some(knowledge) => {
-            let carried = mounted.carried.as_ref();
-            let sigma = knowledge.position_sigma_mm(acting, &after, &flange_from_tool, carried);
-            (sigma, knowledge.region.outside(&after))
-        }
-        None => (0.0, None),
-    };
-    Ok(Solved {
-        mounted: index,
-        meant,
-        before,
-        after,
-        told,
-        conf: arms.nominal.configuration(&after),
-        deviation_before: in_object(&reached_before),
-        deviation_after: in_object(&reached_after),
-        sigma_mm,
-        outside,
-        singularity: solution.singularity,
-        intended: base_from_object * meant,
-        base_from_object,
-        flange_from_tool,
-    })
-}
-
-/// A pose as it will be read back: positions with so many decimals, quaternions with seven.
-fn rounded(pose: &Pose, decimals: u8) -> Pose {
-    let scale = 10f64.powi(i32::from(decimals));
-    let position = pose.translation.vector.map(|v| (v * scale).round() / scale);
-    let q = pose.rotation.quaternion().coords.map(|v| (v * 1e7).round() / 1e7);
-    Pose::from_parts(
-        position.into(),
-        nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(q)),
-    )
-}
-
-fn ends_of<'a>(targets: &SolvedTargets, mountings: &'a Mountings) -> Option<Ends<'a>> {
+/// The corrected end of a motion, where its last target was worked out.
+fn ends_of<'a>(targets: &[Result<Solved, Why>], mountings: &'a Mountings) -> Option<Ends<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
     Some(Ends {
         mounted: &mountings.list[to.mounted],
@@ -470,15 +329,61 @@ struct Worked {
     point: Option<PathPoint>,
 }
 
-fn work(
-    index: usize,
-    motion: &Motion,
-    listing: &Listing,
-    solved: &[SolvedTargets],
-    ends: &[Option<Ends<'_>>],
-    arms: &Arms<'_>,
-    options: &Options,
-) -> Worked {
+/// The two corrected ends of a motion whose path is checked.
+type Path<'a> = (Ends<'a>, Ends<'a>);
+
+impl<'a> Job<'a> {
+    fn portion(&self, motions: std::ops::Range<usize>) -> Portion {
+        let count = motions.len();
+        let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
+        // Whether lines are straight shows in their middles, which are worked out together.
+        let straight = |index: usize| self.listing.motions[index].kind == MotionKind::Linear;
+        let lines: Vec<&Path<'a>> = motions
+            .clone()
+            .zip(&paths)
+            .filter(|(i, _)| straight(*i))
+            .filter_map(|(_, p)| p.as_ref())
+            .collect();
+        let mut middles = middles_off(&lines, self.arms, self.options.emit).into_iter();
+        let mut out = Portion {
+            changes: Vec::with_capacity(count),
+            outcomes: Vec::with_capacity(count),
+            points: Vec::with_capacity(count),
+        };
+        for (index, path) in motions.zip(&paths) {
+            let middle = if straight(index) && path.is_some() { middles.next() } else { None };
+            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY));
+            out.changes.extend(worked.change);
+            out.outcomes.push(worked.outcome);
+            out.points.extend(worked.point);
+        }
+        out
+    }
+
+    /// The path to the end of a motion; `None` where it is not one between two corrected ends in one work object.
+    fn path(&self, index: usize) -> Option<Path<'a>> {
+        let motion = &self.listing.motions[index];
+        if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) {
+            return None;
+        }
+        let previous = motion.previous? as usize;
+        if !may_change(&self.listing.motions[previous], self.options) {
+            return None;
+        }
+        let from = ends_of(self.solved.of(previous), self.mountings)?;
+        let to = ends_of(self.solved.of(index), self.mountings)?;
+        (from.index == to.index).then_some((from, to))
+    }
+
+    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
+    fn work(&self, index: usize, path: Option<&Path<'a>>, middle_mm: f64) -> Worked {
+        work(index, self, path, middle_mm)
+    }
+}
+
+fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) -> Worked {
+    let Job { listing, solved, arms, options, .. } = *job;
+    let motion = &listing.motions[index];
     let mut outcome = MotionOutcome {
         motion: index as u32,
         status: Status::Left,
@@ -505,13 +410,13 @@ fn work(
     if let Some(reason) = motion.left {
         return finish(outcome, Status::Left, Some(Why::Program(reason)), None, None);
     }
-    let targets = &solved[index];
+    let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
             outcome.before_mm = Some(to.deviation_before.norm_mm());
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
-            Some(path_point(motion, to))
+            options.points.then(|| path_point(motion, to, &job.mountings.list[to.mounted].real))
         }
         _ => None,
     };
@@ -531,16 +436,11 @@ fn work(
         return finish(outcome, Status::Refused, Some(why), None, point);
     }
     // Then the path from the motion before.
-    let from = motion.previous.and_then(|p| ends[p as usize].as_ref());
-    let from_changes = motion.previous.is_some_and(|p| may_change(&listing.motions[p as usize], options));
     let (mut before, mut flag) = (Vec::new(), None);
-    if let (Some(from), Some(to)) = (from, ends[index].as_ref())
-        && from.index == to.index
-        && from_changes
-    {
+    if let Some((from, to)) = path {
         match motion.kind {
             MotionKind::Linear => {
-                let bend = straight_bend(from, to, arms, options.emit);
+                let bend = straight_bend(from, to, arms, options.emit, middle_mm);
                 outcome.bend_mm = Some(bend);
                 if bend > options.tolerance_mm {
                     if motion.timed {
@@ -595,8 +495,8 @@ fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why>
     if solved.singularity < options.min_singularity {
         return Some(Why::NearSingularity);
     }
-    let branch = |q: &Joints| arms.nominal.branch(q).map(|b| b.index());
-    if branch(&solved.before) != branch(&solved.after) {
+    // Without branches cfx is 0 everywhere.
+    if solved.conf_before.cfx != solved.conf.cfx {
         return Some(Why::OtherBranch);
     }
     None
@@ -638,16 +538,18 @@ fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: 
     }
 }
 
-fn path_point(motion: &Motion, solved: &Solved) -> PathPoint {
+fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
+    let flange = real.flange_for(&solved.meant);
+    let base_from_object = real.base_from_object(&flange);
     PathPoint {
         index: 0,
         line: motion.place.line,
         instruction: motion.instruction.to_string(),
         kind: motion.kind,
         cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
-        base_from_object: solved.base_from_object,
-        flange_from_tool: solved.flange_from_tool,
-        intended: solved.intended,
+        base_from_object,
+        flange_from_tool: real.flange_from_tool(&flange),
+        intended: base_from_object * solved.meant,
         normal: None,
         joints_before: Some(solved.before),
         joints_after: Some(solved.after),

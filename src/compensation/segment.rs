@@ -40,10 +40,16 @@ fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, arms: &Arms<'_>, emit: Emit) -
             }
         }
     };
-    let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&joints));
-    let meant = between(&from.meant, &to.meant, s);
-    // Along the line the tool may be early or late: only what lies beside the line counts, unless it is too short.
-    let off = reached.translation.vector - meant.translation.vector;
+    off_line(from, to, s, &arms.estimated.arm().forward(&joints))
+}
+
+/// How far the tool is from the intended line at share `s` of the way, with the flange where it is then.
+///
+/// Along the line the tool may be early or late: only what lies beside the line counts, unless it is too short.
+fn off_line(from: &Ends<'_>, to: &Ends<'_>, s: f64, flange: &Pose) -> f64 {
+    let reached = to.mounted.real.target_of(flange);
+    let meant = from.meant.translation.vector.lerp(&to.meant.translation.vector, s);
+    let off = reached.translation.vector - meant;
     let along = to.meant.translation.vector - from.meant.translation.vector;
     match along.try_normalize(1e-6) {
         Some(direction) => (off - direction * direction.dot(&off)).norm(),
@@ -51,15 +57,40 @@ fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, arms: &Arms<'_>, emit: Emit) -
     }
 }
 
+/// [`off_at`] the middle of many lines, in lanes.
+pub(super) fn middles_off(lines: &[&(Ends<'_>, Ends<'_>)], arms: &Arms<'_>, emit: Emit) -> Vec<f64> {
+    let halfway: Vec<Joints> = lines.iter().map(|(from, to)| from.joints.lerp(&to.joints, 0.5)).collect();
+    let joints: Vec<Option<Joints>> = match emit {
+        Emit::Joints => halfway.into_iter().map(Some).collect(),
+        Emit::Targets => {
+            let told = |(from, to): &&(Ends<'_>, Ends<'_>)| {
+                to.mounted.told.flange_for(&between(&from.told, &to.told, 0.5))
+            };
+            let flanges: Vec<Pose> = lines.iter().map(told).collect();
+            let solved = arms.nominal.solve_seeded(&flanges, &halfway);
+            solved.into_iter().map(|s| s.ok().map(|s| s.joints)).collect()
+        }
+    };
+    let known: Vec<Joints> = joints.iter().flatten().copied().collect();
+    let mut flanges = arms.estimated.arm().forward_many(&known).into_iter();
+    lines
+        .iter()
+        .zip(&joints)
+        .map(|((from, to), joints)| match joints.and_then(|_| flanges.next()) {
+            Some(flange) => off_line(from, to, 0.5, &flange),
+            None => f64::INFINITY,
+        })
+        .collect()
+}
+
 /// Longest piece of a line that is judged by three samples (mm).
 const PIECE_MM: f64 = 100.0;
 
-/// Largest distance from the intended line between two ends (mm): the middle first, the quarters where the middle is
-/// not clearly straight, and more samples on long lines.
-pub(super) fn straight_bend(from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>, emit: Emit) -> f64 {
+/// Largest distance from the intended line between two ends (mm): that of the `middle`, which is given, the quarters
+/// where the middle is not clearly straight, and more samples on long lines.
+pub(super) fn straight_bend(from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>, emit: Emit, middle: f64) -> f64 {
     let length = gap(&from.meant.translation.vector, &to.meant.translation.vector);
     let turn = from.meant.rotation.angle_to(&to.meant.rotation);
-    let middle = off_at(from, to, 0.5, arms, emit);
     if length < PIECE_MM && turn < 0.2 && middle < CLEARLY_STRAIGHT_MM {
         return middle;
     }
@@ -93,7 +124,8 @@ fn split(
     depth: usize,
     extra: &mut Vec<Extra>,
 ) -> f64 {
-    let bend = straight_bend(from, to, arms, options.emit);
+    let middle = off_at(from, to, 0.5, arms, options.emit);
+    let bend = straight_bend(from, to, arms, options.emit, middle);
     if bend <= options.tolerance_mm || depth == 0 {
         return bend;
     }

@@ -292,7 +292,7 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     let parameters = link_parameters(nominal);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows.dataset.rows.len()];
     // Priors for what cannot do without: first covariances of filters, boxes of swarms. The others ignore them.
-    let priors = Tolerance::default().priors(&parameters, nominal, frames);
+    let priors = Tolerance::default().priors(&parameters, nominal);
     let task = Calibration::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
     let estimate = solver.solve(&task, &vec![0.0; parameters.len()], seed);
     let (model, frames) = task.apply(&estimate.x);

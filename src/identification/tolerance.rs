@@ -75,8 +75,13 @@ impl Tolerance {
         }
     }
 
+    /// Priors of a list of parameters of an undisturbed measurement.
+    pub fn priors(&self, parameters: &[Parameter], model: &Model) -> Vec<Prior> {
+        parameters.iter().map(|p| self.prior(p, model)).collect()
+    }
+
     /// Priors of a list of parameters; `frames` holds the disturbances.
-    pub fn priors(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
+    pub fn priors_within(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
         parameters
             .iter()
             .map(|p| match *p {

@@ -105,6 +105,14 @@ impl Posed<'_> {
         );
     }
 
+    /// Poses of the flange for many joint vectors.
+    pub fn forward_many(&self, joints: &[Joints]) -> Vec<Pose> {
+        let columns: JointColumns = joints.iter().copied().collect();
+        let mut poses = PoseColumns::default();
+        self.forward_columns(&columns, &mut poses);
+        (0..joints.len()).map(|row| poses.pose(row)).collect()
+    }
+
     /// The last frame of eight rows.
     #[inline(always)]
     fn end_lanes(&self, joints: &JointColumns, from: usize) -> End<Lanes> {

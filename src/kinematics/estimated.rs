@@ -7,11 +7,13 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::arm_file::ArmFile;
+use super::chain::{Chain, cross, minus};
 use super::condition::Condition;
-use super::jacobian::{Ends, effect_twist, link_twist, parameter_jacobian};
+use super::jacobian::{Ends, effect_twist, parameter_jacobian};
 use super::model::{Joints, Model, Posed};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
+use crate::math::lanes::{Lanes, Real, WIDTH, vectorised};
 use crate::math::se3::{Pose, vector_from_pose};
 use crate::math::statistics::ErrorSummary;
 
@@ -137,6 +139,69 @@ pub struct Carried {
     pub twists: Vec<Vector6<f64>>,
 }
 
+/// A point that rides on the flange, whose predicted σ is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct RidingPoint<'a> {
+    /// Controller angles (rad).
+    pub joints: Joints,
+    /// The point on the flange: its translation counts.
+    pub flange_from_tool: Pose,
+    /// The frame that the arm itself placed, against which the point is judged.
+    pub carried: Option<&'a Carried>,
+}
+
+/// Velocities of a point that rides on the last frame at `rides`, for the parameters of links (zero for all others);
+/// hands back the point in the base (mm).
+#[inline(always)]
+fn link_velocities<R: Real>(
+    frames: &Chain<R>,
+    rides: &[R; 3],
+    scale: f64,
+    order: &[Parameter],
+    velocities: &mut [[R; 3]],
+) -> [R; 3] {
+    let mut point = frames.origin[6];
+    for (k, coordinate) in point.iter_mut().enumerate() {
+        *coordinate += rides[0] * frames.x[k] + rides[1] * frames.y[5][k] + rides[2] * frames.z[6][k];
+    }
+    let grown = |axis: &[R; 3]| axis.map(|v| v * R::splat(scale));
+    for (parameter, velocity) in order.iter().zip(velocities) {
+        *velocity = match *parameter {
+            Parameter::Link { joint, coordinate } => match coordinate {
+                LinkCoordinate::D => grown(&frames.z[joint]),
+                LinkCoordinate::A => grown(&frames.lateral[joint]),
+                LinkCoordinate::Theta => cross(&frames.z[joint], &minus(&point, &frames.origin[joint])),
+                LinkCoordinate::Alpha => {
+                    cross(&frames.lateral[joint], &minus(&point, &frames.origin[joint + 1]))
+                }
+                LinkCoordinate::Beta => cross(&frames.y[joint], &minus(&point, &frames.origin[joint + 1])),
+            },
+            _ => [R::splat(0.0); 3],
+        };
+    }
+    point
+}
+
+/// Σᵢⱼ Cᵢⱼ vᵢ·vⱼ for a symmetric C, given column by column.
+#[inline(always)]
+fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
+    let n = velocities.len();
+    let mut out = R::splat(0.0);
+    for (i, v) in velocities.iter().enumerate() {
+        let column = &matrix[i * n..i * n + i + 1];
+        let mut sum = [R::splat(0.0); 3];
+        for (c, w) in column.iter().zip(&velocities[..i]) {
+            for k in 0..3 {
+                sum[k] += R::splat(2.0 * c) * w[k];
+            }
+        }
+        for k in 0..3 {
+            out += v[k] * (sum[k] + R::splat(column[i]) * v[k]);
+        }
+    }
+    out
+}
+
 impl Estimated {
     /// Covariance of the position of a point on the flange (mm²), 3 × 3 in the base.
     pub fn position_covariance(
@@ -161,38 +226,63 @@ impl Estimated {
         flange_from_tool: &Pose,
         carried: Option<&Carried>,
     ) -> f64 {
-        let frames = arm.frames(q);
-        let flange = frames.last() * arm.model.flange;
-        let point: [f64; 3] = (flange * flange_from_tool).translation.vector.into();
+        let point = RidingPoint { joints: *q, flange_from_tool: *flange_from_tool, carried };
+        self.position_sigmas_mm(arm, &[point])[0]
+    }
+
+    /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
+    pub fn position_sigmas_mm(&self, arm: &Posed<'_>, points: &[RidingPoint<'_>]) -> Vec<f64> {
         let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
-        let velocity = |parameter: &Parameter| -> Vector3<f64> {
-            let twist = match *parameter {
-                Parameter::Link { joint, coordinate } => {
-                    let scale = if coordinate.is_length() { 1.0 + growth } else { 1.0 };
-                    link_twist(&frames, joint, coordinate, &point) * scale
+        let zero = Lanes([0.0; WIDTH]);
+        let mut velocities = vec![[zero; 3]; self.order.len()];
+        let mut out = Vec::with_capacity(points.len());
+        for block in points.chunks(WIDTH) {
+            let row = |k: usize| &block[k.min(block.len() - 1)];
+            let angles: [Lanes; 6] =
+                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| row(k).joints[i])));
+            let rides: [Vector3<f64>; WIDTH] =
+                std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
+            let rides: [Lanes; 3] = std::array::from_fn(|i| Lanes(std::array::from_fn(|k| rides[k][i])));
+            let at = vectorised(
+                #[inline(always)]
+                || {
+                    link_velocities(
+                        &arm.frames_of(&angles),
+                        &rides,
+                        1.0 + growth,
+                        &self.order,
+                        &mut velocities,
+                    )
+                },
+            );
+            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i].0[k]) };
+            if !arm.model.effects.is_empty() {
+                for k in 0..block.len() {
+                    let frames = arm.frames(&row(k).joints);
+                    for (parameter, velocity) in self.order.iter().zip(&mut velocities) {
+                        if let Parameter::Effect { index, parameter } = *parameter {
+                            let twist =
+                                effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
+                            (0..3).for_each(|i| velocity[i].0[k] = twist[i]);
+                        }
+                    }
                 }
-                Parameter::Effect { index, parameter } => {
-                    effect_twist(arm, q, &frames, index, parameter, &point)
+            }
+            for (k, here) in block.iter().enumerate() {
+                let Some(carried) = here.carried else { continue };
+                let lever = Vector3::from(point(k)) - carried.origin_mm;
+                for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
+                    let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
+                    (0..3).for_each(|i| velocity[i].0[k] -= moved[i]);
                 }
-                _ => Vector6::zeros(),
-            };
-            twist.fixed_rows::<3>(0).into_owned()
-        };
-        let mut velocities: Vec<Vector3<f64>> = self.order.iter().map(velocity).collect();
-        if let Some(carried) = carried {
-            let lever = Vector3::from(point) - carried.origin_mm;
-            for (v, twist) in velocities.iter_mut().zip(&carried.twists) {
-                *v -= twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
             }
+            let variance = vectorised(
+                #[inline(always)]
+                || quadratic(self.covariance.as_slice(), &velocities),
+            );
+            out.extend(variance.0[..block.len()].iter().map(|v| v.max(0.0).sqrt()));
         }
-        let mut variance = 0.0;
-        for (i, v) in velocities.iter().enumerate() {
-            variance += self.covariance[(i, i)] * v.norm_squared();
-            for (j, w) in velocities[..i].iter().enumerate() {
-                variance += 2.0 * self.covariance[(j, i)] * v.dot(w);
-            }
-        }
-        variance.max(0.0).sqrt()
+        out
     }
 
     /// Derivative of the position of a point on the flange with respect to the arm's parameters: 3 × p, in the base.

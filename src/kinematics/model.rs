@@ -111,8 +111,14 @@ impl Posed<'_> {
 
     /// All joint frames in the base.
     pub fn frames(&self, q: &Joints) -> Chain<f64> {
-        let rotation = self.rotations(q);
-        let (mut sin, mut cos) = ([0.0; 6], [0.0; 6]);
+        self.frames_of(&(*q).into())
+    }
+
+    /// All joint frames in the base, for one row or eight in lanes.
+    #[inline(always)]
+    pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
+        let rotation = self.affected(&self.mapped(q));
+        let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotation[i]);
         }

@@ -46,8 +46,12 @@ const SLACK_DEG: f64 = 0.5;
 /// A pose may lie this many spacings from its nearest measured neighbour without a flag.
 const SPACINGS: f64 = 2.0;
 
+fn square(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
 fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    square(a, b).sqrt()
 }
 
 impl Region {
@@ -102,8 +106,15 @@ impl Region {
         if beyond(worst) > SLACK_DEG {
             return Some(Outside::Joint { joint: worst, by_deg: beyond(worst) });
         }
-        let near = self.samples_deg.iter().map(|s| distance(s, &degrees)).fold(f64::INFINITY, f64::min);
-        let ratio = near / (SPACINGS * self.spacing_deg.max(SLACK_DEG));
-        (ratio > 1.0).then_some(Outside::Coverage { ratio })
+        let allowed = SPACINGS * self.spacing_deg.max(SLACK_DEG);
+        // The first sample that is near enough settles it.
+        let mut nearest = f64::INFINITY;
+        for sample in &self.samples_deg {
+            nearest = nearest.min(square(sample, &degrees));
+            if nearest <= allowed * allowed {
+                return None;
+            }
+        }
+        Some(Outside::Coverage { ratio: nearest.sqrt() / allowed })
     }
 }

@@ -4,6 +4,7 @@
 //! are reported, never resolved silently. All new text stands in one buffer, so that a million edits cost no million
 //! allocations.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use thiserror::Error;
@@ -78,6 +79,28 @@ impl Edits {
         self.entries.push(Entry { start: range.start, end: range.end, text_start, text_end });
     }
 
+    /// Makes room for lists that will be appended.
+    pub fn reserve<'e>(&mut self, others: impl Iterator<Item = &'e Edits>) {
+        let (mut entries, mut text) = (0, 0);
+        for other in others {
+            entries += other.entries.len();
+            text += other.text.len();
+        }
+        self.entries.reserve_exact(entries);
+        self.text.reserve_exact(text);
+    }
+
+    /// Adds the edits of another list behind those of this one.
+    pub fn append(&mut self, other: &Edits) {
+        let shift = self.text.len();
+        self.text.extend_from_slice(&other.text);
+        self.entries.extend(other.entries.iter().map(|entry| Entry {
+            text_start: entry.text_start + shift,
+            text_end: entry.text_end + shift,
+            ..*entry
+        }));
+    }
+
     /// Each edit: the bytes to replace and what shall stand there.
     pub fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[u8])> {
         self.entries
@@ -105,11 +128,14 @@ impl Edits {
 
     /// The new bytes. Sorts a copy of the list where it is not sorted.
     pub fn apply(&self, source: &[u8]) -> Result<Vec<u8>, EditError> {
-        let mut sorted = self.entries.clone();
-        sorted.sort_by_key(|entry| (entry.start, entry.end));
+        let key = |entry: &Entry| (entry.start, entry.end);
+        let mut sorted = Cow::Borrowed(&self.entries);
+        if !sorted.is_sorted_by_key(key) {
+            sorted.to_mut().sort_by_key(key);
+        }
         let mut length = source.len();
         let mut last = 0..0;
-        for entry in &sorted {
+        for entry in sorted.iter() {
             let range = entry.start..entry.end;
             if entry.start > entry.end || entry.end > source.len() {
                 return Err(EditError::Outside { range, length: source.len() });
@@ -122,7 +148,7 @@ impl Edits {
         }
         let mut out = Vec::with_capacity(length);
         let mut at = 0;
-        for entry in &sorted {
+        for entry in sorted.iter() {
             out.extend_from_slice(&source[at..entry.start]);
             out.extend_from_slice(&self.text[entry.text_start..entry.text_end]);
             at = entry.end;

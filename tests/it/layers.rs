@@ -15,6 +15,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "measurement",
         "estimation",
         "identification",
+        "diagnosis",
         "compensation",
         "planning",
         "comparison",
@@ -28,6 +29,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("measurement", vec!["math", "kinematics"]),
         ("estimation", vec!["math"]),
         ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
+        ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
         ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
         (

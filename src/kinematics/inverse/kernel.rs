@@ -216,6 +216,19 @@ impl Kernel {
         }
     }
 
+    /// [`Structure::margins`] of joints, for one row or eight in lanes.
+    #[inline(always)]
+    pub(super) fn margins<R: SinCos>(
+        &self,
+        arm: &Posed<'_>,
+        structure: &Structure,
+        joints: &[R; 6],
+    ) -> [R; 3] {
+        let frames = self.frames(arm, &arm.mapped(joints));
+        let wrist = at(&frames.origin[6], &[frames.x, frames.y[5], frames.z[6]], &self.wrist_mm);
+        structure.margins(&frames, &wrist)
+    }
+
     /// Joint frames for mapped angles.
     #[inline(always)]
     fn frames<R: SinCos>(&self, arm: &Posed<'_>, mapped: &[R; 6]) -> Chain<R> {

@@ -36,7 +36,8 @@ pub(super) struct Goal {
 
 impl Goal {
     pub(super) fn of(target: &Pose, flange: &Pose) -> Self {
-        let last = target * flange.inverse();
+        let mut last = target * flange.inverse();
+        last.rotation.renormalize();
         Self {
             last,
             rotation: last.rotation.to_rotation_matrix().into_inner(),

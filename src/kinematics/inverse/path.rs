@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::configuration::{self, Configuration};
 use super::kernel::Solved;
-use super::{Inverse, InverseError, Solution, same_branch};
+use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::chain::End;
 use crate::kinematics::model::Joints;
 use crate::math::lanes::{Lanes, SinCos, WIDTH, vectorised};
@@ -72,6 +73,35 @@ impl Inverse<'_> {
             .collect()
     }
 
+    /// [`Inverse::configuration`] of many joint vectors.
+    pub fn configurations(&self, joints: &[Joints]) -> Vec<Configuration> {
+        let branches = self.structure.has_branches();
+        let margins = self.margins_of_many(joints);
+        let branch = |m| branches.then(|| Branch::of(m));
+        joints.iter().zip(&margins).map(|(q, m)| configuration::of(branch(m), q)).collect()
+    }
+
+    /// Whether each joint vector is of the configuration that was asked for, borders counted to both sides as in
+    /// [`Inverse::solve_configured`].
+    pub fn fitting(&self, joints: &[Joints], wanted: &[Configuration]) -> Vec<bool> {
+        let margins = self.margins_of_many(joints);
+        joints.iter().zip(&margins).zip(wanted).map(|((q, m), wanted)| wanted.fits(q, m)).collect()
+    }
+
+    fn margins_of_many(&self, joints: &[Joints]) -> Vec<[f64; 3]> {
+        let mut out = Vec::with_capacity(joints.len());
+        for block in joints.chunks(WIDTH) {
+            let angles: [Lanes; 6] =
+                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| block[k.min(block.len() - 1)][i])));
+            let margins = vectorised(
+                #[inline(always)]
+                || self.kernel.margins(&self.arm, &self.structure, &angles),
+            );
+            out.extend((0..block.len()).map(|k| margins.map(|m| m.0[k])));
+        }
+        out
+    }
+
     fn solve_block<'s>(
         &'s self,
         targets: &'s [Pose],
@@ -120,10 +150,14 @@ impl Inverse<'_> {
     }
 
     /// Place of the last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
+    ///
+    /// The quaternion need not have length 1 to the last bit: an interpolated one seldom has, and axes that are longer
+    /// than 1 by 1e-11 ask for a place that no joints reach.
     #[inline(always)]
     fn place<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> End<R> {
         let [x, y, z, w] = *quaternion;
-        let (one, two) = (R::splat(1.0), R::splat(2.0));
+        let one = R::splat(1.0);
+        let two = R::splat(2.0) / (x * x + y * y + z * z + w * w);
         let columns = [
             [one - two * (y * y + z * z), two * (x * y + w * z), two * (x * z - w * y)],
             [two * (x * y - w * z), one - two * (x * x + z * z), two * (y * z + w * x)],

@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use rayon::prelude::*;
+
 use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
 use super::mark;
 use super::print::{self, Fresh};
@@ -17,6 +19,9 @@ use crate::program::motion::{Motion, MotionKind, Origin, Reason, Role, Span, Tar
 use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 use crate::program::tree::Child;
 
+/// Changes that one thread takes at a time.
+const PORTION: usize = 1024;
+
 /// Names of data have at most so many characters.
 const NAME_LENGTH: usize = 32;
 
@@ -26,13 +31,7 @@ impl Task<'_> {
     /// A change of a motion that must be left ([`Motion::reason`]) is refused with that reason; two changes of one
     /// motion would overlap and are an error.
     pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
-        let mut rewriter = Rewriter {
-            task: self,
-            options,
-            edits: vec![Edits::new(); self.trees.len()],
-            names: None,
-            moved_bases: HashSet::new(),
-        };
+        let mut rewriter = Rewriter::new(self, options);
         let outcomes = rewriter.all(changes);
         let mut files = Vec::with_capacity(self.trees.len());
         for (edits, tree) in rewriter.edits.into_iter().zip(&self.trees) {
@@ -63,6 +62,9 @@ struct Wish {
     target: u32,
     fresh: Fresh,
 }
+
+/// Wishes by declaration and first byte of the literal.
+type WishesOf = BTreeMap<(u32, u32), Vec<Wish>>;
 
 /// Who uses which declared target.
 struct Users {
@@ -103,22 +105,15 @@ struct Rewriter<'r, 's> {
     moved_bases: HashSet<u32>,
 }
 
-impl Rewriter<'_, '_> {
+impl<'r, 's> Rewriter<'r, 's> {
+    fn new(task: &'r Task<'s>, options: &'r RewriteOptions) -> Self {
+        let edits = vec![Edits::new(); task.trees.len()];
+        Rewriter { task, options, edits, names: None, moved_bases: HashSet::new() }
+    }
+
     fn all(&mut self, changes: &[Change]) -> Vec<Outcome> {
         let task = self.task;
-        let mut outcomes: Vec<Outcome> = Vec::with_capacity(changes.len());
-        let mut wishes: BTreeMap<(u32, u32), Vec<Wish>> = BTreeMap::new();
-        let mut computed: Vec<Wish> = Vec::new();
-        for (index, change) in changes.iter().enumerate() {
-            let outcome = match task.listing.motions.get(change.motion as usize) {
-                None => Outcome::Refused(Reason::MissingArgument),
-                Some(motion) => match self.refusal(motion, change) {
-                    Some(reason) => Outcome::Refused(reason),
-                    None => self.one(index, motion, change, &mut wishes, &mut computed),
-                },
-            };
-            outcomes.push(outcome);
-        }
+        let (mut outcomes, wishes, computed) = self.in_place(changes);
         let replaced: HashSet<(u32, u32)> = computed.iter().map(|wish| (wish.motion, wish.target)).collect();
         if !wishes.is_empty() {
             let users = Users::of(task, &replaced);
@@ -136,6 +131,45 @@ impl Rewriter<'_, '_> {
             }
         }
         outcomes
+    }
+
+    /// What stands in the instructions themselves, in portions on all threads: an edit of one instruction depends on
+    /// no other. Wishes for declared and computed targets are collected, in the order of the changes.
+    fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, WishesOf, Vec<Wish>) {
+        let (task, options) = (self.task, self.options);
+        let portions: Vec<_> = changes
+            .par_chunks(PORTION)
+            .enumerate()
+            .map(|(portion, changes)| {
+                let mut part = Rewriter::new(task, options);
+                let (mut wishes, mut computed) = (WishesOf::new(), Vec::new());
+                let outcomes: Vec<Outcome> = (portion * PORTION..)
+                    .zip(changes)
+                    .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
+                        None => Outcome::Refused(Reason::MissingArgument),
+                        Some(motion) => match part.refusal(motion, change) {
+                            Some(reason) => Outcome::Refused(reason),
+                            None => part.one(index, motion, change, &mut wishes, &mut computed),
+                        },
+                    })
+                    .collect();
+                (part.edits, outcomes, wishes, computed)
+            })
+            .collect();
+        let (mut outcomes, mut wishes, mut computed) =
+            (Vec::with_capacity(changes.len()), WishesOf::new(), Vec::new());
+        for (file, all) in self.edits.iter_mut().enumerate() {
+            all.reserve(portions.iter().map(|(edits, ..)| &edits[file]));
+        }
+        for (edits, mut some, wished, mut left) in portions {
+            self.edits.iter_mut().zip(&edits).for_each(|(all, some)| all.append(some));
+            outcomes.append(&mut some);
+            for (place, mut more) in wished {
+                wishes.entry(place).or_default().append(&mut more);
+            }
+            computed.append(&mut left);
+        }
+        (outcomes, wishes, computed)
     }
 
     /// Why a change cannot be made.
@@ -185,7 +219,7 @@ impl Rewriter<'_, '_> {
         index: usize,
         motion: &Motion,
         change: &Change,
-        wishes: &mut BTreeMap<(u32, u32), Vec<Wish>>,
+        wishes: &mut WishesOf,
         computed: &mut Vec<Wish>,
     ) -> Outcome {
         let mut outcome = Outcome::Unchanged;

@@ -416,8 +416,8 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
     }));
     let knots_rad = (0..12).map(|_| 2e-4 * even(random)).collect();
     out.effects.push(Effect::GearMap(JointMap { joint: 1, knots_rad }));
-    let lump =
-        [(3, None), (6, Some(1))].map(|(frame, axis)| Lump { frame, axis, factor: 3e-6 * even(random) });
+    let lump = [(3, None, None), (6, Some(1), None), (2, None, Some(0)), (4, Some(0), Some(2))]
+        .map(|(frame, axis, moment)| Lump { frame, axis, moment, factor: 3e-6 * even(random) });
     out.effects.push(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: lump.to_vec() }));
     out.effects.push(Effect::GearRatio(Ratio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
