@@ -15,4 +15,5 @@ mod planning;
 mod report;
 mod visual;
 mod command;
+mod programs;
 mod layers;

@@ -512,6 +512,7 @@ impl Lister<'_, '_> {
             tool: None,
             work_object: None,
             timed: false,
+            insertable: false,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
             conditional: said.skippable,
@@ -689,10 +690,13 @@ impl Lister<'_, '_> {
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
         motion.left = self.left_because(said, mode, machine, &motion);
+        motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
             && !heidenhain
             && !said.skippable
+            && !motion.timed
             && before.start.iter().all(Option::is_some);
+        motion.insertable = insertable;
         let after = self.written_as(said, None);
         let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
             before.start_angles
