@@ -13,6 +13,8 @@ mod robots;
 mod simulate;
 mod identify;
 mod diagnose;
+mod compare;
+mod track;
 mod path;
 mod programs;
 mod compensate;
@@ -45,6 +47,10 @@ enum Verb {
     Identify(identify::Arguments),
     /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
     Diagnose(diagnose::Arguments),
+    /// Methods side by side under a paper's protocol.
+    Compare(compare::Arguments),
+    /// Keep a model accurate as measurements come in.
+    Track(track::Arguments),
     /// A surface to a RAPID program.
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
@@ -104,6 +110,8 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
+        Verb::Compare(arguments) => compare::run(&arguments),
+        Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),

@@ -18,6 +18,8 @@ pub mod format;
 pub mod identification;
 pub mod diagnosis;
 pub mod study;
+pub mod comparison;
+pub mod tracking;
 pub mod deviation;
 pub mod compensation;
 pub mod batch;

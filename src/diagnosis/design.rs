@@ -2,10 +2,17 @@
 //!
 //! With J the whitened Jacobian of the n scalar rows by the p free parameters and Λ their prior precisions,
 //! JᵀJ + Λ = L Lᵀ and Q = J L⁻ᵀ. A candidate with columns C (n × k) has, with everything else refitted to first order, the
-//! gradient g = Cᵀr − (QᵀC)ᵀ b, b = L⁻¹(Jᵀr + Λx), and the information S = CᵀC − (QᵀC)ᵀ(QᵀC).
+//! gradient g = Cᵀr and the information S = CᵀC − (QᵀC)ᵀ(QᵀC), with r the residual at the optimum. The model without some
+//! of the parameters follows from the same J: their columns go, their share J x goes back into r, and the rest is solved
+//! anew, r ← r − Q L⁻¹(Jᵀr + Λx).
 //!
 //! Source: the score test with nuisance parameters, Rao 1948; the projection is that of Frisch and Waugh.
 
+use std::sync::Arc;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::extension::{Extended, Subject};
@@ -15,6 +22,27 @@ use crate::kinematics::parameter::{LinkCoordinate, Parameter};
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
 
+/// Slopes of the whitened residual by what candidates are made of, n each.
+#[derive(Debug, Clone)]
+pub struct Slopes {
+    /// By the rotation of each joint.
+    pub by_joint: Vec<DVector<f64>>,
+    /// By a common relative growth of all lengths.
+    pub by_growth: DVector<f64>,
+    /// By the touched point on the flange, n × 3.
+    pub by_tool: DMatrix<f64>,
+    /// By the sensor's frame or the outlet, n × 6 or n × 3.
+    pub by_frame: DMatrix<f64>,
+    /// By a cable's zero; zeros for other sensors.
+    pub by_zero: DVector<f64>,
+    /// By the sensor's scale.
+    pub by_scale: DVector<f64>,
+    /// By a cable's squared weight over tension; zeros for other sensors.
+    pub by_sag: DVector<f64>,
+    /// What a whitened residual is worth in mm; 0 for orientations.
+    pub mm: Vec<f64>,
+}
+
 /// See the module page. Scalar rows are ordered observation by observation.
 #[derive(Debug, Clone)]
 pub struct Design {
@@ -22,26 +50,26 @@ pub struct Design {
     pub observations: usize,
     /// Scalar rows of an observation.
     pub per: usize,
-    /// Residuals, n.
+    /// Residuals at the optimum of what is free, n.
     pub residual: DVector<f64>,
     /// Q transposed, p × n.
     pub basis: DMatrix<f64>,
-    /// b, p.
-    pub pull: DVector<f64>,
-    /// Residual's slope by the rotation of each joint, n each.
-    pub by_joint: Vec<DVector<f64>>,
-    /// Residual's slope by a common relative growth of all lengths, n.
-    pub by_growth: DVector<f64>,
-    /// By the touched point on the flange, n × 3.
-    pub by_tool: DMatrix<f64>,
-    /// By the sensor's frame or the outlet, n × 6 or n × 3.
-    pub by_frame: DMatrix<f64>,
-    /// By a cable's zero, n; zeros for other sensors.
-    pub by_zero: DVector<f64>,
-    /// By the sensor's scale, n.
-    pub by_scale: DVector<f64>,
-    /// By a cable's squared weight over tension, n; zeros for other sensors.
-    pub by_sag: DVector<f64>,
+    /// What candidates are made of.
+    pub slopes: Arc<Slopes>,
+}
+
+/// A fit linearised, from which the design of any smaller model follows without a refit.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    observations: usize,
+    per: usize,
+    jacobian: DMatrix<f64>,
+    /// JᵀJ + Λ.
+    normal: DMatrix<f64>,
+    residual: DVector<f64>,
+    x: Vec<f64>,
+    precision: Vec<f64>,
+    slopes: Arc<Slopes>,
 }
 
 /// What a candidate's columns come to against a design.
@@ -55,7 +83,7 @@ pub struct Projected {
     pub shared: DMatrix<f64>,
 }
 
-impl Design {
+impl Linear {
     /// Linearises a fit at its estimate.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
         let dataset = &subject.observed.dataset;
@@ -67,16 +95,11 @@ impl Design {
         fit.task.jacobian(&fit.x, 0..rows, &mut residual, &mut jacobian);
         let residual = DVector::from_vec(residual).map(finite);
         let jacobian = DMatrix::from_vec(rows, p, jacobian).map(finite);
-        let mut normal = jacobian.tr_mul(&jacobian);
-        for (k, prior) in fit.priors.iter().enumerate() {
-            normal[(k, k)] += prior.sigma.powi(-2);
+        let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
+        let mut normal = gram(&jacobian);
+        for (k, precision) in precision.iter().enumerate() {
+            normal[(k, k)] += precision;
         }
-        let lower = lower_factor(normal);
-        let transposed = jacobian.transpose();
-        let basis = lower.solve_lower_triangular(&transposed).unwrap_or_else(|| DMatrix::zeros(p, rows));
-        let gradient = jacobian.tr_mul(&residual) + fit.prior_pull();
-        let pull = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
-
         // Slopes by what candidates are made of, at the estimate.
         let anchors = dataset.anchors();
         let mut probes: Vec<Parameter> = Vec::new();
@@ -120,12 +143,10 @@ impl Design {
             (DMatrix::from_columns(&columns), DVector::zeros(rows))
         };
         let (by_scale, by_sag) = readings(subject, fit, per, &weights);
-        Self {
-            observations: dataset.rows.len(),
-            per,
-            residual,
-            basis,
-            pull,
+        let mm = (0..rows)
+            .map(|s| if s % per < 3 { 1.0 / weights[s / per].per_mm.max(1e-12) } else { 0.0 })
+            .collect();
+        let slopes = Arc::new(Slopes {
             by_joint: (0..6).map(column).collect(),
             by_growth,
             by_tool: DMatrix::from_columns(&[column(18), column(19), column(20)]),
@@ -133,14 +154,51 @@ impl Design {
             by_zero,
             by_scale,
             by_sag,
+            mm,
+        });
+        let observations = dataset.rows.len();
+        Self { observations, per, jacobian, normal, residual, x: fit.x.clone(), precision, slopes }
+    }
+
+    /// The design of the model without the parameters at `dropped`.
+    pub fn design(&self, dropped: &[usize]) -> Design {
+        let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
+        let p = kept.len();
+        let mut residual = self.residual.clone();
+        for &k in dropped {
+            residual.axpy(-self.x[k], &self.jacobian.column(k), 1.0);
         }
+        let normal = DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]);
+        let lower = lower_factor(normal);
+        let part = self.jacobian.select_columns(&kept);
+        let mut gradient = part.tr_mul(&residual);
+        for (g, &k) in gradient.iter_mut().zip(&kept) {
+            *g += self.precision[k] * self.x[k];
+        }
+        let basis = solved(&lower, part.transpose());
+        let step = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
+        residual.gemv_tr(-1.0, &basis, &step, 1.0);
+        Design {
+            observations: self.observations,
+            per: self.per,
+            residual,
+            basis,
+            slopes: Arc::clone(&self.slopes),
+        }
+    }
+}
+
+impl Design {
+    /// The design of a whole fit.
+    pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
+        Linear::of(subject, fit).design(&[])
     }
 
     /// Columns against everything that is already free.
     pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
-        let shared = &self.basis * columns;
-        let gradient = columns.tr_mul(&self.residual) - shared.tr_mul(&self.pull);
-        let information = columns.tr_mul(columns) - shared.tr_mul(&shared);
+        let shared = product(&self.basis, columns);
+        let gradient = columns.tr_mul(&self.residual);
+        let information = gram(columns) - gram(&shared);
         Projected { gradient, information, shared }
     }
 
@@ -148,6 +206,55 @@ impl Design {
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
+}
+
+/// Replaces a positive definite matrix by its lower Cholesky factor; `false` for one that is not.
+pub(super) fn factored(a: &mut DMatrix<f64>) -> bool {
+    let n = a.nrows();
+    let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(request);
+    let place = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
+    let done = llt::factor::cholesky_in_place(
+        place,
+        Default::default(),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    a.fill_upper_triangle(0.0, 1);
+    done.is_ok() && a.diagonal().iter().all(|d| *d > 0.0)
+}
+
+/// Solves L Lᵀ x = b.
+pub(super) fn back_and_forth(lower: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
+    lower.tr_solve_lower_triangular(&lower.solve_lower_triangular(b)?)
+}
+
+/// AᵀA.
+pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
+    product(&a.transpose(), a)
+}
+
+/// A B on all threads; the same bits for any number, since every entry is one sum in one order.
+pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
+    let left = MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols());
+    let right = MatRef::from_column_major_slice(b.as_slice(), b.nrows(), b.ncols());
+    let (rows, columns) = out.shape();
+    let place = MatMut::from_column_major_slice_mut(out.as_mut_slice(), rows, columns);
+    faer::linalg::matmul::matmul(place, Accum::Replace, left, right, 1.0, Par::Seq);
+    out
+}
+
+/// L⁻¹ B.
+fn solved(lower: &DMatrix<f64>, mut b: DMatrix<f64>) -> DMatrix<f64> {
+    let n = lower.nrows();
+    let (rows, columns) = b.shape();
+    let left = MatRef::from_column_major_slice(lower.as_slice(), n, n);
+    let place = MatMut::from_column_major_slice_mut(b.as_mut_slice(), rows, columns);
+    faer::linalg::triangular_solve::solve_lower_triangular_in_place(left, place, Par::Seq);
+    b.apply(|v| *v = finite(*v));
+    b
 }
 
 fn finite(v: f64) -> f64 {
@@ -163,8 +270,8 @@ fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
         for k in 0..n {
             shifted[(k, k)] += ridge * normal[(k, k)].abs().max(f64::MIN_POSITIVE);
         }
-        if let Some(factor) = shifted.cholesky() {
-            return factor.l();
+        if factored(&mut shifted) {
+            return shifted;
         }
         ridge = if ridge == 0.0 { 1e-14 } else { ridge * 10.0 };
     }
@@ -181,26 +288,26 @@ fn readings(
     let dataset = &subject.observed.dataset;
     let rows = dataset.rows.len() * per;
     let (mut scale, mut sag) = (DVector::zeros(rows), DVector::zeros(rows));
-    let rotation = fit.frames.base_from_sensor.rotation;
+    let origin = fit.frames.base_from_sensor.translation.vector;
+    let touched = nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector);
     for (i, row) in dataset.rows.iter().enumerate() {
         let w = weights[i].per_mm;
+        // Where the model sees the point, not where the reading has it: noise is no evidence of a scale.
+        let at = (fit.model.forward(&row.joints, &row.condition) * touched).coords;
         match row.reading {
-            Reading::Cable(length) => {
-                scale[i] = w * finite(length);
-                let at = (fit.model.forward(&row.joints, &row.condition)
-                    * nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector))
-                .coords;
-                sag[i] = w * finite(sag_mm(1.0, &(at - fit.frames.outlets_mm[row.anchor])));
+            Reading::Cable(_) => {
+                let away = at - fit.frames.outlets_mm[row.anchor];
+                scale[i] = w * finite(away.norm() + fit.frames.zeros_mm[row.anchor]);
+                sag[i] = w * finite(sag_mm(1.0, &away));
             }
-            Reading::Position(p) => space(&mut scale, i * per, w, rotation * p),
-            Reading::Pose(pose) => space(&mut scale, i * per, w, rotation * pose.translation.vector),
+            Reading::Position(_) | Reading::Pose(_) => space(&mut scale, i * per, w, at - origin),
         }
     }
     (scale, sag)
 }
 
-fn space(scale: &mut DVector<f64>, at: usize, w: f64, turned: Vector3<f64>) {
+fn space(scale: &mut DVector<f64>, at: usize, w: f64, seen: Vector3<f64>) {
     for k in 0..3 {
-        scale[at + k] = -w * finite(turned[k]);
+        scale[at + k] = -w * finite(seen[k]);
     }
 }

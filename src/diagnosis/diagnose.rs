@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::cause::Cause;
-use super::design::Design;
+use super::design::{Design, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{
     Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
@@ -13,7 +13,7 @@ use super::picture::{Picture, picture};
 use super::remaining::{self, Structure};
 use super::rows::{Prepared, prepare};
 use super::score::non_centrality;
-use super::selection::{self, Accepted, BLOCKS, Scored, Selection, scale_beside_growth};
+use super::selection::{self, Accepted, BLOCKS, Folds, Scored, Selection, scale_beside_growth};
 use super::validation::{StageError, Validation, nominal};
 use super::words;
 use crate::identification::calibration::Frames;
@@ -28,6 +28,7 @@ use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors
 use crate::kinematics::model::Model;
 use crate::kinematics::region::Region;
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::sensor::disturbance::{Course, Disturbance};
 use crate::measurement::split;
 
 /// How to diagnose.
@@ -119,25 +120,48 @@ pub fn diagnose(
         });
     }
     tell("looking for causes");
-    let selection = match needed {
-        None => selection::select(&subject, &options.selection, tell),
-        Some(_) => {
-            let none = selection::Options { most: 0, ..options.selection };
-            selection::select(&subject, &none, tell)
+    let thinned = thinned(&prepared.observed);
+    let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
+    let most = if needed.is_some() { 0 } else { options.selection.most };
+    let selection = selection::select(&searched, &selection::Options { most, ..options.selection }, tell);
+    let Selection { geometric, extended: found, accepted, left, .. } = selection;
+    let (geometric, extended) = match &thinned {
+        None => (geometric, found.clone()),
+        Some(thin) => {
+            tell("fitting all rows");
+            notes.push(format!(
+                "causes were looked for in {} of the {} rows, evenly spread; the fits and their errors are of all rows",
+                thin.dataset.rows.len(),
+                dataset.rows.len()
+            ));
+            let causes = to_the_end(&found.causes, &thin.dataset, dataset);
+            (
+                fit(&subject, &[], Freedom::All, Some(&geometric)),
+                fit(&subject, &causes, Freedom::All, Some(&found)),
+            )
         }
     };
-    let Selection { geometric, extended, accepted, left, .. } = selection;
     let wild = remaining::outliers(&extended);
     let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
     tell("holding rows out");
     let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
-    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
+    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(&subject, fit));
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
-    let context =
-        Context { subject: &subject, validation: &validation, extended: &extended, after: stages[2] };
+    let linear = Linear::of(&searched, &found);
+    let whole = linear.design(&[]);
+    let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
+    let context = Context {
+        subject: &searched,
+        found: &found,
+        extended: &extended,
+        linear: &linear,
+        whole: &whole,
+        splits: &split::folds(&searched.observed.dataset, 5, options.selection.seed),
+        set_aside: &aside,
+    };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking at what is left");
     findings.extend(rounding_finding(dataset, &prepared, &subject, &validation, &geometric, &stages));
@@ -212,6 +236,44 @@ pub fn diagnose(
     })
 }
 
+/// Scalar rows in which causes are looked for, at most.
+const SEARCHED: usize = 9_000;
+
+/// Evenly spread rows of a very long data set; `None` for one that is searched whole.
+fn thinned(observed: &crate::identification::fit::Observed) -> Option<crate::identification::fit::Observed> {
+    let dataset = &observed.dataset;
+    let per = match dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let stride = (dataset.rows.len() * per).div_ceil(SEARCHED);
+    (stride > 1).then(|| {
+        let rows: Vec<usize> = (0..dataset.rows.len()).step_by(stride).collect();
+        observed.subset(&rows)
+    })
+}
+
+/// Intervals that reach the last of the rows that were searched reach the last row there is.
+fn to_the_end(causes: &[Cause], searched: &Dataset, dataset: &Dataset) -> Vec<Cause> {
+    let last = |d: &Dataset| d.rows.last().map_or(0, |r| r.number);
+    causes
+        .iter()
+        .map(|cause| match cause {
+            Cause::Measurement(Disturbance { kind, course: Course::Rows { from, to }, values })
+                if *to == last(searched) =>
+            {
+                Cause::Measurement(Disturbance {
+                    kind: kind.clone(),
+                    course: Course::Rows { from: *from, to: last(dataset) },
+                    values: values.clone(),
+                })
+            }
+            other => other.clone(),
+        })
+        .collect()
+}
+
 /// Poses needed, where there are too few.
 fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     let per = match dataset.sensor {
@@ -240,13 +302,25 @@ fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
 }
 
 struct Context<'a> {
+    /// Where causes were looked for: all rows, or some of very many.
     subject: &'a Subject<'a>,
-    validation: &'a Validation,
+    /// The fit there.
+    found: &'a Extended,
+    /// The fit to all rows.
     extended: &'a Extended,
-    after: StageError,
+    /// Linearised where causes were looked for.
+    linear: &'a Linear,
+    whole: &'a Design,
+    splits: &'a [split::Split],
+    set_aside: &'a [usize],
 }
 
 impl Context<'_> {
+    /// Held-out error of a design, with columns added or not, to first order (mm).
+    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
+        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
+    }
+
     /// A finding for every story, and which finding each cause went into.
     fn findings(
         &self,
@@ -259,8 +333,11 @@ impl Context<'_> {
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
         for (index, own) in accepted.iter().enumerate() {
             let cause = &self.extended.causes[index];
-            let step = fit(self.subject, &self.extended.causes[..=index], Freedom::All, None);
-            steps.push(Step { added: told_short(cause), cv_rmse_mm: self.validation.random_rmse(&step) });
+            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+            steps.push(Step {
+                added: told_short(cause),
+                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
+            });
             let parameters = words::parameters(self.extended, index);
             let mergeable = cause.rows().is_none();
             let told = findings.iter().position(|f: &Finding| {
@@ -295,23 +372,21 @@ impl Context<'_> {
         parameters: Vec<FoundParameter>,
         last: usize,
     ) -> (Finding, Picture) {
-        let mut without = self.extended.causes.clone();
-        without.remove(index);
-        let before = fit(self.subject, &without, Freedom::All, None);
-        let before_mm = self.validation.random_rmse(&before);
+        let without = self.linear.design(&self.found.places(index));
+        let folds = Folds::of(&without, self.splits);
+        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
         let mut alternatives: Vec<Alternative> = own
             .rivals
             .iter()
             .take(3)
             .map(|rival| {
-                let mut causes = without.clone();
-                causes.push(rival.candidate.cause.clone());
-                let swapped = fit(self.subject, &causes, Freedom::All, Some(&before));
+                let columns = rival.candidate.columns(&without);
+                let sizes = rival.candidate.cause.sizes();
                 Alternative {
                     effect: rival.candidate.cause.name().to_owned(),
                     joints: pendant(&rival.candidate.cause.joints()),
                     rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm: self.validation.random_rmse(&swapped),
+                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
                     beaten_by: own.own.merit - rival.score.merit,
                 }
             })
@@ -332,7 +407,7 @@ impl Context<'_> {
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
-        let picture = picture(self.subject, cause, &before, self.extended);
+        let picture = picture(self.subject, cause, &without, self.whole);
         let finding = Finding {
             effect: cause.name().to_owned(),
             cause: words::cause(cause, &parameters, last),
@@ -352,7 +427,7 @@ impl Context<'_> {
             parameters,
             p_value: own.log_p.exp(),
             non_centrality: Some(lambda),
-            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.after.random.rmse },
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.held_out(self.whole, None) },
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),
         };
@@ -623,8 +698,7 @@ fn not_testable(
         );
     }
     if missing("sensor-scale") {
-        let design = Design::of(context.subject, context.extended);
-        let one = scale_beside_growth(&design, &DVector::from_element(1, 1e-3));
+        let one = scale_beside_growth(context.whole, &DVector::from_element(1, 1e-3));
         if one < VISIBLE {
             add(
                 "sensor-scale",

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::cause::Cause;
 use super::design::Design;
-use super::extension::{Extended, Subject};
+use super::extension::Subject;
 use crate::kinematics::effect::Effect;
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Kind};
@@ -27,8 +27,8 @@ pub struct Picture {
 /// A row turns a joint visibly when its lever is at least this share of the longest.
 const LEVER: f64 = 0.25;
 
-/// The picture of a cause: `before` is the fit without it, `after` the extended one.
-pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Extended, after: &Extended) -> Picture {
+/// The picture of a cause: `before` is the model without it, `after` the extended one.
+pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &Design) -> Picture {
     let dataset = &subject.observed.dataset;
     let joint = match cause {
         Cause::Arm(Effect::ThermalDrift(_)) | Cause::Measurement(_) => None,
@@ -58,8 +58,8 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Extended, after: &
         return Picture {
             x: label,
             y: (format!("residual turned to joint {}", joint + 1), "°"),
-            before: turned(subject, before, joint, &x),
-            after: turned(subject, after, joint, &x),
+            before: turned(before, joint, &x),
+            after: turned(after, joint, &x),
             rows: None,
         };
     }
@@ -88,21 +88,22 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Extended, after: &
         }
         _ => (("data row".to_owned(), ""), Box::new(number)),
     };
-    let along = direction(cause, after);
+    let along = direction(cause);
     let y_label = match (dataset.sensor, along) {
         (Sensor::Cable, _) => "residual of the cable's length".to_owned(),
         (_, Some(_)) => "residual along the shift".to_owned(),
         (_, None) => "size of the residual".to_owned(),
     };
-    let shown = |fit: &Extended| -> Vec<[f64; 2]> {
-        let plain = fit.task.plain_residuals(&fit.x);
-        let per = plain.len() / dataset.rows.len().max(1);
+    let shown = |design: &Design| -> Vec<[f64; 2]> {
+        let per = design.per;
+        let mm = |s: usize| design.residual[s] * design.slopes.mm[s];
         (0..dataset.rows.len())
             .map(|i| {
+                let vector = || Vector3::from_fn(|k, _| mm(i * per + k));
                 let y = match (per, along) {
-                    (1, _) => plain[i],
-                    (_, Some(along)) => Vector3::from_column_slice(&plain[i * per..i * per + 3]).dot(&along),
-                    (_, None) => Vector3::from_column_slice(&plain[i * per..i * per + 3]).norm(),
+                    (1, _) => mm(i),
+                    (_, Some(along)) => vector().dot(&along),
+                    (_, None) => vector().norm(),
                 };
                 [x(i), y]
             })
@@ -112,7 +113,7 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Extended, after: &
 }
 
 /// Unit vector of a shift of the sensor in the base, where that is the direction to look along.
-fn direction(cause: &Cause, _: &Extended) -> Option<Vector3<f64>> {
+fn direction(cause: &Cause) -> Option<Vector3<f64>> {
     match cause {
         Cause::Measurement(d) if matches!(d.kind, Kind::Frame { .. }) => {
             Vector3::new(d.values[0], d.values[1], d.values[2]).try_normalize(1e-9)
@@ -122,9 +123,8 @@ fn direction(cause: &Cause, _: &Extended) -> Option<Vector3<f64>> {
 }
 
 /// For each row, the rotation of a joint that would explain most of its residual (°).
-fn turned(subject: &Subject<'_>, fit: &Extended, joint: usize, x: &dyn Fn(usize) -> f64) -> Vec<[f64; 2]> {
-    let design = Design::of(subject, fit);
-    let theta = &design.by_joint[joint];
+fn turned(design: &Design, joint: usize, x: &dyn Fn(usize) -> f64) -> Vec<[f64; 2]> {
+    let theta = &design.slopes.by_joint[joint];
     let rows: Vec<(f64, f64)> = (0..design.observations)
         .map(|i| {
             (i * design.per..(i + 1) * design.per)

@@ -1,15 +1,18 @@
 //! Which causes go into the model: forward by evidence and held-out error, backward, exchanged, until nothing helps.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::catalogue::{Candidate, arm_candidates, measurement_candidates};
+use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
 use super::cause::Cause;
-use super::design::Design;
+use super::design::{Design, Linear, back_and_forth, factored, gram, product};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::score::{Score, score};
 use super::{intervals, lines};
 use crate::kinematics::effect::Effect;
+use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::split::{self, Split};
@@ -35,7 +38,7 @@ impl Default for Options {
 #[derive(Debug, Clone)]
 pub struct Scored {
     /// The candidate.
-    pub candidate: Candidate,
+    pub candidate: Arc<Candidate>,
     /// Its score.
     pub score: Score,
 }
@@ -70,7 +73,9 @@ pub struct Selection {
 
 /// Candidates that do not depend on a fit, built once.
 pub struct Catalogue {
-    fixed: Vec<Candidate>,
+    fixed: Vec<Arc<Candidate>>,
+    /// A fine error map of each joint.
+    fine: Vec<Arc<Candidate>>,
     /// Kinds of shifts with their regressors over all rows.
     shifts: Vec<Candidate>,
     families: f64,
@@ -102,7 +107,8 @@ impl Catalogue {
         stories.sort();
         stories.dedup();
         let families = stories.len() as f64;
-        Self { fixed, shifts, families }
+        let fine = (0..6).map(|joint| Arc::new(fine_map(subject, joint))).collect();
+        Self { fixed: fixed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 
     /// All candidates against a fit, best first.
@@ -118,17 +124,20 @@ impl Catalogue {
                 subject.nominal,
             ));
         }
-        let mut open: Vec<Candidate> = Vec::new();
+        let mut open: Vec<Arc<Candidate>> = Vec::new();
         for whole in &shifts {
             let Cause::Measurement(disturbance) = &whole.cause else { continue };
             let found = intervals::scan(design, &whole.columns(design), &whole.cause.sizes(), 2);
             for interval in found {
                 let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
                 let shift = Disturbance::new(disturbance.kind.clone(), Course::Rows { from, to });
-                open.push(Candidate { tried, ..Candidate::measurement(shift, dataset, subject.nominal) });
+                let candidate = Candidate::measurement(shift, dataset, subject.nominal);
+                open.push(Arc::new(Candidate { tried, ..candidate }));
             }
         }
-        open.extend(lines::candidates(subject, design));
+        let (found, mapped) = lines::candidates(subject, design);
+        open.extend(found.into_iter().map(Arc::new));
+        open.extend(mapped.into_iter().map(|joint| Arc::clone(&self.fine[joint])));
         let mut out: Vec<Scored> = self
             .fixed
             .par_iter()
@@ -162,13 +171,15 @@ fn known_load(fit: &Extended) -> Option<Kind> {
 }
 
 /// Grams of Q over the folds of a split, for held-out errors to first order.
-struct Folds {
+#[derive(Debug, Clone)]
+pub struct Folds {
     tests: Vec<Vec<usize>>,
     grams: Vec<DMatrix<f64>>,
 }
 
 impl Folds {
-    fn of(design: &Design, splits: &[Split]) -> Self {
+    /// For a design; `splits` in observations.
+    pub fn of(design: &Design, splits: &[Split]) -> Self {
         let tests: Vec<Vec<usize>> = splits
             .iter()
             .map(|s| s.test.iter().flat_map(|&i| i * design.per..(i + 1) * design.per).collect())
@@ -177,34 +188,68 @@ impl Folds {
             .par_iter()
             .map(|rows| {
                 let q = design.basis.select_columns(rows);
-                &q * q.transpose()
+                product(&q, &q.transpose())
             })
             .collect();
         Self { tests, grams }
     }
 
-    /// Sum of squares of the whitened held-out residuals, everything refitted in every fold to first order.
+    /// Sum of squares of the whitened held-out residuals.
     fn held_out(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> f64 {
+        self.residuals(design, columns).iter().map(DVector::norm_squared).sum()
+    }
+
+    /// Sizes of the held-out position errors (mm), observation by observation, those at `set_aside` left out.
+    pub fn errors_mm(
+        &self,
+        design: &Design,
+        columns: Option<(&DMatrix<f64>, &[f64])>,
+        set_aside: &[usize],
+    ) -> Vec<f64> {
+        let mut out = Vec::new();
+        for (rows, residuals) in self.tests.iter().zip(self.residuals(design, columns)) {
+            for (scalars, r) in rows.chunks(design.per).zip(residuals.as_slice().chunks(design.per)) {
+                if !set_aside.contains(&(scalars[0] / design.per)) {
+                    let square = scalars.iter().zip(r).map(|(&s, r)| (r * design.slopes.mm[s]).powi(2));
+                    out.push(square.sum::<f64>().sqrt());
+                }
+            }
+        }
+        out
+    }
+
+    /// Root mean square of [`Folds::errors_mm`].
+    pub fn rmse_mm(
+        &self,
+        design: &Design,
+        columns: Option<(&DMatrix<f64>, &[f64])>,
+        set_aside: &[usize],
+    ) -> f64 {
+        ErrorSummary::of(self.errors_mm(design, columns, set_aside)).rmse
+    }
+
+    /// Whitened held-out residuals fold by fold, everything refitted in every fold to first order.
+    fn residuals(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> Vec<DVector<f64>> {
         let p = design.basis.nrows();
         let empty = DMatrix::zeros(design.rows(), 0);
         let (columns, sizes) = columns.unwrap_or((&empty, &[]));
         let k = columns.ncols();
-        let shared = &design.basis * columns;
-        let square = columns.tr_mul(columns);
+        let shared = product(&design.basis, columns);
+        let square = gram(columns);
         let gradient = columns.tr_mul(&design.residual);
         self.tests
             .par_iter()
             .zip(&self.grams)
-            .map(|(rows, gram)| {
+            .map(|(rows, part)| {
                 let q = design.basis.select_columns(rows);
                 let c = columns.select_rows(rows);
                 let r = DVector::from_iterator(rows.len(), rows.iter().map(|&s| design.residual[s]));
                 let mut normal = DMatrix::zeros(p + k, p + k);
-                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - gram));
-                let cross = &shared - &q * &c;
+                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - part));
+                let cross = &shared - product(&q, &c);
                 normal.view_mut((0, p), (p, k)).copy_from(&cross);
                 normal.view_mut((p, 0), (k, p)).copy_from(&cross.transpose());
-                let mut own = &square - c.tr_mul(&c);
+                let mut own = &square - gram(&c);
                 for a in 0..k {
                     own[(a, a)] += sizes[a].powi(-2);
                 }
@@ -213,15 +258,14 @@ impl Folds {
                     normal[(a, a)] *= 1.0 + 1e-12;
                 }
                 let mut right = DVector::zeros(p + k);
-                right.rows_mut(0, p).copy_from(&(&design.pull - &q * &r));
+                right.rows_mut(0, p).copy_from(&(-(&q * &r)));
                 right.rows_mut(p, k).copy_from(&(&gradient - c.tr_mul(&r)));
-                let Some(factor) = normal.cholesky() else { return f64::INFINITY };
-                let step = -factor.solve(&right);
-                (r + q.tr_mul(&step.rows(0, p)) + c * step.rows(p, k)).norm_squared()
+                let solved = factored(&mut normal).then(|| back_and_forth(&normal, &right)).flatten();
+                let Some(step) = solved else { return r * f64::INFINITY };
+                let step = -step;
+                r + q.tr_mul(&step.rows(0, p)) + c * step.rows(p, k)
             })
-            .collect::<Vec<f64>>()
-            .iter()
-            .sum()
+            .collect()
     }
 }
 
@@ -241,49 +285,81 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let blocks = split::blocks(dataset, BLOCKS);
     let mut current = geometric.clone();
     let mut refused: Vec<Cause> = Vec::new();
-    let mut left;
-    loop {
+    // Causes that were not far ahead of a rival when they came in: they are looked at again after every step.
+    let mut doubtful: Vec<Cause> = Vec::new();
+    for _ in 0..4 * options.most.max(1) {
         let design = Design::of(subject, &current);
-        left = catalogue.scored(subject, &current, &design);
-        if current.causes.len() >= options.most {
-            break;
-        }
-        let folds = (Folds::of(&design, &random), Folds::of(&design, &blocks));
-        let before = (folds.0.held_out(&design, None), folds.1.held_out(&design, None));
-        let mut taken = None;
-        for scored in left.iter().take_while(|s| s.score.merit > 0.0) {
-            if catalogue.corrected(scored) > options.alpha.ln()
-                || refused.contains(&scored.candidate.cause)
-                || already(&current.causes, &scored.candidate.cause)
-            {
-                continue;
+        let left = catalogue.scored(subject, &current, &design);
+        let taken = (current.causes.len() < options.most)
+            .then(|| {
+                let folds = (Folds::of(&design, &random), Folds::of(&design, &blocks));
+                let before = (folds.0.held_out(&design, None), folds.1.held_out(&design, None));
+                left.iter().take_while(|s| s.score.merit > 0.0).find(|scored| {
+                    if catalogue.corrected(scored) > options.alpha.ln()
+                        || refused.contains(&scored.candidate.cause)
+                        || already(&current.causes, &scored.candidate.cause)
+                    {
+                        return false;
+                    }
+                    let columns = scored.candidate.columns(&design);
+                    let sizes = scored.candidate.cause.sizes();
+                    let after = folds.0.held_out(&design, Some((&columns, &sizes)));
+                    let local = scored.candidate.cause.rows().is_some();
+                    let in_blocks = folds.1.held_out(&design, Some((&columns, &sizes)));
+                    after < before.0 && (local || in_blocks < before.1 * BLOCK_SLACK)
+                })
+            })
+            .flatten();
+        let Some(taken) = taken else {
+            let all: Vec<usize> = (0..current.causes.len()).collect();
+            match review(subject, &catalogue, options, &current, &all) {
+                Review::Changed(settled) => {
+                    current = settled;
+                    continue;
+                }
+                Review::Settled(accepted) => {
+                    let families = catalogue.families;
+                    return Selection { geometric, extended: current, accepted, left, families };
+                }
             }
-            let columns = scored.candidate.columns(&design);
-            let sizes = scored.candidate.cause.sizes();
-            let after = folds.0.held_out(&design, Some((&columns, &sizes)));
-            let local = scored.candidate.cause.rows().is_some();
-            let in_blocks = folds.1.held_out(&design, Some((&columns, &sizes)));
-            if after < before.0 && (local || in_blocks < before.1 * BLOCK_SLACK) {
-                taken = Some(scored);
-                break;
-            }
-        }
-        let Some(taken) = taken else { break };
-        tell(&format!("{} {}", current.causes.len() + 1, taken.candidate.cause.name()));
+        };
+        let cause = taken.candidate.cause.clone();
+        tell(&format!("{}. {}", current.causes.len() + 1, cause.name()));
+        let near = left
+            .iter()
+            .any(|s| !s.candidate.cause.same_story(&cause) && s.score.merit > taken.score.merit - DOUBT);
         let mut causes = current.causes.clone();
-        causes.push(taken.candidate.cause.clone());
-        let grown = fit(subject, &causes, Freedom::All, Some(&current));
-        let settled = exchanged(subject, &catalogue, options, grown);
-        if settled.causes.len() <= current.causes.len() {
-            // The newcomer did not survive beside the others: not to be tried again.
-            refused.push(taken.candidate.cause.clone());
+        causes.push(cause.clone());
+        let count = current.causes.len();
+        current = fit(subject, &causes, Freedom::All, Some(&current));
+        if near {
+            doubtful.push(cause.clone());
         }
-        current = settled;
+        for _ in 0..options.most {
+            let unsure: Vec<usize> =
+                (0..current.causes.len()).filter(|&k| already(&doubtful, &current.causes[k])).collect();
+            match review(subject, &catalogue, options, &current, &unsure) {
+                Review::Changed(settled) => current = settled,
+                Review::Settled(_) => break,
+            }
+        }
+        if current.causes.len() <= count && !already(&current.causes, &cause) {
+            // The newcomer did not survive beside the others: not to be tried again.
+            refused.push(cause);
+        }
     }
-    let accepted =
-        (0..current.causes.len()).map(|index| judged(subject, &catalogue, &current, index)).collect();
+    // Causes that take turns without end: the last state is judged as it stands.
+    let design = Design::of(subject, &current);
+    let left = catalogue.scored(subject, &current, &design);
+    let linear = Linear::of(subject, &current);
+    let accepted = (0..current.causes.len())
+        .map(|index| looked_at(subject, &catalogue, &current, &linear, index).0)
+        .collect();
     Selection { geometric, extended: current, accepted, left, families: catalogue.families }
 }
+
+/// A cause whose best rival has this much less merit, or more, is looked at again after every step.
+const DOUBT: f64 = 30.0;
 
 /// Whether a cause with the same parameters is in the model.
 fn already(causes: &[Cause], candidate: &Cause) -> bool {
@@ -299,21 +375,6 @@ fn already(causes: &[Cause], candidate: &Cause) -> bool {
         (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.course == b.course,
         _ => false,
     })
-}
-
-/// The model without cause `index`, and everything scored against it.
-fn without(
-    subject: &Subject<'_>,
-    catalogue: &Catalogue,
-    current: &Extended,
-    index: usize,
-) -> (Extended, Design, Vec<Scored>) {
-    let mut causes = current.causes.clone();
-    causes.remove(index);
-    let reduced = fit(subject, &causes, Freedom::All, Some(&near(current, index)));
-    let design = Design::of(subject, &reduced);
-    let scored = catalogue.scored(subject, &reduced, &design);
-    (reduced, design, scored)
 }
 
 /// A fit to start from when cause `index` goes: its parameters are taken out, so that the others keep their values.
@@ -357,46 +418,53 @@ fn near(current: &Extended, index: usize) -> Extended {
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
 
-/// Drops causes that no longer carry themselves and exchanges those that another explains better.
-fn exchanged(
+/// What looking again at accepted causes came to.
+enum Review {
+    /// One was dropped or exchanged.
+    Changed(Extended),
+    /// All stand.
+    Settled(Vec<Accepted>),
+}
+
+/// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
+/// explains better.
+fn review(
     subject: &Subject<'_>,
     catalogue: &Catalogue,
     options: &Options,
-    mut current: Extended,
-) -> Extended {
-    for _ in 0..2 * options.most {
-        let mut changed = false;
-        for index in 0..current.causes.len() {
-            let (reduced, design, scored) = without(subject, catalogue, &current, index);
-            let own = own_score(subject, &design, &scored, &current.causes[index]);
-            let best = scored.iter().find(|s| {
-                catalogue.corrected(s) <= options.alpha.ln() && !already(&reduced.causes, &s.candidate.cause)
-            });
-            match best {
-                Some(best)
-                    if best.score.merit > own.score.merit + EXCHANGE
-                        && !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause) =>
-                {
-                    let mut causes = reduced.causes.clone();
-                    causes.push(best.candidate.cause.clone());
-                    current = fit(subject, &causes, Freedom::All, Some(&reduced));
-                    changed = true;
-                }
-                _ if own.score.merit <= 0.0 || catalogue.corrected(&own) > options.alpha.ln() => {
-                    current = reduced;
-                    changed = true;
-                }
-                _ => {}
-            }
-            if changed {
-                break;
-            }
-        }
-        if !changed {
-            break;
-        }
+    current: &Extended,
+    which: &[usize],
+) -> Review {
+    let mut accepted = Vec::new();
+    if which.is_empty() {
+        return Review::Settled(accepted);
     }
-    current
+    let linear = Linear::of(subject, current);
+    for &index in which {
+        let (judged, scored) = looked_at(subject, catalogue, current, &linear, index);
+        let mut others = current.causes.clone();
+        others.remove(index);
+        let best = scored
+            .iter()
+            .find(|s| catalogue.corrected(s) <= options.alpha.ln() && !already(&others, &s.candidate.cause));
+        let better = best.filter(|best| {
+            best.score.merit > judged.own.merit + EXCHANGE
+                && !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
+        });
+        let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+        if better.is_some() || !carries {
+            let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
+            return Review::Changed(match better {
+                Some(better) => {
+                    others.push(better.candidate.cause.clone());
+                    fit(subject, &others, Freedom::All, Some(&reduced))
+                }
+                None => reduced,
+            });
+        }
+        accepted.push(judged);
+    }
+    Review::Settled(accepted)
 }
 
 /// The score of a cause itself, from the list where it is there, computed otherwise (its own rows or order).
@@ -417,22 +485,30 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
         })
         .map(|s| s.candidate.tried)
         .fold(1.0, f64::max);
-    let candidate = Candidate { tried, ..candidate };
+    let candidate = Arc::new(Candidate { tried, ..candidate });
     let score = score(design, &candidate);
     Scored { candidate, score }
 }
 
-fn judged(subject: &Subject<'_>, catalogue: &Catalogue, current: &Extended, index: usize) -> Accepted {
+/// A cause against the model without it: the judgement, and every candidate's score there.
+fn looked_at(
+    subject: &Subject<'_>,
+    catalogue: &Catalogue,
+    current: &Extended,
+    linear: &Linear,
+    index: usize,
+) -> (Accepted, Vec<Scored>) {
     let cause = &current.causes[index];
-    let (_, design, scored) = without(subject, catalogue, current, index);
+    let design = linear.design(&current.places(index));
+    let scored = catalogue.scored(subject, current, &design);
     let own = own_score(subject, &design, &scored, cause);
     let mut rivals: Vec<Scored> = Vec::new();
-    for other in scored {
-        let same = other.candidate.cause.same_story(cause)
-            || current.causes.iter().any(|c| already(std::slice::from_ref(c), &other.candidate.cause));
+    for other in &scored {
+        let same =
+            other.candidate.cause.same_story(cause) || already(&current.causes, &other.candidate.cause);
         let told = rivals.iter().any(|r| r.candidate.cause.same_story(&other.candidate.cause));
         if !same && !told && other.score.merit > 0.25 * own.score.merit.max(0.0) {
-            rivals.push(other);
+            rivals.push(other.clone());
         }
         if rivals.len() >= 5 {
             break;
@@ -440,12 +516,13 @@ fn judged(subject: &Subject<'_>, catalogue: &Catalogue, current: &Extended, inde
     }
     let beside_growth =
         (cause.name() == "sensor-scale").then(|| scale_beside_growth(&design, &own.score.estimate));
-    Accepted { log_p: catalogue.corrected(&own), own: own.score, rivals, beside_growth }
+    let log_p = catalogue.corrected(&own);
+    (Accepted { own: own.score, log_p, rivals, beside_growth }, scored)
 }
 
 /// Non-centrality of a sensor's scale of that size when all lengths of the arm may grow together freely.
 pub fn scale_beside_growth(design: &Design, estimate: &DVector<f64>) -> f64 {
-    let columns = DMatrix::from_columns(&[design.by_scale.clone(), design.by_growth.clone()]);
+    let columns = DMatrix::from_columns(&[design.slopes.by_scale.clone(), design.slopes.by_growth.clone()]);
     let s = design.project(&columns).information;
     let own = s[(0, 0)] - s[(0, 1)].powi(2) / s[(1, 1)].max(1e-300);
     own.max(0.0) * estimate.get(0).copied().unwrap_or(0.0).powi(2)

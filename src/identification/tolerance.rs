@@ -75,8 +75,13 @@ impl Tolerance {
         }
     }
 
+    /// Priors of a list of parameters of an undisturbed measurement.
+    pub fn priors(&self, parameters: &[Parameter], model: &Model) -> Vec<Prior> {
+        parameters.iter().map(|p| self.prior(p, model)).collect()
+    }
+
     /// Priors of a list of parameters; `frames` holds the disturbances.
-    pub fn priors(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
+    pub fn priors_within(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
         parameters
             .iter()
             .map(|p| match *p {
@@ -97,9 +102,14 @@ pub fn effect_sigma(effect: &Effect) -> f64 {
         // A compliance of 1e-5 rad/(N m) times 30 kg.
         Effect::LumpedCompliance(_) => 3e-4,
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
-        Effect::GearMap(_) => 0.05_f64.to_radians(),
+        // The same curve over more knots, each of them smaller.
+        Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,
+        Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
+
+/// A smooth correction moves the wrist by tenths of a millimetre at half a metre.
+pub const SMOOTH_SIGMA_RAD: f64 = 6e-4;
