@@ -12,6 +12,7 @@ mod progress;
 mod robots;
 mod simulate;
 mod identify;
+mod stated;
 mod path;
 mod compensate;
 mod deviation;
