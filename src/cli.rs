@@ -13,6 +13,7 @@ mod robots;
 mod simulate;
 mod identify;
 mod stated;
+mod diagnose;
 mod path;
 mod compensate;
 mod deviation;
@@ -42,6 +43,8 @@ enum Verb {
     Simulate(simulate::Arguments),
     /// Fit the arm to measured poses: a model file, and what the data could tell.
     Identify(identify::Arguments),
+    /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
+    Diagnose(diagnose::Arguments),
     /// A surface to a RAPID program.
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
@@ -100,6 +103,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Robots(arguments) => robots::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
+        Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),

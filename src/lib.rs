@@ -9,6 +9,7 @@ pub mod robots;
 pub mod measurement;
 pub mod estimation;
 pub mod identification;
+pub mod diagnosis;
 pub mod compensation;
 pub mod planning;
 pub mod report;

@@ -4,3 +4,4 @@ pub mod lanes;
 pub mod se3;
 pub mod difference;
 pub mod statistics;
+pub mod tail;

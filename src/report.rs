@@ -16,6 +16,7 @@ pub mod plot;
 pub mod document;
 pub mod format;
 pub mod identification;
+pub mod diagnosis;
 pub mod study;
 pub mod deviation;
 pub mod compensation;

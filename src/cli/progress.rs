@@ -18,6 +18,11 @@ impl Work {
         bar.enable_steady_tick(Duration::from_millis(120));
         Self(bar)
     }
+
+    /// Shows what is being done now.
+    pub(super) fn tell(&self, message: &str) {
+        self.0.set_message(message.to_owned());
+    }
 }
 
 impl Drop for Work {

@@ -25,11 +25,13 @@ use rayon::prelude::*;
 
 use crate::estimation::problem::{NormalEquations, Prior, Problem};
 use crate::kinematics::condition::Condition;
-use crate::kinematics::model::Model;
+use crate::kinematics::effect::Statics;
+use crate::kinematics::model::{Joints, Model};
 use crate::kinematics::parameter::Parameter;
 use crate::math::lanes::WIDTH;
 use crate::math::se3::{Pose, moved};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 
 /// How the sensor stands to the arm: what a calibration must find beside the arm itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +44,8 @@ pub struct Frames {
     pub outlets_mm: Vec<Vector3<f64>>,
     /// What must be added to each cable's free length to give its reading (mm).
     pub zeros_mm: Vec<f64>,
+    /// What disturbed the measurement; empty for an undisturbed one.
+    pub disturbances: Vec<Disturbance>,
 }
 
 impl Frames {
@@ -52,6 +56,7 @@ impl Frames {
             flange_from_target: Pose::identity(),
             outlets_mm: vec![Vector3::zeros(); anchors],
             zeros_mm: vec![0.0; anchors],
+            disturbances: Vec::new(),
         }
     }
 }
@@ -93,6 +98,8 @@ struct Columns {
     growth: Vec<f64>,
     /// For each free effect parameter: rotations and growth per unit.
     effects: Vec<EffectColumns>,
+    /// How far each disturbance goes in each row.
+    courses: Vec<Vec<f64>>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -116,7 +123,7 @@ impl Calibration {
         priors: &[Prior],
         weights: &[Weight],
     ) -> Self {
-        let columns = Columns::of(dataset, start, parameters, weights);
+        let columns = Columns::of(dataset, start, frames, parameters, weights);
         Self {
             start: start.clone(),
             frames: frames.clone(),
@@ -138,6 +145,11 @@ impl Calibration {
         &self.start
     }
 
+    /// The starting frames.
+    pub fn starting_frames(&self) -> &Frames {
+        &self.frames
+    }
+
     /// The model and the frames that `x` stands for.
     pub fn apply(&self, x: &[f64]) -> (Model, Frames) {
         let (mut model, mut frames) = (self.start.clone(), self.frames.clone());
@@ -156,6 +168,9 @@ impl Calibration {
                 }
                 Parameter::Outlet { anchor, axis } => frames.outlets_mm[anchor][axis] += value,
                 Parameter::Zero { anchor } => frames.zeros_mm[anchor] += value,
+                Parameter::Disturbance { index, parameter } => {
+                    frames.disturbances[index].values[parameter] += value;
+                }
             }
         }
         frames.base_from_sensor = moved(&frames.base_from_sensor, &sensor);
@@ -332,7 +347,13 @@ impl Calibration {
 }
 
 impl Columns {
-    fn of(dataset: &Dataset, start: &Model, parameters: &[Parameter], weights: &[Weight]) -> Self {
+    fn of(
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        weights: &[Weight],
+    ) -> Self {
         let n = dataset.rows.len();
         let padded = n.div_ceil(WIDTH) * WIDTH;
         let row = |i: usize| &dataset.rows[i.min(n.saturating_sub(1))];
@@ -366,10 +387,61 @@ impl Columns {
             anchor: (0..padded).map(|i| row(i).anchor).collect(),
             ..Self::default()
         };
-        if !start.effects.is_empty() {
+        let loads = frames.disturbances.iter().any(|d| matches!(d.kind, Kind::Load { .. }));
+        if !start.effects.is_empty() || loads {
             out.add_effects(dataset, start, parameters, padded);
         }
+        out.courses =
+            frames.disturbances.iter().map(|d| column(&|i| d.course.at(row(i)))).collect::<Vec<_>>();
+        if loads {
+            out.add_loads(dataset, start, frames, parameters, padded);
+        }
         out
+    }
+
+    /// Loads that the log does not tell of bend the joints like an effect, in the rows of their course.
+    fn add_loads(
+        &mut self,
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        padded: usize,
+    ) {
+        let torques = flange_torques(dataset, start);
+        for (index, disturbance) in frames.disturbances.iter().enumerate() {
+            let Kind::Load { joints, compliance } = &disturbance.kind else { continue };
+            let course = self.courses[index].clone();
+            let along = |k: usize, parameter: usize| match compliance {
+                Some(compliance) => compliance[k],
+                None => f64::from(u8::from(k == parameter)),
+            };
+            for parameter in 0..disturbance.values.len() {
+                let rotation: [Option<Vec<f64>>; 6] = std::array::from_fn(|joint| {
+                    let k = joints.iter().position(|&j| j == joint)?;
+                    let factor = along(k, parameter);
+                    (factor != 0.0).then(|| {
+                        (0..padded)
+                            .map(|i| {
+                                factor * course[i] * torques[i.min(torques.len().saturating_sub(1))][joint]
+                            })
+                            .collect()
+                    })
+                });
+                if let Some(extra) = &mut self.extra {
+                    for (column, rotation) in extra.iter_mut().zip(&rotation) {
+                        let Some(rotation) = rotation else { continue };
+                        for (e, r) in column.iter_mut().zip(rotation) {
+                            *e += disturbance.values[parameter] * r;
+                        }
+                    }
+                }
+                let here = Parameter::Disturbance { index, parameter };
+                if let Some(place) = parameters.iter().position(|p| *p == here) {
+                    self.effects.push(EffectColumns { place, rotation, growth: None });
+                }
+            }
+        }
     }
 
     fn add_effects(&mut self, dataset: &Dataset, start: &Model, parameters: &[Parameter], padded: usize) {
@@ -397,8 +469,12 @@ impl Columns {
                 extra[j][i] = rotation[j];
             }
             growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
+            let mut at = (usize::MAX, Vec::new());
             for (columns, &(_, index, parameter)) in effects.iter_mut().zip(&free) {
-                let regressor = posed.effect_regressors(index, &row.joints)[parameter];
+                if at.0 != index {
+                    at = (index, posed.effect_regressors(index, &row.joints));
+                }
+                let regressor = at.1[parameter];
                 for j in (0..6).filter(|&j| regressor[j] != 0.0) {
                     columns.rotation[j].get_or_insert_with(|| vec![0.0; padded])[i] = regressor[j];
                 }
@@ -419,4 +495,12 @@ impl Columns {
         self.growth = growth;
         self.effects = effects;
     }
+}
+
+/// Torque about each joint of 1 kg at the flange, for every row (N m).
+pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+    let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
+    let statics = Statics::of(&bare);
+    let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
+    dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
 }

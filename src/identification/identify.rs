@@ -292,7 +292,7 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     let evaluations = estimate.evaluations;
     let freedom = (task.rows() as f64 - parameters.len() as f64).max(1.0);
     let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
-    let priors = Tolerance::default().priors(&parameters, nominal);
+    let priors = Tolerance::default().priors(&parameters, nominal, &frames);
     let rounds = vec![estimate.trace.clone()];
     Fitted {
         parameters,
@@ -308,7 +308,7 @@ fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, s
     }
 }
 
-fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {
+pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {
     let sigmas = fitted.sigmas();
     fitted
         .parameters
@@ -333,10 +333,16 @@ fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> 
                 Parameter::Base(axis) => fitted.frames.base_from_sensor.rotation.scaled_axis()[axis - 3],
                 Parameter::Outlet { anchor, axis } => fitted.frames.outlets_mm[anchor][axis],
                 Parameter::Zero { anchor } => fitted.frames.zeros_mm[anchor],
+                Parameter::Disturbance { index, parameter } => {
+                    fitted.frames.disturbances[index].values[parameter]
+                }
             };
             let unit = match *parameter {
                 Parameter::Effect { index, parameter } => {
                     fitted.model.effects[index].parameters()[parameter].unit
+                }
+                Parameter::Disturbance { index, parameter } => {
+                    fitted.frames.disturbances[index].names()[parameter].1
                 }
                 _ => parameter.unit(),
             };
@@ -353,12 +359,12 @@ fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> 
         .collect()
 }
 
-fn arm_of(fitted: &Fitted) -> Vec<Parameter> {
+pub(crate) fn arm_of(fitted: &Fitted) -> Vec<Parameter> {
     fitted.parameters.iter().copied().filter(Parameter::is_of_arm).collect()
 }
 
 /// The block of the arm's parameters: marginal over the frames.
-fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
+pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
     let places: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
     let n = places.len();
@@ -382,7 +388,7 @@ fn noise_floor(observed: &Observed, fitted: &Fitted) -> Option<f64> {
     (mean > 0.0).then(|| mean.sqrt())
 }
 
-fn mean_condition(dataset: &Dataset) -> Condition {
+pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
     let mean = |value: fn(&Condition) -> Option<f64>| {
         let known: Vec<f64> = dataset.rows.iter().filter_map(|r| value(&r.condition)).collect();
         median(&known)
@@ -395,7 +401,7 @@ fn mean_condition(dataset: &Dataset) -> Condition {
     }
 }
 
-fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &Fitted) -> Estimated {
+pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &Fitted) -> Estimated {
     let joints: Vec<Joints> = dataset.rows.iter().map(|r| r.joints).collect();
     let mut region = Region::of(&joints, 0.0);
     let condition = estimated.condition;

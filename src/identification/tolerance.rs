@@ -4,9 +4,11 @@
 //! speaks. A frame of the sensor is not manufactured: its priors are wide.
 
 use crate::estimation::problem::Prior;
+use crate::identification::calibration::Frames;
 use crate::kinematics::effect::Effect;
 use crate::kinematics::model::Model;
 use crate::kinematics::parameter::Parameter;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 
 /// Standard deviations of the priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +44,8 @@ impl Default for Tolerance {
 
 impl Tolerance {
     /// The prior of a parameter as a deviation from its starting value: mean 0.
+    ///
+    /// That of a disturbance depends on its kind: see [`Tolerance::of_disturbance`].
     pub fn prior(&self, parameter: &Parameter, model: &Model) -> Prior {
         let sigma = match *parameter {
             Parameter::Link { coordinate, .. } if coordinate.is_length() => self.length_mm,
@@ -49,23 +53,52 @@ impl Tolerance {
             Parameter::Tool(k) if k < 3 => self.target_mm,
             Parameter::Tool(_) => self.target_rad,
             Parameter::Base(k) if k >= 3 => self.frame_rad,
-            Parameter::Base(_) | Parameter::Outlet { .. } | Parameter::Zero { .. } => self.frame_mm,
+            Parameter::Base(_)
+            | Parameter::Outlet { .. }
+            | Parameter::Zero { .. }
+            | Parameter::Disturbance { .. } => self.frame_mm,
             Parameter::Effect { index, .. } => effect_sigma(&model.effects[index]),
         };
         Prior { mean: 0.0, sigma }
     }
 
-    /// Priors of a list of parameters.
-    pub fn priors(&self, parameters: &[Parameter], model: &Model) -> Vec<Prior> {
-        parameters.iter().map(|p| self.prior(p, model)).collect()
+    /// Standard deviation of a parameter of a disturbance, in its unit: sizes met in practice, wide.
+    pub fn of_disturbance(disturbance: &Disturbance, parameter: usize) -> f64 {
+        match &disturbance.kind {
+            Kind::Zero | Kind::Tool => 5.0,
+            Kind::Frame { .. } if parameter >= 3 => 5e-3,
+            Kind::Frame { .. } => 5.0,
+            Kind::Scale => 3e-3,
+            Kind::Sag => 3e-3,
+            Kind::Load { compliance: Some(_), .. } => 10.0,
+            Kind::Load { .. } => 1e-4,
+        }
+    }
+
+    /// Priors of a list of parameters; `frames` holds the disturbances.
+    pub fn priors(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
+        parameters
+            .iter()
+            .map(|p| match *p {
+                Parameter::Disturbance { index, parameter } => {
+                    let sigma = Self::of_disturbance(&frames.disturbances[index], parameter);
+                    Prior { mean: 0.0, sigma }
+                }
+                _ => self.prior(p, model),
+            })
+            .collect()
     }
 }
 
 /// Sizes that effects have on real arms, as wide priors.
-fn effect_sigma(effect: &Effect) -> f64 {
+pub fn effect_sigma(effect: &Effect) -> f64 {
     match effect {
         Effect::JointCompliance(_) => 1e-4,
+        // A compliance of 1e-5 rad/(N m) times 30 kg.
+        Effect::LumpedCompliance(_) => 3e-4,
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
+        // The same curve over more knots, each of them smaller.
+        Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,

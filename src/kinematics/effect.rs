@@ -5,7 +5,9 @@
 //! here.
 
 pub mod compliance;
+pub mod load;
 pub mod harmonic;
+pub mod map;
 pub mod ratio;
 pub mod coupling;
 pub mod backlash;
@@ -18,6 +20,8 @@ use self::backlash::Backlash;
 use self::compliance::Compliance;
 use self::coupling::Coupling;
 use self::harmonic::Harmonic;
+use self::load::GravityLoad;
+use self::map::JointMap;
 use self::ratio::Ratio;
 use self::thermal::Thermal;
 use super::chain::{self, Chain, LinkTable, cross, dot};
@@ -31,10 +35,16 @@ use crate::math::lanes::{SinCos, sin_cos};
 pub enum Effect {
     /// A joint that yields under the static torque of gravity.
     JointCompliance(Compliance),
+    /// The same where masses or gravity's direction are unknown.
+    #[serde(rename = "joint-compliance-lumped")]
+    LumpedCompliance(GravityLoad),
     /// An eccentric gear: once or twice per joint turn.
     GearEccentricity(Harmonic),
     /// A line of the reducer at a higher order.
     GearTransmission(Harmonic),
+    /// An error map fixed to a joint.
+    #[serde(rename = "gear-transmission-map")]
+    GearMap(JointMap),
     /// A gear whose ratio is not the nominal one.
     GearRatio(Ratio),
     /// A joint that moves along with another.
@@ -60,6 +70,8 @@ macro_rules! each {
     ($self:expr, $e:ident => $body:expr) => {
         match $self {
             Effect::JointCompliance($e) => $body,
+            Effect::LumpedCompliance($e) => $body,
+            Effect::GearMap($e) => $body,
             Effect::GearEccentricity($e) | Effect::GearTransmission($e) => $body,
             Effect::GearRatio($e) => $body,
             Effect::JointCoupling($e) => $body,
@@ -73,9 +85,9 @@ impl Effect {
     /// The contract name of the effect.
     pub fn name(&self) -> &'static str {
         match self {
-            Effect::JointCompliance(_) => "joint-compliance",
+            Effect::JointCompliance(_) | Effect::LumpedCompliance(_) => "joint-compliance",
             Effect::GearEccentricity(_) => "gear-eccentricity",
-            Effect::GearTransmission(_) => "gear-transmission",
+            Effect::GearTransmission(_) | Effect::GearMap(_) => "gear-transmission",
             Effect::GearRatio(_) => "gear-ratio",
             Effect::JointCoupling(_) => "joint-coupling",
             Effect::Backlash(_) => "backlash",
@@ -110,8 +122,17 @@ impl Effect {
 
     /// Adds [`Effect::rotation`] for one row or eight in lanes; `torque` from [`Statics::loads`].
     #[inline(always)]
-    pub fn turn<R: SinCos>(&self, u: &[R; 6], torque: &[R; 6], condition: &Condition, out: &mut [R; 6]) {
+    pub fn turn<R: SinCos>(
+        &self,
+        statics: &Statics,
+        u: &[R; 6],
+        torque: &[R; 6],
+        condition: &Condition,
+        out: &mut [R; 6],
+    ) {
         match self {
+            Effect::LumpedCompliance(e) => e.turn(statics, u, out),
+            Effect::GearMap(e) => e.turn(u, out),
             Effect::JointCompliance(e) => e.turn(torque, out),
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.turn(u, out),
             Effect::GearRatio(e) => e.turn(u, out),
@@ -129,7 +150,11 @@ impl Effect {
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
             Effect::GearRatio(e) => e.carry(step, out),
             Effect::JointCoupling(e) => e.carry(step, out),
-            Effect::JointCompliance(_) | Effect::Backlash(_) | Effect::ThermalDrift(_) => {}
+            Effect::GearMap(e) => e.carry(u, step, out),
+            Effect::JointCompliance(_)
+            | Effect::LumpedCompliance(_)
+            | Effect::Backlash(_)
+            | Effect::ThermalDrift(_) => {}
         }
     }
 
@@ -208,15 +233,22 @@ impl Statics {
         [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3)
     }
 
-    /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
+    /// The frames at mapped angles `u`.
     #[inline(always)]
-    fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
+    fn frames<R: SinCos>(&self, u: &[R; 6]) -> Chain<R> {
         let zero = R::splat(0.0);
         let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(u[i]);
         }
-        let frames = chain::chain(&self.tables, &sin, &cos);
+        chain::chain(&self.tables, &sin, &cos)
+    }
+
+    /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
+    #[inline(always)]
+    fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
+        let zero = R::splat(0.0);
+        let frames = self.frames(u);
         let mut levers = [[zero; 3]; 6];
         let (mut sum, mut mass) = ([zero; 3], 0.0);
         for k in (0..6).rev() {

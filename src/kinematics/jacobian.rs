@@ -117,7 +117,9 @@ pub fn parameter_jacobian(
                     in_world(Vector6::new(0.0, 0.0, 0.0, w.x, w.y, w.z))
                 }
             }
-            Parameter::Outlet { .. } | Parameter::Zero { .. } => Vector6::zeros(),
+            Parameter::Outlet { .. } | Parameter::Zero { .. } | Parameter::Disturbance { .. } => {
+                Vector6::zeros()
+            }
         })
         .collect();
     Matrix6xX::from_columns(&columns)

@@ -155,7 +155,7 @@ impl Posed<'_> {
                 false => [R::splat(0.0); 6],
             };
             for effect in &self.model.effects {
-                effect.turn(mapped, &torque, &self.condition, &mut out);
+                effect.turn(statics, mapped, &torque, &self.condition, &mut out);
             }
         }
         out

@@ -66,6 +66,13 @@ pub enum Parameter {
         /// Cable.
         anchor: usize,
     },
+    /// A parameter of something that disturbed the measurement.
+    Disturbance {
+        /// Disturbance in the list of the frames.
+        index: usize,
+        /// Parameter of the disturbance.
+        parameter: usize,
+    },
 }
 
 impl Parameter {
@@ -81,7 +88,7 @@ impl Parameter {
             }
             Parameter::Link { coordinate: LinkCoordinate::A | LinkCoordinate::D, .. } => "mm",
             Parameter::Link { .. } => "rad",
-            Parameter::Effect { .. } => "",
+            Parameter::Effect { .. } | Parameter::Disturbance { .. } => "",
             Parameter::Outlet { .. } | Parameter::Zero { .. } => "mm",
         }
     }
@@ -114,6 +121,9 @@ impl fmt::Display for Parameter {
             }
             Parameter::Zero { anchor: 0 } => write!(f, "zero"),
             Parameter::Zero { anchor } => write!(f, "zero{}", anchor + 1),
+            Parameter::Disturbance { index, parameter } => {
+                write!(f, "disturbance{}.{}", index + 1, parameter + 1)
+            }
         }
     }
 }

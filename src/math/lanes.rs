@@ -31,6 +31,8 @@ pub trait Real:
     fn within(self, limit: f64) -> Self;
     /// 1 where the value is above 0, 0 elsewhere and for NaN.
     fn positive(self) -> Self;
+    /// A function of each lane by itself, for what has no vector form.
+    fn each(self, f: impl Fn(f64) -> f64) -> Self;
 }
 
 impl Real for f64 {
@@ -53,6 +55,10 @@ impl Real for f64 {
     #[inline(always)]
     fn positive(self) -> Self {
         if self > 0.0 { 1.0 } else { 0.0 }
+    }
+    #[inline(always)]
+    fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        f(self)
     }
 }
 
@@ -105,6 +111,10 @@ impl SubAssign for Lanes {
 }
 
 impl Real for Lanes {
+    #[inline(always)]
+    fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(f))
+    }
     #[inline(always)]
     fn splat(value: f64) -> Self {
         Self([value; WIDTH])

@@ -1,5 +1,7 @@
 //! What a sensor reads of a pose of the flange: a cable's length, a position, a pose.
 
+pub mod disturbance;
+
 use nalgebra::{Point3, Vector3};
 
 use super::dataset::{Reading, Sensor};

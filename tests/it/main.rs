@@ -10,6 +10,7 @@ mod robots;
 mod kinematics;
 mod measurement;
 mod identification;
+mod diagnosis;
 mod compensation;
 mod planning;
 mod report;

@@ -8,6 +8,7 @@ use crate::kinematics::parameter::{LinkCoordinate, Parameter};
 use crate::math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
 use crate::math::se3::{Pose, left_jacobian};
 use crate::measurement::dataset::Sensor;
+use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 
 type V = [Lanes; 3];
 
@@ -27,6 +28,62 @@ pub(super) struct State {
     /// From flange to the last DH frame.
     flange: Matrix3<f64>,
     effects: Vec<f64>,
+    /// What disturbs each row; absent for an undisturbed measurement.
+    pushed: Option<Pushed>,
+}
+
+/// Disturbances row by row, as columns.
+#[derive(Default)]
+struct Pushed {
+    zero: Vec<f64>,
+    frame: [Vec<f64>; 3],
+    turn: [Vec<f64>; 3],
+    tool: [Vec<f64>; 3],
+    /// 1 + relative error.
+    scale: Vec<f64>,
+    sag: Vec<f64>,
+}
+
+impl Pushed {
+    fn of(disturbances: &[Disturbance], courses: &[Vec<f64>]) -> Option<Self> {
+        let n = courses.first().map(Vec::len)?;
+        let zeros = || vec![0.0; n];
+        let mut out = Self {
+            zero: zeros(),
+            frame: std::array::from_fn(|_| zeros()),
+            turn: std::array::from_fn(|_| zeros()),
+            tool: std::array::from_fn(|_| zeros()),
+            scale: vec![1.0; n],
+            sag: zeros(),
+        };
+        let add = |to: &mut [f64], value: f64, course: &[f64]| {
+            to.iter_mut().zip(course).for_each(|(t, c)| *t += value * c);
+        };
+        for (disturbance, course) in disturbances.iter().zip(courses) {
+            let v = &disturbance.values;
+            match &disturbance.kind {
+                Kind::Zero => add(&mut out.zero, v[0], course),
+                Kind::Frame { turning } => {
+                    for k in 0..3 {
+                        add(&mut out.frame[k], v[k], course);
+                        if *turning {
+                            add(&mut out.turn[k], v[k + 3], course);
+                        }
+                    }
+                }
+                Kind::Tool => (0..3).for_each(|k| add(&mut out.tool[k], v[k], course)),
+                Kind::Scale => add(&mut out.scale, v[0], course),
+                Kind::Sag => add(&mut out.sag, v[0], course),
+                Kind::Load { .. } => {}
+            }
+        }
+        Some(out)
+    }
+}
+
+#[inline(always)]
+fn load(columns: &[Vec<f64>; 3], at: usize) -> V {
+    std::array::from_fn(|k| Lanes::load(&columns[k], at))
 }
 
 impl State {
@@ -55,6 +112,7 @@ impl State {
             target_axes: flange * left_jacobian(&target),
             flange,
             effects: task.columns.effects.iter().map(|e| x[e.place]).collect(),
+            pushed: Pushed::of(&frames.disturbances, &task.columns.courses),
         }
     }
 }
@@ -131,9 +189,31 @@ fn in_base(frames: &Chain<Lanes>, v: &Vector3<f64>) -> V {
 }
 
 #[inline(always)]
-fn point(frames: &Chain<Lanes>, state: &State) -> V {
+fn point(frames: &Chain<Lanes>, state: &State, at: usize) -> V {
     let shift = in_base(frames, &state.target.translation.vector);
-    std::array::from_fn(|k| frames.origin[6][k] + shift[k])
+    let mut out: V = std::array::from_fn(|k| frames.origin[6][k] + shift[k]);
+    if let Some(pushed) = &state.pushed {
+        let tool = load(&pushed.tool, at);
+        for (axis, along) in tool.iter().enumerate() {
+            let direction = in_base(frames, &state.flange.column(axis).into());
+            for k in 0..3 {
+                out[k] += *along * direction[k];
+            }
+        }
+    }
+    out
+}
+
+/// How far disturbance `index` goes in the rows.
+#[inline(always)]
+fn course(task: &Calibration, index: usize, at: usize) -> Lanes {
+    Lanes::load(&task.columns.courses[index], at)
+}
+
+/// What a unit of a cable's sag adds to its length (mm m²): see the page of disturbances.
+#[inline(always)]
+fn sagging(away: &V, length: Lanes) -> Lanes {
+    Lanes::splat(1e-6 / 24.0) * (away[0] * away[0] + away[1] * away[1]) * length
 }
 
 /// One value of the row's cable, for each lane.
@@ -154,7 +234,7 @@ fn cable(
 ) {
     let weight = Lanes::load(&task.columns.per_mm, at);
     let (frames, scale) = frames(task, state, at);
-    let p = point(&frames, state);
+    let p = point(&frames, state, at);
     let single = state.outlets.len() == 1;
     let (outlet, zero): (V, Lanes) = if single {
         (splat(&state.outlets[0]), Lanes::splat(state.zeros[0]))
@@ -162,9 +242,19 @@ fn cable(
         let outlet = std::array::from_fn(|k| of_anchor(task, at, |a| state.outlets[a][k]));
         (outlet, of_anchor(task, at, |a| state.zeros[a]))
     };
-    let v = minus(&p, &outlet);
+    let mut v = minus(&p, &outlet);
+    if let Some(pushed) = &state.pushed {
+        v = minus(&v, &load(&pushed.frame, at));
+    }
     let length = dot(&v, &v).sqrt();
-    let residual = weight * (length + zero - Lanes::load(&task.columns.reading[0], at));
+    let mut free = length + zero;
+    let mut predicted = free;
+    if let Some(pushed) = &state.pushed {
+        free += Lanes::load(&pushed.zero, at);
+        predicted =
+            free * Lanes::load(&pushed.scale, at) + Lanes::load(&pushed.sag, at) * sagging(&v, length);
+    }
+    let residual = weight * (predicted - Lanes::load(&task.columns.reading[0], at));
     let columns = task.parameters.len();
     if !jacobian {
         store(out, place, residual);
@@ -192,7 +282,19 @@ fn cable(
                 -u[axis] * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Zero { anchor } => weight * of_anchor(task, at, |a| f64::from(u8::from(a == anchor))),
-            Parameter::Effect { .. } => {
+            Parameter::Disturbance { index, parameter } if !is_load(task, index) => {
+                let how_far = course(task, index, at);
+                how_far
+                    * match task.frames.disturbances[index].kind {
+                        Kind::Zero => weight,
+                        Kind::Frame { .. } => -u[parameter.min(2)],
+                        Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
+                        Kind::Scale => weight * free,
+                        Kind::Sag => weight * sagging(&v, length),
+                        Kind::Load { .. } => none,
+                    }
+            }
+            Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = none;
                 if let Some(effect) = task.columns.effects.iter().find(|e| e.place == k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
@@ -215,6 +317,20 @@ fn cable(
         };
         store(out, k * rows + place, value);
     }
+}
+
+/// Whether a disturbance bends the joints, as effects do.
+#[inline(always)]
+fn is_load(task: &Calibration, index: usize) -> bool {
+    matches!(task.frames.disturbances[index].kind, Kind::Load { .. })
+}
+
+/// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
+#[inline(always)]
+fn turned_by(turn: &V, v: &V) -> V {
+    let first = cross(turn, v);
+    let second = cross(turn, &first);
+    std::array::from_fn(|k| v[k] + first[k] + Lanes::splat(0.5) * second[k])
 }
 
 /// u · ∂p for a coordinate of a link; `moment[i]` is (p − oᵢ) × u, since u·(z × r) = z·(r × u).
@@ -281,13 +397,19 @@ fn space(
     let (weight, turn_weight) = (Lanes::load(&columns.per_mm, at), Lanes::load(&columns.per_rad, at));
     let none = [Lanes::splat(0.0); 3];
     let (frames, scale) = frames(task, state, at);
-    let p = point(&frames, state);
+    let p = point(&frames, state, at);
     let components = if oriented { 6 } else { 3 };
     let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
     let sensor: [V; 3] = std::array::from_fn(|k| splat(&rotation.matrix().column(k).into()));
     let reading: V = std::array::from_fn(|k| Lanes::load(&columns.reading[k], at));
-    let turned = times(&sensor, &reading);
-    let origin = splat(&state.base_from_sensor.translation.vector);
+    let mut turned = times(&sensor, &reading);
+    let mut origin = splat(&state.base_from_sensor.translation.vector);
+    if let Some(pushed) = &state.pushed {
+        let scale = Lanes::load(&pushed.scale, at);
+        turned = turned_by(&load(&pushed.turn, at), &turned.map(|t| t / scale));
+        let shift = load(&pushed.frame, at);
+        (0..3).for_each(|k| origin[k] += shift[k]);
+    }
     let last = if jacobian { task.parameters.len() } else { 0 };
     for k in 0..3 {
         let residual = weight * (turned[k] + origin[k] - p[k]);
@@ -298,7 +420,14 @@ fn space(
     let mut trace = Lanes::splat(0.0);
     if oriented {
         let measured: [V; 3] = std::array::from_fn(|column| {
-            times(&sensor, &std::array::from_fn(|k| Lanes::load(&columns.reading[3 + 3 * column + k], at)))
+            let axis = times(
+                &sensor,
+                &std::array::from_fn(|k| Lanes::load(&columns.reading[3 + 3 * column + k], at)),
+            );
+            match &state.pushed {
+                Some(pushed) => turned_by(&load(&pushed.turn, at), &axis),
+                None => axis,
+            }
         });
         let target = state.target.rotation.to_rotation_matrix();
         let modelled: [V; 3] = std::array::from_fn(|k| in_base(&frames, &target.matrix().column(k).into()));
@@ -343,7 +472,23 @@ fn space(
                 let w = splat(&state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
-            Parameter::Effect { .. } => {
+            Parameter::Disturbance { index, parameter } if !is_load(task, index) => {
+                let how_far = course(task, index, at);
+                let kind = &task.frames.disturbances[index].kind;
+                of_sensor = !matches!(kind, Kind::Tool);
+                let (v, w) = match kind {
+                    Kind::Frame { .. } if parameter < 3 => (splat(&Vector3::ith(parameter, 1.0)), none),
+                    Kind::Frame { .. } => {
+                        let w = splat(&Vector3::ith(parameter - 3, 1.0));
+                        (cross(&w, &turned), w)
+                    }
+                    Kind::Tool => (in_base(&frames, &state.flange.column(parameter).into()), none),
+                    Kind::Scale => (turned.map(|t| -t), none),
+                    Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
+                };
+                (v.map(|v| how_far * v), w.map(|w| how_far * w))
+            }
+            Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = (none, none);
                 if let Some(effect) = columns.effects.iter().find(|e| e.place == k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {

@@ -9,6 +9,8 @@ use truegrind::kinematics::effect::Effect;
 use truegrind::kinematics::effect::compliance::Compliance;
 use truegrind::kinematics::effect::coupling::Coupling;
 use truegrind::kinematics::effect::harmonic::Harmonic;
+use truegrind::kinematics::effect::load::{GravityLoad, Lump};
+use truegrind::kinematics::effect::map::JointMap;
 use truegrind::kinematics::effect::ratio::Ratio;
 use truegrind::kinematics::effect::thermal::Thermal;
 use truegrind::kinematics::link::{Link, LinkModel};
@@ -411,6 +413,11 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         sine_rad: 3e-5 * even(random),
         cosine_rad: 3e-5,
     }));
+    let knots_rad = (0..12).map(|_| 2e-4 * even(random)).collect();
+    out.effects.push(Effect::GearMap(JointMap { joint: 1, knots_rad }));
+    let lump =
+        [(3, None), (6, Some(1))].map(|(frame, axis)| Lump { frame, axis, factor: 3e-6 * even(random) });
+    out.effects.push(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: lump.to_vec() }));
     out.effects.push(Effect::GearRatio(Ratio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
     out.effects.push(Effect::ThermalDrift(Thermal {

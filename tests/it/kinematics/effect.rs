@@ -136,7 +136,7 @@ fn an_effect_is_the_sum_of_its_regressors() {
         let rotation = effect.rotation(&statics, &u, &condition);
         assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
         let mut turned = [0.0; 6];
-        effect.turn(&u.into(), &torque, &condition, &mut turned);
+        effect.turn(&statics, &u.into(), &torque, &condition, &mut turned);
         assert!((rotation - Joints::from(turned)).amax() < 1e-15, "{}", effect.name());
         assert!(effect.joint().is_none_or(|joint| (0..6).all(|j| j == joint || rotation[j] == 0.0)));
     }

@@ -1,0 +1,159 @@
+//! How often a diagnosis names what was hidden, and how often it names what is not there: `cargo bench --bench diagnosis`.
+//!
+//! Arguments: runs of each kind and sensor (default 8), clean runs of each sensor (default 40), kinds to try.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "../tests/it/diagnosis/simulator.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod simulator;
+#[path = "../tests/it/diagnosis/scenarios.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod scenarios;
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use rand::RngExt;
+use scenarios::{KINDS, Outcome, draw, outcome, stream};
+use simulator::{Hidden, Setup};
+use truegrind::measurement::dataset::Sensor;
+use truegrind::robots;
+
+const BINS: [f64; 5] = [10.0, 20.0, 40.0, 80.0, 160.0];
+
+fn bin(lambda: f64) -> usize {
+    BINS.iter().take_while(|b| lambda >= **b).count()
+}
+
+/// Wilson's 95 % bounds of a rate.
+fn bounds(hits: usize, all: usize) -> (f64, f64) {
+    if all == 0 {
+        return (0.0, 1.0);
+    }
+    let (n, p, z) = (all as f64, hits as f64 / all as f64, 1.96_f64);
+    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    (middle - half, middle + half)
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let number = |k: usize, or: u64| arguments.get(k).and_then(|a| a.parse().ok()).unwrap_or(or);
+    let (runs, clean) = (number(0, 8), number(1, 40));
+    let wanted: Vec<&str> = KINDS
+        .into_iter()
+        .chain(["pair"])
+        .filter(|k| arguments.len() < 3 || arguments[2..].iter().any(|a| a == k))
+        .collect();
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let mut singles: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    let mut pairs: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    let mut by_kind: BTreeMap<(String, &str), (usize, usize)> = BTreeMap::new();
+    let (mut within, mut ratios, mut wrong, mut total) = ((0, 0), Vec::new(), 0, 0);
+    let start = Instant::now();
+    for kind in &wanted {
+        for (sensor, label, sigma_mm) in [(Sensor::Cable, "cable", 0.04), (Sensor::Position, "tracker", 0.03)]
+        {
+            for run in 0..runs {
+                let mut rng = stream(&format!("{kind}{label}"), run);
+                let rows = [200, 350, 600, 1000][run as usize % 4];
+                let hidden: Vec<Hidden> = if *kind == "pair" {
+                    let first = rng.random_range(0..KINDS.len());
+                    let second = (first + rng.random_range(1..KINDS.len())) % KINDS.len();
+                    [first, second].iter().map(|&k| draw(KINDS[k], rows, &mut rng)).collect()
+                } else {
+                    vec![draw(kind, rows, &mut rng)]
+                };
+                if sensor != Sensor::Cable && hidden.iter().any(|h| matches!(h, Hidden::Zero { .. })) {
+                    continue;
+                }
+                let setup =
+                    Setup { sensor, rows, sigma_mm, dirty: true, seed: rng.random_range(0..1_000_000) };
+                let began = Instant::now();
+                let out: Outcome = outcome(&nominal, &hidden, &setup);
+                let took = began.elapsed().as_secs_f64();
+                let visible = out.hidden.iter().all(|(_, l)| *l > 40.0);
+                for ((h, lambda), found) in out.hidden.iter().zip(&out.found) {
+                    let place = if hidden.len() > 1 { &mut pairs } else { &mut singles };
+                    let entry = place.entry(bin(*lambda)).or_default();
+                    entry.1 += 1;
+                    entry.0 += usize::from(*found);
+                    if *lambda > 40.0 {
+                        let entry = by_kind.entry((h.name().to_owned(), label)).or_default();
+                        entry.1 += 1;
+                        entry.0 += usize::from(*found);
+                    }
+                }
+                total += 1;
+                wrong += usize::from(!out.wrong.is_empty());
+                within.0 += out.within.0;
+                within.1 += out.within.1;
+                if visible {
+                    ratios.push(out.over_truth);
+                }
+                if out.found.iter().zip(&out.hidden).any(|(f, (_, l))| !f && *l > 40.0)
+                    || !out.wrong.is_empty()
+                {
+                    println!("{kind} {label} {run} n={rows} {took:.1} s");
+                    for (h, l) in &out.hidden {
+                        println!("   hidden {h:?} λ {l:.0}");
+                    }
+                    println!(
+                        "   found {:?}  wrong {:?} over truth {:.3}",
+                        out.all, out.wrong, out.over_truth
+                    );
+                }
+            }
+        }
+    }
+    let table = |name: &str, rates: &BTreeMap<usize, (usize, usize)>| {
+        println!("\n{name}: found by name and joint or rows, by non-centrality λ");
+        for (b, (hits, all)) in rates {
+            let low = if *b == 0 { 0.0 } else { BINS[b - 1] };
+            let high = BINS.get(*b).map_or("…".to_owned(), |h| format!("{h:.0}"));
+            let (l, h) = bounds(*hits, *all);
+            println!(
+                "  λ {low:>4.0} to {high:>4}: {hits:>4} of {all:>4}  ({:.0} to {:.0} %)",
+                100.0 * l,
+                100.0 * h
+            );
+        }
+    };
+    table("single effects", &singles);
+    table("effects in pairs", &pairs);
+    println!("\nλ > 40 by kind:");
+    for ((kind, label), (hits, all)) in &by_kind {
+        println!("  {kind:<20} {label:<8} {hits} of {all}");
+    }
+    println!("\nparameters within 3σ: {} of {}", within.1, within.0);
+    ratios.sort_by(f64::total_cmp);
+    if let Some(worst) = ratios.last() {
+        let over = ratios.iter().filter(|r| **r > 1.2).count();
+        println!(
+            "held-out error over that of the true structure: median {:.3}, worst {worst:.3}, above 1.2 in {over} of {}",
+            ratios[ratios.len() / 2],
+            ratios.len()
+        );
+    }
+    println!("runs with a further finding that was not hidden: {wrong} of {total}");
+    for (sensor, label, sigma_mm) in [(Sensor::Cable, "cable", 0.04), (Sensor::Position, "tracker", 0.03)] {
+        let mut alarms = 0;
+        for run in 0..clean {
+            let rows = [200, 350, 600, 1000][run as usize % 4];
+            let setup = Setup { sensor, rows, sigma_mm, dirty: true, seed: 900_000 + run };
+            let out = outcome(&nominal, &[], &setup);
+            if !out.wrong.is_empty() {
+                alarms += 1;
+                println!("clean {label} {run}: {:?}", out.wrong);
+            }
+        }
+        let (l, h) = bounds(alarms, clean as usize);
+        println!(
+            "false alarms, {label}: {alarms} of {clean} clean runs ({:.1} to {:.1} %)",
+            100.0 * l,
+            100.0 * h
+        );
+    }
+    println!("{:.0} s", start.elapsed().as_secs_f64());
+}

@@ -1,0 +1,121 @@
+//! `truegrind diagnose DATA --robot R -o MODEL.toml`.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind::identification::calibration::Frames;
+use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
+use truegrind::identification::identify::observe;
+use truegrind::identification::solver::SOLVERS;
+use truegrind::identification::start::starts;
+use truegrind::identification::tolerance::Tolerance;
+use truegrind::kinematics::estimated::Judgement;
+use truegrind::kinematics::model::Model;
+use truegrind::measurement::dataset::Dataset;
+use truegrind::report::diagnosis as view;
+
+use super::files::Batch;
+use super::identify::{DataArguments, read};
+use super::outputs::Outputs;
+use super::progress::Work;
+use super::{Common, Ending, on_threads};
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    data: DataArguments,
+    /// The extended model to write; one that is worse than geometry on held-out rows is not written.
+    #[arg(short, long, value_name = "MODEL.toml")]
+    output: Option<PathBuf>,
+    /// Chance of any false finding on data with nothing hidden.
+    #[arg(long, default_value_t = 0.01)]
+    alpha: f64,
+    /// Most causes that are accepted.
+    #[arg(long, default_value_t = 12)]
+    most: usize,
+    /// Contiguous blocks that are held out in turn, beside five random folds.
+    #[arg(long, default_value_t = 10)]
+    blocks: usize,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let mut targets = arguments.outputs.files();
+    targets.extend(arguments.output.as_deref());
+    Batch::check(&[&arguments.data.data], &targets)?;
+    if !(arguments.alpha > 0.0 && arguments.alpha <= 0.5) {
+        bail!("--alpha {}: expected a probability above 0, up to 0.5", arguments.alpha);
+    }
+    if arguments.blocks < 2 {
+        bail!("--blocks {}: expected at least 2", arguments.blocks);
+    }
+    let (robot, dataset) = read(&arguments.data)?;
+    let mut options = Options { blocks: arguments.blocks, ..Options::default() };
+    options.selection.alpha = arguments.alpha;
+    options.selection.most = arguments.most;
+    options.selection.seed = arguments.common.seed;
+    let name = robot.sheet.name.clone();
+    let work = Work::start(format!("diagnosing {name} from {} rows", dataset.rows.len()));
+    let found = on_threads(arguments.common.threads, || {
+        diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))
+    })??;
+    drop(work);
+    for note in &dataset.notes {
+        eprintln!("note: {note}");
+    }
+    arguments.outputs.print(&view::summary(&found));
+    let mut batch = Batch::sparing([&arguments.data.data]);
+    arguments.outputs.add_to(
+        &mut batch,
+        &view::document(&found, &dataset),
+        &view::finding_table(&found.diagnosis),
+        &serde_json::to_value(&found.diagnosis)?,
+    )?;
+    if let Some(path) = &arguments.output {
+        if found.estimated.verdict.status == Judgement::Fail {
+            batch.write()?;
+            bail!(
+                "{} was not written, because the fit failed: {}",
+                path.display(),
+                found.estimated.verdict.reasons.join("; ")
+            );
+        }
+        batch.add(path, found.estimated.to_toml().map_err(anyhow::Error::msg)?);
+    }
+    batch.write()?;
+    let doubtful = found.estimated.verdict.status == Judgement::Fail
+        || found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
+    Ok(if doubtful { Ending::Flagged } else { Ending::Done })
+}
+
+/// The diagnosis, starting frames included.
+pub(super) fn diagnosed(
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    options: &Options,
+    tell: &(dyn Fn(&str) + Sync),
+) -> anyhow::Result<Diagnosed> {
+    let frames = best_start(dataset, nominal)?;
+    Ok(diagnose(dataset, robot, nominal, &frames, options, tell)?)
+}
+
+/// Where several outlets explain the rows, the one with which registered frames fit best.
+fn best_start(dataset: &Dataset, nominal: &Model) -> anyhow::Result<Frames> {
+    let candidates = starts(dataset, nominal)?;
+    let (observed, _) = observe(dataset, nominal, true);
+    let sensing = frame_parameters(dataset);
+    let rmse = |frames: &Frames| {
+        let start = Start { model: nominal, frames };
+        let fitted = fit(&observed, start, &sensing, &Tolerance::default(), &SOLVERS[0], 0);
+        summary_on(&observed, &fitted.model, &fitted.frames).rmse
+    };
+    let best = candidates.into_iter().map(|f| (rmse(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, f)| f).ok_or_else(|| anyhow::anyhow!("no starting frames"))
+}

@@ -1,0 +1,33 @@
+//! What the model of an arm gets wrong, and why: named physical causes for what geometry does not explain.
+//!
+//! The way of a diagnosis:
+//!
+//! 1. [`rows`]: rounded angles are sharpened by the read-out, rows whose own columns contradict each other are noted.
+//! 2. [`extension`]: a robust fit of frames, links and the causes accepted so far.
+//! 3. [`design`]: that fit linearised and whitened, with frames, links and accepted causes projected off.
+//! 4. [`catalogue`]: every candidate cause as regressors; [`intervals`] finds the rows of shifts, [`lines`] the orders of
+//!    reducer lines.
+//! 5. [`score`]: each candidate fitted jointly with everything else, to first order: gain, evidence, p-value.
+//! 6. [`selection`]: the best candidate is accepted when it passes the likelihood ratio corrected for all trials and lowers
+//!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again.
+//! 7. [`validation`]: held-out errors by full refits, of all stages and of every rival.
+//! 8. [`remaining`]: outliers, a noise that grows with range, and structure that nothing in the catalogue explains.
+//! 9. [`finding`] and [`words`]: the result, in the contract's terms and in a technician's.
+//!
+//! Every candidate's size prior takes part in its evidence, so a candidate with many parameters has to earn them.
+
+pub mod rows;
+pub mod cause;
+pub mod catalogue;
+pub mod extension;
+pub mod design;
+pub mod score;
+pub mod intervals;
+pub mod lines;
+pub mod selection;
+pub mod validation;
+pub mod remaining;
+pub mod finding;
+pub mod words;
+pub mod picture;
+pub mod diagnose;

@@ -1,0 +1,263 @@
+//! A fit, linearised and whitened: what a candidate adds beyond everything that is already free.
+//!
+//! With J the whitened Jacobian of the n scalar rows by the p free parameters and Λ their prior precisions,
+//! JᵀJ + Λ = L Lᵀ and Q = J L⁻ᵀ. A candidate with columns C (n × k) has, with everything else refitted to first order, the
+//! gradient g = Cᵀr and the information S = CᵀC − (QᵀC)ᵀ(QᵀC), with r the residual at the optimum. The model without some
+//! of the parameters follows from the same J: their columns go, their share J x goes back into r, and the rest is solved
+//! anew, r ← r − Q L⁻¹(Jᵀr + Λx).
+//!
+//! Source: the score test with nuisance parameters, Rao 1948; the projection is that of Frisch and Waugh.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::extension::{Extended, Subject};
+use crate::estimation::problem::Problem;
+use crate::identification::calibration::Calibration;
+use crate::kinematics::parameter::{LinkCoordinate, Parameter};
+use crate::measurement::dataset::{Reading, Sensor};
+use crate::measurement::sensor::disturbance::sag_mm;
+
+/// Slopes of the whitened residual by what candidates are made of, n each.
+#[derive(Debug, Clone)]
+pub struct Slopes {
+    /// By the rotation of each joint.
+    pub by_joint: Vec<DVector<f64>>,
+    /// By a common relative growth of all lengths.
+    pub by_growth: DVector<f64>,
+    /// By the touched point on the flange, n × 3.
+    pub by_tool: DMatrix<f64>,
+    /// By the sensor's frame or the outlet, n × 6 or n × 3.
+    pub by_frame: DMatrix<f64>,
+    /// By a cable's zero; zeros for other sensors.
+    pub by_zero: DVector<f64>,
+    /// By the sensor's scale.
+    pub by_scale: DVector<f64>,
+    /// By a cable's squared weight over tension; zeros for other sensors.
+    pub by_sag: DVector<f64>,
+    /// What a whitened residual is worth in mm; 0 for orientations.
+    pub mm: Vec<f64>,
+}
+
+/// See the module page. Scalar rows are ordered observation by observation.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// Observations.
+    pub observations: usize,
+    /// Scalar rows of an observation.
+    pub per: usize,
+    /// Residuals at the optimum of what is free, n.
+    pub residual: DVector<f64>,
+    /// Q transposed, p × n.
+    pub basis: DMatrix<f64>,
+    /// What candidates are made of.
+    pub slopes: Arc<Slopes>,
+}
+
+/// A fit linearised, from which the design of any smaller model follows without a refit.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    observations: usize,
+    per: usize,
+    jacobian: DMatrix<f64>,
+    /// JᵀJ + Λ.
+    normal: DMatrix<f64>,
+    residual: DVector<f64>,
+    x: Vec<f64>,
+    precision: Vec<f64>,
+    slopes: Arc<Slopes>,
+}
+
+/// What a candidate's columns come to against a design.
+#[derive(Debug, Clone)]
+pub struct Projected {
+    /// Gradient, k.
+    pub gradient: DVector<f64>,
+    /// Information with everything else refitted, k × k.
+    pub information: DMatrix<f64>,
+    /// QᵀC, p × k.
+    pub shared: DMatrix<f64>,
+}
+
+impl Linear {
+    /// Linearises a fit at its estimate.
+    pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
+        let dataset = &subject.observed.dataset;
+        let per = fit.task.rows_per_observation();
+        let rows = fit.task.rows();
+        let p = fit.parameters.len();
+        let mut residual = vec![0.0; rows];
+        let mut jacobian = vec![0.0; rows * p];
+        fit.task.jacobian(&fit.x, 0..rows, &mut residual, &mut jacobian);
+        let residual = DVector::from_vec(residual).map(finite);
+        let jacobian = DMatrix::from_vec(rows, p, jacobian).map(finite);
+        let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
+        let mut normal = jacobian.tr_mul(&jacobian);
+        for (k, precision) in precision.iter().enumerate() {
+            normal[(k, k)] += precision;
+        }
+        // Slopes by what candidates are made of, at the estimate.
+        let anchors = dataset.anchors();
+        let mut probes: Vec<Parameter> = Vec::new();
+        for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
+            probes.extend((0..6).map(|joint| Parameter::Link { joint, coordinate }));
+        }
+        probes.extend((0..3).map(Parameter::Tool));
+        let first_frame = probes.len();
+        if dataset.sensor == Sensor::Cable {
+            for anchor in 0..anchors {
+                probes.extend((0..3).map(|axis| Parameter::Outlet { anchor, axis }));
+                probes.push(Parameter::Zero { anchor });
+            }
+        } else {
+            probes.extend((0..6).map(Parameter::Base));
+        }
+        let weights: Vec<_> = fit
+            .weights
+            .iter()
+            .zip(&fit.trust)
+            .map(|(w, t)| crate::identification::calibration::Weight {
+                per_mm: w.per_mm * t.sqrt(),
+                per_rad: w.per_rad * t.sqrt(),
+            })
+            .collect();
+        let task = Calibration::new(dataset, &fit.model, &fit.frames, &probes, &[], &weights);
+        let (mut r, mut slopes) = (vec![0.0; rows], vec![0.0; rows * probes.len()]);
+        task.jacobian(&vec![0.0; probes.len()], 0..rows, &mut r, &mut slopes);
+        let column = |k: usize| DVector::from_column_slice(&slopes[k * rows..(k + 1) * rows]).map(finite);
+        let mut by_growth = DVector::zeros(rows);
+        for (joint, link) in fit.model.links.iter().enumerate() {
+            by_growth += column(6 + joint) * link.a_mm + column(12 + joint) * link.d_mm;
+        }
+        let summed = |axis: usize| {
+            (0..anchors).fold(DVector::zeros(rows), |sum, a| sum + column(first_frame + 4 * a + axis))
+        };
+        let (by_frame, by_zero) = if dataset.sensor == Sensor::Cable {
+            (DMatrix::from_columns(&[summed(0), summed(1), summed(2)]), summed(3))
+        } else {
+            let columns: Vec<_> = (0..6).map(|k| column(first_frame + k)).collect();
+            (DMatrix::from_columns(&columns), DVector::zeros(rows))
+        };
+        let (by_scale, by_sag) = readings(subject, fit, per, &weights);
+        let mm = (0..rows)
+            .map(|s| if s % per < 3 { 1.0 / weights[s / per].per_mm.max(1e-12) } else { 0.0 })
+            .collect();
+        let slopes = Arc::new(Slopes {
+            by_joint: (0..6).map(column).collect(),
+            by_growth,
+            by_tool: DMatrix::from_columns(&[column(18), column(19), column(20)]),
+            by_frame,
+            by_zero,
+            by_scale,
+            by_sag,
+            mm,
+        });
+        let observations = dataset.rows.len();
+        Self { observations, per, jacobian, normal, residual, x: fit.x.clone(), precision, slopes }
+    }
+
+    /// The design of the model without the parameters at `dropped`.
+    pub fn design(&self, dropped: &[usize]) -> Design {
+        let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
+        let p = kept.len();
+        let rows = self.residual.len();
+        let mut residual = self.residual.clone();
+        for &k in dropped {
+            residual.axpy(-self.x[k], &self.jacobian.column(k), 1.0);
+        }
+        let normal = DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]);
+        let lower = lower_factor(normal);
+        let part = self.jacobian.select_columns(&kept);
+        let mut gradient = part.tr_mul(&residual);
+        for (g, &k) in gradient.iter_mut().zip(&kept) {
+            *g += self.precision[k] * self.x[k];
+        }
+        let basis =
+            lower.solve_lower_triangular(&part.transpose()).unwrap_or_else(|| DMatrix::zeros(p, rows));
+        let step = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
+        residual.gemv_tr(-1.0, &basis, &step, 1.0);
+        Design {
+            observations: self.observations,
+            per: self.per,
+            residual,
+            basis,
+            slopes: Arc::clone(&self.slopes),
+        }
+    }
+}
+
+impl Design {
+    /// The design of a whole fit.
+    pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
+        Linear::of(subject, fit).design(&[])
+    }
+
+    /// Columns against everything that is already free.
+    pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
+        let shared = &self.basis * columns;
+        let gradient = columns.tr_mul(&self.residual);
+        let information = columns.tr_mul(columns) - shared.tr_mul(&shared);
+        Projected { gradient, information, shared }
+    }
+
+    /// Scalar rows.
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+}
+
+fn finite(v: f64) -> f64 {
+    if v.is_finite() { v } else { 0.0 }
+}
+
+/// Lower Cholesky factor; a matrix that is not positive definite gets a growing ridge.
+fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
+    let n = normal.nrows();
+    let mut ridge = 0.0;
+    for _ in 0..12 {
+        let mut shifted = normal.clone();
+        for k in 0..n {
+            shifted[(k, k)] += ridge * normal[(k, k)].abs().max(f64::MIN_POSITIVE);
+        }
+        if let Some(factor) = shifted.cholesky() {
+            return factor.l();
+        }
+        ridge = if ridge == 0.0 { 1e-14 } else { ridge * 10.0 };
+    }
+    DMatrix::identity(n, n)
+}
+
+/// Slopes by the sensor's scale and by a cable's sag.
+fn readings(
+    subject: &Subject<'_>,
+    fit: &Extended,
+    per: usize,
+    weights: &[crate::identification::calibration::Weight],
+) -> (DVector<f64>, DVector<f64>) {
+    let dataset = &subject.observed.dataset;
+    let rows = dataset.rows.len() * per;
+    let (mut scale, mut sag) = (DVector::zeros(rows), DVector::zeros(rows));
+    let rotation = fit.frames.base_from_sensor.rotation;
+    for (i, row) in dataset.rows.iter().enumerate() {
+        let w = weights[i].per_mm;
+        match row.reading {
+            Reading::Cable(length) => {
+                scale[i] = w * finite(length);
+                let at = (fit.model.forward(&row.joints, &row.condition)
+                    * nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector))
+                .coords;
+                sag[i] = w * finite(sag_mm(1.0, &(at - fit.frames.outlets_mm[row.anchor])));
+            }
+            Reading::Position(p) => space(&mut scale, i * per, w, rotation * p),
+            Reading::Pose(pose) => space(&mut scale, i * per, w, rotation * pose.translation.vector),
+        }
+    }
+    (scale, sag)
+}
+
+fn space(scale: &mut DVector<f64>, at: usize, w: f64, turned: Vector3<f64>) {
+    for k in 0..3 {
+        scale[at + k] = -w * finite(turned[k]);
+    }
+}

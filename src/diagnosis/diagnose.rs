@@ -1,0 +1,803 @@
+//! The whole diagnosis of one data set.
+
+use nalgebra::DVector;
+
+use super::cause::Cause;
+use super::design::{Design, Linear};
+use super::extension::{Extended, Freedom, Subject, fit};
+use super::finding::{
+    Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
+    RangeNoise, SCHEMA, Source, Stage, Step,
+};
+use super::picture::{Picture, picture};
+use super::remaining::{self, Structure};
+use super::rows::{Prepared, prepare};
+use super::score::non_centrality;
+use super::selection::{self, Accepted, BLOCKS, Folds, Scored, Selection, scale_beside_growth};
+use super::validation::{StageError, Validation, nominal};
+use super::words;
+use crate::identification::calibration::Frames;
+use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
+use crate::identification::identify::{
+    arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
+};
+use crate::identification::rounding::angle_shares;
+use crate::identification::tolerance::Tolerance;
+use crate::kinematics::effect::Effect;
+use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
+use crate::kinematics::model::Model;
+use crate::kinematics::region::Region;
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split;
+
+/// How to diagnose.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Priors of links and frames: wide, so that what geometry can explain is never called an effect.
+    pub tolerance: Tolerance,
+    /// When a cause is accepted.
+    pub selection: selection::Options,
+    /// Contiguous blocks of the second validation.
+    pub blocks: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            tolerance: Tolerance { length_mm: 3.0, angle_rad: 1.0_f64.to_radians(), ..Tolerance::default() },
+            selection: selection::Options::default(),
+            blocks: BLOCKS,
+        }
+    }
+}
+
+/// A diagnosis with the fits behind it.
+#[derive(Debug, Clone)]
+pub struct Diagnosed {
+    /// The result.
+    pub diagnosis: Diagnosis,
+    /// Geometry alone.
+    pub geometric: Extended,
+    /// With all causes.
+    pub extended: Extended,
+    /// The arm for compensation; its verdict says whether it may be used.
+    pub estimated: Estimated,
+    /// The rows as they were fitted.
+    pub prepared: Prepared,
+    /// Rows set aside, as indices of the data set.
+    pub set_aside: Vec<usize>,
+    /// Which finding belongs to which cause of the extended model, in their order; several causes may share one.
+    pub finding_of_cause: Vec<usize>,
+    /// A picture for each finding that has a cause in the model, in the order of the findings.
+    pub pictures: Vec<Picture>,
+}
+
+/// With frames alone fitted, an error beyond this is no tolerance but a mistake (mm).
+const WRONG_ARM_MM: f64 = 25.0;
+
+/// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
+const CLEAR: f64 = 6.0;
+
+/// Non-centrality from which an effect can be counted on to be found.
+pub const VISIBLE: f64 = 40.0;
+
+/// Peak rotation of a joint that an effect of practical size has (rad).
+const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
+
+/// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `tell` hears of each step.
+///
+/// # Errors
+/// When no fit is possible at all: rows that no arm of this name could give.
+pub fn diagnose(
+    dataset: &Dataset,
+    robot: &str,
+    nominal_arm: &Model,
+    frames: &Frames,
+    options: &Options,
+    tell: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosed, DiagnoseError> {
+    let floor = split::noise_floor(dataset);
+    let prepared = prepare(dataset, nominal_arm);
+    let subject =
+        Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &options.tolerance };
+    let mut notes = Vec::new();
+    let needed = scarce(dataset, nominal_arm);
+    if let Some(needed) = needed {
+        notes.push(format!(
+            "{} rows are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
+             usual; what is said here rests on the priors",
+            dataset.rows.len()
+        ));
+    }
+    let registered = nominal(&subject);
+    let typical = remaining::typical_mm(&registered);
+    if !(typical < WRONG_ARM_MM) {
+        return Err(DiagnoseError::WrongArm {
+            file: dataset.file.clone(),
+            robot: robot.to_owned(),
+            rmse_mm: typical,
+        });
+    }
+    tell("looking for causes");
+    let selection = match needed {
+        None => selection::select(&subject, &options.selection, tell),
+        Some(_) => {
+            let none = selection::Options { most: 0, ..options.selection };
+            selection::select(&subject, &none, tell)
+        }
+    };
+    let Selection { geometric, extended, accepted, left, .. } = selection;
+    let wild = remaining::outliers(&extended);
+    let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
+    tell("holding rows out");
+    let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
+    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
+    let mut steps = vec![
+        Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
+        Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
+    ];
+    let linear = Linear::of(&subject, &extended);
+    let whole = linear.design(&[]);
+    let context = Context {
+        subject: &subject,
+        extended: &extended,
+        linear: &linear,
+        whole: &whole,
+        splits: &split::folds(&prepared.observed.dataset, 5, options.selection.seed),
+        set_aside: &set_aside,
+    };
+    let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
+    tell("looking at what is left");
+    findings.extend(rounding_finding(dataset, &prepared, &subject, &validation, &geometric, &stages));
+    findings.extend(mismatch_finding(dataset, &prepared, &stages[2]));
+    findings.extend(outlier_finding(dataset, &wild, &stages[2]));
+    let structure = remaining::structure(&subject, &extended, &set_aside);
+    let noise = remaining::noise_model(&subject, &extended, &set_aside);
+    let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
+    let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
+    let not_testable = not_testable(&context, &left, &names, &prepared);
+    let remaining = told(&structure, &stages[2], floor_mm, &mut findings);
+    if let Err(why) = &prepared.sharpening
+        && dataset.angle_step_rad.is_some()
+        && let crate::identification::rounding::NotSharpened::Mismatch { found_mm, expected_mm } = why
+    {
+        notes.push(format!(
+            "the read-out is {found_mm:.2} mm off the angles where rounding allows {expected_mm:.2}: angles were not sharpened"
+        ));
+    }
+    let mut measure_again: Vec<usize> = set_aside
+        .iter()
+        .chain(prepared.mismatch.rows.iter().map(|(i, _)| i))
+        .map(|&i| dataset.rows[i].number)
+        .collect();
+    measure_again.sort_unstable();
+    measure_again.dedup();
+    let diagnosis = Diagnosis {
+        schema: SCHEMA.to_owned(),
+        dataset: Source {
+            file: dataset.file.clone(),
+            rows: dataset.rows.len(),
+            sensor: sensor_name(dataset.sensor).to_owned(),
+            robot: robot.to_owned(),
+            set_aside: set_aside.len(),
+        },
+        noise_floor_mm: floor_mm,
+        noise_floor_source: floor_source,
+        fits: Fits { nominal: stage(&stages[0]), geometric: stage(&stages[1]), extended: stage(&stages[2]) },
+        steps,
+        findings,
+        not_testable,
+        remaining,
+        noise_model: noise.map(|n| RangeNoise {
+            sigma_mm: n.sigma_mm,
+            per_metre_mm: n.per_metre_mm,
+            p_value: n.p_value,
+        }),
+        measure_again,
+        notes,
+    };
+    let estimated = estimated(
+        dataset,
+        robot,
+        nominal_arm,
+        &subject,
+        &extended,
+        &stages,
+        &diagnosis,
+        &set_aside,
+        options,
+        &prepared,
+    );
+    Ok(Diagnosed {
+        diagnosis,
+        geometric,
+        extended,
+        estimated,
+        prepared,
+        set_aside,
+        finding_of_cause,
+        pictures,
+    })
+}
+
+/// Poses needed, where there are too few.
+fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
+    let per = match dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
+    let needed = (3 * parameters).div_ceil(2 * per) + 10;
+    (dataset.rows.len() < needed).then_some(needed)
+}
+
+fn stage(errors: &StageError) -> Stage {
+    Stage {
+        rmse_mm: errors.fitted.rmse,
+        mean_mm: errors.fitted.mean_absolute,
+        max_mm: errors.fitted.max,
+        cv_rmse_mm: errors.random.rmse,
+        cv_blocks_rmse_mm: errors.blocks.rmse,
+    }
+}
+
+/// Joints as on the teach pendant, from 1.
+fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
+    (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
+}
+
+struct Context<'a> {
+    subject: &'a Subject<'a>,
+    extended: &'a Extended,
+    linear: &'a Linear,
+    whole: &'a Design,
+    splits: &'a [split::Split],
+    set_aside: &'a [usize],
+}
+
+impl Context<'_> {
+    /// Held-out error of a design, with columns added or not, to first order (mm).
+    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
+        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
+    }
+
+    /// A finding for every story, and which finding each cause went into.
+    fn findings(
+        &self,
+        accepted: &[Accepted],
+        steps: &mut Vec<Step>,
+    ) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
+        let mut pictures = Vec::new();
+        let mut findings: Vec<Finding> = Vec::new();
+        let mut places = Vec::new();
+        let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
+        for (index, own) in accepted.iter().enumerate() {
+            let cause = &self.extended.causes[index];
+            let later: Vec<usize> =
+                (index + 1..accepted.len()).flat_map(|k| self.extended.places(k)).collect();
+            steps.push(Step {
+                added: told_short(cause),
+                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
+            });
+            let parameters = words::parameters(self.extended, index);
+            let mergeable = cause.rows().is_none();
+            let told = findings.iter().position(|f: &Finding| {
+                mergeable
+                    && f.effect == cause.name()
+                    && f.rows.is_none()
+                    && f.joints == pendant(&cause.joints())
+            });
+            if let Some(place) = told {
+                findings[place].parameters.extend(parameters);
+                findings[place].cause = format!(
+                    "{}; {}",
+                    findings[place].cause,
+                    words::cause(cause, &words::parameters(self.extended, index), last)
+                );
+                places.push(place);
+                continue;
+            }
+            places.push(findings.len());
+            let (finding, picture) = self.finding(index, cause, own, parameters, last);
+            findings.push(finding);
+            pictures.push(picture);
+        }
+        (findings, places, pictures)
+    }
+
+    fn finding(
+        &self,
+        index: usize,
+        cause: &Cause,
+        own: &Accepted,
+        parameters: Vec<FoundParameter>,
+        last: usize,
+    ) -> (Finding, Picture) {
+        let without = self.linear.design(&self.extended.places(index));
+        let folds = Folds::of(&without, self.splits);
+        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
+        let mut alternatives: Vec<Alternative> = own
+            .rivals
+            .iter()
+            .take(3)
+            .map(|rival| {
+                let columns = rival.candidate.columns(&without);
+                let sizes = rival.candidate.cause.sizes();
+                Alternative {
+                    effect: rival.candidate.cause.name().to_owned(),
+                    joints: pendant(&rival.candidate.cause.joints()),
+                    rows: rival.candidate.cause.rows(),
+                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
+                    beaten_by: own.own.merit - rival.score.merit,
+                }
+            })
+            .collect();
+        let mut clear = alternatives.iter().all(|a| a.beaten_by >= CLEAR);
+        if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
+            clear = false;
+            alternatives.insert(
+                0,
+                Alternative {
+                    effect: "link-geometry".to_owned(),
+                    joints: None,
+                    rows: None,
+                    cv_rmse_mm: before_mm,
+                    beaten_by: own.own.merit,
+                },
+            );
+        }
+        let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
+        let lambda = non_centrality(&own.own.information, &values);
+        let picture = picture(self.subject, cause, &without, self.whole);
+        let finding = Finding {
+            effect: cause.name().to_owned(),
+            cause: words::cause(cause, &parameters, last),
+            confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
+            rows: cause.rows(),
+            row_list: None,
+            joints: pendant(&cause.joints()),
+            evidence: format!(
+                "{}: χ² falls by {:.0} for {} parameters, everything else refitted; twice the log Bayes factor {:.0} \
+                 after counting {} variants",
+                words::pattern(cause),
+                own.own.gain,
+                own.own.estimate.len(),
+                own.own.merit,
+                ((own.own.evidence - own.own.merit) / 2.0).exp().round(),
+            ),
+            parameters,
+            p_value: own.log_p.exp(),
+            non_centrality: Some(lambda),
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.held_out(self.whole, None) },
+            alternatives,
+            remedy: words::remedy(cause.name()).to_owned(),
+        };
+        (finding, picture)
+    }
+}
+
+fn told_short(cause: &Cause) -> String {
+    let joints = cause.joints();
+    match (joints.as_slice(), cause.rows()) {
+        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),
+        ([], None) => cause.name().to_owned(),
+        ([joint], _) => format!("{} of joint {}", cause.name(), joint + 1),
+        (many, _) => {
+            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
+            format!("{} of joints {}", cause.name(), list.join(" and "))
+        }
+    }
+}
+
+/// The rounding counts as a finding when it makes more than this share of the geometric residual's variance.
+const ROUNDING_SHARE: f64 = 0.25;
+
+fn rounding_finding(
+    dataset: &Dataset,
+    prepared: &Prepared,
+    subject: &Subject<'_>,
+    validation: &Validation,
+    geometric: &Extended,
+    stages: &[StageError; 3],
+) -> Option<Finding> {
+    let step = dataset.angle_step_rad?;
+    let logged = &prepared.logged;
+    let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
+    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    let raw = Subject { observed: logged, ..*subject };
+    let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
+    let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
+    if share < ROUNDING_SHARE * before * before {
+        return None;
+    }
+    let (gain, evidence) = match &prepared.sharpening {
+        Ok(report) => (
+            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: stages[1].random.rmse },
+            format!(
+                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; fused with the read-out they are known \
+                 {:.1} times better",
+                step.to_degrees(),
+                share.sqrt(),
+                1.0 / report.narrowed.max(1e-6)
+            ),
+        ),
+        Err(_) => (
+            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
+            format!(
+                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to sharpen them",
+                step.to_degrees(),
+                share.sqrt()
+            ),
+        ),
+    };
+    let _ = validation;
+    Some(Finding {
+        effect: "angle-rounding".to_owned(),
+        cause: format!(
+            "the log rounds joint angles to {:.3}°, which alone moves the touched point by {:.3} mm RMS",
+            step.to_degrees(),
+            share.sqrt()
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: vec![FoundParameter {
+            name: "step".to_owned(),
+            value: step.to_degrees(),
+            sigma: None,
+            unit: "°".to_owned(),
+        }],
+        evidence,
+        p_value: 0.0,
+        non_centrality: None,
+        gain,
+        alternatives: Vec::new(),
+        remedy: words::remedy("angle-rounding").to_owned(),
+    })
+}
+
+fn mismatch_finding(dataset: &Dataset, prepared: &Prepared, after: &StageError) -> Option<Finding> {
+    let rows = &prepared.mismatch.rows;
+    let largest = rows.iter().map(|r| r.1).fold(f64::NAN, f64::max);
+    if rows.is_empty() {
+        return None;
+    }
+    Some(Finding {
+        effect: "readout-mismatch".to_owned(),
+        cause: format!(
+            "in {} rows the controller's x, y, z belong to another pose than its angles, up to {largest:.2} mm apart",
+            rows.len()
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: Some(rows.iter().map(|(i, _)| dataset.rows[*i].number).collect()),
+        joints: None,
+        parameters: vec![FoundParameter {
+            name: "largest mismatch".to_owned(),
+            value: largest,
+            sigma: None,
+            unit: "mm".to_owned(),
+        }],
+        evidence: format!(
+            "read-out against the nominal forward map of the angles: the other rows scatter by {:.4} mm",
+            prepared.mismatch.usual_mm
+        ),
+        p_value: 0.0,
+        non_centrality: None,
+        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        alternatives: Vec::new(),
+        remedy: words::remedy("readout-mismatch").to_owned(),
+    })
+}
+
+fn outlier_finding(dataset: &Dataset, wild: &[(usize, f64)], after: &StageError) -> Option<Finding> {
+    if wild.is_empty() {
+        return None;
+    }
+    let mut list: Vec<usize> = wild.iter().map(|(i, _)| dataset.rows[*i].number).collect();
+    list.sort_unstable();
+    Some(Finding {
+        effect: "outliers".to_owned(),
+        cause: format!(
+            "{} single readings lie far beyond the scatter of all others, up to {:.0} times",
+            list.len(),
+            wild[0].1
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: Some(list),
+        joints: None,
+        parameters: Vec::new(),
+        evidence: "sizes beyond what the tail of the other residuals gives once in a thousand data sets"
+            .to_owned(),
+        p_value: 1e-3,
+        non_centrality: None,
+        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        alternatives: Vec::new(),
+        remedy: words::remedy("outliers").to_owned(),
+    })
+}
+
+/// What sensor and rounding leave, and where that is from.
+fn noise_floor(
+    repeated: &Option<split::NoiseFloor>,
+    subject: &Subject<'_>,
+    extended: &Extended,
+) -> (Option<f64>, String) {
+    if let Some(floor) = repeated {
+        return (
+            Some(floor.sigma_mm),
+            format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
+        );
+    }
+    let observed = subject.observed;
+    let shares = angle_shares(&observed.dataset, &extended.model, &extended.frames, &observed.angles);
+    let coordinates = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let mean = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    if mean > 0.0 {
+        (Some(mean.sqrt()), "rounding of the angles alone; no pose was repeated".to_owned())
+    } else {
+        (None, "no pose was repeated and nothing is rounded".to_owned())
+    }
+}
+
+/// Neighbours must resemble each other by this many standard deviations to be called structure.
+const STRUCTURE_Z: f64 = 5.5;
+/// And by at least this correlation: a large set makes any trifle significant.
+const STRUCTURE_R: f64 = 0.15;
+
+/// A sentence on what is left, and a finding where it has a pattern.
+fn told(
+    structure: &Structure,
+    after: &StageError,
+    floor_mm: Option<f64>,
+    findings: &mut Vec<Finding>,
+) -> Option<String> {
+    let mut patterns = Vec::new();
+    let mut strongest = 0.0_f64;
+    for (r, z, what) in [
+        (structure.neighbours, structure.neighbours_z, "neighbouring poses"),
+        (structure.order, structure.order_z, "consecutive rows"),
+    ] {
+        if z > STRUCTURE_Z && r > STRUCTURE_R {
+            patterns.push(format!("{what} share {:.0} % of it", 100.0 * r));
+            strongest = strongest.max(z);
+        }
+    }
+    let rmse = after.fitted.rmse;
+    if patterns.is_empty() {
+        return match floor_mm {
+            Some(floor) if rmse > 1.5 * floor => Some(format!(
+                "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
+            )),
+            _ => None,
+        };
+    }
+    let text = format!("{rmse:.3} mm RMS with a pattern: {}", patterns.join(", "));
+    findings.push(Finding {
+        effect: "unexplained".to_owned(),
+        cause: format!(
+            "something repeatable is left that nothing in the catalogue explains: {}",
+            patterns.join(", ")
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: format!(
+            "correlation of residuals: nearest poses {:.2} (z = {:.1}), consecutive rows {:.2} (z = {:.1})",
+            structure.neighbours, structure.neighbours_z, structure.order, structure.order_z
+        ),
+        p_value: crate::math::tail::normal_two_sided(strongest),
+        non_centrality: None,
+        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        alternatives: Vec::new(),
+        remedy: words::remedy("unexplained").to_owned(),
+    });
+    Some(text)
+}
+
+/// What these rows cannot show, with the smallest size that they could.
+fn not_testable(
+    context: &Context<'_>,
+    left: &[Scored],
+    found: &[String],
+    prepared: &Prepared,
+) -> Vec<NotTestable> {
+    let dataset = &context.subject.observed.dataset;
+    let columns = super::catalogue::Columns::of(dataset);
+    let mut out = Vec::new();
+    let missing = |name: &str| !found.iter().any(|f| f == name);
+    let mut add = |effect: &str, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
+        out.push(NotTestable { effect: effect.to_owned(), joints, reason, remedy: remedy.to_owned() });
+    };
+    if prepared.sides_from_order && missing("backlash") {
+        add(
+            "backlash",
+            None,
+            "no approach columns, and the order of the rows shows nothing of it".to_owned(),
+            "measure each pose from both sides and log approach1 to approach6",
+        );
+    }
+    if columns.hours.is_none() && columns.temperature.is_none() {
+        add(
+            "thermal-drift",
+            None,
+            "neither time nor temperature is logged".to_owned(),
+            "log t and temperature, and measure from a cold start",
+        );
+    }
+    if dataset.rows.iter().all(|r| r.readout_mm.is_none()) {
+        add(
+            "readout-mismatch",
+            None,
+            "the controller's own x, y, z are not logged".to_owned(),
+            "log the controller's Cartesian read-out beside the angles",
+        );
+    }
+    if missing("sensor-scale") {
+        let design = Design::of(context.subject, context.extended);
+        let one = scale_beside_growth(&design, &DVector::from_element(1, 1e-3));
+        if one < VISIBLE {
+            add(
+                "sensor-scale",
+                None,
+                "a scale error of 0.1 % looks like links that are all longer by as much".to_owned(),
+                "measure a length standard, or distances that do not come from the arm",
+            );
+        }
+    }
+    let still: Vec<usize> = (0..6).filter(|&j| columns.range_rad[j] <= super::catalogue::STILL_RAD).collect();
+    if !still.is_empty() {
+        add(
+            "gear-eccentricity",
+            pendant(&still),
+            "these axes hardly moved".to_owned(),
+            "turn every axis through its whole range",
+        );
+    }
+    // The smallest peak rotation that would show, for every joint and effect of the arm.
+    for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
+        let mut hidden: Vec<(usize, f64)> = Vec::new();
+        for joint in 0..6 {
+            if still.contains(&joint) || (name == "backlash" && prepared.sides_from_order) {
+                continue;
+            }
+            let smallest = left
+                .iter()
+                .filter(|s| {
+                    s.candidate.cause.name() == name
+                        && s.candidate.cause.joints().last() == Some(&joint)
+                        && !matches!(
+                            s.candidate.cause,
+                            Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_))
+                        )
+                })
+                .filter_map(smallest_rad)
+                .fold(f64::NAN, f64::max);
+            if smallest > PRACTICAL_RAD {
+                hidden.push((joint, smallest));
+            }
+        }
+        let told = found.iter().any(|f| f == name);
+        if !hidden.is_empty() && !told {
+            let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
+            let sizes: Vec<String> = hidden
+                .iter()
+                .map(|(j, s)| {
+                    if s.is_finite() && s.to_degrees() < 90.0 {
+                        format!("joint {}: {:.2}°", j + 1, s.to_degrees())
+                    } else {
+                        format!("joint {}: nothing at all", j + 1)
+                    }
+                })
+                .collect();
+            add(
+                name,
+                pendant(&joints),
+                format!(
+                    "in these poses it hides inside geometry and frames; the smallest peak that would show: {}",
+                    sizes.join(", ")
+                ),
+                "measure poses that turn these joints far while the others differ: `truegrind plan` proposes them",
+            );
+        }
+    }
+    out
+}
+
+/// Smallest peak rotation with the non-centrality of [`VISIBLE`] (rad), in the least favourable phase.
+fn smallest_rad(scored: &Scored) -> Option<f64> {
+    use super::catalogue::Regressor;
+    let peak = |r: &Regressor| match r {
+        Regressor::Arm { rotation, .. } => {
+            rotation.iter().flat_map(|(_, c)| c.iter()).fold(0.0_f64, |m, v| m.max(v.abs()))
+        }
+        Regressor::Push { .. } => 0.0,
+    };
+    let information = &scored.score.information;
+    let scaled: Vec<f64> = scored.candidate.regressors.iter().map(peak).collect();
+    if scaled.iter().any(|s| *s <= 0.0) {
+        return None;
+    }
+    let k = scaled.len();
+    let per_peak = nalgebra::DMatrix::from_fn(k, k, |a, b| information[(a, b)] / (scaled[a] * scaled[b]));
+    let least = per_peak.symmetric_eigen().eigenvalues.min().max(1e-12);
+    Some((VISIBLE / least).sqrt())
+}
+
+#[allow(clippy::too_many_arguments)]
+fn estimated(
+    dataset: &Dataset,
+    robot: &str,
+    nominal_arm: &Model,
+    subject: &Subject<'_>,
+    extended: &Extended,
+    stages: &[StageError; 3],
+    diagnosis: &Diagnosis,
+    set_aside: &[usize],
+    options: &Options,
+    prepared: &Prepared,
+) -> Estimated {
+    let fitted = Fitted::from(extended);
+    let parameters = parameter_table(&fitted, nominal_arm);
+    let mut reasons = vec![format!("the fit {}", extended.estimate.termination)];
+    let mut failed = !extended.estimate.termination.is_converged();
+    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
+        failed = true;
+        reasons.push(format!(
+            "with the findings the held-out error is {:.3} mm, geometry alone has {:.3}",
+            stages[2].random.rmse, stages[1].random.rmse
+        ));
+    }
+    if stages[2].random.rmse > stages[0].random.rmse {
+        failed = true;
+        reasons.push(format!(
+            "held out, geometry is worse than registered frames: {:.3} against {:.3} mm",
+            stages[2].random.rmse, stages[0].random.rmse
+        ));
+    }
+    reasons.push("held-out error not evaluated: no limits were stated".to_owned());
+    let order = arm_of(&fitted);
+    let estimated = Estimated {
+        robot: robot.to_owned(),
+        nominal: nominal_arm.clone(),
+        model: extended.model.clone(),
+        covariance: arm_covariance(&fitted),
+        order,
+        provenance: Provenance {
+            file: dataset.file.clone(),
+            sha256: dataset.sha256.clone(),
+            rows: dataset.rows.len() - set_aside.len(),
+            set_aside: set_aside.iter().map(|&i| dataset.rows[i].number).collect(),
+            sensor: sensor_name(dataset.sensor).to_owned(),
+            method: "diagnose".to_owned(),
+            seed: options.selection.seed,
+            held_out: 0.2,
+            sharpened: prepared.sharpening.is_ok(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        },
+        parameters: parameters
+            .iter()
+            .filter(|p| p.name.starts_with("link") || p.name.starts_with("effect"))
+            .cloned()
+            .collect(),
+        registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
+        geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
+        noise_floor_mm: diagnosis.noise_floor_mm,
+        verdict: Verdict { status: if failed { Judgement::Fail } else { Judgement::NotEvaluated }, reasons },
+        region: Region {
+            min_deg: [0.0; 6],
+            max_deg: [0.0; 6],
+            samples_deg: Vec::new(),
+            spacing_deg: 0.0,
+            sigma_mm: 0.0,
+        },
+        condition: mean_condition(dataset),
+    };
+    with_region(estimated, &subject.observed.dataset, &fitted)
+}

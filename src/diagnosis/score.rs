@@ -1,0 +1,127 @@
+//! How much a candidate explains, fitted jointly with everything else, and whether that could be chance.
+//!
+//! With gradient g and information S of the projected candidate and its size prior Λ:
+//!
+//! - estimate −(S + Λ)⁻¹ g and gain gᵀ(S + Λ)⁻¹ g, the fall of χ²;
+//! - evidence gain − ln det(I + S Λ⁻¹), twice the log Bayes factor against its absence (Laplace): what a candidate with many
+//!   parameters, or none that this data could see, has to pay;
+//! - the p-value takes the smaller of gᵀS⁺g under the model's own noise and under the scatter that the residuals really
+//!   have, row by row (White 1980, heteroskedasticity-consistent): noise that depends on the pose is no evidence;
+//! - non-centrality λ = cᵀ S c of a stated size c: what the data would show of it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::catalogue::Candidate;
+use super::design::Design;
+use crate::math::tail::log_chi_square_tail;
+
+/// A scored candidate.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Fall of χ² with the size prior.
+    pub gain: f64,
+    /// Twice the log Bayes factor, variants not counted.
+    pub evidence: f64,
+    /// Evidence less 2 ln of the variants tried.
+    pub merit: f64,
+    /// First-order estimate of the parameters.
+    pub estimate: DVector<f64>,
+    /// Information, projected.
+    pub information: DMatrix<f64>,
+    /// Natural logarithm of the p-value of the candidate alone, not corrected for trials.
+    pub log_p: f64,
+}
+
+/// Scores one candidate.
+pub fn score(design: &Design, candidate: &Candidate) -> Score {
+    score_columns(design, &candidate.columns(design), &candidate.cause.sizes(), candidate.tried)
+}
+
+/// Scores columns with the standard deviations that their parameters have beforehand.
+pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tried: f64) -> Score {
+    let k = columns.ncols();
+    let projected = design.project(columns);
+    // In units of the sizes: well scaled.
+    let scale = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
+    let information = &scale * &projected.information * &scale;
+    let gradient = &scale * &projected.gradient;
+    let nothing = || Score {
+        gain: 0.0,
+        evidence: 0.0,
+        merit: -2.0 * tried.ln(),
+        estimate: DVector::zeros(k),
+        information: projected.information.clone(),
+        log_p: 0.0,
+    };
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return nothing() };
+    let step = factor.solve(&gradient);
+    let gain = gradient.dot(&step);
+    let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let evidence = gain - log_det;
+    if !evidence.is_finite() {
+        return nothing();
+    }
+    let merit = evidence - 2.0 * tried.ln();
+    let log_p = if gain > 8.0 {
+        let scattered = scatter_statistic(design, columns, &projected.shared, &scale, &gradient, &step);
+        let (plain, freedom) = plain_statistic(&information, &gradient);
+        log_chi_square_tail(plain.min(scattered.unwrap_or(plain)), freedom.max(1))
+    } else {
+        log_chi_square_tail(gain, k)
+    };
+    Score { gain, evidence, merit, estimate: -(&scale * step), information: projected.information, log_p }
+}
+
+/// gᵀ S⁺ g over the directions that the data see, and their number.
+fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {
+    let eigen = information.clone().symmetric_eigen();
+    let (mut sum, mut freedom) = (0.0, 0);
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        // A direction in which the size prior knows more than the data is none of the data's.
+        if *value > 0.1 {
+            sum += vector.dot(gradient).powi(2) / value;
+            freedom += 1;
+        }
+    }
+    (sum, freedom)
+}
+
+/// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over observations
+/// of the outer products.
+fn scatter_statistic(
+    design: &Design,
+    columns: &DMatrix<f64>,
+    shared: &DMatrix<f64>,
+    scale: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    step: &DVector<f64>,
+) -> Option<f64> {
+    let k = columns.ncols();
+    if k > 6 {
+        return None;
+    }
+    let pure = (columns - design.basis.tr_mul(shared)) * scale;
+    let left = &design.residual - &pure * step;
+    let mut scatter = DMatrix::zeros(k, k);
+    for i in 0..design.observations {
+        let mut g = DVector::zeros(k);
+        for s in i * design.per..(i + 1) * design.per {
+            g += pure.row(s).transpose() * left[s];
+        }
+        scatter += &g * g.transpose();
+    }
+    let eigen = scatter.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    let mut sum = 0.0;
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > 1e-10 * largest {
+            sum += vector.dot(gradient).powi(2) / value;
+        }
+    }
+    Some(sum)
+}
+
+/// Non-centrality of an effect of size `values`.
+pub fn non_centrality(information: &DMatrix<f64>, values: &DVector<f64>) -> f64 {
+    (values.transpose() * information * values)[0].max(0.0)
+}

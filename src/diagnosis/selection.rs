@@ -1,0 +1,512 @@
+//! Which causes go into the model: forward by evidence and held-out error, backward, exchanged, until nothing helps.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::catalogue::{Candidate, arm_candidates, measurement_candidates};
+use super::cause::Cause;
+use super::design::{Design, Linear};
+use super::extension::{Extended, Freedom, Subject, fit};
+use super::score::{Score, score};
+use super::{intervals, lines};
+use crate::kinematics::effect::Effect;
+use crate::measurement::dataset::Sensor;
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::split::{self, Split};
+
+/// When a cause is accepted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Chance of any false finding on data with nothing hidden.
+    pub alpha: f64,
+    /// Most causes that are accepted.
+    pub most: usize,
+    /// Seed of the random folds.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { alpha: 0.01, most: 12, seed: 0 }
+    }
+}
+
+/// A candidate with its score against a fit.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The candidate.
+    pub candidate: Arc<Candidate>,
+    /// Its score.
+    pub score: Score,
+}
+
+/// An accepted cause, judged against the model without it.
+#[derive(Debug, Clone)]
+pub struct Accepted {
+    /// Its score there.
+    pub own: Score,
+    /// Corrected p-value, its natural logarithm.
+    pub log_p: f64,
+    /// Other stories, best first, with their scores there.
+    pub rivals: Vec<Scored>,
+    /// Non-centrality that is left when all lengths may grow together without a prior; for a sensor's scale.
+    pub beside_growth: Option<f64>,
+}
+
+/// What the selection came to.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// Geometry alone.
+    pub geometric: Extended,
+    /// With all accepted causes.
+    pub extended: Extended,
+    /// One for each cause.
+    pub accepted: Vec<Accepted>,
+    /// Every candidate against the extended model, best first: what is left to find, and what could not be seen.
+    pub left: Vec<Scored>,
+    /// Kinds of candidates (name and joints) that were tried.
+    pub families: f64,
+}
+
+/// Candidates that do not depend on a fit, built once.
+pub struct Catalogue {
+    fixed: Vec<Arc<Candidate>>,
+    /// Kinds of shifts with their regressors over all rows.
+    shifts: Vec<Candidate>,
+    families: f64,
+}
+
+impl Catalogue {
+    /// For a data set.
+    pub fn of(subject: &Subject<'_>) -> Self {
+        let dataset = &subject.observed.dataset;
+        let mut fixed = arm_candidates(subject);
+        fixed.extend(measurement_candidates(subject));
+        let mut kinds = vec![Kind::Frame { turning: false }, Kind::Tool];
+        if dataset.sensor == Sensor::Cable {
+            kinds.push(Kind::Zero);
+        } else {
+            kinds.push(Kind::Frame { turning: true });
+        }
+        kinds.push(Kind::Load { joints: vec![1, 2], compliance: None });
+        let shifts: Vec<Candidate> = kinds
+            .into_iter()
+            .map(|kind| {
+                let disturbance = Disturbance::new(kind, Course::Always);
+                Candidate::measurement(disturbance, dataset, subject.nominal)
+            })
+            .collect();
+        let mut stories: Vec<(&str, Vec<usize>)> =
+            fixed.iter().chain(&shifts).map(|c| (c.cause.name(), c.cause.joints())).collect();
+        stories.extend((0..6).map(|j| ("gear-transmission", vec![j])));
+        stories.sort();
+        stories.dedup();
+        let families = stories.len() as f64;
+        Self { fixed: fixed.into_iter().map(Arc::new).collect(), shifts, families }
+    }
+
+    /// All candidates against a fit, best first.
+    pub fn scored(&self, subject: &Subject<'_>, fit: &Extended, design: &Design) -> Vec<Scored> {
+        let dataset = &subject.observed.dataset;
+        let n = dataset.rows.len();
+        let tried = (n as f64).max(2.0) * (n as f64).max(3.0).ln();
+        let mut shifts = self.shifts.clone();
+        if let Some(known) = known_load(fit) {
+            shifts.push(Candidate::measurement(
+                Disturbance::new(known, Course::Always),
+                dataset,
+                subject.nominal,
+            ));
+        }
+        let mut open: Vec<Arc<Candidate>> = Vec::new();
+        for whole in &shifts {
+            let Cause::Measurement(disturbance) = &whole.cause else { continue };
+            let found = intervals::scan(design, &whole.columns(design), &whole.cause.sizes(), 2);
+            for interval in found {
+                let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
+                let shift = Disturbance::new(disturbance.kind.clone(), Course::Rows { from, to });
+                let candidate = Candidate::measurement(shift, dataset, subject.nominal);
+                open.push(Arc::new(Candidate { tried, ..candidate }));
+            }
+        }
+        open.extend(lines::candidates(subject, design).into_iter().map(Arc::new));
+        let mut out: Vec<Scored> = self
+            .fixed
+            .par_iter()
+            .chain(open.par_iter())
+            .map(|candidate| Scored { candidate: candidate.clone(), score: score(design, candidate) })
+            .collect();
+        out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
+        out
+    }
+
+    /// The corrected p-value's logarithm.
+    fn corrected(&self, scored: &Scored) -> f64 {
+        (scored.score.log_p + (scored.candidate.tried * self.families).ln()).min(0.0)
+    }
+}
+
+/// Unlogged payload under the compliances that were already found.
+fn known_load(fit: &Extended) -> Option<Kind> {
+    let found: Vec<(usize, f64)> = fit
+        .causes
+        .iter()
+        .filter_map(|c| match c {
+            Cause::Arm(Effect::JointCompliance(c)) => Some((c.joint, c.compliance_rad_per_nm)),
+            _ => None,
+        })
+        .collect();
+    (!found.is_empty()).then(|| Kind::Load {
+        joints: found.iter().map(|f| f.0).collect(),
+        compliance: Some(found.iter().map(|f| f.1).collect()),
+    })
+}
+
+/// Grams of Q over the folds of a split, for held-out errors to first order.
+#[derive(Debug, Clone)]
+pub struct Folds {
+    tests: Vec<Vec<usize>>,
+    grams: Vec<DMatrix<f64>>,
+}
+
+impl Folds {
+    /// For a design; `splits` in observations.
+    pub fn of(design: &Design, splits: &[Split]) -> Self {
+        let tests: Vec<Vec<usize>> = splits
+            .iter()
+            .map(|s| s.test.iter().flat_map(|&i| i * design.per..(i + 1) * design.per).collect())
+            .collect();
+        let grams = tests
+            .par_iter()
+            .map(|rows| {
+                let q = design.basis.select_columns(rows);
+                &q * q.transpose()
+            })
+            .collect();
+        Self { tests, grams }
+    }
+
+    /// Sum of squares of the whitened held-out residuals.
+    fn held_out(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> f64 {
+        self.residuals(design, columns).iter().map(DVector::norm_squared).sum()
+    }
+
+    /// Root mean square over observations of the held-out position errors (mm), those at `set_aside` left out.
+    pub fn rmse_mm(
+        &self,
+        design: &Design,
+        columns: Option<(&DMatrix<f64>, &[f64])>,
+        set_aside: &[usize],
+    ) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (rows, residuals) in self.tests.iter().zip(self.residuals(design, columns)) {
+            for (&s, r) in rows.iter().zip(residuals.iter()) {
+                if !set_aside.contains(&(s / design.per)) {
+                    sum += (r * design.slopes.mm[s]).powi(2);
+                    count += usize::from(s % design.per == 0);
+                }
+            }
+        }
+        (sum / f64::from(u32::try_from(count.max(1)).unwrap_or(u32::MAX))).sqrt()
+    }
+
+    /// Whitened held-out residuals fold by fold, everything refitted in every fold to first order.
+    fn residuals(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> Vec<DVector<f64>> {
+        let p = design.basis.nrows();
+        let empty = DMatrix::zeros(design.rows(), 0);
+        let (columns, sizes) = columns.unwrap_or((&empty, &[]));
+        let k = columns.ncols();
+        let shared = &design.basis * columns;
+        let square = columns.tr_mul(columns);
+        let gradient = columns.tr_mul(&design.residual);
+        self.tests
+            .par_iter()
+            .zip(&self.grams)
+            .map(|(rows, gram)| {
+                let q = design.basis.select_columns(rows);
+                let c = columns.select_rows(rows);
+                let r = DVector::from_iterator(rows.len(), rows.iter().map(|&s| design.residual[s]));
+                let mut normal = DMatrix::zeros(p + k, p + k);
+                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - gram));
+                let cross = &shared - &q * &c;
+                normal.view_mut((0, p), (p, k)).copy_from(&cross);
+                normal.view_mut((p, 0), (k, p)).copy_from(&cross.transpose());
+                let mut own = &square - c.tr_mul(&c);
+                for a in 0..k {
+                    own[(a, a)] += sizes[a].powi(-2);
+                }
+                normal.view_mut((p, p), (k, k)).copy_from(&own);
+                for a in 0..p + k {
+                    normal[(a, a)] *= 1.0 + 1e-12;
+                }
+                let mut right = DVector::zeros(p + k);
+                right.rows_mut(0, p).copy_from(&(-(&q * &r)));
+                right.rows_mut(p, k).copy_from(&(&gradient - c.tr_mul(&r)));
+                let Some(factor) = normal.cholesky() else { return r * f64::INFINITY };
+                let step = -factor.solve(&right);
+                r + q.tr_mul(&step.rows(0, p)) + c * step.rows(p, k)
+            })
+            .collect()
+    }
+}
+
+/// A finding may raise the error on held-out blocks by this share at most, where it is not about rows.
+const BLOCK_SLACK: f64 = 1.005;
+
+/// Contiguous blocks of the second validation.
+pub const BLOCKS: usize = 10;
+
+/// Selects causes. `tell` hears of every step.
+pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + Sync)) -> Selection {
+    let dataset = &subject.observed.dataset;
+    let catalogue = Catalogue::of(subject);
+    let registered = fit(subject, &[], Freedom::Frames, None);
+    let geometric = fit(subject, &[], Freedom::All, Some(&registered));
+    let random = split::folds(dataset, 5, options.seed);
+    let blocks = split::blocks(dataset, BLOCKS);
+    let mut current = geometric.clone();
+    let mut refused: Vec<Cause> = Vec::new();
+    // Causes that were not far ahead of a rival when they came in: they are looked at again after every step.
+    let mut doubtful: Vec<Cause> = Vec::new();
+    for _ in 0..4 * options.most.max(1) {
+        let design = Design::of(subject, &current);
+        let left = catalogue.scored(subject, &current, &design);
+        let taken = (current.causes.len() < options.most)
+            .then(|| {
+                let folds = (Folds::of(&design, &random), Folds::of(&design, &blocks));
+                let before = (folds.0.held_out(&design, None), folds.1.held_out(&design, None));
+                left.iter().take_while(|s| s.score.merit > 0.0).find(|scored| {
+                    if catalogue.corrected(scored) > options.alpha.ln()
+                        || refused.contains(&scored.candidate.cause)
+                        || already(&current.causes, &scored.candidate.cause)
+                    {
+                        return false;
+                    }
+                    let columns = scored.candidate.columns(&design);
+                    let sizes = scored.candidate.cause.sizes();
+                    let after = folds.0.held_out(&design, Some((&columns, &sizes)));
+                    let local = scored.candidate.cause.rows().is_some();
+                    let in_blocks = folds.1.held_out(&design, Some((&columns, &sizes)));
+                    after < before.0 && (local || in_blocks < before.1 * BLOCK_SLACK)
+                })
+            })
+            .flatten();
+        let Some(taken) = taken else {
+            let all: Vec<usize> = (0..current.causes.len()).collect();
+            match review(subject, &catalogue, options, &current, &all) {
+                Review::Changed(settled) => {
+                    current = settled;
+                    continue;
+                }
+                Review::Settled(accepted) => {
+                    let families = catalogue.families;
+                    return Selection { geometric, extended: current, accepted, left, families };
+                }
+            }
+        };
+        let cause = taken.candidate.cause.clone();
+        tell(&format!("{}. {}", current.causes.len() + 1, cause.name()));
+        let near = left
+            .iter()
+            .any(|s| !s.candidate.cause.same_story(&cause) && s.score.merit > taken.score.merit - DOUBT);
+        let mut causes = current.causes.clone();
+        causes.push(cause.clone());
+        let count = current.causes.len();
+        current = fit(subject, &causes, Freedom::All, Some(&current));
+        if near {
+            doubtful.push(cause.clone());
+        }
+        for _ in 0..options.most {
+            let unsure: Vec<usize> =
+                (0..current.causes.len()).filter(|&k| already(&doubtful, &current.causes[k])).collect();
+            match review(subject, &catalogue, options, &current, &unsure) {
+                Review::Changed(settled) => current = settled,
+                Review::Settled(_) => break,
+            }
+        }
+        if current.causes.len() <= count && !already(&current.causes, &cause) {
+            // The newcomer did not survive beside the others: not to be tried again.
+            refused.push(cause);
+        }
+    }
+    // Causes that take turns without end: the last state is judged as it stands.
+    let design = Design::of(subject, &current);
+    let left = catalogue.scored(subject, &current, &design);
+    let linear = Linear::of(subject, &current);
+    let accepted = (0..current.causes.len())
+        .map(|index| looked_at(subject, &catalogue, &current, &linear, index).0)
+        .collect();
+    Selection { geometric, extended: current, accepted, left, families: catalogue.families }
+}
+
+/// A cause whose best rival has this much less merit, or more, is looked at again after every step.
+const DOUBT: f64 = 30.0;
+
+/// Whether a cause with the same parameters is in the model.
+fn already(causes: &[Cause], candidate: &Cause) -> bool {
+    causes.iter().any(|c| match (c, candidate) {
+        (Cause::Arm(a), Cause::Arm(b)) => {
+            let still = |e: &Effect| {
+                let mut e = e.clone();
+                (0..e.parameters().len()).for_each(|k| e.set(k, 0.0));
+                e
+            };
+            still(a) == still(b)
+        }
+        (Cause::Measurement(a), Cause::Measurement(b)) => a.kind == b.kind && a.course == b.course,
+        _ => false,
+    })
+}
+
+/// A fit to start from when cause `index` goes: its parameters are taken out, so that the others keep their values.
+fn near(current: &Extended, index: usize) -> Extended {
+    use crate::kinematics::parameter::Parameter;
+    let gone = current.places(index);
+    let arm = matches!(current.causes[index], Cause::Arm(_));
+    let removed = gone.first().map(|&k| current.parameters[k]);
+    let mut out = current.clone();
+    let keep = |k: &usize| !gone.contains(k);
+    let places: Vec<usize> = (0..current.parameters.len()).filter(keep).collect();
+    out.x = places.iter().map(|&k| current.x[k]).collect();
+    out.parameters = places
+        .iter()
+        .map(|&k| match (current.parameters[k], removed) {
+            (Parameter::Effect { index, parameter }, Some(Parameter::Effect { index: g, .. }))
+                if arm && index > g =>
+            {
+                Parameter::Effect { index: index - 1, parameter }
+            }
+            (Parameter::Disturbance { index, parameter }, Some(Parameter::Disturbance { index: g, .. }))
+                if !arm && index > g =>
+            {
+                Parameter::Disturbance { index: index - 1, parameter }
+            }
+            (other, _) => other,
+        })
+        .collect();
+    match removed {
+        Some(Parameter::Effect { index, .. }) => {
+            out.model.effects.remove(index);
+        }
+        Some(Parameter::Disturbance { index, .. }) => {
+            out.frames.disturbances.remove(index);
+        }
+        _ => {}
+    }
+    out
+}
+
+/// A cause must be better than another by this much merit to take its place.
+const EXCHANGE: f64 = 2.0;
+
+/// What looking again at accepted causes came to.
+enum Review {
+    /// One was dropped or exchanged.
+    Changed(Extended),
+    /// All stand.
+    Settled(Vec<Accepted>),
+}
+
+/// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
+/// explains better.
+fn review(
+    subject: &Subject<'_>,
+    catalogue: &Catalogue,
+    options: &Options,
+    current: &Extended,
+    which: &[usize],
+) -> Review {
+    let mut accepted = Vec::new();
+    if which.is_empty() {
+        return Review::Settled(accepted);
+    }
+    let linear = Linear::of(subject, current);
+    for &index in which {
+        let (judged, scored) = looked_at(subject, catalogue, current, &linear, index);
+        let mut others = current.causes.clone();
+        others.remove(index);
+        let best = scored
+            .iter()
+            .find(|s| catalogue.corrected(s) <= options.alpha.ln() && !already(&others, &s.candidate.cause));
+        let better = best.filter(|best| {
+            best.score.merit > judged.own.merit + EXCHANGE
+                && !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
+        });
+        let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+        if better.is_some() || !carries {
+            let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
+            return Review::Changed(match better {
+                Some(better) => {
+                    others.push(better.candidate.cause.clone());
+                    fit(subject, &others, Freedom::All, Some(&reduced))
+                }
+                None => reduced,
+            });
+        }
+        accepted.push(judged);
+    }
+    Review::Settled(accepted)
+}
+
+/// The score of a cause itself, from the list where it is there, computed otherwise (its own rows or order).
+fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &Cause) -> Scored {
+    if let Some(found) = scored.iter().find(|s| already(std::slice::from_ref(cause), &s.candidate.cause)) {
+        return found.clone();
+    }
+    let dataset = &subject.observed.dataset;
+    let candidate = match cause {
+        Cause::Arm(effect) => Candidate::arm(effect.clone(), dataset, subject.nominal),
+        Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, subject.nominal),
+    };
+    let tried = scored
+        .iter()
+        .filter(|s| {
+            s.candidate.cause.name() == cause.name()
+                && s.candidate.cause.rows().is_some() == cause.rows().is_some()
+        })
+        .map(|s| s.candidate.tried)
+        .fold(1.0, f64::max);
+    let candidate = Arc::new(Candidate { tried, ..candidate });
+    let score = score(design, &candidate);
+    Scored { candidate, score }
+}
+
+/// A cause against the model without it: the judgement, and every candidate's score there.
+fn looked_at(
+    subject: &Subject<'_>,
+    catalogue: &Catalogue,
+    current: &Extended,
+    linear: &Linear,
+    index: usize,
+) -> (Accepted, Vec<Scored>) {
+    let cause = &current.causes[index];
+    let design = linear.design(&current.places(index));
+    let scored = catalogue.scored(subject, current, &design);
+    let own = own_score(subject, &design, &scored, cause);
+    let mut rivals: Vec<Scored> = Vec::new();
+    for other in &scored {
+        let same =
+            other.candidate.cause.same_story(cause) || already(&current.causes, &other.candidate.cause);
+        let told = rivals.iter().any(|r| r.candidate.cause.same_story(&other.candidate.cause));
+        if !same && !told && other.score.merit > 0.25 * own.score.merit.max(0.0) {
+            rivals.push(other.clone());
+        }
+        if rivals.len() >= 5 {
+            break;
+        }
+    }
+    let beside_growth =
+        (cause.name() == "sensor-scale").then(|| scale_beside_growth(&design, &own.score.estimate));
+    let log_p = catalogue.corrected(&own);
+    (Accepted { own: own.score, log_p, rivals, beside_growth }, scored)
+}
+
+/// Non-centrality of a sensor's scale of that size when all lengths of the arm may grow together freely.
+pub fn scale_beside_growth(design: &Design, estimate: &DVector<f64>) -> f64 {
+    let columns = DMatrix::from_columns(&[design.slopes.by_scale.clone(), design.slopes.by_growth.clone()]);
+    let s = design.project(&columns).information;
+    let own = s[(0, 0)] - s[(0, 1)].powi(2) / s[(1, 1)].max(1e-300);
+    own.max(0.0) * estimate.get(0).copied().unwrap_or(0.0).powi(2)
+}

@@ -1,0 +1,11 @@
+//! Tests of `diagnosis`: hidden effects are found by name, and nothing is found where nothing is hidden.
+
+#[path = "diagnosis/simulator.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod simulator;
+#[path = "diagnosis/scenarios.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod scenarios;
+mod found;
+mod parts;
+mod real;
