@@ -14,6 +14,7 @@ mod simulate;
 mod identify;
 mod stated;
 mod diagnose;
+mod plan;
 mod path;
 mod compensate;
 mod deviation;
@@ -45,6 +46,8 @@ enum Verb {
     Identify(identify::Arguments),
     /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
     Diagnose(diagnose::Arguments),
+    /// Which poses to measure, as a program that moves there.
+    Plan(Box<plan::Arguments>),
     /// A surface to a RAPID program.
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
@@ -104,6 +107,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
+        Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),

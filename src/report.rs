@@ -21,3 +21,4 @@ pub mod study;
 pub mod deviation;
 pub mod compensation;
 pub mod robots;
+pub mod planning;

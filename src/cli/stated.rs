@@ -7,7 +7,8 @@ use truegrind::identification::calibration::Frames;
 use truegrind::math::se3::Pose;
 use truegrind::measurement::dataset::{Dataset, Sensor};
 
-/// Where the sensor stands, if that was measured. Only the raw error uses it: the fit finds frames by itself.
+/// Where the sensor stands, if that is known. An identification uses it for the raw error alone: the fit finds frames by
+/// itself.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct StatedArguments {
     /// Frame of a position or pose sensor in the robot's base: x,y,z (mm), or x,y,z,qw,qx,qy,qz.
@@ -25,9 +26,39 @@ pub(super) struct StatedArguments {
     touched_point: Option<String>,
 }
 
+/// What the frames must fit.
+struct Measured<'a> {
+    file: &'a str,
+    sensor: Sensor,
+    anchors: usize,
+}
+
 impl StatedArguments {
     /// The frames, when they are stated; an error where they do not fit the sensor of the data.
     pub(super) fn frames(&self, dataset: &Dataset) -> anyhow::Result<Option<Frames>> {
+        let measured = Measured { file: &dataset.file, sensor: dataset.sensor, anchors: dataset.anchors() };
+        self.frames_of(&measured)
+    }
+
+    /// The frames of a measurement that is still to be made: a tracker may stand anywhere, a cable needs its outlet.
+    pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
+        let anchors = self.outlet.len().max(1);
+        if sensor == Sensor::Cable && self.outlet.is_empty() {
+            bail!("--outlet is missing: where in the robot's base does the cable come out?");
+        }
+        let zeros = if self.cable_zero.is_empty() && sensor == Sensor::Cable {
+            vec!["0".to_owned(); anchors]
+        } else {
+            self.cable_zero.clone()
+        };
+        let frame = self.sensor_frame.clone();
+        let frame = if sensor == Sensor::Cable { frame } else { frame.or(Some("0,0,0".to_owned())) };
+        let whole = Self { cable_zero: zeros, sensor_frame: frame, ..self.clone() };
+        let found = whole.frames_of(&Measured { file: "the plan", sensor, anchors })?;
+        found.ok_or_else(|| anyhow!("no frames are stated"))
+    }
+
+    fn frames_of(&self, dataset: &Measured<'_>) -> anyhow::Result<Option<Frames>> {
         let cable = !self.outlet.is_empty() || !self.cable_zero.is_empty();
         let framed = self.sensor_frame.is_some();
         if !cable && !framed {
@@ -36,7 +67,7 @@ impl StatedArguments {
             }
             return Ok(None);
         }
-        let anchors = dataset.anchors();
+        let anchors = dataset.anchors;
         let mut frames = Frames::at_origin(anchors);
         if let Some(text) = &self.touched_point {
             frames.flange_from_target = pose("--touched-point", text)?;
@@ -87,7 +118,8 @@ impl StatedArguments {
     }
 }
 
-fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
+/// Numbers of a list with commas.
+pub(super) fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
     text.split(',')
         .map(|cell| match cell.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),

@@ -17,7 +17,8 @@ use truegrind::math::se3::Pose;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::program::motion::MotionKind;
 use truegrind::surface::SurfaceFile;
-use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Residuals, Workpiece};
+use truegrind::visual::measured::Residuals;
+use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
 
 use super::compensate::{CellArguments, Programs};
 use super::files::{self, Batch};

@@ -114,10 +114,11 @@ pub struct Quality {
     pub log_det: f64,
     /// The same for as many random candidates, mean of ten draws.
     pub random_log_det: f64,
-    /// Predicted standard deviation of the flange's position, root mean square over candidates that were not chosen (mm).
-    pub flange_sigma_mm: f64,
+    /// Predicted standard deviation of what the fitted arm says of a reading, root mean square over candidates that were
+    /// not chosen (mm). What no reading can see does not count.
+    pub reading_sigma_mm: f64,
     /// The same after as many random candidates, mean of ten draws (mm).
-    pub random_flange_sigma_mm: f64,
+    pub random_reading_sigma_mm: f64,
 }
 
 /// Why there is no plan.
@@ -154,6 +155,9 @@ pub enum PlanError {
 /// Random sets that the chosen one is compared with.
 const RANDOM_SETS: usize = 10;
 
+/// Poses at which sets are compared.
+const JUDGES: usize = 300;
+
 /// Plans a measurement.
 ///
 /// # Errors
@@ -184,7 +188,7 @@ pub fn plan(wanted: &Wanted<'_>, options: &Options) -> Result<Plan, PlanError> {
     let design = Design { told: &told, index: options.index };
     let chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
     let geometry = Told { interest: Vec::new(), ..rows::told(wanted, &parameters, &still, &[], options) };
-    let quality = quality(wanted, &geometry, &candidates, &chosen, options).ok_or(PlanError::NotFinite)?;
+    let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
 
     let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
     let (poses, rows) = schedule::schedule(wanted, poses, &visits, &options.bounds, options.seed);
@@ -210,37 +214,30 @@ fn parameters(wanted: &Wanted<'_>) -> Vec<Parameter> {
     out
 }
 
-fn quality(
-    wanted: &Wanted<'_>,
-    told: &Told,
-    candidates: &[Candidate],
-    chosen: &[usize],
-    options: &Options,
-) -> Option<Quality> {
-    let rest: Vec<usize> = (0..candidates.len()).filter(|i| !chosen.contains(i)).collect();
-    let judges: Vec<&Candidate> = match rest.is_empty() {
-        true => candidates.iter().collect(),
-        false => rest.iter().step_by(rest.len().div_ceil(200)).map(|&i| &candidates[i]).collect(),
-    };
+fn quality(told: &Told, chosen: &[usize], options: &Options) -> Option<Quality> {
+    let rest: Vec<usize> = (0..told.rows()).filter(|i| !chosen.contains(i)).collect();
+    let all: Vec<usize> = (0..told.rows()).collect();
+    let pool = if rest.is_empty() { &all } else { &rest };
+    let judges: Vec<usize> = pool.iter().copied().step_by(pool.len().div_ceil(JUDGES)).collect();
     let of = |set: &[usize]| -> Option<(f64, f64)> {
         let information = told.information(set);
-        let covariance = told.covariance(&information)?;
-        Some((design::log_det(&information)?, rows::flange_sigma_mm(wanted, told, &covariance, &judges)))
+        let sigma = told.reading_sigma(&information, &judges)? * options.noise.reading_mm;
+        Some((design::log_det(&information)?, sigma))
     };
-    let (log_det, flange_sigma_mm) = of(chosen)?;
+    let (log_det, reading_sigma_mm) = of(chosen)?;
     let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ 0x72_616e_646f_6d);
-    let mut all: Vec<usize> = (0..candidates.len()).collect();
+    let mut shuffled = all.clone();
     let mut sums = (0.0, 0.0);
     for _ in 0..RANDOM_SETS {
-        all.shuffle(&mut random);
-        let (a, b) = of(&all[..chosen.len()])?;
+        shuffled.shuffle(&mut random);
+        let (a, b) = of(&shuffled[..chosen.len()])?;
         sums = (sums.0 + a, sums.1 + b);
     }
     let mean = 1.0 / RANDOM_SETS as f64;
     Some(Quality {
         log_det,
         random_log_det: sums.0 * mean,
-        flange_sigma_mm,
-        random_flange_sigma_mm: sums.1 * mean,
+        reading_sigma_mm,
+        random_reading_sigma_mm: sums.1 * mean,
     })
 }

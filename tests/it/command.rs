@@ -323,6 +323,74 @@ fn stated_frames_that_make_no_sense_are_refused() {
 }
 
 #[test]
+fn plan_writes_a_program_and_the_log_to_fill_in() {
+    let dir = folder();
+    let at = dir.path();
+    let (code, out, err) = truegrind(
+        at,
+        &[
+            "plan",
+            "--robot",
+            "abb-irb-120",
+            "--sensor",
+            "cable",
+            "--outlet",
+            "750,200,40",
+            "--poses",
+            "12",
+            "--candidates",
+            "120",
+            "--range",
+            "150,1100",
+            "-o",
+            "poses.mod",
+            "--csv",
+            "rows.csv",
+            "--json",
+            "plan.json",
+            "--html",
+            "plan.html",
+        ],
+    );
+    assert!(code == 0 || code == 1, "{err}");
+    assert!(out.contains("What the rows can decide") && out.contains("backlash"), "{out}");
+    let program = fs::read_to_string(at.join("poses.mod")).unwrap();
+    let rows = fs::read_to_string(at.join("rows.csv")).unwrap();
+    // As many as rows, and one in a comment: the header line of the table makes up for it.
+    assert_eq!(program.matches("WaitTime").count(), rows.lines().count());
+    let header = rows.lines().next().unwrap();
+    for column in ["q1", "q6", "approach1", "approach6", "t", "expected_L"] {
+        assert!(header.split(',').any(|c| c == column), "{column} is not in {header}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(at.join("plan.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], "truegrind.plan/1");
+    assert_eq!(json["rows"].as_array().unwrap().len(), rows.lines().count() - 1);
+    // What was written can be shown to the other verbs: no motion is left unread.
+    let (_, out, err) = truegrind(
+        at,
+        &["compensate", "poses.mod", "--robot", "abb-irb-120", "--model", "nominal", "--dry-run"],
+    );
+    assert!(out.contains("nothing to correct"), "{out} {err}");
+    for (arguments, word) in [
+        (vec!["--sensor", "cable"], "--outlet is missing"),
+        (vec!["--sensor", "cable", "--outlet", "750,200,40", "--box", "0,0,0,1,1"], "--box"),
+        (vec!["--sensor", "cable", "--outlet", "750,200,40", "--range", "9,1"], "--range"),
+        (vec!["--sensor", "position", "--outlet", "750,200,40"], "--sensor-frame"),
+        (vec!["--sensor", "position", "--poses", "2"], "at least 4"),
+        (vec!["--sensor", "position", "--for", "plan.json"], "truegrind.diagnosis/1"),
+        (
+            vec!["--sensor", "cable", "--outlet", "750,200,40", "--range", "5000,5001", "--candidates", "50"],
+            "too far from the sensor",
+        ),
+    ] {
+        let all = [&["plan", "--robot", "abb-irb-120"], arguments.as_slice()].concat();
+        let (code, _, err) = truegrind(at, &all);
+        assert!(code == 2 && err.contains(word), "{arguments:?}: `{word}` is not in {err}");
+    }
+}
+
+#[test]
 fn wrong_names_list_what_exists() {
     let dir = folder();
     let at = dir.path();

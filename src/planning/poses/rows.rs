@@ -4,15 +4,13 @@
 //! length 1 tells as much about its combination of parameters as the prior does, and the normal matrix with all priors
 //! is I + Σ xᵢ xᵢᵀ.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix};
 
-use super::candidate::Candidate;
 use super::rival::{Question, columns_of};
 use super::{Options, Wanted};
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::{Calibration, Weight};
 use crate::kinematics::condition::Condition;
-use crate::kinematics::jacobian::{Ends, parameter_jacobian};
 use crate::kinematics::model::{Joints, Model};
 use crate::kinematics::parameter::Parameter;
 use crate::math::se3::Pose;
@@ -168,37 +166,26 @@ impl Told {
         finite.then(|| DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j]))
     }
 
+    /// Predicted standard deviation of what the fitted parameters say of the lengths read in some rows, root mean square,
+    /// in units of the noise: √ mean xᵀ M⁻¹ x. `None` where M is not positive.
+    pub fn reading_sigma(&self, information: &DMatrix<f64>, rows: &[usize]) -> Option<f64> {
+        let factor = Cholesky::new(information.clone())?;
+        // Of a pose the three coordinates, not the angles.
+        let lengths = self.per_row.min(3);
+        let sum: f64 = rows
+            .iter()
+            .map(|row| {
+                let x = self.readings.columns(row * self.per_row, lengths).into_owned();
+                x.component_mul(&factor.solve(&x)).sum()
+            })
+            .sum();
+        Some((sum / rows.len().max(1) as f64).sqrt())
+    }
+
     /// Standard deviation of every parameter when all rows are measured.
     pub fn sigmas(&self) -> Option<Vec<f64>> {
         let all: Vec<usize> = (0..self.rows()).collect();
         let covariance = self.covariance(&self.information(&all))?;
         Some(covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect())
     }
-}
-
-/// Predicted standard deviation of the flange's position over poses, root mean square (mm).
-pub(super) fn flange_sigma_mm(
-    wanted: &Wanted<'_>,
-    told: &Told,
-    covariance: &DMatrix<f64>,
-    poses: &[&Candidate],
-) -> f64 {
-    let places: Vec<usize> = (0..told.parameters.len()).filter(|&k| told.parameters[k].is_of_arm()).collect();
-    let arm: Vec<Parameter> = places.iter().map(|&k| told.parameters[k]).collect();
-    let block = DMatrix::from_fn(places.len(), places.len(), |i, j| covariance[(places[i], places[j])]);
-    let posed = wanted.nominal.under(&Condition::default());
-    let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: [0.0; 6] };
-    let sum: f64 = poses
-        .iter()
-        .map(|pose| {
-            let full = parameter_jacobian(&ends, &posed, &pose.joints, &arm);
-            (0..3)
-                .map(|i| {
-                    let row = DVector::from_fn(arm.len(), |k, _| full[(i, k)]);
-                    row.dot(&(&block * &row))
-                })
-                .sum::<f64>()
-        })
-        .sum();
-    (sum / poses.len().max(1) as f64).sqrt()
 }
