@@ -78,7 +78,7 @@ fn task(rows: usize) -> Calibration {
     frames.outlets_mm[0] = outlet + Vector3::new(4.0, -3.0, 5.0);
     frames.zeros_mm[0] = 14.0;
     let list = parameters(&nominal);
-    let priors: Vec<Prior> = Tolerance::default().priors(&list, &nominal, &Frames::at_origin(1));
+    let priors: Vec<Prior> = Tolerance::default().priors(&list, &nominal);
     Calibration::new(&dataset, &nominal, &frames, &list, &priors, &weights)
 }
 

@@ -1,10 +1,12 @@
 ! Shows: what acts in execution order across routines: displacement, offsets, configuration monitoring, MultiMove, correction.
 MODULE Switches
   CONST robtarget p:=[[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PERS pose measured;
   CONST pose shift:=[[0,0,10],[1,0,0,0]];
   PROC main()
     MoveL p,v100,fine,tool0;
     PDispSet shift;
+    MoveL p,v100,fine,tool0;
     displaced;
     PDispOff;
     MoveL p,v100,fine,tool0;
@@ -19,6 +21,12 @@ MODULE Switches
     MoveL p,v100,fine,tool0;
     SyncMoveOff sync2;
     MoveL p,v100\T:=2,fine,tool0;
+    PDispSet measured;
+    MoveL p,v100,fine,tool0;
+    PDispOn\Rot,p,tool0;
+    MoveL p,v100,fine,tool0;
+    PDispOff;
+    MoveL p,v100,fine,tool0;
   ENDPROC
   PROC displaced()
     MoveL p,v100,fine,tool0;

@@ -15,7 +15,10 @@ mod identify;
 mod stated;
 mod diagnose;
 mod plan;
+mod compare;
+mod track;
 mod path;
+mod programs;
 mod compensate;
 mod deviation;
 mod demo;
@@ -48,6 +51,10 @@ enum Verb {
     Diagnose(diagnose::Arguments),
     /// Which poses to measure, as a program that moves there.
     Plan(Box<plan::Arguments>),
+    /// Methods side by side under a paper's protocol.
+    Compare(compare::Arguments),
+    /// Keep a model accurate as measurements come in.
+    Track(track::Arguments),
     /// A surface to a RAPID program.
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
@@ -108,6 +115,8 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
+        Verb::Compare(arguments) => compare::run(&arguments),
+        Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),

@@ -11,6 +11,7 @@
 //! - [`least_squares`]: all rows at once, with derivatives;
 //! - [`filter`]: one observation at a time, with a covariance that follows;
 //! - [`swarm`]: the cost alone;
+//! - [`network`]: a smooth function with many weights;
 //! - [`chaos`]: the maps that one of the least-squares methods draws its candidates from.
 //!
 //! ```
@@ -60,4 +61,5 @@ mod objective;
 pub mod least_squares;
 pub mod filter;
 pub mod swarm;
+pub mod network;
 pub mod chaos;

@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod tolerance;
 pub mod rounding;
 pub mod identifiability;
+pub mod network;
 pub mod solver;
 pub mod fit;
 pub mod start;

@@ -12,6 +12,7 @@ pub mod identification;
 pub mod diagnosis;
 pub mod compensation;
 pub mod planning;
+pub mod comparison;
 pub mod report;
 #[cfg(feature = "visual")]
 pub mod visual;

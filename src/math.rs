@@ -5,3 +5,4 @@ pub mod se3;
 pub mod difference;
 pub mod statistics;
 pub mod tail;
+pub mod radial;

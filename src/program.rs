@@ -1,11 +1,13 @@
 //! Robot programs as bytes: read without loss, understood as motions, changed by edits. Knows no robot.
 //!
 //! - [`tree`]: a lossless syntax tree over bytes in flat arrays; reading never fails.
-//! - [`edit`]: sorted, disjoint edits; bytes outside them never change.
+//! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
 //! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
 //! - [`draft`]: a program that does not exist yet, for a dialect to write.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
+//! - [`nc`]: G-code of five-axis machines: the same.
+//! - [`reading`]: a program in whichever of them it is written.
 //!
 //! ```
 //! use truegrind::program::motion::TargetValue;
@@ -27,7 +29,10 @@
 
 pub mod tree;
 pub mod edit;
+pub mod diff;
 pub mod motion;
 pub mod rewrite;
 pub mod draft;
 pub mod rapid;
+pub mod nc;
+pub mod reading;

@@ -4,20 +4,25 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::{After, PathReport, Status};
 use truegrind::compensation::rewrite::{Emit, Options, Plan, plan};
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
+use truegrind::program::diff::unified;
 use truegrind::program::motion::Mark;
-use truegrind::program::rapid::{Task, task_list};
+use truegrind::program::nc::setup::Setup;
+use truegrind::program::reading::Program;
 use truegrind::program::rewrite::{Outcome, RewriteOptions};
+use truegrind::report::batch::{self, Ended, Row};
 use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::surface::SurfaceFile;
 
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
+use super::programs::{self, Job, Programs};
 use super::progress::Work;
 use super::{Common, Ending, inputs, on_threads};
 
@@ -66,9 +71,12 @@ impl CellArguments {
 /// Arguments of `compensate`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// RAPID modules of one task, or a .pgf list of them.
+    /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
+    /// Every module is a program of its own, not one task together with the others.
+    #[arg(long)]
+    each: bool,
     /// An estimated arm, or the word `nominal`, with which no byte changes.
     #[arg(long)]
     model: String,
@@ -101,57 +109,52 @@ pub(super) struct Arguments {
     /// Correct a program again that carries the mark of another model: corrections add up.
     #[arg(long)]
     again: bool,
+    /// What changes, as a unified diff.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    diff: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
 }
 
-/// Programs of one task, read.
-pub(super) struct Programs {
-    /// Files, in the order of the listing.
-    pub(super) files: Vec<(PathBuf, Vec<u8>)>,
+/// What all programs of a run share.
+struct Shop<'a> {
+    arguments: &'a Arguments,
+    hash: &'a str,
+    model: &'a str,
+    arm: &'a Estimated,
+    cell: Cell,
+    surface: Option<SurfaceFile>,
+    setup: Setup,
+    options: Options,
 }
 
-impl Programs {
-    /// Reads modules; a `.pgf` stands for the modules that it lists.
-    pub(super) fn read(paths: &[PathBuf]) -> anyhow::Result<Self> {
-        let mut files = Vec::new();
-        for path in paths {
-            let bytes = files::read(path)?;
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgf")) {
-                for module in task_list::modules(&bytes) {
-                    let place = inputs::beside(path, &module);
-                    files.push((place.clone(), files::read(&place)?));
-                }
-            } else {
-                files.push((path.clone(), bytes));
-            }
-        }
-        if files.is_empty() {
-            bail!("no module to read: the task list names none");
-        }
-        Ok(Self { files })
-    }
-
-    /// The task.
-    pub(super) fn task(&self) -> Task<'_> {
-        let names: Vec<String> = self.files.iter().map(|(p, _)| files::name(p)).collect();
-        let sources: Vec<(&str, &[u8])> =
-            names.iter().zip(&self.files).map(|(n, (_, b))| (n.as_str(), b.as_slice())).collect();
-        Task::read(&sources)
-    }
+/// A program, rewritten.
+struct Done {
+    row: Row,
+    /// Files to write, with their bytes.
+    written: Vec<(PathBuf, Vec<u8>)>,
+    diff: Vec<u8>,
+    /// What to say on stderr.
+    notes: Vec<String>,
+    /// Whether nothing was refused or flagged.
+    clean: bool,
+    /// Whether any byte changes.
+    changed: bool,
+    /// Entries of the contract.
+    json: Vec<serde_json::Value>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let dry = arguments.dry_run || arguments.check;
-    let programs = Programs::read(&arguments.programs)?;
-    let targets = outputs_of(arguments, &programs, dry)?;
-    let inputs_of: Vec<&Path> = programs.files.iter().map(|(p, _)| p.as_path()).collect();
-    let mut checked: Vec<&Path> = arguments.outputs.files();
-    if programs.files.len() == 1 {
-        checked.extend(targets.iter().flatten().map(PathBuf::as_path));
+    if !dry && arguments.output.is_none() {
+        bail!("-o OUT is missing: a file for one program, a folder for several (or --dry-run)");
     }
+    let jobs = programs::jobs(&arguments.programs, arguments.each)?;
+    let mut checked: Vec<&Path> = arguments.outputs.files();
+    checked.extend(arguments.diff.as_deref());
+    let inputs_of: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     Batch::check(&inputs_of, &checked)?;
     for (value, name) in
         [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")]
@@ -162,13 +165,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     let model = inputs::model(&arguments.model)?;
     refuse_compensating_controller(arguments.robot.as_deref())?;
-    let (_, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
-    let task = programs.task();
-    if let Some(ending) = already(arguments, &model, &task, &programs)? {
-        return Ok(ending);
-    }
+    let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
     let NamedModel::Estimated { hash, arm, name, .. } = &model else {
-        return unchanged(&programs, &targets);
+        return unchanged(arguments, &jobs);
     };
     debug_assert_eq!(nominal, arm.nominal);
     let (cell, surface, condition) = arguments.cell.read(Some(arm.as_ref()))?;
@@ -181,16 +180,216 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
         condition,
-        points: arguments.outputs.of_points(),
+        points: jobs.len() == 1 && arguments.outputs.of_points(),
         ..Options::default()
     };
-    let work = Work::start(format!("rewriting {} motions", task.listing.motions.len()));
-    let mut planned = on_threads(arguments.common.threads, || plan(&task.listing, arm, &cell, &options))?;
+    let setup = programs::setup(&cell, arguments.robot.as_deref().or(Some(robot.as_str())));
+    let shop = Shop { arguments, hash, model: name, arm, cell, surface, setup, options };
+    match jobs.as_slice() {
+        [job] if job.under.is_none() => one(&shop, job),
+        jobs => many(&shop, jobs),
+    }
+}
+
+/// One program: its own report.
+fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
+    let arguments = shop.arguments;
+    let outputs = &arguments.outputs;
+    let programs = Programs::read(&job.paths)?;
+    let targets = outputs_of(arguments, job, &programs, false)?;
+    let inputs_of: Vec<&Path> = programs.files.iter().map(|(p, _)| p.as_path()).collect();
+    let mut checked: Vec<&Path> = arguments.outputs.files();
+    if programs.files.len() == 1 {
+        checked.extend(targets.iter().flatten().map(PathBuf::as_path));
+    }
+    Batch::check(&inputs_of, &checked)?;
+    let mut batch = Batch::sparing(&inputs_of);
+    let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
+        let listing = program.listing();
+        outputs.print(&view::summary(planned, listing, files));
+        let report = PathReport {
+            program: programs.name(),
+            model: shop.model.to_owned(),
+            after: After::PredictedRemainder,
+            points: std::mem::take(&mut planned.points),
+            held_out_mm: Some(shop.arm.geometry.held_out.rmse),
+        };
+        let reports = std::slice::from_ref(&report);
+        outputs.add_made(
+            &mut batch,
+            || view::document(planned, listing, files, reports),
+            || truegrind::report::deviation::table(&report),
+            || view::json(planned, listing, files),
+        )?;
+        #[cfg(feature = "visual")]
+        if let Some(path) = &outputs.rrd {
+            let bytes = super::view::path(
+                &report.program,
+                &shop.arm.model,
+                "estimated arm",
+                shop.options.condition,
+                reports,
+                shop.surface.as_ref(),
+            )?;
+            batch.add(path, bytes);
+        }
+        Ok(())
+    };
+    let work = Work::start(format!("rewriting {}", programs.name()));
+    let done = on_threads(arguments.common.threads, || {
+        rewritten(shop, &programs, &targets, || drop(work), &mut report)
+    })??;
+    for note in &done.notes {
+        eprintln!("note: {note}");
+    }
+    if done.row.ended == Ended::Already {
+        println!("{}: already compensated with this model; nothing written", done.row.file);
+        return Ok(Ending::Flagged);
+    }
+    if let Some(path) = &arguments.diff {
+        batch.add(path, done.diff);
+    }
+    for (path, bytes) in done.written {
+        batch.add(path, bytes);
+    }
+    if programs.files.len() > 1
+        && !(arguments.dry_run || arguments.check)
+        && let Some(folder) = &arguments.output
+    {
+        files::make_folder(folder)?;
+    }
+    batch.write()?;
+    let would_change = arguments.check && done.changed;
+    Ok(if done.clean && !would_change { Ending::Done } else { Ending::Flagged })
+}
+
+/// Many programs: in parallel, each written on its own, going on past a bad one; one table for all.
+fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
+    let arguments = shop.arguments;
+    #[cfg(feature = "visual")]
+    if arguments.outputs.rrd.is_some() {
+        bail!("--rrd shows one program: name one");
+    }
+    let (with_json, with_diff) = (arguments.outputs.json.is_some(), arguments.diff.is_some());
+    let work = Work::start(format!("rewriting {} programs", jobs.len()));
+    let done: Vec<Done> = on_threads(arguments.common.threads, || {
+        jobs.par_iter()
+            .map(|job| {
+                let done = file_to_file(shop, job);
+                let mut done = done.unwrap_or_else(|error| failed(job, &format!("{error:#}")));
+                if !with_json {
+                    done.json = Vec::new();
+                }
+                if !with_diff {
+                    done.diff = Vec::new();
+                }
+                done
+            })
+            .collect()
+    })?;
+    drop(work);
+    for done in &done {
+        for note in &done.notes {
+            eprintln!("note: {}: {note}", done.row.file);
+        }
+    }
+    let clean = done.iter().all(|done| done.clean);
+    let changed = done.iter().any(|done| done.changed);
+    let (mut rows, mut programs, mut diff) = (Vec::new(), Vec::new(), Vec::new());
+    for done in done {
+        rows.push(done.row);
+        programs.extend(done.json);
+        diff.extend_from_slice(&done.diff);
+    }
+    arguments.outputs.print(&batch::summary(&rows));
+    let mut batch = Batch::sparing(jobs.iter().flat_map(|job| &job.paths));
+    arguments.outputs.add_made(
+        &mut batch,
+        || batch::document(&rows),
+        || batch::table(&rows),
+        || batch::json(&rows, programs),
+    )?;
+    if let Some(path) = &arguments.diff {
+        batch.add(path, diff);
+    }
+    batch.write()?;
+    if rows.iter().all(|row| row.ended == Ended::Failed) {
+        bail!("none of {} programs could be done", rows.len());
+    }
+    Ok(if clean && !(arguments.check && changed) { Ending::Done } else { Ending::Flagged })
+}
+
+fn failed(job: &Job, error: &str) -> Done {
+    let file = job.paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+    Done {
+        row: Row::without(file, Ended::Failed, Some(error.to_owned())),
+        written: Vec::new(),
+        diff: Vec::new(),
+        notes: Vec::new(),
+        clean: false,
+        changed: false,
+        json: Vec::new(),
+    }
+}
+
+/// One program of many: read, rewritten and written.
+fn file_to_file(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Done> {
+    let programs = Programs::read(&job.paths)?;
+    let targets = outputs_of(shop.arguments, job, &programs, true)?;
+    let mut entries = Vec::new();
+    let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
+        if shop.arguments.outputs.json.is_some()
+            && let serde_json::Value::Object(mut all) = view::json(planned, program.listing(), files)
+            && let Some(serde_json::Value::Array(list)) = all.remove("programs")
+        {
+            entries = list;
+        }
+        Ok(())
+    };
+    let mut done = rewritten(shop, &programs, &targets, || (), &mut report)?;
+    done.json = entries;
+    let mut batch = Batch::sparing(programs.files.iter().map(|(path, _)| path));
+    for (path, bytes) in std::mem::take(&mut done.written) {
+        if let Some(folder) = path.parent() {
+            files::make_folder(folder)?;
+        }
+        batch.add(path, bytes);
+    }
+    batch.write()?;
+    Ok(done)
+}
+
+type Report<'r> = &'r mut dyn FnMut(&mut Plan, &Program<'_>, &[ProgramFile]) -> anyhow::Result<()>;
+
+/// Plans and rewrites one program; `report` sees the plan before it goes.
+fn rewritten(
+    shop: &Shop<'_>,
+    programs: &Programs,
+    targets: &[Option<PathBuf>],
+    worked: impl FnOnce(),
+    report: Report<'_>,
+) -> anyhow::Result<Done> {
+    let program = programs.task(&shop.setup);
+    let listing = program.listing();
+    let mut notes = Vec::new();
+    let names = programs.files.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>();
+    if already(shop, &program, programs, &mut notes)? {
+        return Ok(Done {
+            row: Row::without(names.join(", "), Ended::Already, None),
+            written: Vec::new(),
+            diff: Vec::new(),
+            notes,
+            clean: false,
+            changed: false,
+            json: Vec::new(),
+        });
+    }
+    let mut planned = plan(listing, shop.arm, &shop.cell, &shop.options);
     let rewrite = RewriteOptions {
-        mark: Some(Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: hash.clone() }),
+        mark: Some(Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: shop.hash.to_owned() }),
         ..RewriteOptions::default()
     };
-    let rewritten = task.rewrite(&planned.changes, &rewrite)?;
+    let rewritten = program.rewrite(&planned.changes, &rewrite)?;
     for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
         let row = &mut planned.outcomes[change.motion as usize];
         match outcome {
@@ -203,88 +402,67 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             _ => {}
         }
     }
-    drop(work);
-    if let Some(surface) = &surface {
+    worked();
+    if let Some(surface) = &shop.surface {
         add_normals(&mut planned, surface);
     }
-    let files: Vec<ProgramFile> = programs
-        .files
+    let files: Vec<ProgramFile> = names
         .iter()
-        .zip(&targets)
-        .map(|((path, _), target)| ProgramFile {
-            file: path.display().to_string(),
+        .zip(targets)
+        .map(|(name, target)| ProgramFile {
+            file: name.clone(),
             output: target.as_ref().map(|t| t.display().to_string()),
         })
         .collect();
-    arguments.outputs.print(&view::summary(&planned, &task.listing, &files));
-    let report = PathReport {
-        program: programs.files.iter().map(|(p, _)| files::name(p)).collect::<Vec<_>>().join(", "),
-        model: name.clone(),
-        after: After::PredictedRemainder,
-        points: std::mem::take(&mut planned.points),
-        held_out_mm: Some(arm.geometry.held_out.rmse),
-    };
-    let mut batch = Batch::sparing(&inputs_of);
-    let reports = std::slice::from_ref(&report);
-    arguments.outputs.add_made(
-        &mut batch,
-        || view::document(&planned, &task.listing, &files, reports),
-        || truegrind::report::deviation::table(&report),
-        || view::json(&planned, &task.listing, &files),
-    )?;
-    #[cfg(feature = "visual")]
-    if let Some(path) = &arguments.outputs.rrd {
-        let bytes = super::view::path(
-            &report.program,
-            &arm.model,
-            "estimated arm",
-            condition,
-            reports,
-            surface.as_ref(),
-        )?;
-        batch.add(path, bytes);
-    }
-    let mut changed = false;
-    for (((_, source), edits), target) in programs.files.iter().zip(&rewritten.files).zip(&targets) {
+    let (mut written, mut diff, mut changed) = (Vec::new(), Vec::new(), false);
+    for (((path, source), edits), target) in programs.files.iter().zip(&rewritten.files).zip(targets) {
         changed |= !edits.edits.is_empty();
         if edits.unmarked {
-            eprintln!("note: a fragment without MODULE was changed and carries no mark");
+            notes.push("a fragment without MODULE was changed and carries no mark".to_owned());
+        }
+        if shop.arguments.diff.is_some() {
+            let new = target.as_ref().map_or_else(|| path.display().to_string(), |t| t.display().to_string());
+            diff.extend(unified(source, &edits.edits, &path.display().to_string(), &new)?);
         }
         if let Some(target) = target {
-            batch.add(target, edits.edits.apply(source)?);
+            written.push((target.clone(), edits.edits.apply(source)?));
         }
     }
-    if !dry
-        && programs.files.len() > 1
-        && let Some(folder) = &arguments.output
-    {
-        files::make_folder(folder)?;
-    }
-    batch.write()?;
+    let ended = if changed { Ended::Changed } else { Ended::Unchanged };
+    let output = targets.iter().flatten().map(|t| t.display().to_string()).collect::<Vec<_>>().join(", ");
+    let output = Some(output).filter(|output| !output.is_empty());
+    let row = Row::of(names.join(", "), output, ended, &planned, listing.opaque.len());
     let clean = planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));
-    let would_change = arguments.check && changed;
-    Ok(if clean && !would_change { Ending::Done } else { Ending::Flagged })
+    report(&mut planned, &program, &files)?;
+    Ok(Done { row, written, diff, notes, clean, changed, json: Vec::new() })
 }
 
-/// Where each program goes.
-fn outputs_of(arguments: &Arguments, programs: &Programs, dry: bool) -> anyhow::Result<Vec<Option<PathBuf>>> {
-    if dry {
+/// Where each file of a program goes.
+fn outputs_of(
+    arguments: &Arguments,
+    job: &Job,
+    programs: &Programs,
+    several: bool,
+) -> anyhow::Result<Vec<Option<PathBuf>>> {
+    if arguments.dry_run || arguments.check {
         return Ok(vec![None; programs.files.len()]);
     }
     let Some(output) = &arguments.output else {
         bail!("-o OUT is missing: a file for one program, a folder for several (or --dry-run)");
     };
-    if programs.files.len() == 1 && !output.is_dir() {
+    let several = several || programs.files.len() > 1;
+    if !several && !output.is_dir() {
         return Ok(vec![Some(output.clone())]);
     }
     if output.is_file() {
-        bail!(
-            "{} is a file, but there are {} programs: name a folder",
-            output.display(),
-            programs.files.len()
-        );
+        bail!("{} is a file, but there are several programs: name a folder", output.display());
     }
-    Ok(programs.files.iter().map(|(p, _)| Some(output.join(files::name(p)))).collect())
+    // Below the folder that was named everything keeps its place.
+    let place = |path: &Path| match &job.under {
+        Some(under) => path.strip_prefix(under).map_or_else(|_| files::name(path).into(), Path::to_path_buf),
+        None => PathBuf::from(files::name(path)),
+    };
+    Ok(programs.files.iter().map(|(path, _)| Some(output.join(place(path)))).collect())
 }
 
 /// A controller that compensates by itself must not be compensated twice.
@@ -301,21 +479,19 @@ fn refuse_compensating_controller(robot: Option<&str>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the marks of earlier runs mean for this one.
+/// What the marks of earlier runs mean for this one: true where there is nothing left to do.
 fn already(
-    arguments: &Arguments,
-    model: &NamedModel,
-    task: &Task<'_>,
+    shop: &Shop<'_>,
+    program: &Program<'_>,
     programs: &Programs,
-) -> anyhow::Result<Option<Ending>> {
-    let NamedModel::Estimated { hash, .. } = model else { return Ok(None) };
-    for (mark, (path, _)) in task.listing.marks.iter().zip(&programs.files) {
+    notes: &mut Vec<String>,
+) -> anyhow::Result<bool> {
+    for (mark, (path, _)) in program.listing().marks.iter().zip(&programs.files) {
         let Some(mark) = mark else { continue };
-        if mark.model == *hash {
-            println!("{}: already compensated with this model; nothing written", path.display());
-            return Ok(Some(Ending::Flagged));
+        if mark.model == shop.hash {
+            return Ok(true);
         }
-        if !arguments.again {
+        if !shop.arguments.again {
             bail!(
                 "{}: already compensated with another model ({}): take the original program, or say --again, with which the \
                  corrections add up",
@@ -323,25 +499,32 @@ fn already(
                 mark.model
             );
         }
-        eprintln!(
-            "note: {}: compensated before with model {}; corrections add up",
+        notes.push(format!(
+            "{}: compensated before with model {}; corrections add up",
             path.display(),
             mark.model
-        );
+        ));
     }
-    Ok(None)
+    Ok(false)
 }
 
 /// The model `nominal`: the same bytes.
-fn unchanged(programs: &Programs, targets: &[Option<PathBuf>]) -> anyhow::Result<Ending> {
-    let mut batch = Batch::sparing(programs.files.iter().map(|(p, _)| p));
-    for ((_, bytes), target) in programs.files.iter().zip(targets) {
-        if let Some(target) = target {
+fn unchanged(arguments: &Arguments, jobs: &[Job]) -> anyhow::Result<Ending> {
+    let several = jobs.len() > 1 || jobs.iter().any(|job| job.under.is_some());
+    for job in jobs {
+        let programs = Programs::read(&job.paths)?;
+        let mut batch = Batch::sparing(programs.files.iter().map(|(p, _)| p));
+        let targets = outputs_of(arguments, job, &programs, several)?;
+        for ((_, bytes), target) in programs.files.iter().zip(targets) {
+            let Some(target) = target else { continue };
+            if several && let Some(folder) = target.parent() {
+                files::make_folder(folder)?;
+            }
             batch.add(target, bytes.clone());
         }
+        batch.write()?;
     }
     println!("model nominal: nothing to correct, every byte stays");
-    batch.write()?;
     Ok(Ending::Done)
 }
 

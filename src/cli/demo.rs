@@ -191,12 +191,16 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> anyho
             origin: FrameOrigin::Metrology,
             teaching_deg: Vec::new(),
             taught_with: None,
+            position_mm: None,
+            quaternion_wxyz: None,
         }],
         wobj: vec![CellFrame {
             name: surface.work_object.name.clone(),
             origin: FrameOrigin::Taught,
             teaching_deg,
             taught_with: Some(surface.tool.name.clone()),
+            position_mm: None,
+            quaternion_wxyz: None,
         }],
     })
 }

@@ -12,16 +12,17 @@ use truegrind::kinematics::model::Model;
 use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
 
-use super::compensate::{CellArguments, Programs};
+use super::compensate::CellArguments;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
+use super::programs::{self, Programs};
 use super::{Common, Ending, inputs, on_threads};
 
 /// Arguments of `deviation`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// RAPID modules of one task, or a .pgf list of them.
+    /// RAPID modules of one task, a .pgf list of them, or NC files.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
     /// Estimated arms; one row each. With --actual the word `nominal` is enough.
@@ -47,6 +48,8 @@ pub(super) struct Arguments {
 /// An arm on which programs are run.
 struct Runner {
     name: String,
+    /// The robot, by the name that its model gives.
+    robot: Option<String>,
     nominal: Model,
     model: Model,
     knowledge: Option<Box<Estimated>>,
@@ -65,18 +68,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .collect();
     Batch::check(&all, &arguments.outputs.files())?;
     let runners = runners(arguments)?;
-    let task = programs.task();
-    let original = originals.as_ref().map(Programs::task);
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
-    let name = programs.files.iter().map(|(p, _)| files::name(p)).collect::<Vec<_>>().join(", ");
+    let robot = arguments.robot.as_deref().or(first.robot.as_deref());
+    let setup = programs::setup(&cell, robot);
+    let task = programs.task(&setup);
+    let original = originals.as_ref().map(|original| original.task(&setup));
+    let name = programs.name();
     let reports: Vec<PathReport> = on_threads(arguments.common.threads, || {
         runners
             .iter()
             .map(|runner| {
                 let judged = Judged {
-                    original: original.as_ref().map_or(&task.listing, |o| &o.listing),
-                    rewritten: original.as_ref().map(|_| &task.listing),
+                    original: original.as_ref().map_or(task.listing(), |o| o.listing()),
+                    rewritten: original.as_ref().map(|_| task.listing()),
                     cell: &cell,
                     surface: surface.as_ref().map(|s| &s.surface),
                     program: &name,
@@ -125,20 +130,22 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
             .map_err(|e| anyhow!("{}: not an arm of `simulate --arm`: {e}", path.display()))?;
         let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
         let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;
-        let (_, nominal) = inputs::nominal(first, arguments.robot.as_deref())?;
+        let (robot, nominal) = inputs::nominal(first, arguments.robot.as_deref())?;
         let name = format!("actual arm {}", files::name(path));
-        return Ok(vec![Runner { name, nominal, model, knowledge: None, after: After::Achieved }]);
+        let robot = Some(robot);
+        return Ok(vec![Runner { name, robot, nominal, model, knowledge: None, after: After::Achieved }]);
     }
     models
         .into_iter()
         .map(|model| {
-            let (_, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
+            let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
             match model {
                 NamedModel::Nominal => bail!(
                     "--model nominal has no deviation from itself: give an estimated arm, or --actual ARM.toml"
                 ),
                 NamedModel::Estimated { name, arm, .. } => Ok(Runner {
                     name,
+                    robot: Some(robot),
                     nominal,
                     model: arm.model.clone(),
                     knowledge: Some(arm),

@@ -64,7 +64,7 @@ pub(super) struct Arguments {
     /// The model file to write; a failed fit is not written.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
-    /// Method: lm, ltlm, lm-as-printed or ltlm-as-printed.
+    /// Method, such as lm, ltlm, ekf, ukf-vslm, rls, rbf or lm-as-printed; an unknown one gets the list.
     #[arg(long, default_value = "lm")]
     method: String,
     /// Share of rows held out to state the error.

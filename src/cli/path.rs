@@ -2,14 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::anyhow;
+use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::planning::toolpath::{Toolpath, toolpath};
+use truegrind::program::nc;
+use truegrind::program::nc::dialect::Dialect;
+use truegrind::program::nc::orientation::Angles;
 use truegrind::program::rapid::writer;
 use truegrind::robots::Robot;
 use truegrind::surface::SurfaceFile;
 
 use super::files::{self, Batch};
+use super::programs::angles;
 use super::{Ending, inputs};
 
 /// Arguments of `path`.
@@ -20,8 +24,8 @@ pub(super) struct Arguments {
     /// Robot: a name of `truegrind robots`, or a TOML file.
     #[arg(long)]
     robot: String,
-    /// The RAPID module to write; `-` prints it.
-    #[arg(short, long, value_name = "PROGRAM.mod")]
+    /// The program to write: RAPID (.mod), Fanuc style (.nc) or Siemens (.mpf) by its ending; `-` prints RAPID.
+    #[arg(short, long, value_name = "PROGRAM")]
     output: PathBuf,
     /// Put the targets into the instructions instead of naming them p10, p20, …
     #[arg(long)]
@@ -34,12 +38,26 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let file = surface(&arguments.surface)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
-    let bytes = writer::write(&path.draft)?;
+    let ending = arguments.output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    let bytes = match ending.as_deref() {
+        Some("nc") => nc::writer::write(&path.draft, Dialect::Fanuc, angles_of(&robot))?,
+        Some("mpf" | "spf") => nc::writer::write(&path.draft, Dialect::Siemens, angles_of(&robot))?,
+        Some("ngc" | "h") => bail!(
+            "{}: programs of this control are read and rewritten, not written anew; name a .mod, .nc or .mpf file",
+            arguments.output.display()
+        ),
+        _ => writer::write(&path.draft)?,
+    };
     say(&path, &robot, &arguments.output);
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
     Ok(Ending::Done)
+}
+
+/// What A, B and C mean: as the robot file says, else turns about the fixed x, y and z as their letters have it.
+fn angles_of(robot: &Robot) -> Angles {
+    robot.sheet.orientation().and_then(angles).unwrap_or(Angles::Wpr)
 }
 
 fn say(path: &Toolpath, robot: &Robot, output: &Path) {

@@ -6,6 +6,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::diagnosis::diagnose::Diagnosed;
 use truegrind::identification::fit::{Start, errors_on, fit, frame_parameters};
 use truegrind::identification::identify::{Identification, Options, observe};
 use truegrind::identification::solver::SOLVERS;
@@ -16,15 +17,17 @@ use truegrind::kinematics::model::{Joints, Model};
 use truegrind::math::se3::Pose;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::program::motion::MotionKind;
+use truegrind::program::reading::Language;
 use truegrind::surface::SurfaceFile;
 use truegrind::visual::measured::Residuals;
 use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
 
-use super::compensate::{CellArguments, Programs};
+use super::compensate::CellArguments;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
+use super::programs::Programs;
 use super::progress::Work;
-use super::{Common, Ending, identify, inputs, on_threads};
+use super::{Common, Ending, identify, inputs, on_threads, programs};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -67,7 +70,6 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
     Ok(match extension.as_str() {
         "rrd" => Kind::Recording,
         "csv" | "xlsx" | "xls" | "xlsm" | "ods" => Kind::Measurements,
-        "mod" | "modx" | "prg" | "sys" | "pgf" => Kind::Program,
         "toml" => {
             let text = files::read_text(path)?;
             let table: toml::Table = text.parse().map_err(|e| anyhow!("{}: no TOML: {e}", path.display()))?;
@@ -81,9 +83,10 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
             }
             Kind::Model
         }
+        _ if extension == "pgf" || Language::by_name(&files::name(path)).is_some() => Kind::Program,
         _ => bail!(
-            "{}: expected a recording (.rrd), measurements (.csv, .xlsx), a model (.toml) or a program (.mod, .modx, \
-             .prg, .sys, .pgf)",
+            "{}: expected a recording (.rrd), measurements (.csv, .xlsx), a model (.toml) or a program (.mod, .prg, .sys, \
+             .pgf, .nc, .mpf and the like)",
             path.display()
         ),
     })
@@ -264,7 +267,6 @@ fn model(file: &Path) -> anyhow::Result<Recording> {
 /// Programs of one task: where an estimated arm goes with them, or the nominal one.
 fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording> {
     let programs = Programs::read(paths)?;
-    let task = programs.task();
     let stated = stated_model(arguments)?;
     let knowledge = stated.as_ref().map(|(_, arm)| arm.as_ref());
     let (cell, surface, condition) = arguments.cell.read(knowledge)?;
@@ -273,12 +275,14 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         (None, Some(robot)) => inputs::robot(robot)?.model,
         (None, None) => bail!("{}: --robot or --model says which arm runs it", paths[0].display()),
     };
-    let program = programs.files.iter().map(|(p, _)| files::name(p)).collect::<Vec<_>>().join(", ");
+    let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
+    let task = programs.task(&programs::setup(&cell, robot));
+    let program = programs.name();
     let acting =
         Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };
     let report = judge(
         &Judged {
-            original: &task.listing,
+            original: task.listing(),
             rewritten: None,
             cell: &cell,
             surface: surface.as_ref().map(|s| &s.surface),
@@ -327,4 +331,9 @@ fn recording(
 /// The recording of an identification.
 pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
     Ok(visual::dataset_recording(dataset, found)?.rrd()?)
+}
+
+/// The recording of a diagnosis.
+pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
+    Ok(visual::diagnosis_recording(dataset, found)?.rrd()?)
 }

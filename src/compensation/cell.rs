@@ -5,7 +5,7 @@
 //! where it truly is. A taught frame without its teaching points cannot be moved: the difference is estimated and
 //! stated instead.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::kinematics::model::{Joints, Posed};
@@ -37,6 +37,22 @@ pub struct CellFrame {
     /// The tool with which a work object was taught.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taught_with: Option<String>,
+    /// Where it lies (mm), for NC programs, which name tools and work offsets (`T1`, `G54`) without saying where they are:
+    /// a tool on the flange, a work object in the base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_mm: Option<[f64; 3]>,
+    /// How it is turned, w, x, y, z; not at all where left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion_wxyz: Option<[f64; 4]>,
+}
+
+impl CellFrame {
+    /// Where the file says it lies.
+    pub fn pose(&self) -> Option<Pose> {
+        let [w, x, y, z] = self.quaternion_wxyz.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        self.position_mm.map(|position| Pose::from_parts(position.into(), turn))
+    }
 }
 
 /// The cell file: what is known of the origin of tools and work objects.
@@ -61,6 +77,11 @@ impl Cell {
         for (kind, frame, least) in
             cell.tool.iter().map(|f| ("tool", f, 4)).chain(cell.wobj.iter().map(|f| ("wobj", f, 3)))
         {
+            if let Some(q) = frame.quaternion_wxyz
+                && !((q.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-3)
+            {
+                return Err(format!("{kind} \"{}\": quaternion_wxyz has not length 1", frame.name));
+            }
             let found = frame.teaching_deg.len();
             if frame.origin == FrameOrigin::Taught && found > 0 && found < least {
                 return Err(format!(

@@ -117,6 +117,9 @@ pub fn mount(
             let points = std::array::from_fn(|i| estimated.forward(&teaching[i]) * tcp);
             match taught_frame(&points) {
                 Some(pose) => {
+                    // What the program displaces was not taught: it comes on top.
+                    let within = object.0.displacement.map_or_else(Pose::identity, |frame| frame.pose());
+                    let pose = pose * within;
                     let shift = (pose.translation.vector - told.object.translation.vector).norm();
                     let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
                     real.object = pose;

@@ -217,8 +217,16 @@ impl Columns {
 const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
-/// Knots of an error map over a turn: a smooth curve, and one that follows single teeth of a slow stage.
-const MAP_KNOTS: [usize; 2] = [24, 72];
+/// Knots of an error map over a turn: a smooth curve.
+const MAP_KNOTS: usize = 24;
+/// Knots of one that follows the periods of a reducer's stages, tried where lines of the joint stand out.
+const FINE_KNOTS: usize = 72;
+
+/// The finely resolved error map of a joint.
+pub fn fine_map(subject: &Subject<'_>, joint: usize) -> Candidate {
+    let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; FINE_KNOTS] });
+    Candidate::arm(effect, &subject.observed.dataset, subject.nominal)
+}
 
 /// An axis that moved less than this shows nothing of itself (rad).
 pub const STILL_RAD: f64 = 0.02;
@@ -236,9 +244,7 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::GearEccentricity(harmonic), 1.0));
         }
         effects.push((Effect::GearRatio(Ratio { joint, error: 0.0 }), 1.0));
-        for knots in MAP_KNOTS {
-            effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] }), 1.0));
-        }
+        effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
     }
     if nominal.bodies.is_some() {
         for joint in 0..6 {
@@ -246,26 +252,33 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             effects.push((Effect::JointCompliance(compliance), 1.0));
         }
     }
+    let lump = |frame, axis, moment| Lump { frame, axis, moment, factor: 0.0 };
     for joint in 0..5 {
         let frames: &[usize] = match joint {
             0 | 1 => &[2, 4, 6],
             2 => &[4, 6],
             _ => &[6],
         };
-        let lump = frames.iter().map(|&frame| Lump { frame, axis: None, factor: 0.0 }).collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump }), 1.0));
+        let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        // With the first moments of the links between, the static torque of any masses is spanned.
+        if joint == 1 || joint == 2 {
+            let moments = (joint + 1..4).flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
+            let all = lumps.into_iter().chain(moments).collect();
+            effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+        }
     }
     // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
     for joint in 0..3 {
-        let lump = (0..3)
+        let tilted = (0..3)
             .filter(|&axis| axis != down)
             .flat_map(|axis| {
                 let frames: &[usize] = if joint < 2 { &[2, 4] } else { &[4] };
-                frames.iter().map(move |&frame| Lump { frame, axis: Some(axis), factor: 0.0 })
+                frames.iter().map(move |&frame| lump(frame, Some(axis), None))
             })
             .collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump }), 1.0));
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: tilted }), 1.0));
     }
     for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
         effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));

@@ -10,6 +10,9 @@
 
 use std::sync::Arc;
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::extension::{Extended, Subject};
@@ -93,7 +96,7 @@ impl Linear {
         let residual = DVector::from_vec(residual).map(finite);
         let jacobian = DMatrix::from_vec(rows, p, jacobian).map(finite);
         let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
-        let mut normal = jacobian.tr_mul(&jacobian);
+        let mut normal = gram(&jacobian);
         for (k, precision) in precision.iter().enumerate() {
             normal[(k, k)] += precision;
         }
@@ -161,7 +164,6 @@ impl Linear {
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
-        let rows = self.residual.len();
         let mut residual = self.residual.clone();
         for &k in dropped {
             residual.axpy(-self.x[k], &self.jacobian.column(k), 1.0);
@@ -173,8 +175,7 @@ impl Linear {
         for (g, &k) in gradient.iter_mut().zip(&kept) {
             *g += self.precision[k] * self.x[k];
         }
-        let basis =
-            lower.solve_lower_triangular(&part.transpose()).unwrap_or_else(|| DMatrix::zeros(p, rows));
+        let basis = solved(&lower, part.transpose());
         let step = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
         residual.gemv_tr(-1.0, &basis, &step, 1.0);
         Design {
@@ -195,9 +196,9 @@ impl Design {
 
     /// Columns against everything that is already free.
     pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
-        let shared = &self.basis * columns;
+        let shared = product(&self.basis, columns);
         let gradient = columns.tr_mul(&self.residual);
-        let information = columns.tr_mul(columns) - shared.tr_mul(&shared);
+        let information = gram(columns) - gram(&shared);
         Projected { gradient, information, shared }
     }
 
@@ -205,6 +206,55 @@ impl Design {
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
+}
+
+/// Replaces a positive definite matrix by its lower Cholesky factor; `false` for one that is not.
+pub(super) fn factored(a: &mut DMatrix<f64>) -> bool {
+    let n = a.nrows();
+    let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(request);
+    let place = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
+    let done = llt::factor::cholesky_in_place(
+        place,
+        Default::default(),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Default::default(),
+    );
+    a.fill_upper_triangle(0.0, 1);
+    done.is_ok() && a.diagonal().iter().all(|d| *d > 0.0)
+}
+
+/// Solves L Lᵀ x = b.
+pub(super) fn back_and_forth(lower: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
+    lower.tr_solve_lower_triangular(&lower.solve_lower_triangular(b)?)
+}
+
+/// AᵀA.
+pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
+    product(&a.transpose(), a)
+}
+
+/// A B on all threads; the same bits for any number, since every entry is one sum in one order.
+pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
+    let left = MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols());
+    let right = MatRef::from_column_major_slice(b.as_slice(), b.nrows(), b.ncols());
+    let (rows, columns) = out.shape();
+    let place = MatMut::from_column_major_slice_mut(out.as_mut_slice(), rows, columns);
+    faer::linalg::matmul::matmul(place, Accum::Replace, left, right, 1.0, Par::Seq);
+    out
+}
+
+/// L⁻¹ B.
+fn solved(lower: &DMatrix<f64>, mut b: DMatrix<f64>) -> DMatrix<f64> {
+    let n = lower.nrows();
+    let (rows, columns) = b.shape();
+    let left = MatRef::from_column_major_slice(lower.as_slice(), n, n);
+    let place = MatMut::from_column_major_slice_mut(b.as_mut_slice(), rows, columns);
+    faer::linalg::triangular_solve::solve_lower_triangular_in_place(left, place, Par::Seq);
+    b.apply(|v| *v = finite(*v));
+    b
 }
 
 fn finite(v: f64) -> f64 {
@@ -220,8 +270,8 @@ fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
         for k in 0..n {
             shifted[(k, k)] += ridge * normal[(k, k)].abs().max(f64::MIN_POSITIVE);
         }
-        if let Some(factor) = shifted.cholesky() {
-            return factor.l();
+        if factored(&mut shifted) {
+            return shifted;
         }
         ridge = if ridge == 0.0 { 1e-14 } else { ridge * 10.0 };
     }
@@ -238,26 +288,26 @@ fn readings(
     let dataset = &subject.observed.dataset;
     let rows = dataset.rows.len() * per;
     let (mut scale, mut sag) = (DVector::zeros(rows), DVector::zeros(rows));
-    let rotation = fit.frames.base_from_sensor.rotation;
+    let origin = fit.frames.base_from_sensor.translation.vector;
+    let touched = nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector);
     for (i, row) in dataset.rows.iter().enumerate() {
         let w = weights[i].per_mm;
+        // Where the model sees the point, not where the reading has it: noise is no evidence of a scale.
+        let at = (fit.model.forward(&row.joints, &row.condition) * touched).coords;
         match row.reading {
-            Reading::Cable(length) => {
-                scale[i] = w * finite(length);
-                let at = (fit.model.forward(&row.joints, &row.condition)
-                    * nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector))
-                .coords;
-                sag[i] = w * finite(sag_mm(1.0, &(at - fit.frames.outlets_mm[row.anchor])));
+            Reading::Cable(_) => {
+                let away = at - fit.frames.outlets_mm[row.anchor];
+                scale[i] = w * finite(away.norm() + fit.frames.zeros_mm[row.anchor]);
+                sag[i] = w * finite(sag_mm(1.0, &away));
             }
-            Reading::Position(p) => space(&mut scale, i * per, w, rotation * p),
-            Reading::Pose(pose) => space(&mut scale, i * per, w, rotation * pose.translation.vector),
+            Reading::Position(_) | Reading::Pose(_) => space(&mut scale, i * per, w, at - origin),
         }
     }
     (scale, sag)
 }
 
-fn space(scale: &mut DVector<f64>, at: usize, w: f64, turned: Vector3<f64>) {
+fn space(scale: &mut DVector<f64>, at: usize, w: f64, seen: Vector3<f64>) {
     for k in 0..3 {
-        scale[at + k] = -w * finite(turned[k]);
+        scale[at + k] = -w * finite(seen[k]);
     }
 }

@@ -28,6 +28,7 @@ use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors
 use crate::kinematics::model::Model;
 use crate::kinematics::region::Region;
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::sensor::disturbance::{Course, Disturbance};
 use crate::measurement::split;
 
 /// How to diagnose.
@@ -119,32 +120,47 @@ pub fn diagnose(
         });
     }
     tell("looking for causes");
-    let selection = match needed {
-        None => selection::select(&subject, &options.selection, tell),
-        Some(_) => {
-            let none = selection::Options { most: 0, ..options.selection };
-            selection::select(&subject, &none, tell)
+    let thinned = thinned(&prepared.observed);
+    let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
+    let most = if needed.is_some() { 0 } else { options.selection.most };
+    let selection = selection::select(&searched, &selection::Options { most, ..options.selection }, tell);
+    let Selection { geometric, extended: found, accepted, left, .. } = selection;
+    let (geometric, extended) = match &thinned {
+        None => (geometric, found.clone()),
+        Some(thin) => {
+            tell("fitting all rows");
+            notes.push(format!(
+                "causes were looked for in {} of the {} rows, evenly spread; the fits and their errors are of all rows",
+                thin.dataset.rows.len(),
+                dataset.rows.len()
+            ));
+            let causes = to_the_end(&found.causes, &thin.dataset, dataset);
+            (
+                fit(&subject, &[], Freedom::All, Some(&geometric)),
+                fit(&subject, &causes, Freedom::All, Some(&found)),
+            )
         }
     };
-    let Selection { geometric, extended, accepted, left, .. } = selection;
     let wild = remaining::outliers(&extended);
     let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
     tell("holding rows out");
     let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
-    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
+    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(&subject, fit));
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
-    let linear = Linear::of(&subject, &extended);
+    let linear = Linear::of(&searched, &found);
     let whole = linear.design(&[]);
+    let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
     let context = Context {
-        subject: &subject,
+        subject: &searched,
+        found: &found,
         extended: &extended,
         linear: &linear,
         whole: &whole,
-        splits: &split::folds(&prepared.observed.dataset, 5, options.selection.seed),
-        set_aside: &set_aside,
+        splits: &split::folds(&searched.observed.dataset, 5, options.selection.seed),
+        set_aside: &aside,
     };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking at what is left");
@@ -194,6 +210,7 @@ pub fn diagnose(
             p_value: n.p_value,
         }),
         measure_again,
+        transfers: Vec::new(),
         notes,
     };
     let estimated = estimated(
@@ -218,6 +235,44 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// Scalar rows in which causes are looked for, at most.
+const SEARCHED: usize = 9_000;
+
+/// Evenly spread rows of a very long data set; `None` for one that is searched whole.
+fn thinned(observed: &crate::identification::fit::Observed) -> Option<crate::identification::fit::Observed> {
+    let dataset = &observed.dataset;
+    let per = match dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let stride = (dataset.rows.len() * per).div_ceil(SEARCHED);
+    (stride > 1).then(|| {
+        let rows: Vec<usize> = (0..dataset.rows.len()).step_by(stride).collect();
+        observed.subset(&rows)
+    })
+}
+
+/// Intervals that reach the last of the rows that were searched reach the last row there is.
+fn to_the_end(causes: &[Cause], searched: &Dataset, dataset: &Dataset) -> Vec<Cause> {
+    let last = |d: &Dataset| d.rows.last().map_or(0, |r| r.number);
+    causes
+        .iter()
+        .map(|cause| match cause {
+            Cause::Measurement(Disturbance { kind, course: Course::Rows { from, to }, values })
+                if *to == last(searched) =>
+            {
+                Cause::Measurement(Disturbance {
+                    kind: kind.clone(),
+                    course: Course::Rows { from: *from, to: last(dataset) },
+                    values: values.clone(),
+                })
+            }
+            other => other.clone(),
+        })
+        .collect()
 }
 
 /// Poses needed, where there are too few.
@@ -248,8 +303,13 @@ fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
 }
 
 struct Context<'a> {
+    /// Where causes were looked for: all rows, or some of very many.
     subject: &'a Subject<'a>,
+    /// The fit there.
+    found: &'a Extended,
+    /// The fit to all rows.
     extended: &'a Extended,
+    /// Linearised where causes were looked for.
     linear: &'a Linear,
     whole: &'a Design,
     splits: &'a [split::Split],
@@ -274,8 +334,7 @@ impl Context<'_> {
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
         for (index, own) in accepted.iter().enumerate() {
             let cause = &self.extended.causes[index];
-            let later: Vec<usize> =
-                (index + 1..accepted.len()).flat_map(|k| self.extended.places(k)).collect();
+            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
             steps.push(Step {
                 added: told_short(cause),
                 cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
@@ -314,7 +373,7 @@ impl Context<'_> {
         parameters: Vec<FoundParameter>,
         last: usize,
     ) -> (Finding, Picture) {
-        let without = self.linear.design(&self.extended.places(index));
+        let without = self.linear.design(&self.found.places(index));
         let folds = Folds::of(&without, self.splits);
         let before_mm = folds.rmse_mm(&without, None, self.set_aside);
         let mut alternatives: Vec<Alternative> = own
@@ -640,8 +699,7 @@ fn not_testable(
         );
     }
     if missing("sensor-scale") {
-        let design = Design::of(context.subject, context.extended);
-        let one = scale_beside_growth(&design, &DVector::from_element(1, 1e-3));
+        let one = scale_beside_growth(context.whole, &DVector::from_element(1, 1e-3));
         if one < VISIBLE {
             add(
                 "sensor-scale",

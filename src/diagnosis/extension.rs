@@ -74,8 +74,8 @@ pub struct Extended {
 /// Bend of Huber's weight, in standard deviations.
 const BEND: f64 = 2.0;
 
-/// At most this many rounds of solver and weights.
-const ROUNDS: usize = 8;
+/// At most this many rounds of solver and weights: from scratch, and from a fit nearby.
+const ROUNDS: [usize; 2] = [8, 4];
 
 /// The start of a fit: nominal arm and frames with the causes at size 0, and what is free.
 fn start(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom) -> (Model, Frames, Vec<Parameter>) {
@@ -137,13 +137,13 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
     let observed = subject.observed;
     let dataset = &observed.dataset;
     let (start_model, start_frames, parameters) = start(subject, causes, freedom);
-    let priors = subject.tolerance.priors(&parameters, &start_model, &start_frames);
+    let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
     let n = dataset.rows.len();
     let (lengths, angles) = components(dataset.sensor);
     let per = lengths + angles;
     let mut x = near.map_or_else(|| vec![0.0; parameters.len()], |e| carried(&parameters, e));
     let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
-    let mut trust = near.map_or_else(|| vec![1.0; n], |e| e.trust.clone());
+    let mut trust = near.filter(|e| e.trust.len() == n).map_or_else(|| vec![1.0; n], |e| e.trust.clone());
     let (mut model, mut frames) = match near {
         Some(e) => (e.model.clone(), e.frames.clone()),
         None => (start_model.clone(), start_frames.clone()),
@@ -161,7 +161,7 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
             &trusted(&base, &trust),
         );
         // Weights still change: what is beyond a few steps would be thrown away.
-        let rough = lm::Options { max_iterations: 4, cost_tolerance: 1e-5, ..lm::Options::default() };
+        let rough = lm::Options { max_iterations: 3, cost_tolerance: 1e-4, ..lm::Options::default() };
         let estimate = lm::solve(&task, &x, &rough);
         x.clone_from(&estimate.x);
         (model, frames) = task.apply(&x);
@@ -197,8 +197,8 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
             .collect();
         let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
         let moved = next.iter().zip(&trust).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let settled = (of_lengths - 1.0).abs() < 5e-3 && (of_angles - 1.0).abs() < 5e-3 && moved < 2e-2;
-        if (settled && round > 1) || round >= ROUNDS {
+        let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
+        if (settled && round > 1) || round >= ROUNDS[usize::from(near.is_some())] {
             // The scale under which the weighted squares have their degrees of freedom.
             let spent: f64 = estimate.covariance.as_ref().map_or(0.0, |c| {
                 priors

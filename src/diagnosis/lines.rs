@@ -16,14 +16,20 @@ use crate::kinematics::effect::harmonic::Harmonic;
 /// Orders 3 to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
 pub const HIGHEST: usize = 330;
 
+/// Highest order that a fine map can follow.
+const MAPPED: usize = 30;
+
+/// A line's χ² from which a fine map is worth a try.
+const STANDS_OUT: f64 = 25.0;
+
 /// Lines kept for each joint.
 const KEPT: usize = 2;
 
-/// The strongest lines of every joint as candidates.
-pub fn candidates(subject: &Subject<'_>, design: &Design) -> Vec<Candidate> {
+/// The strongest lines of every joint as candidates, and the joints in which lines up to the reach of a fine map stand out.
+pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Vec<usize>) {
     let dataset = &subject.observed.dataset;
     let n = design.observations;
-    let strongest: Vec<(usize, usize)> = (0..6)
+    let strongest: Vec<(f64, usize, usize)> = (0..6)
         .into_par_iter()
         .flat_map_iter(|joint| {
             let theta = &design.slopes.by_joint[joint];
@@ -54,17 +60,24 @@ pub fn candidates(subject: &Subject<'_>, design: &Design) -> Vec<Candidate> {
                 lines.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                 lines.truncate(KEPT);
             }
-            lines.into_iter().map(move |(_, order)| (joint, order))
+            lines.into_iter().map(move |(size, order)| (size, joint, order))
         })
         .collect();
-    strongest
+    let mut mapped: Vec<usize> = strongest
+        .iter()
+        .filter(|(size, _, order)| *size > STANDS_OUT && *order <= MAPPED)
+        .map(|l| l.1)
+        .collect();
+    mapped.dedup();
+    let candidates = strongest
         .into_par_iter()
-        .map(|(joint, order)| {
+        .map(|(_, joint, order)| {
             let harmonic = Harmonic { joint, order: order as f64, sine_rad: 0.0, cosine_rad: 0.0 };
             Candidate {
                 tried: (HIGHEST - 2) as f64,
                 ..Candidate::arm(Effect::GearTransmission(harmonic), dataset, subject.nominal)
             }
         })
-        .collect()
+        .collect();
+    (candidates, mapped)
 }

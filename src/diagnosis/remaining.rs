@@ -77,7 +77,8 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     let (middle, high) = (quantile(0.5).max(1e-12), quantile(0.95));
     // Sizes of whole vectors: the reach of a tail is taken as that of one coordinate with the same stretch.
     let stretch = high / middle;
-    let tail = (1.0 / heaviness(stretch)).max(0.0);
+    // Two quantiles of a few hundred sizes cannot rule out a tail of five degrees of freedom: it is always allowed for.
+    let tail = (1.0 / heaviness(stretch)).max(0.2);
     let limit = middle * reach(tail, n);
     let mut rows: Vec<(usize, f64)> =
         fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
@@ -112,6 +113,9 @@ fn heaviness(stretch: f64) -> f64 {
     1e6
 }
 
+/// Room for what the fit of a tail by two quantiles gets wrong.
+const MARGIN: f64 = 1.1;
+
 /// Size over median beyond which one of n rows comes once in a thousand data sets, for a tail 1/ν.
 fn reach(tail: f64, n: usize) -> f64 {
     let p = 1e-3 / n as f64;
@@ -123,12 +127,12 @@ fn reach(tail: f64, n: usize) -> f64 {
     }
     let z: f64 = high;
     if tail < 1e-5 {
-        return 1.2 * z / 0.6745;
+        return MARGIN * z / 0.6745;
     }
     let nu = 1.0 / tail;
     let stretched = (nu * ((z * z * (nu - 1.5) / (nu * (nu - 1.0).max(0.6)).max(0.3)).exp_m1())).sqrt();
     // Never closer than the normal's, with a margin for the coarse fit of the tail.
-    1.2 * stretched.max(z) / 0.72
+    MARGIN * stretched.max(z) / 0.72
 }
 
 /// Whether the noise grows with range.

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::catalogue::{Candidate, arm_candidates, measurement_candidates};
+use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
 use super::cause::Cause;
-use super::design::{Design, Linear};
+use super::design::{Design, Linear, back_and_forth, factored, gram, product};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::score::{Score, score};
 use super::{intervals, lines};
 use crate::kinematics::effect::Effect;
+use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::split::{self, Split};
@@ -73,6 +74,8 @@ pub struct Selection {
 /// Candidates that do not depend on a fit, built once.
 pub struct Catalogue {
     fixed: Vec<Arc<Candidate>>,
+    /// A fine error map of each joint.
+    fine: Vec<Arc<Candidate>>,
     /// Kinds of shifts with their regressors over all rows.
     shifts: Vec<Candidate>,
     families: f64,
@@ -104,7 +107,8 @@ impl Catalogue {
         stories.sort();
         stories.dedup();
         let families = stories.len() as f64;
-        Self { fixed: fixed.into_iter().map(Arc::new).collect(), shifts, families }
+        let fine = (0..6).map(|joint| Arc::new(fine_map(subject, joint))).collect();
+        Self { fixed: fixed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 
     /// All candidates against a fit, best first.
@@ -131,7 +135,9 @@ impl Catalogue {
                 open.push(Arc::new(Candidate { tried, ..candidate }));
             }
         }
-        open.extend(lines::candidates(subject, design).into_iter().map(Arc::new));
+        let (found, mapped) = lines::candidates(subject, design);
+        open.extend(found.into_iter().map(Arc::new));
+        open.extend(mapped.into_iter().map(|joint| Arc::clone(&self.fine[joint])));
         let mut out: Vec<Scored> = self
             .fixed
             .par_iter()
@@ -182,7 +188,7 @@ impl Folds {
             .par_iter()
             .map(|rows| {
                 let q = design.basis.select_columns(rows);
-                &q * q.transpose()
+                product(&q, &q.transpose())
             })
             .collect();
         Self { tests, grams }
@@ -193,23 +199,33 @@ impl Folds {
         self.residuals(design, columns).iter().map(DVector::norm_squared).sum()
     }
 
-    /// Root mean square over observations of the held-out position errors (mm), those at `set_aside` left out.
+    /// Sizes of the held-out position errors (mm), observation by observation, those at `set_aside` left out.
+    pub fn errors_mm(
+        &self,
+        design: &Design,
+        columns: Option<(&DMatrix<f64>, &[f64])>,
+        set_aside: &[usize],
+    ) -> Vec<f64> {
+        let mut out = Vec::new();
+        for (rows, residuals) in self.tests.iter().zip(self.residuals(design, columns)) {
+            for (scalars, r) in rows.chunks(design.per).zip(residuals.as_slice().chunks(design.per)) {
+                if !set_aside.contains(&(scalars[0] / design.per)) {
+                    let square = scalars.iter().zip(r).map(|(&s, r)| (r * design.slopes.mm[s]).powi(2));
+                    out.push(square.sum::<f64>().sqrt());
+                }
+            }
+        }
+        out
+    }
+
+    /// Root mean square of [`Folds::errors_mm`].
     pub fn rmse_mm(
         &self,
         design: &Design,
         columns: Option<(&DMatrix<f64>, &[f64])>,
         set_aside: &[usize],
     ) -> f64 {
-        let (mut sum, mut count) = (0.0, 0);
-        for (rows, residuals) in self.tests.iter().zip(self.residuals(design, columns)) {
-            for (&s, r) in rows.iter().zip(residuals.iter()) {
-                if !set_aside.contains(&(s / design.per)) {
-                    sum += (r * design.slopes.mm[s]).powi(2);
-                    count += usize::from(s % design.per == 0);
-                }
-            }
-        }
-        (sum / f64::from(u32::try_from(count.max(1)).unwrap_or(u32::MAX))).sqrt()
+        ErrorSummary::of(self.errors_mm(design, columns, set_aside)).rmse
     }
 
     /// Whitened held-out residuals fold by fold, everything refitted in every fold to first order.
@@ -218,22 +234,22 @@ impl Folds {
         let empty = DMatrix::zeros(design.rows(), 0);
         let (columns, sizes) = columns.unwrap_or((&empty, &[]));
         let k = columns.ncols();
-        let shared = &design.basis * columns;
-        let square = columns.tr_mul(columns);
+        let shared = product(&design.basis, columns);
+        let square = gram(columns);
         let gradient = columns.tr_mul(&design.residual);
         self.tests
             .par_iter()
             .zip(&self.grams)
-            .map(|(rows, gram)| {
+            .map(|(rows, part)| {
                 let q = design.basis.select_columns(rows);
                 let c = columns.select_rows(rows);
                 let r = DVector::from_iterator(rows.len(), rows.iter().map(|&s| design.residual[s]));
                 let mut normal = DMatrix::zeros(p + k, p + k);
-                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - gram));
-                let cross = &shared - &q * &c;
+                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - part));
+                let cross = &shared - product(&q, &c);
                 normal.view_mut((0, p), (p, k)).copy_from(&cross);
                 normal.view_mut((p, 0), (k, p)).copy_from(&cross.transpose());
-                let mut own = &square - c.tr_mul(&c);
+                let mut own = &square - gram(&c);
                 for a in 0..k {
                     own[(a, a)] += sizes[a].powi(-2);
                 }
@@ -244,8 +260,9 @@ impl Folds {
                 let mut right = DVector::zeros(p + k);
                 right.rows_mut(0, p).copy_from(&(-(&q * &r)));
                 right.rows_mut(p, k).copy_from(&(&gradient - c.tr_mul(&r)));
-                let Some(factor) = normal.cholesky() else { return r * f64::INFINITY };
-                let step = -factor.solve(&right);
+                let solved = factored(&mut normal).then(|| back_and_forth(&normal, &right)).flatten();
+                let Some(step) = solved else { return r * f64::INFINITY };
+                let step = -step;
                 r + q.tr_mul(&step.rows(0, p)) + c * step.rows(p, k)
             })
             .collect()

@@ -96,6 +96,9 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
         Cause::Arm(Effect::GearMap(_)) => format!(
             "joint {joint} has an error that depends on its own angle and is no simple harmonic: worn teeth or encoder ring"
         ),
+        Cause::Arm(Effect::SmoothCorrection(_)) => {
+            "something repeatable depends on the joints; it has no physical name".to_owned()
+        }
         Cause::Arm(Effect::GearRatio(_)) => {
             format!("the gear ratio of joint {joint} is off by {:.3} % of its angle", value * 100.0)
         }

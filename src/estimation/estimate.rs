@@ -96,6 +96,8 @@ impl std::fmt::Display for Termination {
 pub struct Iteration {
     /// Cost at the point the iteration ended on.
     pub cost: f64,
+    /// The same without the priors' share, where the method knows it apart.
+    pub row_cost: Option<f64>,
     /// Euclidean length of the step in the method's own scaling; 0 where the step was refused.
     pub step_norm: f64,
     /// Damping μ (Levenberg–Marquardt), step size (beetle, variable step size), forgetting factor, inertia.

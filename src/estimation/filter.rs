@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimation::estimate::{Estimate, Iteration, Termination};
 use crate::estimation::objective::Objective;
-use crate::estimation::problem::Problem;
+use crate::estimation::problem::{Problem, prior_cost};
 
 /// What one observation said, before it changed the state.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +52,8 @@ pub fn prior_state(problem: &dyn Problem, start: &[f64], unknown_sigma: f64) -> 
 /// Sum of the row costs and priors at a filter's state, as an entry of its trace.
 fn entry(objective: &mut Objective<'_>, x: &DVector<f64>, step_norm: f64) -> Iteration {
     let cost = objective.cost(x.as_slice());
-    Iteration { cost, step_norm, evaluations: objective.evaluations, ..Iteration::default() }
+    let row_cost = Some(cost - prior_cost(objective.priors, x.as_slice()));
+    Iteration { cost, row_cost, step_norm, evaluations: objective.evaluations, ..Iteration::default() }
 }
 
 /// A finished filter as an estimate. The last entry of the trace holds the cost at `x`.

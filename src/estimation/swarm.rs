@@ -111,6 +111,7 @@ impl<'a> Search<'a> {
             cost: self.best_cost,
             step_norm,
             damping: Some(setting),
+            row_cost: None,
             gradient_norm: None,
             evaluations: self.objective.evaluations,
         });

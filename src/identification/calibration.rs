@@ -98,8 +98,18 @@ struct Columns {
     growth: Vec<f64>,
     /// For each free effect parameter: rotations and growth per unit.
     effects: Vec<EffectColumns>,
+    /// Where in `effects` each parameter of x is; out of range for those that are no effect's.
+    effect_at: Vec<usize>,
     /// How far each disturbance goes in each row.
     courses: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    /// The columns of the parameter at place `k` of x, where it is an effect's or a load's.
+    #[inline(always)]
+    fn effect_of(&self, k: usize) -> Option<&EffectColumns> {
+        self.effect_at.get(k).and_then(|&e| self.effects.get(e))
+    }
 }
 
 #[derive(Debug, Clone, Default)]
@@ -327,7 +337,7 @@ impl Calibration {
             places.push(residuals);
         }
         let columns = if with_jacobian { p + 1 } else { 1 };
-        let mut buffer = vec![0.0; columns * c * BLOCK_LANES * WIDTH];
+        let mut buffer = vec![0.0; columns * c * BLOCK_LANES.min(last - first) * WIDTH];
         for from in (first..last).step_by(BLOCK_LANES) {
             let lanes = BLOCK_LANES.min(last - from);
             let rows = lanes * WIDTH;
@@ -395,6 +405,10 @@ impl Columns {
             frames.disturbances.iter().map(|d| column(&|i| d.course.at(row(i)))).collect::<Vec<_>>();
         if loads {
             out.add_loads(dataset, start, frames, parameters, padded);
+        }
+        out.effect_at = vec![usize::MAX; parameters.len()];
+        for (e, effect) in out.effects.iter().enumerate() {
+            out.effect_at[effect.place] = e;
         }
         out
     }

@@ -120,7 +120,7 @@ pub fn fit(
     solver: &Solver,
     seed: u64,
 ) -> Fitted {
-    let priors = tolerance.priors(parameters, start.model, start.frames);
+    let priors = tolerance.priors_within(parameters, start.model, start.frames);
     let (mut sigma_mm, mut sigma_rad) = (0.1, 1e-3);
     let mut x = vec![0.0; parameters.len()];
     let mut model = start.model.clone();
@@ -222,7 +222,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
     let dataset = &observed.dataset;
     let parameters: Vec<Parameter> =
         arm_parameters(start.model).into_iter().chain(frame_parameters(dataset)).collect();
-    let priors = tolerance.priors(&parameters, start.model, start.frames);
+    let priors = tolerance.priors_within(&parameters, start.model, start.frames);
     let n = dataset.rows.len();
     let mut factor = vec![1.0; n];
     let mut x = vec![0.0; parameters.len()];

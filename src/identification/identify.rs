@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::estimation::estimate::Termination;
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{
@@ -9,7 +10,7 @@ use crate::identification::fit::{
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{NotSharpened, Sharpening, logged_covariance, sharpen};
-use crate::identification::solver::Solver;
+use crate::identification::solver::{Family, Solver};
 use crate::identification::tolerance::Tolerance;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{
@@ -128,7 +129,11 @@ pub fn identify(
     let start = Start { model: nominal, frames };
     let (observed, sharpening) = observe(dataset, nominal, options.sharpen);
     enough(&observed.dataset, nominal, options.held_out)?;
-    let outliers = outliers(&observed, start, &options.tolerance, options.solver);
+    // Every method sees the same rows.
+    let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
+    let prepared = options.solver.prepared(nominal, dataset);
+    let nominal = &prepared;
+    let start = Start { model: nominal, frames };
     let kept: Vec<usize> =
         (0..dataset.rows.len()).filter(|i| outliers.rows.iter().all(|(o, _)| o != i)).collect();
     let observed = observed.subset(&kept);
@@ -136,8 +141,7 @@ pub fn identify(
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
     let sensing = frame_parameters(&observed.dataset);
-    let everything: Vec<Parameter> =
-        arm_parameters(nominal).into_iter().chain(sensing.iter().copied()).collect();
+    let everything = options.solver.parameters(nominal, &sensing);
     let seed = options.seed;
     // Stages on the training rows: errors. Literal forms move frames first, then links without priors.
     let registered =
@@ -154,8 +158,9 @@ pub fn identify(
         if options.solver.literal {
             literal(rows, nominal, &registered.frames, options.solver, seed)
         } else {
+            let frames = if options.solver.wants_registered() { &registered.frames } else { frames };
             let from = Start { model: nominal, frames };
-            fit(rows, from, &everything, &options.tolerance, options.solver, seed)
+            fit(rows, from, &everything, &options.solver.tolerance(&options.tolerance), options.solver, seed)
         }
     };
     let training = geometry_of(&fitted_rows, &registered);
@@ -286,13 +291,14 @@ fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), Ident
 fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, seed: u64) -> Fitted {
     let parameters = link_parameters(nominal);
     let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows.dataset.rows.len()];
-    let task = Calibration::new(&rows.dataset, nominal, frames, &parameters, &[], &weights);
+    // Priors for what cannot do without: first covariances of filters, boxes of swarms. The others ignore them.
+    let priors = Tolerance::default().priors(&parameters, nominal);
+    let task = Calibration::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
     let estimate = solver.solve(&task, &vec![0.0; parameters.len()], seed);
     let (model, frames) = task.apply(&estimate.x);
     let evaluations = estimate.evaluations;
     let freedom = (task.rows() as f64 - parameters.len() as f64).max(1.0);
     let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
-    let priors = Tolerance::default().priors(&parameters, nominal, &frames);
     let rounds = vec![estimate.trace.clone()];
     Fitted {
         parameters,
@@ -435,8 +441,12 @@ fn judge(
         reasons.push(text);
     };
     for (fitted, rows) in [(training, "the rows of the split"), (geometry, "all rows")] {
+        let filtered =
+            options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
             reasons.push(format!("on {rows} the fit {}", fitted.termination()));
+        } else if filtered {
+            reasons.push(format!("on {rows} the filter took in every reading; it claims no minimum"));
         } else {
             fail(&mut reasons, format!("on {rows} the fit did not converge: {}", fitted.termination()));
         }

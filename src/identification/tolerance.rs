@@ -75,8 +75,13 @@ impl Tolerance {
         }
     }
 
+    /// Priors of a list of parameters of an undisturbed measurement.
+    pub fn priors(&self, parameters: &[Parameter], model: &Model) -> Vec<Prior> {
+        parameters.iter().map(|p| self.prior(p, model)).collect()
+    }
+
     /// Priors of a list of parameters; `frames` holds the disturbances.
-    pub fn priors(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
+    pub fn priors_within(&self, parameters: &[Parameter], model: &Model, frames: &Frames) -> Vec<Prior> {
         parameters
             .iter()
             .map(|p| match *p {
@@ -102,5 +107,9 @@ pub fn effect_sigma(effect: &Effect) -> f64 {
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,
+        Effect::SmoothCorrection(_) => SMOOTH_SIGMA_RAD,
     }
 }
+
+/// A smooth correction moves the wrist by tenths of a millimetre at half a metre.
+pub const SMOOTH_SIGMA_RAD: f64 = 6e-4;

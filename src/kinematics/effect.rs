@@ -12,6 +12,7 @@ pub mod ratio;
 pub mod coupling;
 pub mod backlash;
 pub mod thermal;
+pub mod smooth;
 
 use nalgebra::{Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,7 @@ use self::harmonic::Harmonic;
 use self::load::GravityLoad;
 use self::map::JointMap;
 use self::ratio::Ratio;
+use self::smooth::Smooth;
 use self::thermal::Thermal;
 use super::chain::{self, Chain, LinkTable, cross, dot};
 use super::condition::Condition;
@@ -53,6 +55,8 @@ pub enum Effect {
     Backlash(Backlash),
     /// Links that grow with time or temperature.
     ThermalDrift(Thermal),
+    /// What a network learned of errors without a physical name.
+    SmoothCorrection(Smooth),
 }
 
 /// A parameter of an effect as the tables show it.
@@ -77,6 +81,7 @@ macro_rules! each {
             Effect::JointCoupling($e) => $body,
             Effect::Backlash($e) => $body,
             Effect::ThermalDrift($e) => $body,
+            Effect::SmoothCorrection($e) => $body,
         }
     };
 }
@@ -92,10 +97,11 @@ impl Effect {
             Effect::JointCoupling(_) => "joint-coupling",
             Effect::Backlash(_) => "backlash",
             Effect::ThermalDrift(_) => "thermal-drift",
+            Effect::SmoothCorrection(_) => "smooth-correction",
         }
     }
 
-    /// The joint (0-based) that the effect acts on; `None` where it acts on the links.
+    /// The joint (0-based) that the effect acts on; `None` where it acts on the links or on several joints.
     pub fn joint(&self) -> Option<usize> {
         each!(self, e => e.joint())
     }
@@ -138,6 +144,7 @@ impl Effect {
             Effect::GearRatio(e) => e.turn(u, out),
             Effect::JointCoupling(e) => e.turn(u, out),
             Effect::Backlash(e) => e.turn(condition, out),
+            Effect::SmoothCorrection(e) => e.turn(u, out),
             Effect::ThermalDrift(_) => {}
         }
     }
@@ -150,6 +157,7 @@ impl Effect {
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
             Effect::GearRatio(e) => e.carry(step, out),
             Effect::JointCoupling(e) => e.carry(step, out),
+            Effect::SmoothCorrection(e) => e.carry(u, step, out),
             Effect::GearMap(e) => e.carry(u, step, out),
             Effect::JointCompliance(_)
             | Effect::LumpedCompliance(_)

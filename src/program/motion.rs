@@ -254,6 +254,9 @@ pub struct WorkObject {
     pub value: Result<WorkObjectValue, Reason>,
     /// Where it is declared; `None` for `wobj0` and for one that is declared nowhere.
     pub place: Option<Place>,
+    /// A displacement within it that the program sets (PDispSet, TRANS, ROT) and the text tells; the object frame of
+    /// `value` has it in it already.
+    pub displacement: Option<Frame>,
 }
 
 /// What a work object is. Targets stand in `user_frame * object_frame`.
@@ -569,6 +572,42 @@ reasons! {
         NoJointForm => "the instruction has no form with joint targets",
         /// The new value is of a kind that the instruction does not take.
         WrongKind => "the new value is not of the kind that the instruction takes",
+        /// NC: an axis has no value yet.
+        PositionUnknown => "an axis has no value: none is stated since the start, a reference return, or a change of frame or tool",
+        /// NC: nothing has said how the tool is turned.
+        OrientationUnknown => "the orientation is not stated: no A, B, C and no tool vector before it",
+        /// NC: what A, B and C mean is not known.
+        Convention => "what A, B and C mean is not known: the robot file does not name a convention",
+        /// NC: a variable without a known value.
+        Variable => "a variable whose value is known only at run time",
+        /// NC: a number without a point, which may count increments.
+        AmbiguousNumber => "a number without decimal point: mm or increments, by a parameter of the control",
+        /// NC: the place can be reached by a jump.
+        UnknownFlow => "reached by a jump, call or loop: what holds here is known only at run time",
+        /// NC: the block has a slash.
+        Skippable => "the block may be skipped (/)",
+        /// NC: without tool centre point control X, Y and Z are not the tip.
+        NoTipControl => "without tool centre point control (G43.4, TRAORI, M128) X Y Z are not the tip",
+        /// NC: coordinates are turned, scaled, mirrored, polar or in a tilted plane.
+        Transformed => "coordinates are turned, scaled, mirrored, polar or in a tilted plane",
+        /// NC: the control offsets the path by the tool's radius.
+        RadiusCompensation => "the control offsets the path by the tool radius (G41, G42)",
+        /// NC: in machine coordinates.
+        MachineCoordinates => "in machine coordinates (G53, SUPA, M91)",
+        /// NC: a cycle of the control.
+        Cycle => "a cycle of the control: its motions are not in the text",
+        /// NC: a path that is not made of lines and arcs.
+        NotFollowed => "a spline, thread, contour or other path that is neither line nor arc",
+        /// NC: a call.
+        Subprogram => "calls a subprogram: its motions are in it",
+        /// NC: a return to a stored point.
+        ReferenceReturn => "goes to a reference point that the control holds",
+        /// NC: moves until a signal comes.
+        Probe => "moves until a signal comes: where it ends is known only at run time",
+        /// NC: the centre of the arc stands in another block.
+        CentreElsewhere => "the centre of the arc stands in another block (CC)",
+        /// NC: part of the block could not be read.
+        Unread => "part of the block could not be read",
     }
 }
 

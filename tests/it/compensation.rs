@@ -242,6 +242,8 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
         origin,
         teaching_deg,
         taught_with: None,
+        position_mm: None,
+        quaternion_wxyz: None,
     };
     let cell = Cell {
         tool: vec![frame("tSpindle", FrameOrigin::Metrology, Vec::new())],

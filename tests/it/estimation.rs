@@ -10,3 +10,4 @@ mod filters;
 mod swarms;
 mod chaos;
 mod triangular;
+mod network;

@@ -15,8 +15,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "measurement",
         "estimation",
         "identification",
+        "diagnosis",
         "compensation",
         "planning",
+        "comparison",
     ];
     BTreeMap::from([
         ("math", vec![]),
@@ -27,8 +29,26 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("measurement", vec!["math", "kinematics"]),
         ("estimation", vec!["math"]),
         ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
+        ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
-        ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
+        (
+            "planning",
+            vec!["math", "kinematics", "measurement", "estimation", "identification", "program", "surface"],
+        ),
+        (
+            "comparison",
+            vec![
+                "math",
+                "kinematics",
+                "program",
+                "surface",
+                "measurement",
+                "estimation",
+                "identification",
+                "compensation",
+                "planning",
+            ],
+        ),
         ("report", all_below_six.clone()),
         ("visual", all_below_six),
     ])

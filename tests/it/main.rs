@@ -13,6 +13,7 @@ mod identification;
 mod diagnosis;
 mod compensation;
 mod planning;
+mod comparison;
 mod report;
 mod visual;
 mod command;

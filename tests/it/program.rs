@@ -8,3 +8,4 @@ mod rewriting;
 mod evaluation;
 mod writing;
 mod edits;
+mod nc;

@@ -118,6 +118,16 @@ impl Recursion {
         Some(Self { x, memory, matrix })
     }
 
+    /// Goes on in square-root form from a state and the root S of its covariance, as [`Recursion::root`] gave it.
+    pub fn from_root(x: DVector<f64>, root: DMatrix<f64>) -> Self {
+        Self { x, memory: Memory::SquareRoot, matrix: root }
+    }
+
+    /// S of the square-root form, to be saved without a loss of bits; `None` in the other.
+    pub fn root(&self) -> Option<&DMatrix<f64>> {
+        (self.memory == Memory::SquareRoot).then_some(&self.matrix)
+    }
+
     /// The covariance P.
     pub fn covariance(&self) -> DMatrix<f64> {
         match self.memory {

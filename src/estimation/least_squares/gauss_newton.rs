@@ -127,6 +127,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             cost: here.at.cost(),
             step_norm: length,
             damping: None,
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });

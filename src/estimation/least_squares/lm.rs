@@ -229,6 +229,7 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             cost: here.at.cost(),
             step_norm,
             damping: Some(damping.mu),
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });
@@ -314,6 +315,7 @@ fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options
             cost: after,
             step_norm: promise.step_norm,
             damping: Some(options.mu),
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });

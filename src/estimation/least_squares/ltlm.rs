@@ -191,7 +191,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
 
 fn entry(cost: f64, step_norm: f64, mu: f64, cosine: f64, objective: &Objective<'_>) -> Iteration {
     let evaluations = objective.evaluations;
-    Iteration { cost, step_norm, damping: Some(mu), gradient_norm: Some(cosine), evaluations }
+    Iteration { cost, row_cost: None, step_norm, damping: Some(mu), gradient_norm: Some(cosine), evaluations }
 }
 
 /// Equations 16 to 18 without x₁, whose cost is known: the best finite candidate.

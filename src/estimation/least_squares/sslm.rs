@@ -171,6 +171,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             cost: here.at.cost(),
             step_norm: delta * promise.step_norm,
             damping: Some(delta),
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });

@@ -164,6 +164,7 @@ fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             cost: here.at.cost(),
             step_norm: moved.sqrt(),
             damping: Some(delta),
+            row_cost: None,
             gradient_norm: None,
             evaluations: objective.evaluations,
         });
@@ -208,6 +209,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
             cost: after,
             step_norm: delta * promise.step_norm,
             damping: Some(delta),
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });
@@ -274,6 +276,7 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
             cost: here.at.cost(),
             step_norm: if taken { delta * promise.step_norm } else { 0.0 },
             damping: Some(delta),
+            row_cost: None,
             gradient_norm: Some(cosine),
             evaluations: objective.evaluations,
         });

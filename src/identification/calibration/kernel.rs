@@ -262,7 +262,8 @@ fn cable(
     }
     store(out, columns * rows + place, residual);
     // u carries the weight, so that every column comes out whitened.
-    let pull = weight / length;
+    let scaled = state.pushed.as_ref().map_or(Lanes::splat(1.0), |pushed| Lanes::load(&pushed.scale, at));
+    let pull = weight * scaled / length;
     let u: V = std::array::from_fn(|k| v[k] * pull);
     let moment: [V; 7] = std::array::from_fn(|i| cross(&minus(&p, &frames.origin[i]), &u));
     let link = |joint, coordinate| link_pull(&frames, &u, &moment, joint, coordinate);
@@ -277,16 +278,18 @@ fn cable(
                 dot(&in_base(&frames, &state.flange.column(axis).into()), &u)
             }
             Parameter::Outlet { axis, .. } if single => -u[axis],
-            Parameter::Zero { .. } if single => weight,
+            Parameter::Zero { .. } if single => weight * scaled,
             Parameter::Outlet { anchor, axis } => {
                 -u[axis] * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
             }
-            Parameter::Zero { anchor } => weight * of_anchor(task, at, |a| f64::from(u8::from(a == anchor))),
+            Parameter::Zero { anchor } => {
+                weight * scaled * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
+            }
             Parameter::Disturbance { index, parameter } if !is_load(task, index) => {
                 let how_far = course(task, index, at);
                 how_far
                     * match task.frames.disturbances[index].kind {
-                        Kind::Zero => weight,
+                        Kind::Zero => weight * scaled,
                         Kind::Frame { .. } => -u[parameter.min(2)],
                         Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
@@ -296,7 +299,7 @@ fn cable(
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = none;
-                if let Some(effect) = task.columns.effects.iter().find(|e| e.place == k) {
+                if let Some(effect) = task.columns.effect_of(k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
                             sum += Lanes::load(rotation, at) * link(joint, LinkCoordinate::Theta);
@@ -404,15 +407,18 @@ fn space(
     let reading: V = std::array::from_fn(|k| Lanes::load(&columns.reading[k], at));
     let mut turned = times(&sensor, &reading);
     let mut origin = splat(&state.base_from_sensor.translation.vector);
+    // The scale multiplies what the model sees, not the reading: its noise must not look like evidence of a scale.
+    let mut scaled = Lanes::splat(1.0);
     if let Some(pushed) = &state.pushed {
-        let scale = Lanes::load(&pushed.scale, at);
-        turned = turned_by(&load(&pushed.turn, at), &turned.map(|t| t / scale));
+        scaled = Lanes::load(&pushed.scale, at);
+        turned = turned_by(&load(&pushed.turn, at), &turned);
         let shift = load(&pushed.frame, at);
         (0..3).for_each(|k| origin[k] += shift[k]);
     }
+    let seen = minus(&p, &origin);
     let last = if jacobian { task.parameters.len() } else { 0 };
     for k in 0..3 {
-        let residual = weight * (turned[k] + origin[k] - p[k]);
+        let residual = weight * (turned[k] - scaled * seen[k]);
         store(out, (last * components + k) * rows + place, residual);
     }
     // E = R_C R_m (R R_t)ᵀ as columns, its trace, and ½ vee(E − Eᵀ).
@@ -483,14 +489,14 @@ fn space(
                         (cross(&w, &turned), w)
                     }
                     Kind::Tool => (in_base(&frames, &state.flange.column(parameter).into()), none),
-                    Kind::Scale => (turned.map(|t| -t), none),
+                    Kind::Scale => (seen.map(|v| -v / scaled), none),
                     Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
                 };
                 (v.map(|v| how_far * v), w.map(|w| how_far * w))
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = (none, none);
-                if let Some(effect) = columns.effects.iter().find(|e| e.place == k) {
+                if let Some(effect) = columns.effect_of(k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
                             let twist = link_twist(&frames, &p, joint, LinkCoordinate::Theta);
@@ -511,7 +517,12 @@ fn space(
             }
             Parameter::Outlet { .. } | Parameter::Zero { .. } => (none, none),
         };
-        let sign = if of_sensor { weight } else { -weight };
+        // A shift of the sensor and everything of the arm are seen through the scale; a turn of the sensor is not.
+        let through_scale =
+            !matches!(*parameter, Parameter::Base(3..) | Parameter::Disturbance { parameter: 3.., .. })
+                || !of_sensor;
+        let size = if through_scale { weight * scaled } else { weight };
+        let sign = if of_sensor { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {
             store(out, (k * components + i) * rows + place, sign * v);
         }

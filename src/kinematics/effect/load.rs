@@ -4,7 +4,7 @@
 //! δθⱼ = Σ κₜ τⱼ(oₜ, dₜ), with τⱼ(o, d) = zⱼ · ((o − oⱼ) × g d) the torque about axis j of 1 kg at the origin o of a frame
 //! beyond the joint, under gravity along d (the arm's own direction, or an axis of the base), and κₜ the product of
 //! compliance and mass. The static torque of any arm is linear in its masses and first moments, so lumps at elbow, wrist
-//! and flange span it but for the offsets of the centres of mass from the frames.
+//! and flange, and first moments in the frames between them, span it whatever the masses are.
 //! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004) with the masses freed.
 
 use nalgebra::Matrix6;
@@ -25,6 +25,10 @@ pub struct Lump {
     /// Base axis (0, 1, 2) along which gravity pulls; absent for the arm's own direction of gravity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<usize>,
+    /// Axis (0, 1, 2) of the frame along which the lump stands off its origin by a metre; then only the stand-off counts: a
+    /// first moment of 1 kg m that moves with the frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<usize>,
     /// Compliance times mass [rad kg/(N m)].
     pub factor: f64,
 }
@@ -49,6 +53,7 @@ impl GravityLoad {
             .iter()
             .map(|l| EffectParameter {
                 name: match l.frame {
+                    _ if l.moment.is_some() => "compliance x first moment",
                     0..=2 => "compliance x elbow mass",
                     3 => "compliance x forearm mass",
                     4 | 5 => "compliance x wrist mass",
@@ -70,7 +75,7 @@ impl GravityLoad {
     #[inline(always)]
     fn torque<R: Real>(&self, statics: &Statics, frames: &Chain<R>, lump: &Lump) -> R {
         let g = pull(statics, lump).map(R::splat);
-        let lever = minus(&frames.origin[lump.frame], &frames.origin[self.joint]);
+        let lever = lever(frames, lump, self.joint);
         dot(&frames.z[self.joint], &cross(&lever, &g))
     }
 
@@ -108,13 +113,25 @@ impl GravityLoad {
             for i in 0..lump.frame.min(6) {
                 // The torque is the gradient of a potential: ∂²/∂uₐ∂u_b = g · (zₐ × (z_b × (p − o_b))), a ≤ b.
                 let (a, b) = (i.min(self.joint), i.max(self.joint));
-                let lever = minus(&frames.origin[lump.frame], &frames.origin[b]);
+                let lever = lever(&frames, lump, b);
                 let bent = cross(&frames.z[a], &cross(&frames.z[b], &lever));
                 out[(self.joint, i)] += lump.factor * dot(&g, &bent);
             }
         }
         out
     }
+}
+
+/// From the axis of a joint to the lump, or the stand-off of a first moment (mm).
+#[inline(always)]
+fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
+    let axis = match lump.moment {
+        None => return minus(&frames.origin[lump.frame], &frames.origin[joint]),
+        Some(0) => cross(&frames.y[lump.frame - 1], &frames.z[lump.frame]),
+        Some(1) => frames.y[lump.frame - 1],
+        Some(_) => frames.z[lump.frame],
+    };
+    axis.map(|a| R::splat(1e3) * a)
 }
 
 /// Weight of 1 kg [N], with metres for the millimetres of the levers.

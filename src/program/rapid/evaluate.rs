@@ -447,20 +447,22 @@ impl<'a, 's> Evaluator<'a, 's> {
             return Value::Unknown(Reason::RunTimeFunction);
         }
         let mut required = Vec::new();
-        let mut options: [Option<Value>; 3] = [None, None, None];
+        let mut options = Options::default();
         for argument in arguments(tree, node) {
-            let Some(value) = argument.value else { continue };
-            match argument.name {
-                None => required.push(self.value(context, value)),
-                Some(option) => {
+            match (argument.name, argument.value) {
+                (None, None) => {}
+                (None, Some(value)) => required.push(self.value(context, value)),
+                (Some(option), value) => {
                     let option: Vec<u8> = tree.text(option).iter().map(|&byte| fold(byte)).collect();
-                    let slot = match &*option {
-                        b"rx" => 0,
-                        b"ry" => 1,
-                        b"rz" => 2,
+                    let value = value.map(|value| self.value(context, value));
+                    match (&*option, value) {
+                        (b"rx", Some(value)) => options.turns[0] = Some(value),
+                        (b"ry", Some(value)) => options.turns[1] = Some(value),
+                        (b"rz", Some(value)) => options.turns[2] = Some(value),
+                        (b"wobj", Some(value)) if name == b"mirpos" => options.work_object = Some(value),
+                        (b"miry", None) => options.mirrors_y = true,
                         _ => return Value::Unknown(Reason::RunTimeFunction),
-                    };
-                    options[slot] = Some(self.value(context, value));
+                    }
                 }
             }
         }
@@ -576,8 +578,19 @@ fn orient_zyx(z_deg: f64, y_deg: f64, x_deg: f64) -> UnitQuaternion<f64> {
         * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), x_deg.to_radians())
 }
 
+/// Optional arguments of the functions that are known here.
+#[derive(Default)]
+struct Options {
+    /// `\Rx`, `\Ry`, `\Rz`.
+    turns: [Option<Value>; 3],
+    /// `\WObj` of MirPos.
+    work_object: Option<Value>,
+    /// `\MirY`.
+    mirrors_y: bool,
+}
+
 /// A predefined function of values.
-fn call(name: &[u8], required: &[Value], options: &[Option<Value>; 3]) -> Result<Value, Reason> {
+fn call(name: &[u8], required: &[Value], options: &Options) -> Result<Value, Reason> {
     let number = |index: usize| required.get(index).ok_or(Reason::MissingArgument)?.number();
     // An unknown offset is another reason than an unknown base.
     let offset = |value: &Value| value.number().map_err(|_| Reason::RunTimeOffset);
@@ -596,7 +609,7 @@ fn call(name: &[u8], required: &[Value], options: &[Option<Value>; 3]) -> Result
             let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
             let shift = Vector3::new(offset(x)?, offset(y)?, offset(z)?);
             let mut angles = [0.0; 3];
-            for (angle, option) in angles.iter_mut().zip(options) {
+            for (angle, option) in angles.iter_mut().zip(&options.turns) {
                 if let Some(value) = option {
                     *angle = offset(value)?;
                 }
@@ -612,6 +625,22 @@ fn call(name: &[u8], required: &[Value], options: &[Option<Value>; 3]) -> Result
                 if angles == [0.0; 3] {
                     frame.quaternion = quaternion;
                 }
+            })
+        }
+        b"mirpos" => {
+            let [target, plane] = required else { return Err(Reason::MissingArgument) };
+            let plane = plane.work_object()?;
+            let object = match &options.work_object {
+                Some(value) => value.work_object()?,
+                None => built_in(b"wobj0").ok_or(Reason::WrongShape)?.work_object()?,
+            };
+            if !plane.fixed || !object.fixed {
+                return Err(Reason::MovingWorkObject);
+            }
+            let plane = plane.user_frame.pose() * plane.object_frame.pose();
+            let object = object.user_frame.pose() * object.object_frame.pose();
+            edited(target, |frame| {
+                *frame = Frame::from_pose(&mirrored(&frame.pose(), &plane, &object, options.mirrors_y));
             })
         }
         b"posemult" => {
@@ -672,6 +701,27 @@ fn call(name: &[u8], required: &[Value], options: &[Option<Value>; 3]) -> Result
         b"pow" => Ok(Value::Number(number(0)?.powf(number(1)?))),
         _ => Err(Reason::RunTimeFunction),
     }
+}
+
+/// A pose in a work object, mirrored in the xy plane of a frame (RAPID reference, MirPos): the position, the z axis of the
+/// tool, and its x axis (with `\MirY` its y axis); the third axis makes it right-handed again.
+fn mirrored(pose: &Pose, plane: &Pose, object: &Pose, mirrors_y: bool) -> Pose {
+    let world = object * pose;
+    let normal = plane.rotation * Vector3::z();
+    let origin = plane.translation.vector;
+    let reflected = |v: Vector3<f64>| v - normal * (2.0 * normal.dot(&v));
+    let position = origin + reflected(world.translation.vector - origin);
+    let axis = |v: Vector3<f64>| reflected(world.rotation * v);
+    let z = axis(Vector3::z());
+    let columns = if mirrors_y {
+        let y = axis(Vector3::y());
+        [y.cross(&z), y, z]
+    } else {
+        let x = axis(Vector3::x());
+        [x, z.cross(&x), z]
+    };
+    let turn = rotation_from_matrix(&Matrix3::from_columns(&columns));
+    object.inverse() * Pose::from_parts(position.into(), turn)
 }
 
 /// A robtarget with another pose; conf and external axes stay.

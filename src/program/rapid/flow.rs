@@ -6,14 +6,18 @@
 //! anywhere in the routine.
 
 use super::evaluate::{Context, Evaluator, Known};
-use super::instruction;
-use super::modal::{States, setting};
+use super::instruction::{self, INSTRUCTIONS};
+use super::modal::{States, Which, setting};
 use super::symbol::{Unit, What, only_reads};
-use super::syntax::{Syntax, expressions, parts, token_kind};
-use super::token::{Token, folded};
+use super::syntax::{Syntax, arguments, expressions, parts, token_kind};
+use super::token::{Token, folded, same_name};
 use super::value::Value;
-use crate::program::motion::Reason;
+use crate::program::motion::{Frame, Reason};
 use crate::program::tree::Child;
+
+/// The key in [`Known`] under which the program displacement stands: no name of the program has it. Where it is absent
+/// the displacement is as at the entry of the routine.
+pub(super) const DISPLACEMENT: u32 = u32::MAX;
 
 /// What holds before a statement.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,9 +155,13 @@ impl Walk<'_, '_, '_> {
                 entry.modal = entry.modal.or(self.settings(node));
                 entry.previous = None;
                 let assigned = self.assigned_in(node);
+                let displaces = self.displaces(node);
                 let forget = |state: &mut State| {
                     for &id in &assigned {
                         state.known.insert(id, Value::Unknown(Reason::Assigned));
+                    }
+                    if displaces {
+                        state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
                     }
                 };
                 forget(&mut entry);
@@ -212,7 +220,37 @@ impl Walk<'_, '_, '_> {
     /// What holds at a place that can be reached from anywhere in the routine.
     fn anywhere(&self) -> State {
         let known = self.assigned.iter().map(|&id| (id, Value::Unknown(Reason::Assigned)));
-        State { known: known.collect(), modal: self.any, previous: None, reached: true }
+        let mut known: Known = known.collect();
+        if !self.any.keeps(Which::Displacement) {
+            known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+        }
+        State { known, modal: self.any, previous: None, reached: true }
+    }
+
+    /// Whether statements under a node may set or end a program displacement.
+    fn displaces(&mut self, node: u32) -> bool {
+        !self.settings(node).leaves(Which::Displacement)
+    }
+
+    /// The displacement after PDispSet, PDispOn or PDispOff.
+    fn displaced(&self, node: u32, state: &State, name: &[u8]) -> Value {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        if same_name(name, b"PDispOff") {
+            return Value::from_frame(&Frame::IDENTITY);
+        }
+        let frame =
+            arguments(tree, node).find(|argument| !argument.optional).and_then(|argument| argument.value);
+        match frame.filter(|_| same_name(name, b"PDispSet")) {
+            Some(frame) => {
+                let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+                match self.evaluator.value(context, frame).frame() {
+                    Ok(frame) => Value::from_frame(&frame),
+                    Err(_) => Value::Unknown(Reason::Displacement),
+                }
+            }
+            // PDispOn counts from where the robot stands.
+            None => Value::Unknown(Reason::Displacement),
+        }
     }
 
     fn forgotten(&self, known: &Known) -> Known {
@@ -269,19 +307,34 @@ impl Walk<'_, '_, '_> {
         let known_motion = !late && instruction::find(name).is_some() && !symbols.hides_instruction;
         if known_motion {
             if motion.is_some() {
-                state.previous = motion;
+                // A search stops where its signal comes.
+                let searches = instruction::find(name).is_some_and(|index| INSTRUCTIONS[index].searches());
+                state.previous = motion.filter(|_| !searches);
             }
             return state;
         }
         if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.set(which, on);
+            if which == Which::Displacement {
+                let value = self.displaced(node, &state, name);
+                state.known.insert(DISPLACEMENT, value);
+            }
             return state;
         }
         let routine = if late { None } else { symbols.routine(self.unit.scope, name) };
         match routine {
             Some(routine) => {
                 self.visitor.called(CallSite { routine, modal: state.modal });
-                state.modal = self.visitor.exit_of(routine).entered(state.modal);
+                let exit = self.visitor.exit_of(routine);
+                state.modal = exit.entered(state.modal);
+                if !exit.keeps(Which::Displacement) {
+                    let value = if exit.is_off(Which::Displacement) {
+                        Value::from_frame(&Frame::IDENTITY)
+                    } else {
+                        Value::Unknown(Reason::Displacement)
+                    };
+                    state.known.insert(DISPLACEMENT, value);
+                }
             }
             None if motion.is_some() && !late => {
                 state.previous = motion;
@@ -292,7 +345,9 @@ impl Walk<'_, '_, '_> {
         }
         // A routine may change everything that is declared outside this one.
         for (id, value) in &mut state.known {
-            if symbols.symbols[*id as usize].scope != self.unit.scope {
+            let outside =
+                symbols.symbols.get(*id as usize).is_some_and(|symbol| symbol.scope != self.unit.scope);
+            if outside {
                 *value = Value::Unknown(Reason::Assigned);
             }
         }

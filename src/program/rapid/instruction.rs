@@ -91,6 +91,11 @@ impl Instruction {
         })
     }
 
+    /// Whether it ends where a signal comes.
+    pub fn searches(&self) -> bool {
+        self.pattern.contains('O')
+    }
+
     /// How many required arguments there are at least.
     pub fn least(&self) -> usize {
         self.pattern.bytes().filter(|&letter| letter != b'*').count()
@@ -165,6 +170,29 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     rigid("ArcCStart", Circular, "CTS*Zt"),
     rigid("ArcC", Circular, "CTS*Zt"),
     rigid("ArcCEnd", Circular, "CTS*Zt"),
+    plain("ArcL1Start", Linear, "TS*Zt"),
+    same("ArcL1", Linear, "TS*Zt"),
+    within("ArcL1End", "ArcL1", Linear, "TS*Zt"),
+    rigid("ArcC1Start", Circular, "CTS*Zt"),
+    rigid("ArcC1", Circular, "CTS*Zt"),
+    rigid("ArcC1End", Circular, "CTS*Zt"),
+    plain("ArcL2Start", Linear, "TS*Zt"),
+    same("ArcL2", Linear, "TS*Zt"),
+    within("ArcL2End", "ArcL2", Linear, "TS*Zt"),
+    rigid("ArcC2Start", Circular, "CTS*Zt"),
+    rigid("ArcC2", Circular, "CTS*Zt"),
+    rigid("ArcC2End", Circular, "CTS*Zt"),
+    guided(rigid("ArcAdaptLStart", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptL", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptLEnd", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptC", Circular, "CTS*Zt")),
+    guided(rigid("ArcAdaptCEnd", Circular, "CTS*Zt")),
+    guided(rigid("ArcCalcLStart", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcL", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcLEnd", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcC", Circular, "CTS*Zt")),
+    guided(rigid("ArcCalcCEnd", Circular, "CTS*Zt")),
+    rigid("ArcMoveExtJ", External, "JSZ"),
     plain("ArcMoveL", Linear, "TSZt"),
     plain("ArcMoveJ", Joint, "TSZt"),
     rigid("ArcMoveC", Circular, "CTSZt"),
@@ -192,6 +220,20 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     same("CapL", Linear, "TS*Zt"),
     rigid("CapC", Circular, "CTS*Zt"),
     rigid("ContactL", Linear, "TSt"),
+    with_joints(plain("SMoveL", Linear, "TSZt"), "MoveAbsJ"),
+    with_joints(plain("SMoveJ", Joint, "TSZt"), "MoveAbsJ"),
+    plain("SMoveLDO", Linear, "TSZt.."),
+    plain("SMoveJDO", Joint, "TSZt.."),
+    plain("SMoveLGO", Linear, "TSZt."),
+    plain("SMoveJGO", Joint, "TSZt."),
+    plain("SMoveLSync", Linear, "TSZt."),
+    plain("SMoveJSync", Joint, "TSZt."),
+    plain("STriggL", Linear, "TS.Zt"),
+    plain("STriggJ", Joint, "TS.Zt"),
+    rigid("SSearchL", Linear, ".OTSt"),
+    rigid("CalibL", Linear, "TS*t"),
+    rigid("CalibJ", Joint, "TS*t"),
+    rigid("MeasureWearL", Linear, "TS*t"),
     guided(rigid("EGMMoveL", Linear, ".TSZt")),
     guided(rigid("EGMMoveC", Circular, ".CTSZt")),
 ];

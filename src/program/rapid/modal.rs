@@ -87,7 +87,22 @@ impl States {
         States(out)
     }
 
-    fn switch(self, which: Which) -> Switch {
+    /// Whether a switch is certainly as at the entry of the routine.
+    pub(super) fn keeps(self, which: Which) -> bool {
+        self.0 >> (3 * which as u32) & 7 == ENTRY
+    }
+
+    /// Whether a switch is certainly off.
+    pub(super) fn is_off(self, which: Which) -> bool {
+        self.0 >> (3 * which as u32) & 7 == OFF
+    }
+
+    /// Whether nothing is said about a switch.
+    pub(super) fn leaves(self, which: Which) -> bool {
+        self.0 >> (3 * which as u32) & 7 == 0
+    }
+
+    pub(super) fn switch(self, which: Which) -> Switch {
         match self.0 >> (3 * which as u32) & 3 {
             OFF => Switch::Off,
             ON => Switch::On,

@@ -13,7 +13,7 @@ use super::flow::{CallSite, State, Surroundings, Visitor, walk};
 use super::instruction::{self, INSTRUCTIONS, Instruction, Slot};
 use super::literal;
 use super::mark;
-use super::modal::States;
+use super::modal::{States, Which};
 use super::parser::parse;
 use super::symbol::{Symbols, Unit, What, only_reads};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
@@ -93,6 +93,8 @@ struct Lister<'a, 's> {
     statements: Vec<Statement>,
     /// The switches at each motion, "as at the entry" included.
     modal: Vec<States>,
+    /// Whether the program displacement of each motion is known, and stands in its work object.
+    displaced: Vec<bool>,
     /// The unit of each motion.
     units: Vec<u32>,
     unit: u32,
@@ -123,6 +125,7 @@ impl<'a, 's> Lister<'a, 's> {
             listing: Listing::default(),
             statements: Vec::new(),
             modal: Vec::new(),
+            displaced: Vec::new(),
             units: Vec::new(),
             unit: 0,
             sites: Vec::new(),
@@ -227,10 +230,15 @@ impl<'a, 's> Lister<'a, 's> {
                 break;
             }
         }
-        for ((motion, modal), unit) in self.listing.motions.iter_mut().zip(&self.modal).zip(&self.units) {
-            motion.modal = modal.entered(entries[*unit as usize]).modal();
+        let motions = self.listing.motions.iter_mut().zip(&self.modal).zip(&self.units);
+        for (((motion, modal), unit), displaced) in motions.zip(&self.displaced) {
+            let states = modal.entered(entries[*unit as usize]);
+            motion.modal = states.modal();
             if motion.left.is_none() {
-                motion.left = left_by_modal(motion);
+                // A displacement that the text tells stands in the work object.
+                let unknown = !displaced && states.switch(Which::Displacement) != Switch::Off;
+                let offset = states.switch(Which::ExternalOffset) != Switch::Off;
+                motion.left = left_by_modal(motion, unknown || offset);
             }
         }
     }
@@ -522,6 +530,7 @@ impl Visitor for Lister<'_, '_> {
         self.listing.motions.push(motion);
         self.statements.push(Statement { node, guarded: place.guarded });
         self.modal.push(state.modal);
+        self.displaced.push(matches!(frames::displacement(state), Some(Ok(_))));
         self.units.push(self.unit);
         Some(self.listing.motions.len() as u32 - 1)
     }
@@ -572,12 +581,12 @@ impl Options {
     }
 }
 
-fn left_by_modal(motion: &Motion) -> Option<Reason> {
+fn left_by_modal(motion: &Motion, displaced: bool) -> Option<Reason> {
     if motion.modal.synchronised != Switch::Off {
         Some(Reason::Synchronised)
     } else if motion.modal.sensor_guided != Switch::Off {
         Some(Reason::SensorGuided)
-    } else if motion.modal.displacement != Switch::Off && motion.kind != MotionKind::AbsoluteJoint {
+    } else if displaced && motion.kind != MotionKind::AbsoluteJoint {
         Some(Reason::Displacement)
     } else {
         None

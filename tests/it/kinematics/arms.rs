@@ -12,6 +12,7 @@ use truegrind::kinematics::effect::harmonic::Harmonic;
 use truegrind::kinematics::effect::load::{GravityLoad, Lump};
 use truegrind::kinematics::effect::map::JointMap;
 use truegrind::kinematics::effect::ratio::Ratio;
+use truegrind::kinematics::effect::smooth::Smooth;
 use truegrind::kinematics::effect::thermal::Thermal;
 use truegrind::kinematics::link::{Link, LinkModel};
 use truegrind::kinematics::model::{Body, Joints, Limits, Model};
@@ -415,8 +416,8 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
     }));
     let knots_rad = (0..12).map(|_| 2e-4 * even(random)).collect();
     out.effects.push(Effect::GearMap(JointMap { joint: 1, knots_rad }));
-    let lump =
-        [(3, None), (6, Some(1))].map(|(frame, axis)| Lump { frame, axis, factor: 3e-6 * even(random) });
+    let lump = [(3, None, None), (6, Some(1), None), (2, None, Some(0)), (4, Some(0), Some(2))]
+        .map(|(frame, axis, moment)| Lump { frame, axis, moment, factor: 3e-6 * even(random) });
     out.effects.push(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: lump.to_vec() }));
     out.effects.push(Effect::GearRatio(Ratio { joint: 5, error: 2e-4 }));
     out.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
@@ -425,6 +426,11 @@ pub(crate) fn with_effects(model: &Model, random: &mut ChaCha8Rng) -> Model {
         time_constant_h: 1.5,
         growth_per_k: 1e-5,
         reference_c: 20.0,
+    }));
+    out.effects.push(Effect::SmoothCorrection(Smooth {
+        centres_rad: vec![[0.0, 0.3, -0.2], [0.8, -0.4, 0.5], [-0.9, 0.1, 1.0]],
+        reach_rad: 1.6,
+        weights_rad: vec![[3e-4, -2e-4, 1e-4], [-1e-4, 3e-4, 2e-4], [2e-4, 1e-4, -3e-4]],
     }));
     out
 }

@@ -216,3 +216,64 @@ fn numbers_are_read_and_written_exactly() {
         assert_eq!(number::decimals(text.as_bytes()), wanted, "{text}");
     }
 }
+
+#[test]
+fn mirpos_mirrors_position_and_two_axes() {
+    // The mirror's xy plane is the world's zx plane.
+    let data = format!(
+        "CONST robtarget p:=[[500,-20,300],[1,0,0,0],[0,0,0,0],{EXT}];\n\
+         PERS wobjdata mirror:=[FALSE,TRUE,\"\",[[0,5,0],[0.70710678118654752,0.70710678118654752,0,0]],[[0,0,0],[1,0,0,0]]];\n\
+         PERS wobjdata w:=[FALSE,TRUE,\"\",[[0,100,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];"
+    );
+    let found = target(&data, "", "MirPos(p,mirror)").unwrap();
+    close(found, &nalgebra::Isometry3::translation(500.0, 30.0, 300.0));
+    let half = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+    let found = target(&data, "", "MirPos(p,mirror\\MirY)").unwrap();
+    close(found, &nalgebra::Isometry3::from_parts(Vector3::new(500.0, 30.0, 300.0).into(), half));
+    // In a work object: there and back.
+    let found = target(&data, "", "MirPos(p,mirror\\WObj:=w)").unwrap();
+    close(found, &nalgebra::Isometry3::translation(500.0, -170.0, 300.0));
+    assert_eq!(target(&data, "", "MirPos(p,unknown)"), Err(Reason::Undeclared));
+}
+
+/// Positions of the motions of main in the base, or why they are left.
+fn displaced(body: &str) -> Vec<Result<[f64; 3], Reason>> {
+    let source = format!(
+        "MODULE M\nCONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nPROC main()\n{body}\nENDPROC\n\
+         PROC sets()\nPDispSet [[0,0,1],[1,0,0,0]];\nENDPROC\nPROC ends()\nPDispOff;\nENDPROC\n\
+         PROC neither()\nTPWrite \"x\";\nENDPROC\nENDMODULE\n"
+    );
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let listing = &task.listing;
+    listing
+        .motions
+        .iter()
+        .map(|motion| match motion.reason() {
+            Some(reason) => Err(reason),
+            None => {
+                let object = listing.work_object(motion).unwrap().value.clone().unwrap();
+                let told = motion.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+                let pose = object.user_frame.pose() * object.object_frame.pose() * told;
+                Ok(pose.translation.vector.map(|x| x.round()).into())
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_displacement_that_the_text_tells_is_part_of_the_work_object() {
+    let go = "MoveL p,v100,fine,tool0;\n";
+    let set = "PDispSet [[10,20,30],[0.70710678118654752,0,0,0.70710678118654752]];\n";
+    let (plain, moved) = (Ok([500.0, 0.0, 300.0]), Ok([10.0, 520.0, 330.0]));
+    let left = Err(Reason::Displacement);
+    assert_eq!(displaced(&format!("{go}{set}{go}PDispOff;\n{go}")), [plain, moved, plain]);
+    // Where ways join, in loops, and after calls only what is certain holds.
+    assert_eq!(displaced(&format!("IF x THEN\n{set}{go}ENDIF\n{go}")), [moved, left]);
+    assert_eq!(displaced(&format!("IF x THEN\n{set}ELSE\n{set}ENDIF\n{go}")), [moved]);
+    assert_eq!(displaced(&format!("WHILE x DO\n{go}{set}{go}ENDWHILE\n{go}")), [left, moved, left]);
+    assert_eq!(displaced(&format!("{set}neither;\n{go}sets;\n{go}ends;\n{go}")), [moved, left, plain]);
+    assert_eq!(displaced(&format!("PDispSet found;\n{go}PDispOn p,tool0;\n{go}")), [left, left]);
+    assert_eq!(displaced(&format!("{set}EOffsSet [1,0,0,0,0,0];\n{go}")), [left]);
+    assert_eq!(displaced(&format!("{set}here:\n{go}")), [left]);
+}

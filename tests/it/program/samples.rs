@@ -9,7 +9,7 @@ use truegrind::program::motion::{Listing, Origin, Reason, Switch, TargetValue};
 use truegrind::program::rapid::{Task, task_list};
 use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};
 
-fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn read<'s>(files: &'s [(String, Vec<u8>)]) -> Task<'s> {
     Task::read(&files)
 }
 
-fn told(listing: &Listing, names: &[String]) -> String {
+pub(crate) fn told(listing: &Listing, names: &[String]) -> String {
     let mut out = String::new();
     for motion in &listing.motions {
         let name = &names[motion.place.file as usize];
@@ -150,17 +150,19 @@ fn only_the_sample_of_broken_programs_has_opaque_regions() {
 #[test]
 fn every_reason_to_leave_a_motion_has_a_sample() {
     let mut seen = BTreeSet::new();
-    for (_, files) in &groups() {
-        let task = read(files);
-        for motion in &task.listing.motions {
+    let mut look = |listing: &Listing| {
+        for motion in &listing.motions {
             seen.extend(motion.left);
             seen.extend(motion.targets.iter().filter_map(|target| target.value.err()));
         }
-        let frames = task.listing.tools.iter().filter_map(|tool| tool.value.err());
-        seen.extend(frames);
-        seen.extend(
-            task.listing.work_objects.iter().filter_map(|work_object| work_object.value.as_ref().err()),
-        );
+        seen.extend(listing.tools.iter().filter_map(|tool| tool.value.err()));
+        seen.extend(listing.work_objects.iter().filter_map(|work_object| work_object.value.as_ref().err()));
+    };
+    for (_, files) in &groups() {
+        look(&read(files).listing);
+    }
+    for (name, bytes) in &super::nc::samples() {
+        look(&super::nc::read(name, bytes).listing);
     }
     // These belong to rewriting and have tests there.
     let rewriting = [Reason::NoInsertion, Reason::NoJointForm, Reason::WrongKind];

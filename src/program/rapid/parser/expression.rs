@@ -34,7 +34,8 @@ impl Parser<'_, '_> {
                 Token::Backslash => {
                     let node = self.open(Syntax::Option);
                     self.bump();
-                    if !self.peek().is_keyword() && self.peek() != Token::Ident {
+                    if !self.peek().is_keyword() && !matches!(self.peek(), Token::Ident | Token::Placeholder)
+                    {
                         return Err(Fail(OpaqueReason::ExpectedName));
                     }
                     self.bump();

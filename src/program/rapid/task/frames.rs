@@ -1,8 +1,8 @@
 //! Speed, zone, tool and work object of a motion: each distinct one once in the listing.
 
-use super::super::flow::State;
+use super::super::flow::{DISPLACEMENT, State};
 use super::Lister;
-use crate::program::motion::{Place, Reason, Speed, Tool, WorkObject, Zone};
+use crate::program::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
 use crate::program::rapid::evaluate::Context;
 use crate::program::rapid::symbol::Unit;
 use crate::program::rapid::syntax::{text_of, tokens_of};
@@ -77,30 +77,44 @@ impl<'s> Lister<'_, 's> {
         index
     }
 
+    /// The work object of a motion, with the displacement in it that the text tells.
     pub(super) fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
+        let displacement = displacement(state).and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
         let text: &'s [u8] = match value {
             Some(value) => text_of(&self.trees[unit.file as usize], value),
             None => b"wobj0",
         };
         // Without an argument it is wobj0 in every scope, whatever a scope calls by that name.
         let scope = if value.is_some() { unit.scope } else { u32::MAX };
-        if let Some(index) = self.work_objects.get(scope, text) {
+        if displacement.is_none()
+            && let Some(index) = self.work_objects.get(scope, text)
+        {
             return index;
+        }
+        let mut found = match value {
+            Some(value) => self.evaluated(unit, state, value).work_object(),
+            None => built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
+        };
+        if let (Ok(found), Some(displacement)) = (&mut found, &displacement) {
+            found.object_frame = Frame::from_pose(&(found.object_frame.pose() * displacement.pose()));
         }
         let work_object = WorkObject {
             name: display(text),
-            value: match value {
-                Some(value) => self.evaluated(unit, state, value).work_object(),
-                None => built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
-            },
+            value: found,
             place: value.and_then(|value| self.declared_at(unit, value)),
+            displacement,
         };
         let index = intern(&mut self.listing.work_objects, work_object);
-        if value.is_none_or(|value| !self.varies(unit, value)) {
+        if displacement.is_none() && value.is_none_or(|value| !self.varies(unit, value)) {
             self.work_objects.put(scope, text, index);
         }
         index
     }
+}
+
+/// The program displacement before a statement: `None` as at the entry of the routine, an error where it is not known.
+pub(super) fn displacement(state: &State) -> Option<Result<Frame, Reason>> {
+    state.known.get(&DISPLACEMENT).map(|value| value.frame())
 }
 
 /// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost

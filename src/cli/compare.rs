@@ -1,0 +1,178 @@
+//! `truegrind compare DATA --robot R --experiment NAME`: methods side by side under a paper's protocol.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use truegrind::comparison::experiment::{Experiment, Kind};
+use truegrind::comparison::grinding::Actual;
+use truegrind::comparison::protocol::Options;
+use truegrind::comparison::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
+use truegrind::kinematics::model::Model;
+use truegrind::measurement::dataset::Dataset;
+use truegrind::report::comparison::{self as view, Origin};
+use truegrind::report::format;
+
+use super::files::{self, Batch};
+use super::identify::{Angles, DataArguments};
+use super::outputs::{Outputs, width};
+use super::progress::Work;
+use super::{Common, Ending, identify, inputs, on_threads};
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Measurements, CSV or XLSX; left out, the experiment's own recipe is measured in simulation.
+    data: Option<PathBuf>,
+    /// Robot that was measured: a name of `truegrind robots`, or a TOML file. Needed with DATA.
+    #[arg(long)]
+    robot: Option<String>,
+    /// Experiment: a name of `--list`, or a TOML file.
+    #[arg(long, required_unless_present = "list")]
+    experiment: Option<String>,
+    /// The experiments that ship.
+    #[arg(long)]
+    list: bool,
+    /// Rows of one case instead of the protocol's: the same shares of fewer rows, a reduced protocol.
+    #[arg(long, value_name = "N")]
+    rows: Option<usize>,
+    /// Sheet of a workbook; the first with the columns otherwise.
+    #[arg(long)]
+    sheet: Option<String>,
+    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    #[arg(long, value_enum)]
+    angles: Option<Angles>,
+    /// Take the units as they are, however odd they look.
+    #[arg(long)]
+    allow_odd_units: bool,
+    /// Measured seconds as CSV; they are in no other file for programs, since no two runs agree on them.
+    #[arg(long, value_name = "FILE")]
+    times: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+/// Measured rows and where they come from.
+struct Measured {
+    dataset: Dataset,
+    robot: String,
+    nominal: Model,
+    actual: Option<Model>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    if arguments.list {
+        let table = view::list(&Experiment::shipped()?);
+        print!("{}", format::terminal::table(&table, width()));
+        return Ok(Ending::Done);
+    }
+    let name = arguments.experiment.as_deref().unwrap_or_default();
+    let mut inputs: Vec<&Path> = arguments.data.as_deref().into_iter().collect();
+    let is_file = name.ends_with(".toml");
+    if is_file {
+        inputs.push(Path::new(name));
+    }
+    let mut targets = arguments.outputs.files();
+    targets.extend(arguments.times.as_deref());
+    Batch::check(&inputs, &targets)?;
+    if arguments.outputs.rrd.is_some() {
+        bail!("--rrd: an experiment has no recording; --html FILE writes a page with its plots");
+    }
+    let experiment = if is_file {
+        Experiment::parse(&files::read_text(Path::new(name))?, name)?
+    } else {
+        Experiment::by_name(name)?
+    };
+    let kind = experiment.kind().ok_or_else(|| anyhow!("{name}: says nothing to run"))?;
+    let seed = arguments.common.seed;
+    let mut origin = Origin { seed, ..Origin::default() };
+    let measured = if experiment.takes_rows() { Some(measured(arguments, &experiment)?) } else { None };
+    if let Some(measured) = &measured {
+        origin.file = Some(measured.dataset.file.clone());
+        origin.sha256 = Some(measured.dataset.sha256.clone());
+        origin.rows = Some(measured.dataset.rows.len());
+        origin.robot = Some(measured.robot.clone());
+        measured.dataset.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    } else if let Some(data) = &arguments.data {
+        bail!("{}: experiment {name} takes no measurements; leave DATA out", data.display());
+    }
+    if arguments.rows.is_some() && !matches!(kind, Kind::Methods(_)) {
+        bail!("--rows: experiment {name} draws no rows");
+    }
+    let work = Work::start(format!("experiment {}", experiment.name));
+    let results = on_threads(arguments.common.threads, || -> anyhow::Result<Results> {
+        let rows = || measured.as_ref().ok_or_else(|| anyhow!("no measurements"));
+        Ok(match kind {
+            Kind::Methods(methods) => {
+                let from = rows()?;
+                let options = Options { rows: arguments.rows, seed, simulated: arguments.data.is_none() };
+                let study =
+                    protocol::run(&experiment, methods, &from.dataset, &from.robot, &from.nominal, &options)?;
+                Results::Methods(Box::new(study))
+            }
+            Kind::Grinding(settings) => {
+                let from = rows()?;
+                let actual = from.actual.as_ref().map_or(Actual::Estimated, Actual::Simulated);
+                let name = &experiment.name;
+                let result =
+                    grinding::run(settings, name, &from.dataset, &from.robot, &from.nominal, actual, seed)?;
+                Results::Grinding(Box::new(result))
+            }
+            Kind::Uniformity(settings) => Results::Uniformity(uniformity::run(settings, seed)),
+            Kind::SignedRank(tables) => Results::SignedRank(signed_rank::run(tables)),
+            Kind::Degradation(settings) => {
+                let recipe = experiment.recipe.as_deref().unwrap_or_default();
+                let result = degradation::run(settings, &experiment.name, recipe, seed, nominal)?;
+                Results::Degradation(Box::new(result))
+            }
+        })
+    })??;
+    drop(work);
+    arguments.outputs.print(&view::summary(&experiment, &results));
+    let times = view::times(&results);
+    if let Some(times) = &times {
+        eprint!("{}", format::terminal::table(times, width()));
+    }
+    let mut batch = Batch::sparing(inputs);
+    arguments.outputs.add_to(
+        &mut batch,
+        &view::document(&experiment, &results, &origin),
+        &view::table(&results),
+        &view::json(&experiment, &results, &origin),
+    )?;
+    if let (Some(path), Some(times)) = (&arguments.times, &times) {
+        batch.add(path, format::csv::table(times));
+    }
+    batch.write()?;
+    Ok(Ending::Done)
+}
+
+fn nominal(name: &str) -> Result<Model, String> {
+    inputs::robot(name).map(|r| r.model).map_err(|e| format!("{e:#}"))
+}
+
+fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Measured> {
+    let Some(data) = &arguments.data else {
+        if arguments.robot.is_some() {
+            bail!("--robot without DATA: the experiment's recipe has a robot of its own");
+        }
+        let (dataset, simulation, robot) = simulated::measure(experiment, nominal)?;
+        return Ok(Measured { dataset, robot, nominal: simulation.nominal, actual: Some(simulation.actual) });
+    };
+    let robot = arguments.robot.clone().ok_or_else(|| {
+        anyhow!(
+            "{}: --robot says which arm was measured; `truegrind robots` lists those that ship",
+            data.display()
+        )
+    })?;
+    let (robot, dataset) = identify::read(&DataArguments {
+        data: data.clone(),
+        robot,
+        sheet: arguments.sheet.clone(),
+        angles: arguments.angles,
+        allow_odd_units: arguments.allow_odd_units,
+    })?;
+    Ok(Measured { dataset, robot: robot.sheet.name.clone(), nominal: robot.model, actual: None })
+}

@@ -1,0 +1,290 @@
+//! `truegrind track DATA --model MODEL.toml`: keeps an arm accurate over its life.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context, anyhow, bail};
+use clap::Args;
+use truegrind::comparison::tracking::{Alarm, Options, State, TrackError, Tracker};
+use truegrind::kinematics::estimated::Estimated;
+use truegrind::measurement::convention::AngleConvention;
+use truegrind::measurement::dataset::Dataset;
+use truegrind::measurement::import;
+use truegrind::report::tracking as view;
+use truegrind::robots::sheet;
+
+use super::files::{self, Batch};
+use super::identify::Angles;
+use super::inputs::NamedModel;
+use super::outputs::Outputs;
+use super::{Common, Ending, inputs, on_threads};
+
+/// Arguments of `track`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Measurements: a file that grows, or a folder of files.
+    data: PathBuf,
+    /// The model to keep accurate, as `truegrind identify -o` wrote it.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: PathBuf,
+    /// Robot; the model says which otherwise, and a mismatch is an error.
+    #[arg(long)]
+    robot: Option<String>,
+    /// Folder for the dated models; the model's own otherwise.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Where the state is kept between runs; beside the dated models otherwise.
+    #[arg(long, value_name = "TRACK.toml")]
+    state: Option<PathBuf>,
+    /// Go on and look for new measurements every so many seconds, until stopped.
+    #[arg(long, value_name = "SECONDS")]
+    follow: Option<f64>,
+    /// Date for the names of models, such as 2026-05-04T12:30:00Z; the clock's otherwise.
+    #[arg(long, value_name = "DATE")]
+    date: Option<String>,
+    /// Poses that place the sensor before tracking begins.
+    #[arg(long, value_name = "N")]
+    first_poses: Option<usize>,
+    /// Standard deviation of the sensor (mm); from the first poses otherwise.
+    #[arg(long, value_name = "MM")]
+    sigma: Option<f64>,
+    /// How much a parameter may drift from pose to pose, in mm or degrees: link2.theta=0.0001. May be repeated.
+    #[arg(long, value_name = "NAME=VALUE")]
+    drift: Vec<String>,
+    /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
+    #[arg(long, value_enum)]
+    angles: Option<Angles>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let name = arguments.model.display().to_string();
+    let NamedModel::Estimated { arm, hash, .. } = inputs::model(&name)? else {
+        bail!("--model {name}: expected a model file, since the nominal arm has nothing to keep accurate");
+    };
+    inputs::nominal(
+        &NamedModel::Estimated { name: name.clone(), hash: hash.clone(), arm: arm.clone() },
+        arguments.robot.as_deref(),
+    )?;
+    let stem = arguments.model.file_stem().map_or("model".into(), |s| s.to_string_lossy().into_owned());
+    let folder = match &arguments.output {
+        Some(folder) => {
+            files::make_folder(folder)?;
+            folder.clone()
+        }
+        None => arguments.model.parent().map(Path::to_path_buf).unwrap_or_default(),
+    };
+    let state_path = arguments.state.clone().unwrap_or_else(|| folder.join(format!("{stem}.track.toml")));
+    let inputs_of_run = [arguments.data.as_path(), arguments.model.as_path()];
+    let mut targets = arguments.outputs.files();
+    targets.push(&state_path);
+    Batch::check(&inputs_of_run, &targets)?;
+    if arguments.outputs.rrd.is_some() {
+        bail!("--rrd: a track has no recording; --html FILE writes a page");
+    }
+    let options = options(arguments, &arm)?;
+    if let Some(seconds) = arguments.follow.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        bail!("--follow {seconds}: expected seconds above 0");
+    }
+    if let Some(date) = &arguments.date {
+        stamp(date)?;
+    }
+    let mut flagged = false;
+    loop {
+        let seen = on_threads(arguments.common.threads, || {
+            pass(arguments, &arm, &hash, &options, &folder, &stem, &state_path)
+        })??;
+        flagged |= seen;
+        let Some(seconds) = arguments.follow else { break };
+        std::thread::sleep(Duration::from_secs_f64(seconds));
+    }
+    Ok(if flagged { Ending::Flagged } else { Ending::Done })
+}
+
+/// One look at the data: everything new is taken in, and model and state are written together. Whether an alarm was
+/// raised.
+fn pass(
+    arguments: &Arguments,
+    arm: &Estimated,
+    hash: &str,
+    options: &Options,
+    folder: &Path,
+    stem: &str,
+    state_path: &Path,
+) -> anyhow::Result<bool> {
+    let files = measurement_files(&arguments.data)?;
+    let mut tracker = match state_path.is_file() {
+        true => {
+            let text = files::read_text(state_path)?;
+            let name = state_path.display().to_string();
+            let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
+            if state.model_hash != hash {
+                bail!(
+                    "{name} is the track of another model than {}: give the model that it began with, or another --state",
+                    arguments.model.display()
+                );
+            }
+            Some(Tracker::resume(arm, state, &name)?)
+        }
+        false => None,
+    };
+    let before = tracker.as_ref().map_or(0, |t| t.state().poses);
+    let mut alarms: Vec<Alarm> = Vec::new();
+    for path in &files {
+        let Some(dataset) = read(arguments, arm, path)? else { continue };
+        if tracker.is_none() {
+            match Tracker::begin(arm, hash, &dataset, options) {
+                Ok(begun) => tracker = Some(begun),
+                // A file that is still growing: nothing is wrong, nothing can be done.
+                Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
+                    eprintln!("note: {error}");
+                    continue;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        if let Some(tracker) = &mut tracker {
+            alarms.extend(tracker.take(&dataset)?);
+        }
+    }
+    let Some(tracker) = tracker else {
+        if arguments.follow.is_some() {
+            return Ok(false);
+        }
+        bail!("{}: no measurements to begin with", arguments.data.display());
+    };
+    let fresh = tracker.state().poses - before;
+    if fresh == 0 {
+        if arguments.follow.is_none() {
+            eprintln!("note: no new measurements since {} poses; nothing written", before);
+        }
+        return Ok(false);
+    }
+    let model = tracker.model();
+    let date = match &arguments.date {
+        Some(date) => stamp(date)?,
+        None => now()?,
+    };
+    let model_path = folder.join(format!("{stem}-{date}-{:06}.toml", tracker.state().poses));
+    if model_path.exists() {
+        bail!(
+            "{} is there already: it is never overwritten; give another --date or -o",
+            model_path.display()
+        );
+    }
+    let page = view::document(&tracker, fresh, &alarms, &model_path.display().to_string());
+    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &model_path.display().to_string()));
+    let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
+    // The model first, the state last: what is cut off between the two is done again in the next run.
+    batch.add(&model_path, model.to_toml().map_err(anyhow::Error::msg)?);
+    arguments.outputs.add_to(
+        &mut batch,
+        &page,
+        &view::table(&tracker),
+        &view::json(&tracker, fresh, &alarms),
+    )?;
+    batch.add(state_path, tracker.state().to_toml().map_err(anyhow::Error::msg)?);
+    batch.write()?;
+    Ok(!alarms.is_empty())
+}
+
+/// The file, or the files of a folder by name.
+fn measurement_files(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let mut out: Vec<PathBuf> = std::fs::read_dir(path)
+        .with_context(|| format!("{}: cannot be read", path.display()))?
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| {
+            p.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("xlsx"))
+        })
+        .collect();
+    out.sort();
+    if out.is_empty() {
+        bail!("{}: the folder has no .csv or .xlsx files", path.display());
+    }
+    Ok(out)
+}
+
+/// The rows of a file that are whole; `None` while it has no row.
+fn read(arguments: &Arguments, arm: &Estimated, path: &Path) -> anyhow::Result<Option<Dataset>> {
+    let mut bytes = files::read(path)?;
+    let is_text = !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xlsx"));
+    if is_text {
+        // A line that is still being written has no end yet.
+        let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1);
+        if bytes[end..].iter().any(|b| !b.is_ascii_whitespace()) {
+            bytes.truncate(end);
+        }
+        if bytes.iter().filter(|b| **b == b'\n').count() < 2 {
+            return Ok(None);
+        }
+    }
+    let options = import::Options { allow_odd_units: true, ..import::Options::default() };
+    let dataset = import::read(&files::name(path), &bytes, &options)?;
+    let dh = match arguments.angles {
+        Some(angles) => angles == Angles::Dh,
+        None => inputs::robot(arguments.robot.as_deref().unwrap_or(&arm.robot))
+            .is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
+    };
+    let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
+    let applied = convention.apply(&dataset, &arm.nominal);
+    applied.map(Some).ok_or_else(|| anyhow!("{}: its joint map cannot be inverted", arm.robot))
+}
+
+fn options(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Options> {
+    let mut options = Options { sigma_mm: arguments.sigma, ..Options::default() };
+    if let Some(sigma) = arguments.sigma.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        bail!("--sigma {sigma}: expected a number above 0");
+    }
+    if let Some(poses) = arguments.first_poses {
+        options.first_poses = poses.max(4);
+    }
+    for text in &arguments.drift {
+        let (name, value) = text
+            .split_once('=')
+            .and_then(|(name, value)| Some((name.trim(), value.trim().parse::<f64>().ok()?)))
+            .filter(|(_, value)| *value >= 0.0 && value.is_finite())
+            .ok_or_else(|| anyhow!("--drift {text}: expected NAME=VALUE, such as link2.theta=0.0001"))?;
+        let known: Vec<String> = arm.order.iter().map(ToString::to_string).collect();
+        let Some(at) = known.iter().position(|k| k == name) else {
+            bail!("--drift {text}: no parameter {name}; the model has {}", known.join(", "));
+        };
+        let scale = if arm.order[at].unit() == "rad" { 1f64.to_radians() } else { 1.0 };
+        options.drift.insert(name.to_owned(), value * scale);
+    }
+    Ok(options)
+}
+
+/// A date as it stands in a file name, 20260504T123000Z.
+fn stamp(date: &str) -> anyhow::Result<String> {
+    let out: String = date.chars().filter(|c| !matches!(c, '-' | ':')).collect();
+    let fits = out.len() >= 8
+        && out.chars().take(8).all(|c| c.is_ascii_digit())
+        && out.chars().all(|c| c.is_ascii_alphanumeric());
+    if !fits {
+        bail!("--date {date}: expected a date such as 2026-05-04 or 2026-05-04T12:30:00Z");
+    }
+    Ok(out)
+}
+
+/// The clock, in UTC.
+fn now() -> anyhow::Result<String> {
+    let seconds =
+        SystemTime::now().duration_since(UNIX_EPOCH).context("the clock stands before 1970")?.as_secs();
+    let (days, rest) = (seconds / 86_400, seconds % 86_400);
+    // Days to year, month and day in the proleptic Gregorian calendar (Hinnant, chrono-compatible algorithms).
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    Ok(format!("{year:04}{month:02}{day:02}T{:02}{:02}{:02}Z", rest / 3600, rest / 60 % 60, rest % 60))
+}

@@ -1,0 +1,150 @@
+//! Which control a file is written for.
+//!
+//! The dialects differ in what a bracket is, in what a number without a point means, and in how a tool is turned. The
+//! signs are looked for in the first 64 KiB outside comments; where none is found the file is plain ISO 6983.
+
+/// A family of controls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Dialect {
+    /// ISO 6983 without a sign of its own: parentheses are comments, numbers are mm with or without a point.
+    Iso,
+    /// Fanuc and those like it (Haas, Mitsubishi): as ISO, but a number without a point may count increments.
+    Fanuc,
+    /// LinuxCNC.
+    LinuxCnc,
+    /// Siemens 840D: names, parentheses for arguments, `A3=`, frames.
+    Siemens,
+    /// Heidenhain conversational.
+    Heidenhain,
+}
+
+impl Dialect {
+    /// Its name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Dialect::Iso => "ISO",
+            Dialect::Fanuc => "Fanuc",
+            Dialect::LinuxCnc => "LinuxCNC",
+            Dialect::Siemens => "Siemens",
+            Dialect::Heidenhain => "Heidenhain",
+        }
+    }
+
+    /// Whether `( … )` is a comment.
+    pub fn paren_comments(self) -> bool {
+        matches!(self, Dialect::Iso | Dialect::Fanuc | Dialect::LinuxCnc)
+    }
+
+    /// The dialect of a file by its signs.
+    pub fn of(source: &[u8]) -> Dialect {
+        let sample = &source[..source.len().min(1 << 16)];
+        let mut fanuc = false;
+        for line in sample.split(|&byte| byte == b'\n') {
+            let line = line.trim_ascii();
+            if line.starts_with(b"%_N_") || line.starts_with(b";$PATH") {
+                return Dialect::Siemens;
+            }
+            let line = &line[..line.iter().position(|&byte| byte == b';').unwrap_or(line.len())];
+            let upper = line.to_ascii_uppercase();
+            if heidenhain(&upper) {
+                return Dialect::Heidenhain;
+            }
+            let code = without_comments(&upper);
+            if siemens(&code) {
+                return Dialect::Siemens;
+            }
+            if linux_cnc(&code) {
+                return Dialect::LinuxCnc;
+            }
+            fanuc |= fanuc_sign(&code);
+        }
+        if fanuc { Dialect::Fanuc } else { Dialect::Iso }
+    }
+}
+
+fn contains(line: &[u8], sign: &str) -> bool {
+    line.windows(sign.len()).any(|part| part == sign.as_bytes())
+}
+
+/// `0 BEGIN PGM NAME MM`.
+fn heidenhain(line: &[u8]) -> bool {
+    let rest = line.trim_ascii_start();
+    let rest = rest[rest.iter().take_while(|byte| byte.is_ascii_digit()).count()..].trim_ascii_start();
+    rest.starts_with(b"BEGIN PGM")
+}
+
+/// A line without what stands in parentheses after white space, a digit or its beginning (arguments follow a name).
+fn without_comments(line: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(line.len());
+    let mut inside = false;
+    for &byte in line {
+        match byte {
+            b'(' if !inside && !last_is_name(&out) => inside = true,
+            b')' if inside => inside = false,
+            _ if inside => {}
+            _ => out.push(byte),
+        }
+    }
+    out
+}
+
+/// Whether a parenthesis here would hold the arguments of a name: two letters or more stand before it.
+fn last_is_name(before: &[u8]) -> bool {
+    let name: Vec<u8> = before
+        .iter()
+        .rev()
+        .copied()
+        .take_while(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'$'))
+        .collect();
+    name.iter().filter(|byte| byte.is_ascii_alphabetic()).count() >= 2
+}
+
+fn siemens(code: &[u8]) -> bool {
+    const SIGNS: [&str; 24] = [
+        "TRAORI", "TRAFOOF", "CYCLE8", "CYCLE9", "MCALL", "MSG(", "$P_", "$TC_", "$MA_", "$AA_", "=AC(",
+        "=IC(", "=DC(", "CTRANS(", "ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "COMPCAD", "COMPCURV",
+        "EXTERN ", "DEF REAL", "DEF INT", "SUPA",
+    ];
+    if SIGNS.iter().any(|sign| contains(code, sign)) {
+        return true;
+    }
+    // A3= B3= C3=, X1=, R12=: an address with a number and an equals sign, which no other control writes.
+    code.windows(2).enumerate().any(|(at, pair)| {
+        pair[0].is_ascii_digit()
+            && pair[1] == b'='
+            && code.get(at + 2) != Some(&b'=')
+            && !code.contains(&b'#')
+            && code[..=at]
+                .iter()
+                .rev()
+                .find(|byte| !byte.is_ascii_digit())
+                .is_some_and(|&byte| byte.is_ascii_alphabetic() && byte != b'Q')
+    })
+}
+
+fn linux_cnc(code: &[u8]) -> bool {
+    let code = code.trim_ascii_start();
+    if contains(code, "#<") {
+        return true;
+    }
+    // o100 sub, o<name> call.
+    let word = ["SUB", "ENDSUB", "CALL", "WHILE", "ENDWHILE", "IF", "ENDIF", "REPEAT", "ENDREPEAT"];
+    code.first() == Some(&b'O')
+        && code
+            .split(|byte| byte.is_ascii_whitespace() || *byte == b'[')
+            .skip(1)
+            .take(2)
+            .any(|part| word.iter().any(|word| part == word.as_bytes()))
+}
+
+fn fanuc_sign(code: &[u8]) -> bool {
+    let program_number = matches!(code.first(), Some(b'O' | b':'))
+        && code.len() > 1
+        && code[1..].iter().take_while(|byte| byte.is_ascii_digit()).count() >= 1
+        && code[1..].iter().all(|byte| byte.is_ascii_digit() || byte.is_ascii_whitespace());
+    program_number
+        || ["G43.4", "G43.5", "G5.1", "G05.1", "G65", "M98", "GOTO", "WHILE[", "G68.2", "G08P1", "G05P10000"]
+            .iter()
+            .any(|sign| contains(code, sign))
+        || code.first() == Some(&b'#')
+}

@@ -1,0 +1,756 @@
+//! New values to edits of NC text.
+//!
+//! Words keep their order, spacing and at least their decimals; a word that was left out because it held on is put in
+//! where its axis must now change, and a word of a motion that stays is put in where the motion before it has moved, so
+//! that what is left as it is goes where it always went. Arcs get the centre (or radius) of the circle through their new
+//! start, middle and end.
+
+use std::collections::HashMap;
+
+use nalgebra::UnitQuaternion;
+
+use super::arc::{Arc, Plane};
+use super::dialect::Dialect;
+use super::expression::literal;
+use super::machine::Turn;
+use super::mark;
+use super::orientation::{Angles, vector_and_spin};
+use super::parser::word;
+use super::syntax::{Belongs, NcTree, Syntax, Word};
+use super::task::{Event, Task, Written};
+use super::token::Token;
+use crate::program::edit::{EditError, Edits};
+use crate::program::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
+use crate::program::rapid::number;
+use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+
+/// Changes smaller than this are numerical noise, whatever the decimals of the source.
+const NOISE: f64 = 1e-9;
+
+/// Ends of a whole circle that are farther apart than this are none (mm).
+const CLOSED_MM: f64 = 1e-3;
+
+impl Task<'_> {
+    /// The edits that make the changes; per file sorted and disjoint.
+    ///
+    /// # Errors
+    /// Edits that overlap, which is a defect of this module.
+    pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
+        let mut outcomes = vec![Outcome::Unchanged; changes.len()];
+        let mut wanted: HashMap<u32, usize> = HashMap::with_capacity(changes.len());
+        for (index, change) in changes.iter().enumerate() {
+            let refusal = match self.listing.motions.get(change.motion as usize) {
+                None => Some(Reason::MissingArgument),
+                Some(_) if wanted.contains_key(&change.motion) => Some(Reason::WrongKind),
+                Some(motion) => self.refusal(motion, change),
+            };
+            match refusal {
+                Some(reason) => outcomes[index] = Outcome::Refused(reason),
+                None => {
+                    wanted.insert(change.motion, index);
+                }
+            }
+        }
+        let mut edits = vec![Edits::new(); self.trees.len()];
+        if !wanted.is_empty() {
+            let mut follower = Follower { task: self, options, edits: &mut edits, now: Now::default() };
+            for event in &self.events {
+                match *event {
+                    Event::Unknown => follower.now = Now::default(),
+                    Event::Lost(axes) => follower.now.lose(axes),
+                    Event::Shift(stated) => follower.now.shift_at(stated),
+                    Event::NoShift => follower.now.moved = [0.0; 3],
+                    Event::Motion(motion) => {
+                        let index = wanted.get(&motion).copied();
+                        let outcome = follower.motion(motion, index.map(|index| &changes[index]));
+                        if let Some(index) = index {
+                            outcomes[index] = outcome;
+                        }
+                    }
+                }
+            }
+        }
+        let mut files = Vec::with_capacity(self.trees.len());
+        for ((edits, tree), &dialect) in edits.into_iter().zip(&self.trees).zip(&self.dialects) {
+            let mut file = FileEdits { edits, unmarked: false };
+            if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
+                let comment = mark::text(mark, dialect);
+                match mark::token(tree) {
+                    Some(old) => file.edits.replace(tree.range(old, old + 1), comment.as_bytes()),
+                    None => {
+                        let line = [comment.as_bytes(), line_end(tree.source())].concat();
+                        file.edits.insert(mark::place(tree, dialect), &line);
+                    }
+                }
+            }
+            file.edits.sort()?;
+            files.push(file);
+        }
+        Ok(Rewritten { files, outcomes })
+    }
+
+    fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
+        if let Some(reason) = motion.reason() {
+            return Some(reason);
+        }
+        for new in &change.targets {
+            if matches!(new, NewTarget::Joint { .. }) {
+                return Some(Reason::NoJointForm);
+            }
+        }
+        if change.before.is_empty() {
+            return None;
+        }
+        if !self.written[change.motion as usize].insertable {
+            return Some(Reason::NoInsertion);
+        }
+        change.before.iter().find_map(|extra| match (extra.kind, &extra.target) {
+            (MotionKind::Linear, NewTarget::Cartesian { .. }) => None,
+            (_, NewTarget::Joint { .. }) => Some(Reason::NoJointForm),
+            _ => Some(Reason::WrongKind),
+        })
+    }
+}
+
+/// What the control will hold at a block, where the rewritten file says something else than the original.
+#[derive(Debug, Clone, Default)]
+struct Now {
+    /// Position (mm); `None` where it is as the original says.
+    position: [Option<f64>; 3],
+    /// What the original says there.
+    meant: [Option<f64>; 3],
+    angles: [Option<f64>; 3],
+    vector: Option<([f64; 3], f64)>,
+    /// By how much a shift of G92 has moved, because it was set where the tool now stands elsewhere.
+    moved: [f64; 3],
+}
+
+impl Now {
+    fn lose(&mut self, axes: u8) {
+        for axis in 0..3 {
+            if axes & 1 << axis != 0 {
+                (self.position[axis], self.meant[axis]) = (None, None);
+            }
+            if axes & 8 << axis != 0 {
+                self.angles[axis] = None;
+            }
+        }
+    }
+
+    fn shift_at(&mut self, stated: [Option<f64>; 3]) {
+        for axis in 0..3 {
+            if stated[axis].is_some()
+                && let (Some(now), Some(meant)) = (self.position[axis], self.meant[axis])
+            {
+                self.moved[axis] = now - meant;
+            }
+        }
+    }
+}
+
+/// The words of a block that say where to go.
+#[derive(Default)]
+struct Slots<'s> {
+    axes: [Option<Word<'s>>; 3],
+    angles: [Option<Word<'s>>; 3],
+    vector: [Option<Word<'s>>; 3],
+    centre: [Option<Word<'s>>; 3],
+    spin: Option<Word<'s>>,
+    radius: Option<Word<'s>>,
+    feed: Option<Word<'s>>,
+    /// G90 or G91, as written.
+    distance: Option<Word<'s>>,
+    /// After which token new words go.
+    end: u32,
+    /// The last word before that.
+    last: u32,
+}
+
+/// Where a motion shall go.
+struct Aim {
+    position: [f64; 3],
+    /// `None` keeps the words of the orientation.
+    rotation: Option<UnitQuaternion<f64>>,
+    via: Option<[f64; 3]>,
+}
+
+struct Follower<'f, 's> {
+    task: &'f Task<'s>,
+    options: &'f RewriteOptions,
+    edits: &'f mut Vec<Edits>,
+    now: Now,
+}
+
+impl<'s> Follower<'_, 's> {
+    /// Writes one motion; what was asked for it, if anything.
+    fn motion(&mut self, index: u32, change: Option<&Change>) -> Outcome {
+        let task = self.task;
+        let motion = &task.listing.motions[index as usize];
+        let written = &task.written[index as usize];
+        let to =
+            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        let stays = motion.left.is_some_and(|reason| !stays_in_place(reason));
+        let Some(to) = to.filter(|_| !stays) else {
+            let file = motion.place.file as usize;
+            self.pass(&task.trees[file], task.dialects[file], written);
+            return Outcome::Unchanged;
+        };
+        let start: [Option<f64>; 3] =
+            std::array::from_fn(|axis| self.now.position[axis].or(written.start[axis]));
+        let new = change.and_then(|change| aim_of(motion, change));
+        let adds = change.is_some_and(|change| !change.before.is_empty());
+        if new.is_none() && !adds && self.is_as_meant(written, &start) {
+            self.arrive(&to, written, None);
+            return Outcome::Unchanged;
+        }
+        let original = Aim { position: to.position_mm, rotation: None, via: via_of(motion) };
+        let mut aim = new.unwrap_or(original);
+        let mut arc = None;
+        let mut outcome = Outcome::Unchanged;
+        if let Some((old, positive, _)) = written.arc {
+            arc = self.arc(&aim, start, &old, positive);
+            if arc.is_none() {
+                // No circle goes there: the motion stays.
+                if change.is_some() {
+                    outcome = Outcome::Refused(Reason::WrongShape);
+                    aim = Aim { position: to.position_mm, rotation: None, via: via_of(motion) };
+                    arc = self.arc(&aim, start, &old, positive);
+                }
+            }
+        }
+        let tree = &task.trees[motion.place.file as usize];
+        let slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        if let Some(change) = change
+            && !matches!(outcome, Outcome::Refused(_))
+            && !change.before.is_empty()
+        {
+            self.extras(motion, written, &slots, &change.before, &to);
+            outcome = Outcome::InPlace;
+        }
+        let done = self.write(motion, written, &slots, &aim, arc);
+        if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
+    }
+
+    /// Whether the control stands where the original has it, so that a motion that stays needs nothing.
+    fn is_as_meant(&self, written: &Written, start: &[Option<f64>; 3]) -> bool {
+        self.now.moved == [0.0; 3]
+            && start == &written.start
+            && (0..3)
+                .all(|axis| self.now.angles[axis].is_none_or(|now| Some(now) == written.start_angles[axis]))
+            && self.now.vector.is_none_or(|now| Some(now) == written.start_vector)
+    }
+
+    /// After a motion that stays as it is written: its words say again what the original says, the others hold on.
+    fn pass(&mut self, tree: &NcTree<'s>, dialect: Dialect, written: &Written) {
+        let slots = slots(tree, dialect, written);
+        for axis in 0..3 {
+            if slots.axes[axis].is_some() {
+                (self.now.position[axis], self.now.meant[axis]) = (None, None);
+            }
+            if slots.angles[axis].is_some() {
+                self.now.angles[axis] = None;
+            }
+        }
+        if slots.vector.iter().any(Option::is_some) {
+            self.now.vector = None;
+        }
+    }
+
+    /// After a motion: as meant, or where it has been told to go.
+    fn arrive(&mut self, to: &RobTarget, written: &Written, told: Option<([f64; 3], Told)>) {
+        self.now.meant = to.position_mm.map(Some);
+        match told {
+            None => {
+                self.now.position = to.position_mm.map(Some);
+                self.now.angles = written.angles;
+                self.now.vector = written.vector;
+            }
+            Some((position, told)) => {
+                self.now.position = position.map(Some);
+                match told {
+                    Told::AsMeant => (self.now.angles, self.now.vector) = (written.angles, written.vector),
+                    Told::Angles(angles) => self.now.angles = angles.map(Some),
+                    Told::Vector(vector, spin) => self.now.vector = Some((vector, spin)),
+                }
+            }
+        }
+    }
+
+    fn arc(&self, aim: &Aim, start: [Option<f64>; 3], old: &Arc, positive: bool) -> Option<Arc> {
+        let start = [start[0]?, start[1]?, start[2]?];
+        if old.is_whole() {
+            let Plane { a, b, .. } = old.plane;
+            let gap = (start[a] - aim.position[a]).hypot(start[b] - aim.position[b]);
+            if gap > CLOSED_MM {
+                return None;
+            }
+        }
+        Arc::through(old.plane, start, aim.via?, aim.position, positive, old.is_whole())
+    }
+
+    /// Writes the words of one block.
+    fn write(
+        &mut self,
+        motion: &Motion,
+        written: &Written,
+        slots: &Slots<'s>,
+        aim: &Aim,
+        arc: Option<Arc>,
+    ) -> Outcome {
+        let task = self.task;
+        let file = motion.place.file as usize;
+        let (tree, dialect) = (&task.trees[file], task.dialects[file]);
+        let mut edits = std::mem::take(&mut self.edits[file]);
+        let mut pen = Pen {
+            tree,
+            dialect,
+            edits: &mut edits,
+            added: Vec::new(),
+            replaced: Outcome::Unchanged,
+            spaced: spaced(tree, slots.last),
+        };
+        let unit = written.unit_mm;
+        let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
+        let start: [Option<f64>; 3] =
+            std::array::from_fn(|axis| self.now.position[axis].or(written.start[axis]));
+        let to =
+            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        let meant = to.map_or(aim.position, |to| to.position_mm);
+        let mut reached = aim.position;
+        for axis in 0..3 {
+            let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
+            let from = start[axis].unwrap_or(0.0);
+            let word = slots.axes[axis];
+            let increment = word.and_then(|word| said(tree, dialect, &word)).unwrap_or(!written.absolute);
+            let base = if increment { from } else { shift };
+            let value = (aim.position[axis] - base) / unit;
+            let keep = (from - base) / unit;
+            let old_base = if increment { written.start[axis] } else { written.shift[axis] };
+            let was = old_base.map_or(f64::NAN, |old| (meant[axis] - old) / unit);
+            let name = [b"X", b"Y", b"Z"][axis];
+            let value = pen.put(word, name, value, keep, was, decimals);
+            reached[axis] = value * unit + base;
+        }
+        let told = self.orientation(&mut pen, written, slots, aim, file);
+        if let (Some(arc), Some(begin)) = (arc, all(start)) {
+            let Plane { a, b, .. } = arc.plane;
+            let absolute_centre = written.arc.is_some_and(|(_, _, absolute)| absolute);
+            let old = written.arc.map(|(old, _, _)| old);
+            if let Some(radius) = slots.radius {
+                let was = old.and_then(|old| {
+                    let length = (written.start[a]? - old.centre_mm[0])
+                        .hypot(written.start[b]? - old.centre_mm[1])
+                        / unit;
+                    Some(if old.is_long() { -length } else { length })
+                });
+                let length = (begin[a] - arc.centre_mm[0]).hypot(begin[b] - arc.centre_mm[1]) / unit;
+                let length = if arc.is_long() { -length } else { length };
+                pen.put(Some(radius), b"R", length, length, was.unwrap_or(f64::NAN), decimals);
+            } else {
+                for (place, axis) in [a, b].into_iter().enumerate() {
+                    let word = slots.centre[axis];
+                    let increment =
+                        word.and_then(|word| said(tree, dialect, &word)).unwrap_or(!absolute_centre);
+                    let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
+                    let base = if increment { begin[axis] } else { shift };
+                    let value = (arc.centre_mm[place] - base) / unit;
+                    // A centre that is left out is that of the start.
+                    let keep = (begin[axis] - base) / unit;
+                    let old_base = if increment { written.start[axis] } else { written.shift[axis] };
+                    let was = old.and_then(|old| Some((old.centre_mm[place] - old_base?) / unit));
+                    pen.put(word, [b"I", b"J", b"K"][axis], value, keep, was.unwrap_or(f64::NAN), decimals);
+                }
+            }
+        }
+        let Pen { added, mut replaced, .. } = pen;
+        if !added.is_empty() {
+            // After the last byte of the last word: white space belongs to what follows.
+            let at = tree.start(slots.end - 1) + tree.text(slots.end - 1).len();
+            edits.insert(at, &added);
+            if replaced == Outcome::Unchanged {
+                replaced = Outcome::InPlace;
+            }
+        }
+        self.edits[file] = edits;
+        if let Some(to) = to {
+            self.arrive(&to, written, Some((reached, told)));
+        }
+        replaced
+    }
+
+    fn orientation(
+        &self,
+        pen: &mut Pen<'_, 's>,
+        written: &Written,
+        slots: &Slots<'s>,
+        aim: &Aim,
+        file: usize,
+    ) -> Told {
+        match written.turn {
+            Turn::Unknown(_) => Told::AsMeant,
+            Turn::Angles | Turn::Rpy => {
+                let rpy = written.turn == Turn::Rpy;
+                let Some(meant) = all(written.angles) else { return Told::AsMeant };
+                let angles =
+                    match (aim.rotation, if rpy { Some(Angles::Wpr) } else { self.task.angles[file] }) {
+                        (Some(rotation), Some(angles)) => angles.angles(&rotation, meant),
+                        _ => meant,
+                    };
+                let mut reached = angles;
+                let names: [&[u8]; 3] = if rpy { [b"A2", b"B2", b"C2"] } else { [b"A", b"B", b"C"] };
+                for axis in 0..3 {
+                    let from = self.now.angles[axis].or(written.start_angles[axis]);
+                    let word = slots.angles[axis];
+                    let increment =
+                        word.and_then(|word| said(pen.tree, pen.dialect, &word)).unwrap_or(!written.absolute);
+                    let base = if increment { from.unwrap_or(0.0) } else { 0.0 };
+                    // An angle that was never stated before this block has a word in it.
+                    let keep = from.map_or(angles[axis], |from| from - base);
+                    let old_base = if increment { written.start_angles[axis] } else { Some(0.0) };
+                    let was = old_base.map_or(f64::NAN, |old| meant[axis] - old);
+                    let decimals = self.options.joint_decimals;
+                    let value = pen.put(word, names[axis], angles[axis] - base, keep, was, decimals);
+                    reached[axis] = value + base;
+                }
+                Told::Angles(reached)
+            }
+            Turn::Vector => {
+                let Some((meant, meant_spin)) = written.vector else { return Told::AsMeant };
+                let length = meant.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let (vector, spin) = match &aim.rotation {
+                    Some(rotation) => {
+                        let (vector, spin) = vector_and_spin(rotation, meant_spin);
+                        // As long as the old one, which need not have length 1.
+                        (vector.map(|x| x * length), spin)
+                    }
+                    None => (meant, meant_spin),
+                };
+                let decimals = self.options.quaternion_decimals;
+                let names: [&[u8]; 3] = match (pen.dialect, written.vector_words) {
+                    (_, true) => [b"I", b"J", b"K"],
+                    (Dialect::Heidenhain, _) => [b"TX", b"TY", b"TZ"],
+                    _ => [b"A3", b"B3", b"C3"],
+                };
+                let before = self.now.vector.or(written.start_vector);
+                let stated = slots.vector.iter().any(Option::is_some);
+                let holds =
+                    before.is_some_and(|(old, _)| (0..3).all(|i| !differs(old[i], vector[i], decimals)));
+                if stated || !holds {
+                    for axis in 0..3 {
+                        // A component that is left out is 0.
+                        pen.put(slots.vector[axis], names[axis], vector[axis], 0.0, meant[axis], decimals);
+                    }
+                }
+                if pen.dialect == Dialect::Siemens {
+                    let held = before.map_or(0.0, |(_, spin)| spin);
+                    pen.put(slots.spin, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
+                }
+                Told::Vector(vector, spin)
+            }
+        }
+    }
+
+    /// Blocks before a block, in the words of that block.
+    fn extras(
+        &mut self,
+        motion: &Motion,
+        written: &Written,
+        slots: &Slots<'s>,
+        extras: &[Extra],
+        to: &RobTarget,
+    ) {
+        let task = self.task;
+        let file = motion.place.file as usize;
+        let (tree, dialect) = (&task.trees[file], task.dialects[file]);
+        let source = tree.source();
+        let begin = motion.statement.start as usize;
+        let mut text = Vec::new();
+        for extra in extras {
+            let NewTarget::Cartesian { position_mm, quaternion, .. } = extra.target else { continue };
+            let rotation = Frame { position_mm, quaternion }.pose().rotation;
+            let mut scratch = Edits::new();
+            let mut pen = Pen {
+                tree,
+                dialect,
+                edits: &mut scratch,
+                added: Vec::new(),
+                replaced: Outcome::Unchanged,
+                spaced: true,
+            };
+            let unit = written.unit_mm;
+            let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
+            let mut reached = position_mm;
+            for axis in 0..3 {
+                let from = self.now.position[axis].or(written.start[axis]).unwrap_or(0.0);
+                let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
+                let base = if written.absolute { shift } else { from };
+                let value = (position_mm[axis] - base) / unit;
+                let value = pen.put(None, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
+                reached[axis] = value * unit + base;
+            }
+            let none = Slots::default();
+            let aim = Aim { position: position_mm, rotation: Some(rotation), via: None };
+            let told = self.orientation(&mut pen, written, &none, &aim, file);
+            let words = pen.added;
+            text.extend_from_slice(b"G1");
+            if let Some(distance) = slots.distance {
+                text.push(b' ');
+                text.extend_from_slice(&source[tree.range(distance.first, distance.end)]);
+            }
+            text.extend_from_slice(&words);
+            if let Some(feed) = slots.feed {
+                text.push(b' ');
+                text.extend_from_slice(&source[tree.range(feed.first, feed.end)]);
+            }
+            text.extend_from_slice(line_end(source));
+            self.arrive(to, written, Some((reached, told)));
+        }
+        self.edits[file].insert(begin, &text);
+    }
+}
+
+/// How the orientation was written.
+enum Told {
+    AsMeant,
+    Angles([f64; 3]),
+    Vector([f64; 3], f64),
+}
+
+/// Writes words of one block.
+struct Pen<'p, 's> {
+    tree: &'p NcTree<'s>,
+    dialect: Dialect,
+    edits: &'p mut Edits,
+    /// Words to put in.
+    added: Vec<u8>,
+    replaced: Outcome,
+    /// Whether white space stands between words here.
+    spaced: bool,
+}
+
+impl Pen<'_, '_> {
+    /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
+    /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
+    fn put(
+        &mut self,
+        word: Option<Word<'_>>,
+        name: &[u8],
+        value: f64,
+        keep: f64,
+        was: f64,
+        least: u8,
+    ) -> f64 {
+        let Some(word) = word else {
+            if !differs(keep, value, least) {
+                return keep;
+            }
+            if self.spaced {
+                self.added.push(b' ');
+            }
+            self.added.extend_from_slice(name);
+            if name.len() > 1 && self.dialect == Dialect::Siemens {
+                self.added.push(b'=');
+            }
+            if self.dialect == Dialect::Heidenhain && number::rounded(value, least) >= 0.0 {
+                self.added.push(b'+');
+            }
+            number::write(&mut self.added, value, least);
+            return number::rounded(value, least);
+        };
+        match word.belongs {
+            Belongs::Literal { sign, number: token } => {
+                let text = self.tree.text(token);
+                let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
+                let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
+                let decimals = decimals(text).max(least);
+                if !differs(old, value, decimals) {
+                    return old;
+                }
+                let first = sign.unwrap_or(token);
+                let plus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Plus))
+                    || self.dialect == Dialect::Heidenhain;
+                let rounded = number::rounded(value, decimals);
+                self.edits.replace_with(self.tree.range(first, token + 1), |out| {
+                    if plus && rounded >= 0.0 {
+                        out.push(b'+');
+                    }
+                    number::write(out, value, decimals);
+                });
+                if self.replaced == Outcome::Unchanged {
+                    self.replaced = Outcome::InPlace;
+                }
+                rounded
+            }
+            Belongs::Expression { .. } if !differs(was, value, least) => was,
+            Belongs::Expression { first, end } => {
+                // AC( … ) and IC( … ) keep their name.
+                let called =
+                    self.dialect == Dialect::Siemens && self.tree.kind(first) == Some(Token::Name) && {
+                        let name = self.tree.text(first).to_ascii_uppercase();
+                        matches!(&*name, b"AC" | b"IC" | b"DC" | b"ACP" | b"ACN")
+                    };
+                let open = (first..end).find(|&token| self.tree.kind(token) == Some(Token::ParenOpen));
+                let range = match open {
+                    Some(open) if called => self.tree.start(open + 1)..self.tree.start(end - 1),
+                    _ => self.tree.range(first, end),
+                };
+                let rounded = number::rounded(value, least);
+                self.edits.replace_with(range, |out| number::write(out, value, least));
+                self.replaced = Outcome::Inlined;
+                rounded
+            }
+            Belongs::Nothing | Belongs::Arguments { .. } => keep,
+        }
+    }
+}
+
+/// Half a unit of the last decimal, and never less than noise. What is not known differs from everything.
+fn differs(old: f64, new: f64, decimals: u8) -> bool {
+    let half = 0.5 * 10_f64.powi(-i32::from(decimals));
+    !((new - old).abs() <= half.max(NOISE))
+}
+
+fn decimals(text: &[u8]) -> u8 {
+    let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
+    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
+}
+
+fn all(values: [Option<f64>; 3]) -> Option<[f64; 3]> {
+    Some([values[0]?, values[1]?, values[2]?])
+}
+
+/// Whether a motion that is left for this reason still goes to the point that its words say in the work frame, so that
+/// words which the motions before it have changed must be said again.
+fn stays_in_place(reason: Reason) -> bool {
+    matches!(
+        reason,
+        Reason::RadiusCompensation
+            | Reason::NoTipControl
+            | Reason::ToolUnknown
+            | Reason::WorkObjectUnknown
+            | Reason::CentreElsewhere
+    )
+}
+
+fn via_of(motion: &Motion) -> Option<[f64; 3]> {
+    let target = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    match target.value {
+        Ok(TargetValue::Cartesian(target)) => Some(target.position_mm),
+        _ => None,
+    }
+}
+
+fn aim_of(motion: &Motion, change: &Change) -> Option<Aim> {
+    let mut aim: Option<Aim> = None;
+    let mut via = via_of(motion);
+    for (target, new) in motion.targets.iter().zip(&change.targets) {
+        let NewTarget::Cartesian { position_mm, quaternion, .. } = *new else { continue };
+        match target.role {
+            Role::Via => via = Some(position_mm),
+            Role::To => {
+                let rotation = Some(Frame { position_mm, quaternion }.pose().rotation);
+                aim = Some(Aim { position: position_mm, rotation, via: None });
+            }
+        }
+    }
+    let mut aim = aim?;
+    aim.via = via;
+    Some(aim)
+}
+
+/// The words of a block by what they are.
+fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) -> Slots<'s> {
+    let mut slots = Slots::default();
+    let node = tree.nodes[written.node as usize];
+    if !matches!(node.kind, Syntax::Block | Syntax::Skippable) {
+        return slots;
+    }
+    let (mut place, mut fallback) = (None, (node.end, node.first));
+    for child in tree.child_nodes(written.node) {
+        let word = word(tree, child);
+        let name = word.name.to_ascii_uppercase();
+        let at = |letter: u8, first: u8| usize::from(letter - first);
+        let mut says_where = true;
+        match &*name {
+            [letter @ b'X'..=b'Z'] => slots.axes[at(*letter, b'X')] = Some(word),
+            [b'I', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
+                slots.axes[at(*letter, b'X')] = Some(word);
+            }
+            [b'C'] if dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {
+                says_where = false
+            }
+            [letter @ b'A'..=b'C'] if written.turn == Turn::Angles => {
+                slots.angles[at(*letter, b'A')] = Some(word);
+            }
+            [b'I', letter @ b'A'..=b'C'] if dialect == Dialect::Heidenhain => {
+                slots.angles[at(*letter, b'A')] = Some(word);
+            }
+            [letter @ b'A'..=b'C', b'2'] if written.turn == Turn::Rpy => {
+                slots.angles[at(*letter, b'A')] = Some(word);
+            }
+            [letter @ b'A'..=b'C', b'3'] => slots.vector[at(*letter, b'A')] = Some(word),
+            [b'T', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
+                slots.vector[at(*letter, b'X')] = Some(word);
+            }
+            [letter @ b'I'..=b'K'] if written.vector_words && written.arc.is_none() => {
+                slots.vector[at(*letter, b'I')] = Some(word);
+            }
+            [letter @ b'I'..=b'K'] => slots.centre[at(*letter, b'I')] = Some(word),
+            b"THETA" => slots.spin = Some(word),
+            b"R" if dialect != Dialect::Heidenhain => slots.radius = Some(word),
+            b"R" => match word.belongs {
+                Belongs::Literal { sign: None, .. } => says_where = false,
+                _ => slots.radius = Some(word),
+            },
+            b"CR" if dialect == Dialect::Siemens => slots.radius = Some(word),
+            b"F" => {
+                slots.feed = Some(word);
+                says_where = false;
+            }
+            b"G" | b"N" | b"L" | b"LN" => {
+                fallback = (word.end, word.first);
+                if let Belongs::Literal { sign: None, number } = word.belongs
+                    && matches!(literal(tree.text(number)), Some(90.0 | 91.0))
+                {
+                    slots.distance = Some(word);
+                }
+                says_where = false;
+            }
+            _ => says_where = false,
+        }
+        if says_where {
+            place = Some((word.end, word.first));
+        }
+    }
+    (slots.end, slots.last) = place.unwrap_or(fallback);
+    slots
+}
+
+/// Whether a word says by itself that it is an increment (IC, IX) or not (AC).
+fn said(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
+    if dialect == Dialect::Heidenhain {
+        return Some(word.name.len() == 2 && word.name[0] | 32 == b'i');
+    }
+    let Belongs::Expression { first, .. } = word.belongs else { return None };
+    if dialect != Dialect::Siemens || tree.kind(first) != Some(Token::Name) {
+        return None;
+    }
+    match &*tree.text(first).to_ascii_uppercase() {
+        b"IC" => Some(true),
+        b"AC" | b"DC" | b"ACP" | b"ACN" => Some(false),
+        _ => None,
+    }
+}
+
+/// Whether white space stands before the word that begins with this token (or it begins its line).
+fn spaced(tree: &NcTree<'_>, token: u32) -> bool {
+    token == 0 || tree.kind(token - 1).is_some_and(Token::is_trivia)
+}
+
+/// The line end that a file uses.
+pub(super) fn line_end(source: &[u8]) -> &'static [u8] {
+    match source.iter().position(|&byte| byte == b'\n') {
+        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
+        _ => b"\n",
+    }
+}

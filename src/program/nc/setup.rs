@@ -1,0 +1,96 @@
+//! What an NC file does not say itself: how A, B and C turn the tool, where work offsets lie, what tools are.
+//!
+//! A cell or robot file may say it, or comment lines of the program, which the control passes over:
+//!
+//! ```text
+//! ; truegrind angles wpr
+//! ; truegrind tool T1 tGrind [[0,0,150],[1,0,0,0]]
+//! ; truegrind frame G54 wPart [[500,0,300],[1,0,0,0]]
+//! ```
+
+use super::dialect::Dialect;
+use super::orientation::Angles;
+use crate::program::motion::{Frame, ToolValue};
+
+/// What is known beside the program. What is given here goes before what the program's comments say.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Setup {
+    /// The dialect; found by its signs where left out.
+    pub dialect: Option<Dialect>,
+    /// What A, B and C mean.
+    pub angles: Option<Angles>,
+    /// Tools by name (`T1`).
+    pub tools: Vec<(String, Frame)>,
+    /// Work offsets by name (`G54`).
+    pub frames: Vec<(String, Frame)>,
+}
+
+impl Setup {
+    /// The tool frame of a name, in any case.
+    pub fn tool(&self, name: &str) -> Option<Frame> {
+        find(&self.tools, name)
+    }
+
+    /// The work offset of a name, in any case.
+    pub fn frame(&self, name: &str) -> Option<Frame> {
+        find(&self.frames, name)
+    }
+}
+
+fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
+    list.iter().find(|(other, _)| other.eq_ignore_ascii_case(name)).map(|(_, frame)| *frame)
+}
+
+/// A tool on the flange of which only the frame is known.
+pub(super) fn held(frame: Frame) -> ToolValue {
+    ToolValue { robhold: true, frame, mass_kg: 0.0, centre_of_gravity_mm: [0.0; 3] }
+}
+
+/// A statement in a comment.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Statement {
+    /// `angles wpr`
+    Angles(Angles),
+    /// `tool T1 name [[…],[…]]`
+    Tool(String, Frame),
+    /// `frame G54 name [[…],[…]]`
+    Frame(String, Frame),
+}
+
+/// Reads a comment as a statement of a frame, tool or convention.
+pub(super) fn statement(comment: &[u8]) -> Option<Statement> {
+    // Nearly every comment is turned away here.
+    let text = comment.trim_ascii();
+    let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"(")).unwrap_or(text).trim_ascii();
+    if text.len() < 12 || !text[..10].eq_ignore_ascii_case(b"truegrind ") {
+        return None;
+    }
+    let text = std::str::from_utf8(text).ok()?;
+    let text = text.strip_suffix(')').unwrap_or(text);
+    let mut words = text.splitn(5, ' ').skip(1);
+    let what = words.next()?.to_ascii_lowercase();
+    let name = words.next()?.to_owned();
+    if what == "angles" {
+        return Angles::of(&name).map(Statement::Angles);
+    }
+    let frame = frame(words.nth(1)?)?;
+    match &*what {
+        "tool" => Some(Statement::Tool(name, frame)),
+        "frame" => Some(Statement::Frame(name, frame)),
+        _ => None,
+    }
+}
+
+/// `[[x,y,z],[q1,q2,q3,q4]]`
+fn frame(text: &str) -> Option<Frame> {
+    let mut numbers = [0.0_f64; 7];
+    let mut found = 0;
+    for part in text.split(|c: char| matches!(c, '[' | ']' | ',' | ' ')).filter(|part| !part.is_empty()) {
+        *numbers.get_mut(found)? = part.parse().ok()?;
+        found += 1;
+    }
+    let [x, y, z, w, i, j, k] = numbers;
+    let square = w * w + i * i + j * j + k * k;
+    (found == 7 && (square - 1.0).abs() < 1e-3)
+        .then_some(Frame { position_mm: [x, y, z], quaternion: [w, i, j, k] })
+}

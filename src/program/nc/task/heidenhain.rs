@@ -1,0 +1,150 @@
+//! Heidenhain conversational: blocks that are no words of an address each.
+
+use super::super::dialect::Dialect;
+use super::super::expression::{Worth, literal};
+use super::super::machine::{Group, Mode, Turn};
+use super::super::syntax::Word;
+use super::super::token::Token;
+use super::{Event, Lister, Said};
+use crate::program::motion::Reason;
+
+impl Lister<'_, '_> {
+    /// What the first word of a block says. True where the block does nothing else.
+    pub(super) fn heidenhain(&mut self, said: &Said<'_>) -> bool {
+        debug_assert_eq!(self.dialect, Dialect::Heidenhain);
+        let Some(first) = said.words.first() else { return false };
+        let name = first.name.to_ascii_uppercase();
+        match &*name {
+            b"L" | b"LN" => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            b"C" | b"CR" => {
+                let direction = said.words.iter().find(|word| word.is("DR"));
+                let negative = direction.is_some_and(|word| {
+                    (word.first..word.end).any(|token| self.tree.kind(token) == Some(Token::Minus))
+                });
+                self.state.mode = match direction {
+                    Some(_) => Mode::Circular(!negative),
+                    None => Mode::Other(Reason::NotFollowed),
+                };
+                false
+            }
+            b"CT" => {
+                self.state.mode = Mode::Other(Reason::NotFollowed);
+                false
+            }
+            b"CC" => {
+                for axis in 0..2 {
+                    self.state.pole[axis] = match said.axes[axis] {
+                        None => self.state.position[axis],
+                        Some(index) => {
+                            let (value, increment) = self.worth(&said.words[index]);
+                            if increment == Some(true) {
+                                self.state.position[axis].and_then(|at| value.map(|value| at + value))
+                            } else {
+                                value
+                            }
+                        }
+                    };
+                }
+                true
+            }
+            b"M" => false,
+            _ => {
+                self.other_block(said, first, &name);
+                true
+            }
+        }
+    }
+
+    /// Blocks that are not looked into word by word.
+    fn other_block(&mut self, said: &Said<'_>, first: &Word<'_>, name: &[u8]) {
+        let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
+        let words: Vec<&[u8]> =
+            text.split(|byte| byte.is_ascii_whitespace()).filter(|part| !part.is_empty()).collect();
+        let second = words.get(1).copied().unwrap_or_default();
+        match name {
+            b"TOOL" if second == b"CALL" => {
+                if let Some(number) = words.get(2).and_then(|word| literal(word)) {
+                    self.state.tool = format!("T{}", number.round());
+                    self.set(Group::Tool);
+                }
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            b"CYCL" if second == b"CALL" => {
+                self.left(said, "CYCL CALL", Reason::Cycle);
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            b"CYCL" => {
+                let number: Vec<u8> = words
+                    .get(2)
+                    .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
+                    .unwrap_or_default();
+                if matches!(&*number, b"7" | b"8" | b"10" | b"11" | b"19" | b"26" | b"247") {
+                    self.state.transform = Some(Reason::Transformed);
+                    self.set(Group::Transform);
+                    self.state.lose_position();
+                    self.events.push(Event::Lost(super::POSITION));
+                }
+            }
+            b"PLANE" => {
+                self.state.transform = (second != b"RESET").then_some(Reason::Transformed);
+                self.set(Group::Transform);
+                self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
+                self.state.lose_position();
+                self.events.push(Event::Unknown);
+            }
+            b"FUNCTION" if second == b"TCPM" => {
+                self.state.tip = true;
+                self.set(Group::Tip);
+            }
+            b"FUNCTION" if words.contains(&&b"TCPM"[..]) => {
+                self.state.tip = false;
+                self.set(Group::Tip);
+            }
+            b"TRANS" => {
+                self.state.transform = Some(Reason::Transformed);
+                self.set(Group::Transform);
+            }
+            b"LBL" => {
+                if second != b"0" {
+                    self.forget();
+                }
+            }
+            b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
+                self.subprogram(said, "CALL");
+            }
+            b"APPR" | b"DEP" | b"RND" | b"CHF" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT"
+            | b"FPOL" | b"SPL" => {
+                let text = String::from_utf8_lossy(name).into_owned();
+                self.left(said, &text, Reason::NotFollowed);
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            b"TCH" => {
+                self.left(said, "TCH PROBE", Reason::Probe);
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            b"FN" | b"Q" | b"QL" | b"QR" => self.parameter(first),
+            b"BEGIN" | b"END" if words.contains(&&b"INCH"[..]) => self.state.unit_mm = 25.4,
+            _ => {}
+        }
+    }
+
+    /// `Q1 = +5`, `FN 0: Q1 = +5`.
+    fn parameter(&mut self, word: &Word<'_>) {
+        let equal = (word.first..word.end).find(|&token| self.tree.kind(token) == Some(Token::Equal));
+        let Some(equal) = equal else { return };
+        let number = (word.first..equal)
+            .rev()
+            .find(|&token| self.tree.kind(token) == Some(Token::Number))
+            .and_then(|token| literal(self.tree.text(token)));
+        let Some(number) = number else { return };
+        let value: Worth = self.evaluated((equal + 1, word.end));
+        self.state.variables.insert(super::numbered(b'Q', number), value);
+    }
+}

@@ -1,0 +1,904 @@
+//! What a block sets, and where it goes.
+
+use std::sync::Arc as Shared;
+
+use super::super::arc::{Arc, Plane};
+use super::super::dialect::Dialect;
+use super::super::expression::Worth;
+use super::super::machine::{Group, Mode, Turn};
+use super::super::syntax::Belongs;
+use super::super::token::Token;
+use super::{Event, Lister, Said, Written};
+use crate::program::motion::{
+    Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed, SpeedValue,
+    Switch, TargetValue, Zone, ZoneValue,
+};
+
+/// Names of one word in a block that are no subprogram.
+const KEYWORDS: &[&str] = &[
+    "TRAORI",
+    "TRAFOOF",
+    "STOPRE",
+    "STARTFIFO",
+    "STOPFIFO",
+    "FFWON",
+    "FFWOF",
+    "SOFT",
+    "BRISK",
+    "DRIVE",
+    "COMPON",
+    "COMPOF",
+    "COMPCAD",
+    "COMPCURV",
+    "COMPSURF",
+    "ORIWKS",
+    "ORIMKS",
+    "ORIAXES",
+    "ORIVECT",
+    "ORIPLANE",
+    "ORIRPY",
+    "ORIRPY2",
+    "ORIEULER",
+    "ORIVIRT1",
+    "ORIVIRT2",
+    "ORIROTA",
+    "ORIROTR",
+    "ORIROTT",
+    "ORIROTC",
+    "ORICONCW",
+    "ORICURVE",
+    "OSC",
+    "OSS",
+    "OSD",
+    "OSOF",
+    "OST",
+    "UPATH",
+    "SPATH",
+    "FGROUP",
+    "CFC",
+    "CFTCP",
+    "CFIN",
+    "KONT",
+    "NORM",
+    "CUT2D",
+    "CUT2DF",
+    "CUT3DC",
+    "CUT3DF",
+    "DIAMON",
+    "DIAMOF",
+    "DIAM90",
+    "WALIMON",
+    "WALIMOF",
+    "TOFRAME",
+    "PAROT",
+    "PAROTOF",
+    "SUPA",
+    "G153",
+    "RET",
+    "TRANS",
+    "ROT",
+    "SCALE",
+    "MIRROR",
+    "ATRANS",
+    "AROT",
+    "FINEA",
+    "COARSEA",
+    "RTLION",
+    "RTLIOF",
+    "PTP",
+    "CP",
+    "PTPG0",
+    "FNORM",
+    "FLIN",
+    "FCUB",
+    "FPO",
+    "CDON",
+    "CDOF",
+    "CPRECON",
+    "CPRECOF",
+    "MCALL",
+    "MSG",
+    "ELSE",
+    "ENDIF",
+    "ENDWHILE",
+    "ENDFOR",
+    "ENDLOOP",
+    "LOOP",
+    "REPEAT",
+    "DISPLOF",
+    "DISPLON",
+    "SBLOF",
+    "SBLON",
+    "SAVE",
+    "DYNNORM",
+    "DYNPOS",
+    "DYNROUGH",
+    "DYNSEMIFIN",
+    "DYNFINISH",
+    "G641",
+    "ACC",
+    "TCARR",
+    "TCOABS",
+    "TCOFR",
+    "GEOAX",
+    "PRESETON",
+    "WAITM",
+    "LIMS",
+    "SPCON",
+    "SPCOF",
+    "FZ",
+    "OEMIPO1",
+    "ADISPOS",
+    "ADIS",
+];
+
+/// Names with arguments that move nothing.
+const HARMLESS: &[&str] = &[
+    "MSG",
+    "CYCLE832",
+    "SETMS",
+    "WAITM",
+    "WAITMC",
+    "WAITE",
+    "START",
+    "INIT",
+    "GROUP_BEGIN",
+    "GROUP_END",
+    "WORKPIECE",
+    "TRAORI",
+    "FGROUP",
+    "FGREF",
+    "GEOAX",
+    "SETINT",
+    "CLRM",
+    "SETM",
+    "PRESETON",
+    "OTOL",
+    "CTOL",
+    "GETD",
+    "GET",
+    "RELEASE",
+    "SETAL",
+    "WRITE",
+    "DELETE",
+    "STOPRE",
+    "ACC",
+    "FL",
+    "VELOLIM",
+    "ACCLIM",
+    "PROC",
+    "TRAFOOF",
+    "SPOS",
+    "FA",
+    "OVR",
+    "F_HEAD",
+    "F_TOOL",
+    "E_HEAD",
+    "DEF",
+    "TRAILON",
+    "TRAILOF",
+    "COUPON",
+    "COUPOF",
+    "DISPLOF",
+    "EXTERN",
+];
+
+impl Lister<'_, '_> {
+    // ---- what a block sets ----
+
+    /// Commands with a name. True where nothing else is done in the block.
+    pub(super) fn named_commands(&mut self, said: &Said<'_>) -> bool {
+        if self.dialect != Dialect::Siemens {
+            return false;
+        }
+        for word in &said.words {
+            if word.name.first() == Some(&b'$') && word.assigned {
+                self.system_variable(word);
+            }
+        }
+        if self.programmable_frame(said) {
+            return true;
+        }
+        let mut done = false;
+        for index in 0..said.words.len() {
+            let word = said.words[index];
+            if word.name.len() < 2 || word.assigned || self.tree.kind(word.end - 1) == Some(Token::Colon) {
+                continue;
+            }
+            let name = word.name.to_ascii_uppercase();
+            match &*name {
+                b"TRAORI" => {
+                    self.state.tip = true;
+                    self.set(Group::Tip);
+                }
+                b"TRAFOOF" => {
+                    self.state.tip = false;
+                    self.set(Group::Tip);
+                    if self.state.transform == Some(Reason::Transformed) {
+                        self.state.transform = None;
+                    }
+                }
+                b"TRANSMIT" | b"TRACYL" | b"TRAANG" | b"ORIMKS" => {
+                    self.state.transform = Some(Reason::Transformed);
+                    self.set(Group::Transform);
+                }
+                b"ORIWKS" => self.state.transform = None,
+                b"ORIRPY" => self.state.rpy_stated = true,
+                b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => self.state.rpy_stated = false,
+                b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
+                    self.state.mode = Mode::Other(Reason::NotFollowed);
+                }
+                b"CYCLE800" => {
+                    let empty = matches!(word.belongs, Belongs::Arguments { first, end } if end == first + 2);
+                    self.state.transform = (!empty).then_some(Reason::Transformed);
+                    self.set(Group::Transform);
+                    self.state.lose_position();
+                    self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
+                    self.events.push(Event::Unknown);
+                    done = true;
+                }
+                _ => match word.belongs {
+                    Belongs::Arguments { .. } if HARMLESS.iter().any(|known| word.is(known)) => {}
+                    Belongs::Arguments { .. } if is_cycle(&name) => {
+                        let text = String::from_utf8_lossy(&name).into_owned();
+                        self.left(said, &text, Reason::Cycle);
+                        self.state.lose_position();
+                        self.events.push(Event::Lost(super::POSITION));
+                        done = true;
+                    }
+                    Belongs::Arguments { .. } => {
+                        let text = String::from_utf8_lossy(word.name).into_owned();
+                        self.subprogram(said, &text);
+                        done = true;
+                    }
+                    Belongs::Nothing
+                        if self.is_alone(said) && !KEYWORDS.iter().any(|known| word.is(known)) =>
+                    {
+                        let text = String::from_utf8_lossy(word.name).into_owned();
+                        self.subprogram(said, &text);
+                        done = true;
+                    }
+                    _ => {}
+                },
+            }
+        }
+        done
+    }
+
+    /// Whether a block has but one word beside its number.
+    fn is_alone(&self, said: &Said<'_>) -> bool {
+        said.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1 && !said.opaque
+    }
+
+    /// G words that hold on. True where the block's axis words are no motion.
+    pub(super) fn modal_codes(&mut self, said: &Said<'_>) -> bool {
+        let siemens = self.dialect == Dialect::Siemens;
+        let linux = self.dialect == Dialect::LinuxCnc;
+        self.state.exact_stop &= self.state.exact_stop_holds;
+        for &code in &said.g {
+            match code {
+                0 => self.state.mode = Mode::Rapid,
+                10 => self.state.mode = Mode::Linear,
+                20 => self.state.mode = Mode::Circular(false),
+                30 => self.state.mode = Mode::Circular(true),
+                50 | 51 if linux => self.state.mode = Mode::Other(Reason::NotFollowed),
+                52 | 53 | 62 | 320 | 330 | 340 | 3310 | 3320 => {
+                    self.state.mode = Mode::Other(Reason::NotFollowed);
+                }
+                70 if linux => self.transform(Some(Reason::Transformed)),
+                80 if linux => self.transform(None),
+                90 => self.state.exact_stop = true,
+                160 | 510 | 511 if !siemens => self.transform(Some(Reason::Transformed)),
+                680 | 682 | 683 | 684 => {
+                    self.transform(Some(Reason::Transformed));
+                    self.state.lose_position();
+                    self.events.push(Event::Lost(super::POSITION));
+                    return true;
+                }
+                150 | 500 | 501 | 690 if !siemens => self.transform(None),
+                170 | 180 | 190 => {
+                    self.state.plane = match code {
+                        170 => Plane::XY,
+                        180 => Plane::ZX,
+                        _ => Plane::YZ,
+                    };
+                    self.set(Group::Plane);
+                }
+                200 => self.unit(25.4),
+                210 => self.unit(1.0),
+                700 | 7000 if siemens => self.unit(25.4),
+                710 | 7100 if siemens => self.unit(1.0),
+                400 => {
+                    self.state.radius = false;
+                    self.set(Group::Radius);
+                }
+                410 | 420 => {
+                    self.state.radius = true;
+                    self.set(Group::Radius);
+                }
+                434 | 435 => {
+                    (self.state.tip, self.state.vector_words) = (true, code == 435);
+                    self.set(Group::Tip);
+                }
+                490 => {
+                    (self.state.tip, self.state.vector_words) = (false, false);
+                    self.set(Group::Tip);
+                }
+                540..=599 | 5000..=5999 => self.work_offset(code, said),
+                600 | 610 => (self.state.exact_stop, self.state.exact_stop_holds) = (true, true),
+                640 | 6410..=6450 => (self.state.exact_stop, self.state.exact_stop_holds) = (false, false),
+                730 | 740 | 760 | 810..=890 if !siemens => self.state.mode = Mode::Other(Reason::Cycle),
+                800 => self.state.mode = Mode::Unset,
+                900 | 910 => {
+                    self.state.absolute = code == 900;
+                    self.set(Group::Distance);
+                }
+                901 => self.state.centre_absolute = true,
+                911 => self.state.centre_absolute = false,
+                930 | 950 => self.state.feed_per_minute = false,
+                940 => self.state.feed_per_minute = true,
+                _ => {}
+            }
+        }
+        false
+    }
+
+    fn unit(&mut self, mm: f64) {
+        self.state.unit_mm = mm;
+        self.set(Group::Unit);
+    }
+
+    fn transform(&mut self, reason: Option<Reason>) {
+        self.state.transform = reason;
+        self.set(Group::Transform);
+        self.state.lose_position();
+        self.events.push(Event::Lost(super::POSITION));
+    }
+
+    fn work_offset(&mut self, code: u32, said: &Said<'_>) {
+        let mut name =
+            if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
+        if code == 541
+            && let Some(number) = said.p.and_then(|index| self.literal(&said.words[index]))
+        {
+            name = format!("G54.1 P{}", number.round());
+        }
+        if name != self.state.frame {
+            // Where the tool stands has other coordinates now.
+            self.state.lose_position();
+            self.events.push(Event::Lost(super::POSITION));
+        }
+        self.state.frame = name;
+        self.set(Group::Frame);
+    }
+
+    /// G words of one block. True where the block's axis words are no motion that is followed.
+    pub(super) fn unmodal_codes(&mut self, said: &Said<'_>) -> bool {
+        let siemens = self.dialect == Dialect::Siemens;
+        for &code in &said.g {
+            match code {
+                40 | 110 | 220 | 230 | 250 | 260 => return true,
+                100 if !siemens => {
+                    self.set_offset(said);
+                    return true;
+                }
+                120 | 130 => {
+                    self.left(said, "G12", Reason::Cycle);
+                    return true;
+                }
+                280 | 281 | 290 | 300 | 301 => {
+                    self.gone(said, code, Reason::ReferenceReturn);
+                    return true;
+                }
+                740 | 750 if siemens => {
+                    self.gone(said, code, Reason::ReferenceReturn);
+                    return true;
+                }
+                310 | 382..=385 => {
+                    self.gone(said, code, Reason::Probe);
+                    return true;
+                }
+                1470 | 1480 | 2470 | 2480 | 3470 | 3480 if siemens => {
+                    self.gone(said, code, Reason::NotFollowed);
+                    return true;
+                }
+                531 => {
+                    self.state.lose_position();
+                    self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
+                    self.events.push(Event::Unknown);
+                    return true;
+                }
+                520 if !siemens => {
+                    // A shift of the work frame itself: the tool stands elsewhere in it.
+                    for axis in 0..3 {
+                        if let Some(index) = said.axes[axis] {
+                            let value = self.worth(&said.words[index]).0;
+                            self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
+                        }
+                    }
+                    self.set(Group::Shift);
+                    return true;
+                }
+                650 | 660 => {
+                    self.subprogram(said, if code == 650 { "G65" } else { "G66" });
+                    return true;
+                }
+                920 => {
+                    self.set_shift(said);
+                    return true;
+                }
+                921 | 922 => {
+                    self.state.shift = [Ok(0.0); 3];
+                    self.events.push(Event::NoShift);
+                    self.set(Group::Shift);
+                    return true;
+                }
+                923 => {
+                    self.state.shift = [Err(Reason::Variable); 3];
+                    return true;
+                }
+                _ => {}
+            }
+        }
+        if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso | Dialect::LinuxCnc)
+            && said.m.iter().any(|m| matches!(m, 97 | 98 | 198))
+        {
+            self.subprogram(said, "M98");
+            return true;
+        }
+        false
+    }
+
+    /// G92: the place where the tool stands is called this from here on.
+    fn set_shift(&mut self, said: &Said<'_>) {
+        let mut stated = [None; 3];
+        for axis in 0..3 {
+            let Some(index) = said.axes[axis] else { continue };
+            let value = self.worth(&said.words[index]).0.map(|value| value * self.state.unit_mm);
+            self.state.shift[axis] = match (self.state.position[axis], value) {
+                (Ok(at), Ok(value)) => {
+                    stated[axis] = Some(value);
+                    Ok(at - value)
+                }
+                (Err(reason), _) | (_, Err(reason)) => Err(reason),
+            };
+        }
+        self.set(Group::Shift);
+        self.events.push(Event::Shift(stated));
+    }
+
+    /// A motion to where the text does not tell.
+    fn gone(&mut self, said: &Said<'_>, code: u32, reason: Reason) {
+        let name =
+            if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
+        self.left(said, &name, reason);
+        let none = said.axes.iter().chain(&said.abc).all(Option::is_none);
+        let mut lost = 0;
+        for axis in 0..3 {
+            if none || said.axes[axis].is_some() {
+                self.state.position[axis] = Err(Reason::PositionUnknown);
+                lost |= 1 << axis;
+            }
+            if none || said.abc[axis].is_some() {
+                self.state.abc[axis] = Err(Reason::OrientationUnknown);
+                lost |= 8 << axis;
+            }
+        }
+        self.state.previous = None;
+        self.events.push(Event::Lost(lost));
+    }
+
+    // ---- motions ----
+
+    fn instruction(&mut self, name: &str) -> Shared<str> {
+        if let Some(found) = self.instructions.get(name) {
+            return found.clone();
+        }
+        let shared: Shared<str> = name.into();
+        self.instructions.insert(name.to_owned(), shared.clone());
+        shared
+    }
+
+    fn listed(&mut self, said: &Said<'_>, name: &str, kind: MotionKind) -> Motion {
+        let first = said.words.first().map_or(self.tree.nodes[said.node as usize].first, |word| word.first);
+        Motion {
+            place: self.place(first),
+            statement: self.tree.node_span(said.node),
+            instruction: self.instruction(name),
+            kind,
+            targets: Vec::new(),
+            speed: None,
+            zone: None,
+            tool: None,
+            work_object: None,
+            timed: false,
+            modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
+            in_loop: false,
+            conditional: said.skippable,
+            previous: self.state.previous,
+            routine: None,
+            left: None,
+        }
+    }
+
+    fn push(&mut self, motion: Motion, written: Written) -> u32 {
+        let index = self.listing.motions.len() as u32;
+        self.listing.motions.push(motion);
+        self.written.push(written);
+        self.events.push(Event::Motion(index));
+        index
+    }
+
+    /// A motion that is listed and left.
+    pub(super) fn left(&mut self, said: &Said<'_>, name: &str, reason: Reason) {
+        let mut motion = self.listed(said, name, MotionKind::Unknown);
+        motion.left = Some(reason);
+        let written = self.written_as(said, None);
+        self.push(motion, written);
+        self.state.previous = None;
+    }
+
+    fn written_as(&self, said: &Said<'_>, arc: Option<(Arc, bool, bool)>) -> Written {
+        let state = &self.state;
+        let angles = if state.turn == Turn::Rpy { &state.rpy } else { &state.abc };
+        let vector = match (state.vector, state.spin) {
+            ([Ok(x), Ok(y), Ok(z)], Ok(spin)) => Some(([x, y, z], spin)),
+            _ => None,
+        };
+        Written {
+            node: said.node,
+            absolute: state.absolute,
+            unit_mm: state.unit_mm,
+            start: state.position.map(Result::ok),
+            start_angles: angles.map(Result::ok),
+            angles: angles.map(Result::ok),
+            start_vector: vector,
+            vector,
+            shift: state.shift.map(Result::ok),
+            turn: state.turn,
+            vector_words: state.vector_words,
+            arc,
+            insertable: false,
+        }
+    }
+
+    fn axis_values(
+        &self,
+        said: &Said<'_>,
+        words: &[Option<usize>; 3],
+        old: &[Worth; 3],
+        unit: f64,
+    ) -> [Worth; 3] {
+        std::array::from_fn(|axis| match words[axis] {
+            None => old[axis],
+            Some(index) => {
+                let (value, increment) = self.worth(&said.words[index]);
+                let value = value.map(|value| value * unit);
+                if increment.unwrap_or(!self.state.absolute) {
+                    old[axis].and_then(|old| value.map(|value| old + value))
+                } else {
+                    value
+                }
+            }
+        })
+    }
+
+    /// Where a block goes.
+    pub(super) fn motion(&mut self, said: &Said<'_>, machine: bool) {
+        let heidenhain = self.dialect == Dialect::Heidenhain;
+        let mode = if heidenhain && said.rapid && self.state.mode == Mode::Linear {
+            Mode::Rapid
+        } else {
+            self.state.mode
+        };
+        let vector_words = self.state.vector_words && matches!(mode, Mode::Rapid | Mode::Linear);
+        let has_centre = said.centre.iter().any(Option::is_some) && !vector_words;
+        let circular = matches!(mode, Mode::Circular(_));
+        let vector_moves = vector_words && said.centre.iter().any(Option::is_some);
+        if !said.moves() && !(circular && (has_centre || said.radius.is_some())) && !vector_moves {
+            if said.opaque {
+                self.unread(said);
+            }
+            return;
+        }
+        if mode == Mode::Unset {
+            // Axis words without a motion: a control says no, or a word above was not understood.
+            self.left(said, "?", Reason::UnknownInstruction);
+            self.state.lose_position();
+            self.events.push(Event::Unknown);
+            return;
+        }
+        let before = self.written_as(said, None);
+        // Orientation.
+        let turn = self.turned(said, vector_words);
+        // Position.
+        let from = self.state.position;
+        let mut to = self.axis_values(said, &said.axes, &from, self.state.unit_mm);
+        for axis in 0..3 {
+            if let Some(index) = said.axes[axis]
+                && self.worth(&said.words[index]).1 != Some(true)
+                && (self.state.absolute || self.worth(&said.words[index]).1 == Some(false))
+            {
+                to[axis] = to[axis].and_then(|value| self.state.shift[axis].map(|shift| value + shift));
+            }
+        }
+        let (name, kind) = match mode {
+            Mode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
+            Mode::Linear if heidenhain => ("L", MotionKind::Linear),
+            Mode::Circular(_) if heidenhain => ("C", MotionKind::Circular),
+            Mode::Rapid => ("G0", MotionKind::Joint),
+            Mode::Linear => ("G1", MotionKind::Linear),
+            Mode::Circular(false) => ("G2", MotionKind::Circular),
+            Mode::Circular(true) => ("G3", MotionKind::Circular),
+            Mode::Other(Reason::Cycle) => ("cycle", MotionKind::Unknown),
+            Mode::Other(_) | Mode::Unset => ("path", MotionKind::Unknown),
+        };
+        let mut motion = self.listed(said, name, kind);
+        let old_rotation = self.state.rotation(self.angles);
+        self.state.turn = turn.0;
+        (self.state.abc, self.state.rpy, self.state.vector, self.state.spin) = turn.1;
+        let rotation = self.state.rotation(self.angles);
+        let target = |position: [Worth; 3], turn: Result<nalgebra::UnitQuaternion<f64>, Reason>| {
+            let position_mm = [position[0]?, position[1]?, position[2]?];
+            let q = turn?;
+            let quaternion = [q.w, q.i, q.j, q.k];
+            Ok(TargetValue::Cartesian(RobTarget {
+                position_mm,
+                quaternion,
+                conf: [0; 4],
+                external: [None; 6],
+            }))
+        };
+        let value = target(to, rotation);
+        let literal = said
+            .axes
+            .iter()
+            .chain(&said.abc)
+            .chain(&said.rpy)
+            .chain(&said.vector)
+            .flatten()
+            .all(|&index| self.literal(&said.words[index]).is_some());
+        let origin = match value {
+            Ok(_) if literal => Origin::Inline,
+            Ok(_) => Origin::Computed,
+            Err(_) => Origin::Unknown,
+        };
+        let argument = self.argument(said);
+        // The way round.
+        let mut arc = None;
+        if let Mode::Circular(positive) = mode {
+            let found = self.arc(said, from, to, positive);
+            let middle = found.and_then(|arc| {
+                let (Ok(a), Ok(b)) = (all(from), all(to)) else { return Err(Reason::PositionUnknown) };
+                Ok(arc.at(a, b, 0.5).map(Ok))
+            });
+            let half = match (old_rotation, rotation) {
+                (Ok(a), Ok(b)) => Ok(a.try_slerp(&b, 0.5, 1e-9).unwrap_or(b)),
+                (Err(reason), _) | (_, Err(reason)) => Err(reason),
+            };
+            let via = middle.and_then(|middle| target(middle, half));
+            let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
+            motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
+            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
+        }
+        if kind != MotionKind::Unknown {
+            motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
+        }
+        motion.speed = (mode != Mode::Rapid).then(|| self.speed()).flatten();
+        motion.zone = self.zone();
+        motion.tool = Some(self.tool());
+        motion.work_object = Some(self.work_object());
+        motion.left = self.left_because(said, mode, machine, &motion);
+        let insertable = kind == MotionKind::Linear
+            && !heidenhain
+            && !said.skippable
+            && before.start.iter().all(Option::is_some);
+        let after = self.written_as(said, None);
+        let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
+            before.start_angles
+        } else {
+            [None; 3]
+        };
+        let written = Written {
+            arc,
+            insertable,
+            start_angles,
+            turn: after.turn,
+            angles: after.angles,
+            vector: after.vector,
+            ..before
+        };
+        let index = self.push(motion, written);
+        self.state.previous = Some(index);
+        if mode == Mode::Other(Reason::Cycle) || machine {
+            self.state.lose_position();
+            self.events.push(Event::Lost(super::POSITION));
+        } else if matches!(mode, Mode::Other(_)) {
+            // A spline ends at its last point, whatever its way.
+            self.state.position = to;
+            self.state.previous = None;
+        } else {
+            self.state.position = to;
+        }
+    }
+
+    /// A block that could not be read whole, without words that move: what it did is not known.
+    fn unread(&mut self, said: &Said<'_>) {
+        if said.words.iter().any(|word| matches!(word.address(), Some(b'G'))) {
+            self.state.lose_position();
+            self.events.push(Event::Unknown);
+        }
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn turned(
+        &self,
+        said: &Said<'_>,
+        vector_words: bool,
+    ) -> (Turn, ([Worth; 3], [Worth; 3], [Worth; 3], Worth)) {
+        let state = &self.state;
+        let (mut abc, mut rpy, mut vector, mut spin) = (state.abc, state.rpy, state.vector, state.spin);
+        let mut turn = state.turn;
+        let any = |words: &[Option<usize>; 3]| words.iter().any(Option::is_some);
+        if any(&said.abc) {
+            abc = self.axis_values(said, &said.abc, &abc, 1.0);
+            turn = Turn::Angles;
+        }
+        if any(&said.rpy) {
+            rpy = self.axis_values(said, &said.rpy, &rpy, 1.0);
+            turn = Turn::Rpy;
+        }
+        let vector_said = if vector_words { &said.centre } else { &said.vector };
+        if any(vector_said) {
+            // Components that are not written are 0.
+            vector = vector_said.map(|index| index.map_or(Ok(0.0), |index| self.worth(&said.words[index]).0));
+            turn = Turn::Vector;
+        }
+        if let Some(index) = said.spin {
+            spin = self.worth(&said.words[index]).0;
+        }
+        (turn, (abc, rpy, vector, spin))
+    }
+
+    fn arc(&self, said: &Said<'_>, from: [Worth; 3], to: [Worth; 3], positive: bool) -> Result<Arc, Reason> {
+        if said.turns {
+            return Err(Reason::NotFollowed);
+        }
+        let (start, end) = (all(from)?, all(to)?);
+        let plane = self.state.plane;
+        let unit = self.state.unit_mm;
+        if self.dialect == Dialect::Heidenhain && said.radius.is_none() {
+            let centre = [self.state.pole[0]?, self.state.pole[1]?];
+            return Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
+        }
+        if let Some(index) = said.radius {
+            let radius = self.worth(&said.words[index]).0? * unit;
+            return Arc::of_radius(plane, start, end, radius, positive).ok_or(Reason::WrongShape);
+        }
+        let mut centre = [0.0; 2];
+        for (place, axis) in [plane.a, plane.b].into_iter().enumerate() {
+            centre[place] = match said.centre[axis] {
+                None if self.state.centre_absolute => return Err(Reason::MissingArgument),
+                None => start[axis],
+                Some(index) => {
+                    let (value, increment) = self.worth(&said.words[index]);
+                    let value = value? * unit;
+                    if increment.unwrap_or(!self.state.centre_absolute) {
+                        start[axis] + value
+                    } else {
+                        value + self.state.shift[axis]?
+                    }
+                }
+            };
+        }
+        if said.centre[plane.a].is_none() && said.centre[plane.b].is_none() {
+            return Err(Reason::MissingArgument);
+        }
+        Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape)
+    }
+
+    /// From the first to the last word that says where to go.
+    fn argument(&self, said: &Said<'_>) -> Span {
+        let words = said
+            .axes
+            .iter()
+            .chain(&said.abc)
+            .chain(&said.rpy)
+            .chain(&said.vector)
+            .chain(&said.centre)
+            .flatten()
+            .map(|&index| said.words[index]);
+        let (first, end) =
+            words.fold((u32::MAX, 0), |(first, end), word| (first.min(word.first), end.max(word.end)));
+        if first < end { self.tree.span(first, end) } else { self.tree.node_span(said.node) }
+    }
+
+    fn left_because(&self, said: &Said<'_>, mode: Mode, machine: bool, motion: &Motion) -> Option<Reason> {
+        let state = &self.state;
+        let uncertain = [
+            Group::Distance,
+            Group::Unit,
+            Group::Frame,
+            Group::Radius,
+            Group::Tip,
+            Group::Transform,
+            Group::Tool,
+            Group::Shift,
+        ];
+        let turns = !matches!(state.turn, Turn::Unknown(Reason::OrientationUnknown));
+        let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
+        let frames = || {
+            let tool = self.listing.tool(motion).and_then(|tool| tool.value.err());
+            tool.or_else(|| {
+                self.listing.work_object(motion).and_then(|object| object.value.as_ref().err().copied())
+            })
+        };
+        if said.opaque {
+            Some(Reason::Unread)
+        } else if said.skippable {
+            Some(Reason::Skippable)
+        } else if let Mode::Other(reason) = mode {
+            Some(reason)
+        } else if machine {
+            Some(Reason::MachineCoordinates)
+        } else if uncertain.iter().any(|&group| state.is_uncertain(group))
+            || matches!(mode, Mode::Circular(_)) && state.is_uncertain(Group::Plane)
+        {
+            Some(Reason::UnknownFlow)
+        } else if let Some(reason) = state.transform {
+            Some(reason)
+        } else if state.radius {
+            Some(Reason::RadiusCompensation)
+        } else if turns && needs_tip && !state.tip {
+            Some(Reason::NoTipControl)
+        } else if self.dialect == Dialect::Heidenhain
+            && matches!(mode, Mode::Circular(_))
+            && said.radius.is_none()
+        {
+            Some(Reason::CentreElsewhere)
+        } else {
+            frames()
+        }
+    }
+
+    fn speed(&mut self) -> Option<u32> {
+        let feed = match (self.state.feed, self.state.feed_per_minute) {
+            (Ok(feed), true) => feed,
+            _ => return None,
+        };
+        if let Some(&index) = self.speeds.get(&feed.to_bits()) {
+            return Some(index);
+        }
+        let value = SpeedValue {
+            tcp_mm_s: feed,
+            orientation_deg_s: 500.0,
+            linear_external_mm_s: 5000.0,
+            rotating_external_deg_s: 1000.0,
+        };
+        self.listing.speeds.push(Speed { text: format!("F{}", feed * 60.0), value: Ok(value) });
+        let index = self.listing.speeds.len() as u32 - 1;
+        self.speeds.insert(feed.to_bits(), index);
+        Some(index)
+    }
+
+    fn zone(&mut self) -> Option<u32> {
+        if !self.state.exact_stop {
+            return None;
+        }
+        let fine = ZoneValue { fine: true, tcp_mm: 0.0, orientation_mm: 0.0, orientation_deg: 0.0 };
+        let zone = Zone { text: "exact stop".to_owned(), value: Ok(fine) };
+        let found = self.listing.zones.iter().position(|other| *other == zone);
+        Some(found.unwrap_or_else(|| {
+            self.listing.zones.push(zone);
+            self.listing.zones.len() - 1
+        }) as u32)
+    }
+}
+
+fn all(values: [Worth; 3]) -> Result<[f64; 3], Reason> {
+    Ok([values[0]?, values[1]?, values[2]?])
+}
+
+fn is_cycle(name: &[u8]) -> bool {
+    ["CYCLE", "POCKET", "HOLES", "SLOT", "LONGHOLE"].iter().any(|kind| name.starts_with(kind.as_bytes()))
+}

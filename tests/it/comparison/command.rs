@@ -1,0 +1,165 @@
+//! `truegrind compare` and `truegrind track` as a user runs them.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+
+const TRACKER: &str = include_str!("../../data/irb120-tracker.csv");
+
+fn truegrind(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output =
+        Command::cargo_bin("truegrind").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut out: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    out.sort();
+    out
+}
+
+#[test]
+fn compare_lists_what_there_is_and_refuses_what_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let (code, out, _) = truegrind(dir.path(), &["compare", "--list"]);
+    assert!(code == 0 && out.contains("ltlm-table-6") && out.contains("rls-degradation"), "{out}");
+    let (code, _, err) = truegrind(dir.path(), &["compare", "--experiment", "table-6"]);
+    assert!(code == 2 && err.contains("unknown experiment") && err.contains("ukf-vslm-d2"), "{err}");
+    fs::write(dir.path().join("data.csv"), TRACKER).unwrap();
+    let (code, _, err) = truegrind(dir.path(), &["compare", "data.csv", "--experiment", "ltlm-table-6"]);
+    assert!(code == 2 && err.contains("--robot"), "{err}");
+    let with_robot = [
+        "compare",
+        "data.csv",
+        "--robot",
+        "abb-irb-120",
+        "--experiment",
+        "ltlm-table-6",
+        "--json",
+        "out.json",
+    ];
+    let (code, _, err) = truegrind(dir.path(), &with_robot);
+    assert!(code == 2 && err.contains("200 rows") && err.contains("--rows 200"), "{err}");
+    assert_eq!(names(dir.path()), ["data.csv"], "nothing is written");
+}
+
+#[test]
+fn compare_runs_an_experiment_of_ones_own_and_writes_the_same_bytes_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), TRACKER).unwrap();
+    fs::write(
+        at.join("mine.toml"),
+        "name = \"mine\"\ntitle = \"Mine\"\npaper = \"ours\"\n[methods]\nreference = \"B\"\n[methods.protocol]\nrows = 100\n\
+         held_out = 0.2\ncases = 2\n[[methods.method]]\nid = \"A\"\nname = \"EKF\"\nsolver = \"ekf\"\ntreatment = \
+         \"sound\"\n[[methods.method]]\nid = \"B\"\nname = \"LM\"\nsolver = \"lm\"\ntreatment = \"sound\"\n",
+    )
+    .unwrap();
+    let run = |json: &str, threads: &str| {
+        let arguments = [
+            "compare",
+            "data.csv",
+            "--robot",
+            "abb-irb-120",
+            "--experiment",
+            "mine.toml",
+            "--json",
+            json,
+            "--csv",
+            "out.csv",
+            "--md",
+            "out.md",
+            "--html",
+            "out.html",
+            "--threads",
+            threads,
+        ];
+        truegrind(at, &arguments)
+    };
+    let (code, out, err) = run("one.json", "1");
+    assert!(code == 0, "{err}");
+    assert!(
+        out.contains("Held-out errors, 2 cases of 100 rows") && !out.contains("not the same in every run")
+    );
+    assert!(err.contains("not the same in every run"), "seconds go to stderr: {err}");
+    let (_, again, _) = run("two.json", "2");
+    assert_eq!(out, again);
+    let text = |name: &str| fs::read_to_string(at.join(name)).unwrap();
+    assert_eq!(text("one.json"), text("two.json"));
+    assert!(text("one.json").contains("truegrind.comparison/1"));
+    assert_eq!(text("out.csv").lines().count(), 1 + 2 * 3);
+    assert!(text("out.html").contains("<svg") && text("out.md").contains("Mine"));
+}
+
+#[test]
+fn track_takes_in_a_growing_file_writes_dated_models_and_goes_on_where_it_was_stopped() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("first.csv"), TRACKER).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(code == 0, "{err}");
+    let lines: Vec<&str> = TRACKER.lines().collect();
+    let day = |rows: usize, tail: &str| {
+        fs::write(at.join("day.csv"), lines[..=rows].join("\n") + "\n" + tail).unwrap();
+    };
+    let track = |arguments: &[&str]| {
+        let mut all = vec!["track", "day.csv", "--model", "model.toml", "-o", "out"];
+        all.extend(arguments);
+        truegrind(at, &all)
+    };
+    // A last line that is still being written is not read.
+    day(60, "12.3,4.");
+    let (code, out, err) = track(&["--date", "2026-05-04T12:30:00Z", "--json", "one.json"]);
+    assert!(code == 0 && out.contains("60 new poses"), "{out}{err}");
+    assert_eq!(names(&at.join("out")), ["model-20260504T123000Z-000060.toml", "model.track.toml"]);
+    day(110, "");
+    let (code, out, err) = track(&["--date", "2026-05-05"]);
+    assert!(code == 0 && out.contains("50 new poses"), "{out}{err}");
+    assert_eq!(names(&at.join("out")).len(), 3);
+    // Nothing new: nothing written.
+    let (code, _, err) = track(&["--date", "2026-05-06"]);
+    assert!(code == 0 && err.contains("no new measurements"), "{err}");
+    assert_eq!(names(&at.join("out")).len(), 3);
+    // The same in one go, to the bit.
+    let (_, _, err) =
+        truegrind(at, &["track", "day.csv", "--model", "model.toml", "-o", "whole", "--date", "2026-05-05"]);
+    let of = |folder: &str| fs::read_to_string(at.join(folder).join("model.track.toml"));
+    assert_eq!(of("out").unwrap(), of("whole").unwrap(), "{err}");
+    // A written model is a model like any other.
+    let model = "out/model-20260505-000110.toml";
+    let (code, _, err) = truegrind(at, &["track", "day.csv", "--model", model, "-o", "next"]);
+    assert!(code == 0, "{err}");
+    // Another model with this track, a bad date, a parameter that there is none of.
+    let (code, _, err) =
+        truegrind(at, &["track", "day.csv", "--model", model, "--state", "out/model.track.toml"]);
+    assert!(code == 2 && err.contains("another model"), "{err}");
+    assert!(track(&["--date", "today"]).2.contains("expected a date"));
+    assert!(track(&["--drift", "link9.theta=1"]).2.contains("link2.theta"));
+}
+
+#[test]
+fn identify_takes_every_sound_method_and_lists_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), TRACKER).unwrap();
+    let identify = |method: &str| {
+        truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "--method", method, "-o", "m.toml"])
+    };
+    let (code, _, err) = identify("annealing");
+    assert!(code == 2 && err.contains("unknown method") && err.contains("qibas"), "{err}");
+    for method in ["vslm", "sslm", "least-squares", "ukf-vslm", "ekf", "rls", "rbf"] {
+        let (code, out, err) = identify(method);
+        assert!(code == 0, "{method}: {out}{err}");
+        assert!(fs::read_to_string(at.join("m.toml")).unwrap().contains(&format!("method = \"{method}\"")));
+    }
+    // The network is in the file as an effect without a physical name, and the file is read again.
+    assert!(fs::read_to_string(at.join("m.toml")).unwrap().contains("smooth-correction"));
+    let (code, _, err) = truegrind(at, &["track", "data.csv", "--model", "m.toml", "-o", "out"]);
+    assert!(code == 0, "{err}");
+}

@@ -1,0 +1,62 @@
+//! An arm that degrades: RLS is least squares, and what it wins over LM has other names.
+
+use truegrind::comparison::degradation::{Degradation, Way, run};
+use truegrind::comparison::experiment::{Experiment, Kind};
+
+use super::experiment::nominal;
+
+fn small() -> Degradation {
+    let all = Experiment::shipped().unwrap();
+    let experiment = all.iter().find(|e| e.name == "rls-degradation").unwrap();
+    let Some(Kind::Degradation(settings)) = experiment.kind() else { panic!("a degradation experiment") };
+    Degradation { arms: 2, groups: 3, counts: vec![4, 5, 15], ..settings.clone() }
+}
+
+#[test]
+fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
+    let settings = small();
+    let result = run(&settings, "test", "tx60-pose", 3, nominal).unwrap();
+    // The arm degrades, and neglect undoes the first calibration.
+    assert!(result.nominal_mm[0] > 0.3 && result.nominal_mm[0] < 1.2, "{:?}", result.nominal_mm);
+    assert!(result.neglected_mm[2] > 2.0 * result.neglected_mm[0], "{:?}", result.neglected_mm);
+    let after = |way: Way, count: usize| {
+        let journey = result.journeys.iter().find(|j| j.way == way && j.count == count).unwrap();
+        journey.mean(|s| s.verification_after_mm)
+    };
+    for count in [15, 20, 50] {
+        let (rls, memory) = (after(Way::Rls, count), after(Way::LmMemory, count));
+        assert!((rls - memory).abs() < 0.02 * rls, "{count} poses: {rls} {memory}");
+        assert!(rls < 0.5 * result.nominal_mm[0]);
+    }
+    // Forgetting follows an arm that changes better than remembering everything.
+    let last = |way: Way| {
+        let journey = result.journeys.iter().find(|j| j.way == way && j.count == 50).unwrap();
+        journey.steps.last().unwrap().verification_after_mm
+    };
+    assert!(last(Way::RlsForgetting) < last(Way::Rls));
+}
+
+#[test]
+fn few_poses_are_stated_with_rank_and_condition() {
+    let result = run(&small(), "test", "tx60-pose", 3, nominal).unwrap();
+    let [four, five, fifteen] = result.counts.as_slice() else { panic!("three counts") };
+    assert_eq!((four.equations, five.equations), (24, 30));
+    assert!(four.rank <= 24 && fifteen.rank == 24);
+    assert!(four.condition > fifteen.condition);
+    // Few poses explain themselves and little else.
+    assert!(four.identification_mm < four.verification_mm);
+    assert!(fifteen.verification_mm < four.verification_mm);
+}
+
+#[test]
+fn what_cannot_be_used_is_said() {
+    let text = include_str!("../../../experiments/rls-degradation.toml");
+    for (from, to, word) in [
+        ("continuous = [15, 20]", "continuous = [60]", "no more than identify"),
+        ("forgetting = 0.95", "forgetting = 1.5", "up to 1"),
+        ("arms = 8", "arms = 0", "1 of each"),
+    ] {
+        let message = Experiment::parse(&text.replace(from, to), "mine.toml").unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+}
