@@ -139,9 +139,9 @@ pub(super) fn outlier_finding(
         row_list: Some(list),
         joints: None,
         parameters: Vec::new(),
-        evidence: "sizes beyond what the tail of the other residuals gives once in a thousand data sets"
+        evidence: "sizes beyond what the tail of the other residuals gives once in a hundred data sets"
             .to_owned(),
-        p_value: 1e-3,
+        p_value: 1e-2,
         non_centrality: None,
         gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
         alternatives: Vec::new(),
