@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::cell::Cell;
 use super::deviation::{PathPoint, Status};
 use super::mounting::{Mounted, Mounting, mount};
-use super::segment::{Ends, circle_bend, insertions, middles_off, straight_bend};
+use super::segment::{Ends, circle_bend, fastest, insertions, middles_off, straight_bend};
 use super::solve::{Solved, SolvedTargets, solve_all};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
@@ -443,7 +443,7 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
                 let bend = straight_bend(from, to, arms, options.emit, middle_mm);
                 outcome.bend_mm = Some(bend);
                 if bend > options.tolerance_mm {
-                    if motion.timed {
+                    if !motion.insertable {
                         flag = Some(Why::Bend { mm: bend });
                     } else {
                         let (extra, left) = insertions(from, to, arms, options);
@@ -457,15 +457,16 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
                 }
             }
             MotionKind::Circular if good.len() == 2 => {
-                let bend = circle_bend(from, &good[0].meant, &good[0].told, to, arms);
-                outcome.bend_mm = Some(bend);
-                if bend > options.tolerance_mm {
-                    flag = Some(Why::Bend { mm: bend });
-                }
+                outcome.bend_mm = circle_bend(from, &good[0].meant, &good[0].told, to, arms);
+                flag = match outcome.bend_mm {
+                    None => Some(Why::WholeCircle),
+                    Some(bend) => (bend > options.tolerance_mm).then_some(Why::Bend { mm: bend }),
+                };
             }
             _ => {}
         }
     }
+    let flag = flag.or_else(|| path.and_then(|path| too_fast(motion, listing, path, &good, arms)));
     let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
     let new_targets: Vec<NewTarget> =
         motion.targets.iter().zip(&good).map(|(t, s)| new_target(t, s, motion, options)).collect();
@@ -500,6 +501,25 @@ fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why>
         return Some(Why::OtherBranch);
     }
     None
+}
+
+/// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
+fn too_fast(
+    motion: &Motion,
+    listing: &Listing,
+    (from, to): &Path<'_>,
+    good: &[&Solved],
+    arms: &Arms<'_>,
+) -> Option<Why> {
+    let speed = listing.speed(motion).filter(|_| !motion.timed)?.value.as_ref().ok()?;
+    let [start, end] = [&from.meant, &to.meant].map(|pose| pose.translation.vector);
+    // An arc is a little longer than its two chords; the joints on it go with them.
+    let length = match good {
+        [via, _] => gap(&start, &via.meant.translation.vector) + gap(&via.meant.translation.vector, &end),
+        _ => gap(&start, &end),
+    };
+    let (joint, ratio) = fastest(from, to, length, speed, arms)?;
+    (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
 }
 
 fn doubtful(solved: &Solved, arms: &Arms<'_>) -> Option<Why> {

@@ -6,6 +6,7 @@ use super::mounting::Mounted;
 use super::rewrite::{Arms, Emit, Options, extra_of, gap};
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
+use crate::program::motion::SpeedValue;
 use crate::program::rewrite::Extra;
 
 /// A corrected end of a motion.
@@ -86,16 +87,52 @@ pub(super) fn middles_off(lines: &[&(Ends<'_>, Ends<'_>)], arms: &Arms<'_>, emit
 /// Longest piece of a line that is judged by three samples (mm).
 const PIECE_MM: f64 = 100.0;
 
-/// Largest distance from the intended line between two ends (mm): that of the `middle`, which is given, the quarters
-/// where the middle is not clearly straight, and more samples on long lines.
+/// Largest distance from the intended line between two ends (mm): that of the `middle`, which is given, and where that
+/// is not clearly straight of samples that get denser until they tell the distance to [`CHORD_MM`].
 pub(super) fn straight_bend(from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>, emit: Emit, middle: f64) -> f64 {
     let length = gap(&from.meant.translation.vector, &to.meant.translation.vector);
     let turn = from.meant.rotation.angle_to(&to.meant.rotation);
     if length < PIECE_MM && turn < 0.2 && middle < CLEARLY_STRAIGHT_MM {
         return middle;
     }
-    let pieces = 4 * ((length / PIECE_MM).ceil() as usize).clamp(1, 25);
-    (1..pieces).map(|k| off_at(from, to, k as f64 / pieces as f64, arms, emit)).fold(middle, f64::max)
+    let pieces = ((length / PIECE_MM).ceil() as usize).clamp(1, 25) * 2;
+    largest(pieces, &|s| off_at(from, to, s, arms, emit)).max(middle)
+}
+
+/// Between two samples the distance from the intended path is known to this (mm): their chord leaves the distance half
+/// way by no more.
+const CHORD_MM: f64 = 0.002;
+
+/// How often a piece is halved at most.
+const HALVINGS: u32 = 5;
+
+/// The largest value of a function over a path, which is 0 at both ends: equal pieces, each halved until its chord tells
+/// its middle to [`CHORD_MM`].
+fn largest(pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
+    let at = |k: usize| if k == 0 || k == pieces { 0.0 } else { off(k as f64 / pieces as f64) };
+    let mut most = 0.0_f64;
+    let mut before = at(0);
+    for k in 0..pieces {
+        let after = at(k + 1);
+        let (begin, end) = (k as f64 / pieces as f64, (k + 1) as f64 / pieces as f64);
+        most = most.max(after).max(between_samples((begin, before), (end, after), off, HALVINGS));
+        before = after;
+    }
+    most
+}
+
+fn between_samples(a: (f64, f64), b: (f64, f64), off: &dyn Fn(f64) -> f64, halvings: u32) -> f64 {
+    let s = 0.5 * (a.0 + b.0);
+    let middle = off(s);
+    // A path that cannot be gone is told by its first sample.
+    if halvings == 0 || !middle.is_finite() || (middle - 0.5 * (a.1 + b.1)).abs() <= CHORD_MM {
+        return middle;
+    }
+    let halves = [
+        between_samples(a, (s, middle), off, halvings - 1),
+        between_samples((s, middle), b, off, halvings - 1),
+    ];
+    halves[0].max(halves[1]).max(middle)
 }
 
 /// Below this the middle of a short line tells enough: the bend is a parabola to leading order.
@@ -141,34 +178,79 @@ fn split(
     first.max(second)
 }
 
-/// Largest distance of the tool from the intended circle, both circles through their three points, at seven shares
-/// of the arc; infinite where one of them is no circle.
+/// Largest distance of the tool from the intended circle, both circles through their three points, sampled along the
+/// arc until the samples tell it to [`CHORD_MM`]; infinite where three points make no circle, `None` for a whole one.
 pub(super) fn circle_bend(
     from: &Ends<'_>,
     via_meant: &Pose,
     via_told: &Pose,
     to: &Ends<'_>,
     arms: &Arms<'_>,
-) -> f64 {
+) -> Option<f64> {
     let point = |p: &Pose| Point3::from(p.translation.vector);
+    let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < 1e-6;
+    if closed {
+        return None;
+    }
     let meant = Arc::through(&point(&from.meant), &point(via_meant), &point(&to.meant));
     let told = Arc::through(&point(&from.told), &point(via_told), &point(&to.told));
-    let (Some(meant), Some(told)) = (meant, told) else { return f64::INFINITY };
-    (1..8)
-        .map(|k| {
-            let s = f64::from(k) / 8.0;
-            let rotation = between(&from.told, &to.told, s).rotation;
-            let pose = Pose::from_parts(told.at(s).coords.into(), rotation);
-            let near = from.joints.lerp(&to.joints, s);
-            match arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near) {
-                Ok(solution) => {
-                    let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&solution.joints));
-                    meant.distance(&point(&reached))
-                }
-                Err(_) => f64::INFINITY,
+    let (Some(meant), Some(told)) = (meant, told) else { return Some(f64::INFINITY) };
+    let off = |s: f64| {
+        let rotation = between(&from.told, &to.told, s).rotation;
+        let pose = Pose::from_parts(told.at(s).coords.into(), rotation);
+        let near = from.joints.lerp(&to.joints, s);
+        match arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near) {
+            Ok(solution) => {
+                let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&solution.joints));
+                meant.distance(&point(&reached))
             }
-        })
-        .fold(0.0, f64::max)
+            Err(_) => f64::INFINITY,
+        }
+    };
+    // At least every eighth of a turn, and every piece of a long arc.
+    let pieces = ((meant.sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
+        .max((meant.sweep * meant.radius / PIECE_MM).ceil() as usize)
+        .clamp(4, 64);
+    Some(largest(pieces, &off))
+}
+
+/// The joint that turns fastest for what it can, with its speed over its limit, at a speed along a path of this length
+/// and turn; `None` where the path or the limits say nothing.
+pub(super) fn fastest(
+    from: &Ends<'_>,
+    to: &Ends<'_>,
+    length_mm: f64,
+    speed: &SpeedValue,
+    arms: &Arms<'_>,
+) -> Option<(usize, f64)> {
+    let limits = arms.nominal.arm().model.limits.speed_rad_s?;
+    let turn_deg = from.meant.rotation.angle_to(&to.meant.rotation).to_degrees();
+    let duration_s = (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s);
+    if !(duration_s > 1e-6 && duration_s.is_finite()) {
+        return None;
+    }
+    // Speeds along a line follow its parts; joints at the parts of a long or turning one are worked out.
+    let parts = ((length_mm / 50.0).ceil() as usize).max((turn_deg / 10.0).ceil() as usize).clamp(1, 40);
+    let mut worst: Option<(usize, f64)> = None;
+    let mut before = from.joints;
+    for part in 1..=parts {
+        let s = part as f64 / parts as f64;
+        let joints = if part == parts {
+            to.joints
+        } else {
+            let told = between(&from.told, &to.told, s);
+            let near = from.joints.lerp(&to.joints, s);
+            arms.nominal.solve_near(&to.mounted.told.flange_for(&told), &near).ok()?.joints
+        };
+        for joint in 0..6 {
+            let ratio = (joints[joint] - before[joint]).abs() * parts as f64 / duration_s / limits[joint];
+            if worst.is_none_or(|(_, most)| ratio > most) {
+                worst = Some((joint, ratio));
+            }
+        }
+        before = joints;
+    }
+    worst
 }
 
 /// An arc from its start over a point to its end.

@@ -38,6 +38,15 @@ pub enum Why {
         /// By how much (mm).
         mm: f64,
     },
+    /// At the programmed speed a joint turns faster than it can.
+    TooFast {
+        /// Joint, 0-based.
+        joint: usize,
+        /// Its speed over its limit, above 1.
+        ratio: f64,
+    },
+    /// A whole circle: its ends say nothing of its plane, so its path is not checked.
+    WholeCircle,
     /// A joint stands outside the range in which it was measured.
     JointNotMeasured {
         /// Joint, 0-based.
@@ -82,6 +91,14 @@ impl fmt::Display for Why {
             Why::NearSingularity => f.write_str("too close to a singularity"),
             Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
+            Why::TooFast { joint, ratio } => {
+                write!(
+                    f,
+                    "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
+                    joint + 1
+                )
+            }
+            Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
             Why::JointNotMeasured { joint, by_deg } => {
                 write!(
                     f,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
 use super::cause::Cause;
-use super::design::{Design, Linear, back_and_forth, factored, gram, product};
+use super::design::{Design, Linear, back_and_forth, factored, gram, outer, product};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::score::{Score, score};
 use super::{intervals, lines};
@@ -30,7 +30,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { alpha: 0.01, most: 12, seed: 0 }
+        Self { alpha: 0.01, most: 20, seed: 0 }
     }
 }
 
@@ -188,7 +188,7 @@ impl Folds {
             .par_iter()
             .map(|rows| {
                 let q = design.basis.select_columns(rows);
-                product(&q, &q.transpose())
+                outer(&q)
             })
             .collect();
         Self { tests, grams }

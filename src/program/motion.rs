@@ -384,6 +384,8 @@ pub struct Motion {
     pub work_object: Option<u32>,
     /// Whether the speed is overridden by a time for the whole motion (`\T`), which forbids extra targets.
     pub timed: bool,
+    /// Whether the language lets targets be put in before it.
+    pub insertable: bool,
     /// The modal state in which it runs.
     pub modal: Modal,
     /// Whether it stands in a loop.

@@ -395,6 +395,11 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
             sized("correction of the orientation exceeds the bound".to_owned(), deg, "°")
         }
         Why::Bend { mm } => sized("the path between targets leaves the intended one".to_owned(), mm, "mm"),
+        Why::TooFast { joint, ratio } => sized(
+            format!("at the programmed speed joint {} turns faster than it can", joint + 1),
+            ratio,
+            "× limit",
+        ),
         Why::JointNotMeasured { joint, by_deg } => sized(
             format!("joint {} is outside the range in which the arm was measured", joint + 1),
             by_deg,
@@ -410,6 +415,7 @@ fn worst_text(value: f64, unit: &str) -> String {
     match unit {
         "°" => format!("{value:.2}°"),
         "×" => format!("{value:.1} times the usual distance"),
+        "× limit" => format!("{value:.2} times its limit"),
         unit => format!("{value:.3} {unit}"),
     }
 }

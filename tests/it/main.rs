@@ -17,4 +17,5 @@ mod comparison;
 mod report;
 mod visual;
 mod command;
+mod programs;
 mod layers;

@@ -64,6 +64,8 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token) -> (To
         }
         b'+' => (Token::Plus, 1),
         b'-' => (Token::Minus, 1),
+        // The end of a block on old tapes.
+        b'*' if dialect.paren_comments() && ends_line(&rest[1..]) => (Token::Comment, 1),
         b'*' => two(b'*', Token::Power, Token::Star),
         b'/' => (Token::Slash, 1),
         b'=' => two(b'=', Token::EqualEqual, Token::Equal),
@@ -83,6 +85,12 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token) -> (To
 
 fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C | 0x1A | 0x00 | 0xA0)
+}
+
+/// Whether nothing but white space follows on the line.
+fn ends_line(rest: &[u8]) -> bool {
+    let next = rest.iter().find(|&&byte| !matches!(byte, b' ' | b'\t' | b'\r'));
+    next.is_none_or(|&byte| byte == b'\n')
 }
 
 fn run(rest: &[u8], wanted: impl Fn(u8) -> bool) -> usize {

@@ -166,6 +166,28 @@ struct Slots<'s> {
     last: u32,
 }
 
+/// Places in the order of words.
+const AXES: usize = 0;
+const ANGLES: usize = 3;
+const VECTOR: usize = 6;
+const SPIN: usize = 9;
+const CENTRE: usize = 10;
+const RADIUS: usize = 13;
+const ORDER: usize = 14;
+
+impl<'s> Slots<'s> {
+    fn order(&self) -> [Option<Word<'s>>; ORDER] {
+        let mut order = [None; ORDER];
+        order[AXES..ANGLES].copy_from_slice(&self.axes);
+        order[ANGLES..VECTOR].copy_from_slice(&self.angles);
+        order[VECTOR..SPIN].copy_from_slice(&self.vector);
+        order[SPIN] = self.spin;
+        order[CENTRE..RADIUS].copy_from_slice(&self.centre);
+        order[RADIUS] = self.radius;
+        order
+    }
+}
+
 /// Where a motion shall go.
 struct Aim {
     position: [f64; 3],
@@ -305,6 +327,8 @@ impl<'s> Follower<'_, 's> {
             tree,
             dialect,
             edits: &mut edits,
+            order: slots.order(),
+            end: slots.end,
             added: Vec::new(),
             replaced: Outcome::Unchanged,
             spaced: spaced(tree, slots.last),
@@ -328,7 +352,7 @@ impl<'s> Follower<'_, 's> {
             let old_base = if increment { written.start[axis] } else { written.shift[axis] };
             let was = old_base.map_or(f64::NAN, |old| (meant[axis] - old) / unit);
             let name = [b"X", b"Y", b"Z"][axis];
-            let value = pen.put(word, name, value, keep, was, decimals);
+            let value = pen.put(AXES + axis, name, value, keep, was, decimals);
             reached[axis] = value * unit + base;
         }
         let told = self.orientation(&mut pen, written, slots, aim, file);
@@ -336,7 +360,7 @@ impl<'s> Follower<'_, 's> {
             let Plane { a, b, .. } = arc.plane;
             let absolute_centre = written.arc.is_some_and(|(_, _, absolute)| absolute);
             let old = written.arc.map(|(old, _, _)| old);
-            if let Some(radius) = slots.radius {
+            if slots.radius.is_some() {
                 let was = old.and_then(|old| {
                     let length = (written.start[a]? - old.centre_mm[0])
                         .hypot(written.start[b]? - old.centre_mm[1])
@@ -345,7 +369,7 @@ impl<'s> Follower<'_, 's> {
                 });
                 let length = (begin[a] - arc.centre_mm[0]).hypot(begin[b] - arc.centre_mm[1]) / unit;
                 let length = if arc.is_long() { -length } else { length };
-                pen.put(Some(radius), b"R", length, length, was.unwrap_or(f64::NAN), decimals);
+                pen.put(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
             } else {
                 for (place, axis) in [a, b].into_iter().enumerate() {
                     let word = slots.centre[axis];
@@ -358,19 +382,18 @@ impl<'s> Follower<'_, 's> {
                     let keep = (begin[axis] - base) / unit;
                     let old_base = if increment { written.start[axis] } else { written.shift[axis] };
                     let was = old.and_then(|old| Some((old.centre_mm[place] - old_base?) / unit));
-                    pen.put(word, [b"I", b"J", b"K"][axis], value, keep, was.unwrap_or(f64::NAN), decimals);
+                    pen.put(
+                        CENTRE + axis,
+                        [b"I", b"J", b"K"][axis],
+                        value,
+                        keep,
+                        was.unwrap_or(f64::NAN),
+                        decimals,
+                    );
                 }
             }
         }
-        let Pen { added, mut replaced, .. } = pen;
-        if !added.is_empty() {
-            // After the last byte of the last word: white space belongs to what follows.
-            let at = tree.start(slots.end - 1) + tree.text(slots.end - 1).len();
-            edits.insert(at, &added);
-            if replaced == Outcome::Unchanged {
-                replaced = Outcome::InPlace;
-            }
-        }
+        let replaced = pen.replaced;
         self.edits[file] = edits;
         if let Some(to) = to {
             self.arrive(&to, written, Some((reached, told)));
@@ -409,7 +432,7 @@ impl<'s> Follower<'_, 's> {
                     let old_base = if increment { written.start_angles[axis] } else { Some(0.0) };
                     let was = old_base.map_or(f64::NAN, |old| meant[axis] - old);
                     let decimals = self.options.joint_decimals;
-                    let value = pen.put(word, names[axis], angles[axis] - base, keep, was, decimals);
+                    let value = pen.put(ANGLES + axis, names[axis], angles[axis] - base, keep, was, decimals);
                     reached[axis] = value + base;
                 }
                 Told::Angles(reached)
@@ -438,12 +461,12 @@ impl<'s> Follower<'_, 's> {
                 if stated || !holds {
                     for axis in 0..3 {
                         // A component that is left out is 0.
-                        pen.put(slots.vector[axis], names[axis], vector[axis], 0.0, meant[axis], decimals);
+                        pen.put(VECTOR + axis, names[axis], vector[axis], 0.0, meant[axis], decimals);
                     }
                 }
                 if pen.dialect == Dialect::Siemens {
                     let held = before.map_or(0.0, |(_, spin)| spin);
-                    pen.put(slots.spin, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
+                    pen.put(SPIN, b"THETA", spin, held, meant_spin, self.options.joint_decimals);
                 }
                 Told::Vector(vector, spin)
             }
@@ -473,6 +496,8 @@ impl<'s> Follower<'_, 's> {
                 tree,
                 dialect,
                 edits: &mut scratch,
+                order: [None; ORDER],
+                end: 0,
                 added: Vec::new(),
                 replaced: Outcome::Unchanged,
                 spaced: true,
@@ -485,7 +510,8 @@ impl<'s> Follower<'_, 's> {
                 let shift = written.shift[axis].unwrap_or(0.0) + self.now.moved[axis];
                 let base = if written.absolute { shift } else { from };
                 let value = (position_mm[axis] - base) / unit;
-                let value = pen.put(None, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
+                let value =
+                    pen.put(AXES + axis, [b"X", b"Y", b"Z"][axis], value, f64::NAN, f64::NAN, decimals);
                 reached[axis] = value * unit + base;
             }
             let none = Slots::default();
@@ -521,7 +547,11 @@ struct Pen<'p, 's> {
     tree: &'p NcTree<'s>,
     dialect: Dialect,
     edits: &'p mut Edits,
-    /// Words to put in.
+    /// The words of the block in the order in which controls list them.
+    order: [Option<Word<'p>>; ORDER],
+    /// After which token new words go where the block has none of these.
+    end: u32,
+    /// The words of a block that does not exist yet.
     added: Vec<u8>,
     replaced: Outcome,
     /// Whether white space stands between words here.
@@ -529,32 +559,51 @@ struct Pen<'p, 's> {
 }
 
 impl Pen<'_, '_> {
+    /// Puts a word in at its place among the others: before the next of them, else after the last.
+    fn insert(&mut self, place: usize, mut text: Vec<u8>) {
+        if self.end == 0 {
+            self.added.push(b' ');
+            self.added.extend_from_slice(&text);
+            return;
+        }
+        if self.replaced == Outcome::Unchanged {
+            self.replaced = Outcome::InPlace;
+        }
+        match self.order[place + 1..].iter().flatten().next() {
+            Some(next) => {
+                if self.spaced {
+                    text.push(b' ');
+                }
+                self.edits.insert(self.tree.start(next.first), &text);
+            }
+            None => {
+                let last = self.order[..place].iter().flatten().next_back().map_or(self.end, |word| word.end);
+                if self.spaced {
+                    text.insert(0, b' ');
+                }
+                // After the last byte of the word: white space belongs to what follows.
+                let at = self.tree.start(last - 1) + self.tree.text(last - 1).len();
+                self.edits.insert(at, &text);
+            }
+        }
+    }
+
     /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
     /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
-    fn put(
-        &mut self,
-        word: Option<Word<'_>>,
-        name: &[u8],
-        value: f64,
-        keep: f64,
-        was: f64,
-        least: u8,
-    ) -> f64 {
-        let Some(word) = word else {
+    fn put(&mut self, place: usize, name: &[u8], value: f64, keep: f64, was: f64, least: u8) -> f64 {
+        let Some(word) = self.order[place] else {
             if !differs(keep, value, least) {
                 return keep;
             }
-            if self.spaced {
-                self.added.push(b' ');
-            }
-            self.added.extend_from_slice(name);
+            let mut text = name.to_vec();
             if name.len() > 1 && self.dialect == Dialect::Siemens {
-                self.added.push(b'=');
+                text.push(b'=');
             }
             if self.dialect == Dialect::Heidenhain && number::rounded(value, least) >= 0.0 {
-                self.added.push(b'+');
+                text.push(b'+');
             }
-            number::write(&mut self.added, value, least);
+            number::write(&mut text, value, least);
+            self.insert(place, text);
             return number::rounded(value, least);
         };
         match word.belongs {

@@ -168,6 +168,8 @@ struct Said<'s> {
     /// FMAX.
     rapid: bool,
     turns: bool,
+    /// Corners that are rounded or cut: `,R5`, `,C2`, RND=, CHF=, CHR=.
+    corner: bool,
 }
 
 impl Said<'_> {
@@ -361,12 +363,14 @@ impl<'t, 's> Lister<'t, 's> {
                 Some(b'Y') => said.axes[1] = at,
                 Some(b'Z') => said.axes[2] = at,
                 Some(b'C') if self.dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {}
+                Some(b'C') if index > 0 && said.words[index - 1].name == b"," => said.corner = true,
                 Some(letter @ (b'A' | b'B' | b'C')) => said.abc[usize::from(letter - b'A')] = at,
                 Some(letter @ (b'I' | b'J' | b'K')) => said.centre[usize::from(letter - b'I')] = at,
                 Some(b'R') if self.dialect == Dialect::Heidenhain => match word.belongs {
                     Belongs::Literal { sign: None, .. } => self.state.radius = false,
                     _ => said.radius = at,
                 },
+                Some(b'R') if index > 0 && said.words[index - 1].name == b"," => said.corner = true,
                 Some(b'R') => said.radius = at,
                 Some(b'F') => said.feed = at,
                 Some(b'P') => said.p = at,
@@ -388,6 +392,7 @@ impl<'t, 's> Lister<'t, 's> {
             (Dialect::Siemens, b"THETA") => said.spin = at,
             (Dialect::Siemens, b"CR") => said.radius = at,
             (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => said.turns = true,
+            (Dialect::Siemens, b"RND" | b"RNDM" | b"CHF" | b"CHR") => said.corner = true,
             (Dialect::Siemens, b"SUPA" | b"G153") => said.machine = true,
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => said.axes[usize::from(letter - b'X')] = at,
             (Dialect::Heidenhain, [b'I', letter @ b'A'..=b'C']) => said.abc[usize::from(letter - b'A')] = at,
@@ -615,11 +620,12 @@ impl<'t, 's> Lister<'t, 's> {
                 }
                 true
             }
-            (b":", _) => {
+            // A program number stands alone; with words it is a block number.
+            (b":", _) if said.words.len() == 1 => {
                 if !self.written.is_empty() {
                     self.forget();
                 }
-                said.words.len() == 1
+                true
             }
             (b"PROC", _) => {
                 self.forget();
@@ -705,7 +711,7 @@ fn group_of(code: u32, dialect: Dialect) -> Option<(Group, u32)> {
         540..=599 => (Group::Frame, code),
         5000..=5999 if dialect == Dialect::Siemens => (Group::Frame, code),
         400..=429 => (Group::Radius, code),
-        434 | 435 => (Group::Tip, code),
+        434 | 435 | 2340 => (Group::Tip, code),
         490 => (Group::Tip, 0),
         680 | 682 | 683 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
         _ => return None,

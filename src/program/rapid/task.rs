@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator, Source};
 use super::flow::{CallSite, State, Surroundings, Visitor, walk};
-use super::instruction::{self, INSTRUCTIONS, Instruction, Slot};
+use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
 use super::literal;
 use super::mark;
 use super::modal::{States, Which};
@@ -279,6 +279,7 @@ impl<'a, 's> Lister<'a, 's> {
             tool: None,
             work_object: None,
             timed: false,
+            insertable: false,
             modal: crate::program::motion::Modal::START,
             in_loop: around.in_loop,
             conditional: around.conditional,
@@ -386,6 +387,7 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         motion.timed = options.timed;
+        motion.insertable = !options.timed && !around.guarded && instruction.between != Between::Nothing;
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }

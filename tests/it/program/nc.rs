@@ -317,7 +317,7 @@ fn words_keep_their_place_and_missing_ones_are_put_in() {
         rewrite_as(&source, Dialect::LinuxCnc, |listing| vec![change_of(listing, 1, [0.25, 0.125, 0.0])]);
     assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
     // X in place with enough decimals, Y put in; the next motion, which stays, says X again and goes on with its own Y.
-    let expected = source.replace("X 5.5", "X 5.7500 Y2.1250").replace("Y-7", "Y-7 X5.5000");
+    let expected = source.replace("X 5.5", "X 5.7500 Y2.1250").replace("Y-7", "X5.5000 Y-7");
     assert_eq!(text, expected);
 }
 

@@ -306,8 +306,10 @@ impl Lister<'_, '_> {
                 }
                 200 => self.unit(25.4),
                 210 => self.unit(1.0),
-                700 | 7000 if siemens => self.unit(25.4),
-                710 | 7100 if siemens => self.unit(1.0),
+                // Lathe cycles of Fanuc have the same numbers, and a P.
+                700 | 710 if said.p.is_none() => self.unit(if code == 700 { 25.4 } else { 1.0 }),
+                7000 if siemens => self.unit(25.4),
+                7100 if siemens => self.unit(1.0),
                 400 => {
                     self.state.radius = false;
                     self.set(Group::Radius);
@@ -316,7 +318,8 @@ impl Lister<'_, '_> {
                     self.state.radius = true;
                     self.set(Group::Radius);
                 }
-                434 | 435 => {
+                // G234 is Haas's.
+                434 | 435 | 2340 => {
                     (self.state.tip, self.state.vector_words) = (true, code == 435);
                     self.set(Group::Tip);
                 }
@@ -440,6 +443,13 @@ impl Lister<'_, '_> {
                 _ => {}
             }
         }
+        if self.dialect == Dialect::Heidenhain && said.m.contains(&140) {
+            // Back along the tool to the end of the range.
+            self.left(said, "M140", Reason::ReferenceReturn);
+            self.state.lose_position();
+            self.events.push(Event::Lost(super::POSITION));
+            return true;
+        }
         if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso | Dialect::LinuxCnc)
             && said.m.iter().any(|m| matches!(m, 97 | 98 | 198))
         {
@@ -512,6 +522,7 @@ impl Lister<'_, '_> {
             tool: None,
             work_object: None,
             timed: false,
+            insertable: false,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
             conditional: said.skippable,
@@ -689,10 +700,13 @@ impl Lister<'_, '_> {
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
         motion.left = self.left_because(said, mode, machine, &motion);
+        motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
             && !heidenhain
             && !said.skippable
+            && !motion.timed
             && before.start.iter().all(Option::is_some);
+        motion.insertable = insertable;
         let after = self.written_as(said, None);
         let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
             before.start_angles
@@ -837,6 +851,8 @@ impl Lister<'_, '_> {
             Some(Reason::Unread)
         } else if said.skippable {
             Some(Reason::Skippable)
+        } else if said.corner {
+            Some(Reason::NotFollowed)
         } else if let Mode::Other(reason) = mode {
             Some(reason)
         } else if machine {

@@ -1,0 +1,258 @@
+//! Programs of either language as a user has them: NC from path to deviation, folders, bad files, diffs, marks.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use nalgebra::Vector3;
+use tempfile::TempDir;
+use truegrind::kinematics::estimated::Estimated;
+
+const CABLE: &str = include_str!("../data/irb120-cable.csv");
+
+fn truegrind(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output =
+        Command::cargo_bin("truegrind").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+/// A folder with a model of the simulated actual arm, which stands in `arm.toml`.
+fn workshop() -> TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    fs::write(at.join("recipe.toml"), include_str!("../data/irb120-cable.toml")).unwrap();
+    fs::write(at.join("blade.toml"), include_str!("../../surfaces/blade.toml")).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, _, err) = truegrind(at, &["simulate", "recipe.toml", "-o", "again.csv", "--arm", "arm.toml"]);
+    assert_eq!(code, 0, "{err}");
+    dir
+}
+
+/// Deviations before and after of every point, on the actual arm.
+fn achieved(at: &Path, program: &str, intended: &str) -> Vec<[Vector3<f64>; 2]> {
+    let (code, text, err) = truegrind(
+        at,
+        &[
+            "deviation",
+            program,
+            "--model",
+            "nominal",
+            "--robot",
+            "abb-irb-120",
+            "--intended",
+            intended,
+            "--actual",
+            "arm.toml",
+            "--json",
+        ],
+    );
+    assert_eq!(code, 0, "{err}");
+    let report = json(&text);
+    let points = report["programs"][0]["models"][0]["points"].as_array().unwrap().clone();
+    let vector = |value: &serde_json::Value| {
+        Vector3::from(["dx_mm", "dy_mm", "dz_mm"].map(|axis| value[axis].as_f64().unwrap()))
+    };
+    points.iter().map(|point| [vector(&point["before"]), vector(&point["after"])]).collect()
+}
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn a_path_as_nc_is_compensated_and_goes_where_it_shall() {
+    let dir = workshop();
+    let at = dir.path();
+    for arguments in [
+        &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "blade.mod"][..],
+        &["compensate", "blade.mod", "--model", "model.toml", "-o", "out.mod"],
+    ] {
+        let (code, _, err) = truegrind(at, arguments);
+        assert!(code == 0 || code == 1, "{err}");
+    }
+    let rapid = achieved(at, "out.mod", "blade.mod");
+    let shape = |which: usize| {
+        let mean = rapid.iter().map(|d| d[which]).sum::<Vector3<f64>>() / rapid.len() as f64;
+        rapid.iter().map(|d| (d[which] - mean).norm_squared()).sum::<f64>()
+    };
+    assert!(shape(1) < 0.5 * shape(0), "the rewritten program is better: {} {}", shape(0), shape(1));
+    for (name, word) in [("blade.nc", "G43.4 H1"), ("blade.mpf", "TRAORI")] {
+        let out = format!("out-{name}");
+        let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", name]);
+        assert_eq!(code, 0, "{err}");
+        let original = fs::read_to_string(at.join(name)).unwrap();
+        assert!(original.contains(word) && original.contains("\nN"), "{original}");
+        let (code, text, err) =
+            truegrind(at, &["compensate", name, "--model", "model.toml", "-o", &out, "--json"]);
+        assert!(code == 0 || code == 1, "{err}");
+        let contract = json(&text);
+        let motions = contract["programs"][0]["motions"].as_array().unwrap();
+        assert!(motions.len() > 300, "{}", motions.len());
+        let changed = motions.iter().filter(|m| m["status"] == "changed" || m["status"] == "flagged").count();
+        assert!(changed * 10 > motions.len() * 9, "{changed} of {}", motions.len());
+        let rewritten = fs::read_to_string(at.join(&out)).unwrap();
+        assert!(rewritten.contains("truegrind 0") && rewritten.contains(" model "), "a mark is written");
+        // A word that was left out and must now change stands in its block.
+        let words = |text: &str| {
+            text.lines().filter(|line| line.starts_with('N')).flat_map(str::split_whitespace).count()
+        };
+        assert!(words(&rewritten) > words(&original) + 300, "{} {}", words(&rewritten), words(&original));
+        // On the actual arm, which the correction knew nothing of, it goes where the RAPID program goes.
+        let found = achieved(at, &out, name);
+        assert_eq!(found.len(), rapid.len());
+        for ([before, after], [rapid_before, rapid_after]) in found.iter().zip(&rapid) {
+            assert!((before - rapid_before).norm() < 2e-3, "{name}: {before} {rapid_before}");
+            assert!((after - rapid_after).norm() < 2e-3, "{name}: {after} {rapid_after}");
+        }
+        let (code, text, _) = truegrind(at, &["compensate", &out, "--model", "model.toml", "-o", "twice.nc"]);
+        assert_eq!((code, text.contains("already compensated")), (1, true), "{text}");
+        assert!(!at.join("twice.nc").exists());
+    }
+}
+
+fn module(name: &str, count: usize, shift: f64) -> String {
+    let mut text = format!("MODULE {name}\n  PROC main()\n    ConfL\\Off;\n");
+    for k in 0..count {
+        let _ = writeln!(
+            text,
+            "    MoveL [[{:.1},{:.1},450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;",
+            350.0 + shift,
+            k as f64 * 2.0 - 20.0
+        );
+    }
+    text + "  ENDPROC\nENDMODULE\n"
+}
+
+#[test]
+fn a_folder_is_done_in_parallel_past_what_cannot_be_done() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in/below")).unwrap();
+    fs::write(at.join("in/a.mod"), module("A", 5, 0.0)).unwrap();
+    fs::write(at.join("in/below/b.mod"), module("A", 4, 10.0)).unwrap();
+    fs::write(at.join("in/c.mod"), "MODULE C\n  ! truegrind 0.0.1 model ffffffffffff\nENDMODULE\n").unwrap();
+    fs::write(at.join("in/d.mod"), [1, 2, 3, 4, 5, 0, 0, 1]).unwrap();
+    fs::write(at.join("in/e.pgf"), "<Program><Module>e1.mod</Module></Program>").unwrap();
+    fs::write(at.join("in/e1.mod"), module("E", 3, 20.0)).unwrap();
+    fs::write(at.join("in/f.pgf"), "<Program><Module>nowhere.mod</Module></Program>").unwrap();
+    fs::write(at.join("in/g.nc"), "G21 G90\nG1 X1 Y2 Z3 F100\n").unwrap();
+    fs::write(at.join("in/notes.txt"), "no program").unwrap();
+    let run = |out: &str, threads: &str| {
+        truegrind(
+            at,
+            &[
+                "compensate",
+                "in",
+                "--model",
+                "model.toml",
+                "-o",
+                out,
+                "--csv",
+                "rows.csv",
+                "--json",
+                "all.json",
+                "--md",
+                "all.md",
+                "--html",
+                "all.html",
+                "--diff",
+                "all.diff",
+                "--threads",
+                threads,
+            ],
+        )
+    };
+    let (code, text, err) = run("out", "1");
+    assert_eq!(code, 1, "{text}\n{err}");
+    let rows = fs::read_to_string(at.join("rows.csv")).unwrap();
+    let status = |file: &str| -> Vec<String> {
+        let row = rows.lines().find(|row| row.contains(file)).unwrap_or_else(|| panic!("{file}: {rows}"));
+        row.split(',').take(4).map(str::to_owned).collect()
+    };
+    assert_eq!(rows.lines().count(), 8, "{rows}");
+    assert_eq!(status("in/a.mod")[1..], ["changed", "5", "5"]);
+    assert_eq!(status("in/below/b.mod")[1..], ["changed", "4", "4"]);
+    assert_eq!(status("in/c.mod")[1], "failed");
+    assert_eq!(status("in/d.mod")[1..3], ["unchanged", "0"]);
+    assert_eq!(status("in/e1.mod")[1..], ["changed", "3", "3"]);
+    assert_eq!(status("in/f.pgf")[1], "failed");
+    assert_eq!(status("in/g.nc")[1..], ["unchanged", "1", "0"]);
+    let all = json(&fs::read_to_string(at.join("all.json")).unwrap());
+    assert_eq!(all["failed"].as_array().unwrap().len(), 2);
+    assert_eq!(all["totals"]["motions"], 13);
+    assert_eq!(all["programs"].as_array().unwrap().len(), 5);
+    for page in ["all.md", "all.html"] {
+        let page = fs::read_to_string(at.join(page)).unwrap();
+        assert!(page.contains("in/below/b.mod") && page.contains("nowhere.mod"), "{page}");
+    }
+    // Below the folder everything keeps its place; what was not done is not there.
+    for (file, there) in [
+        ("a.mod", true),
+        ("below/b.mod", true),
+        ("c.mod", false),
+        ("d.mod", true),
+        ("e1.mod", true),
+        ("g.nc", true),
+    ] {
+        assert_eq!(at.join("out").join(file).exists(), there, "{file}");
+    }
+    assert_eq!(fs::read(at.join("out/d.mod")).unwrap(), [1, 2, 3, 4, 5, 0, 0, 1]);
+    // The same bytes for any number of threads, and a diff that says what changed.
+    let diff = fs::read_to_string(at.join("all.diff")).unwrap();
+    assert!(diff.contains("--- in/a.mod\n+++ out/a.mod\n@@ -1,"), "{diff}");
+    assert_eq!(diff.lines().filter(|line| line.starts_with("-    MoveL")).count(), 12);
+    let (_, _, _) = run("out2", "2");
+    for file in ["a.mod", "below/b.mod", "e1.mod"] {
+        assert_eq!(
+            fs::read(at.join("out").join(file)).unwrap(),
+            fs::read(at.join("out2").join(file)).unwrap(),
+            "{file}"
+        );
+    }
+    // Once more over what was written: all of it is done already.
+    let (code, text, _) = truegrind(at, &["compensate", "out", "--model", "model.toml", "-o", "out3"]);
+    assert_eq!(code, 1);
+    assert!(text.contains("3 already compensated"), "{text}");
+}
+
+#[test]
+fn dry_run_check_and_diff_write_no_program() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::write(at.join("a.mod"), module("A", 5, 0.0)).unwrap();
+    let (code, text, err) =
+        truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run", "--diff"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(text.contains("--- a.mod\n+++ a.mod\n"), "{text}");
+    assert!(text.contains("+  ! truegrind ") || text.contains("+! truegrind "), "{text}");
+    let (code, _, _) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--check"]);
+    assert_eq!(code, 1, "something would change");
+    assert_eq!(fs::read_to_string(at.join("a.mod")).unwrap(), module("A", 5, 0.0));
+    // A program of another model: refused, and with --again said to add up.
+    let (code, _, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", "b.mod"]);
+    assert_eq!(code, 0, "{err}");
+    let text = fs::read_to_string(at.join("model.toml")).unwrap();
+    fs::write(at.join("other.toml"), format!("{text}\n# another\n")).unwrap();
+    let (code, _, err) = truegrind(at, &["compensate", "b.mod", "--model", "other.toml", "-o", "c.mod"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("--again") && !at.join("c.mod").exists(), "{err}");
+    let (code, _, err) =
+        truegrind(at, &["compensate", "b.mod", "--model", "other.toml", "-o", "c.mod", "--again"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("add up"), "{err}");
+    let marked = fs::read_to_string(at.join("c.mod")).unwrap();
+    assert_eq!(marked.matches("truegrind 0").count(), 1, "one mark, of the new model: {marked}");
+    // A fragment carries no mark, and that is said.
+    let fragment =
+        module("A", 2, 0.0).lines().filter(|line| line.contains("MoveL")).collect::<Vec<_>>().join("\n");
+    fs::write(at.join("f.mod"), fragment).unwrap();
+    let (code, _, err) = truegrind(at, &["compensate", "f.mod", "--model", "model.toml", "-o", "g.mod"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("carries no mark"), "{err}");
+    assert!(Estimated::from_toml(&text).is_ok());
+}
