@@ -276,7 +276,8 @@ fn verdict(study: &Study) -> Verdict {
         .iter()
         .filter(|c| matches!(&c.conclusion, Conclusion::SameOptimum { stopped, .. } if !stopped.is_empty()));
     let headline = format!(
-        "Of {} comparisons with {}, {} are significant differences of methods and {} only of where a method was stopped",
+        "Of {} methods compared with {}, {} differ significantly; {} share its optimum and differ only by where they were \
+         stopped",
         comparisons.len(),
         name_of(study, &study.judgement.reference),
         real.count(),
