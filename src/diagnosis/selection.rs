@@ -144,6 +144,12 @@ impl Catalogue {
             .chain(open.par_iter())
             .map(|candidate| Scored { candidate: candidate.clone(), score: score(design, candidate) })
             .collect();
+        // A closer description of a cause that is already in the model is likelier than one more cause.
+        for scored in &mut out {
+            if fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
+                scored.score.merit += CLOSER;
+            }
+        }
         out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
         out
     }
@@ -414,6 +420,9 @@ fn near(current: &Extended, index: usize) -> Extended {
     }
     out
 }
+
+/// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
+const CLOSER: f64 = 10.0;
 
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
