@@ -320,7 +320,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             let all: Vec<usize> = (0..current.causes.len()).collect();
             match review(subject, &catalogue, options, &current, &all) {
                 Review::Changed(settled) => {
-                    current = settled;
+                    current = *settled;
                     continue;
                 }
                 Review::Settled(accepted) => {
@@ -345,7 +345,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             let unsure: Vec<usize> =
                 (0..current.causes.len()).filter(|&k| already(&doubtful, &current.causes[k])).collect();
             match review(subject, &catalogue, options, &current, &unsure) {
-                Review::Changed(settled) => current = settled,
+                Review::Changed(settled) => current = *settled,
                 Review::Settled(_) => break,
             }
         }
@@ -430,7 +430,7 @@ const EXCHANGE: f64 = 2.0;
 /// What looking again at accepted causes came to.
 enum Review {
     /// One was dropped or exchanged.
-    Changed(Extended),
+    Changed(Box<Extended>),
     /// All stand.
     Settled(Vec<Accepted>),
 }
@@ -463,13 +463,13 @@ fn review(
         let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
         if better.is_some() || !carries {
             let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
-            return Review::Changed(match better {
+            return Review::Changed(Box::new(match better {
                 Some(better) => {
                     others.push(better.candidate.cause.clone());
                     fit(subject, &others, Freedom::All, Some(&reduced))
                 }
                 None => reduced,
-            });
+            }));
         }
         accepted.push(judged);
     }
