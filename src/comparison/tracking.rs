@@ -14,7 +14,7 @@
 //! **Which parameter, since when.** For every parameter k and every pose s of the history, the generalised likelihood
 //! ratio of a step of k at s (Willsky and Jones 1976), against what was known before the history began. With J and r of
 //! the history at that state, P its covariance, A_s = Σ_{i≥s} JᵢᵀJᵢ, g_s = Σ_{i≥s} Jᵢᵀrᵢ and M = (P⁻¹ + A₀)⁻¹:
-//! ratio = (g_s[k] − A_s[:,k]ᵀ M g₀)² / (A_s[k,k] − A_s[:,k]ᵀ M A_s[:,k]), exact for rows of unit noise. Parameters whose
+//! ratio = (g_s(k) − A_s(:,k)ᵀ M g₀)² / (A_s(k,k) − A_s(:,k)ᵀ M A_s(:,k)), exact for rows of unit noise. Parameters whose
 //! ratio is nearly as large are named as alternatives: a sensor that was knocked and a joint that lost its zero can look
 //! the same.
 //!
