@@ -108,6 +108,8 @@ impl Numbers {
             (Parameter::Effect { index, parameter }, _) => {
                 match model.effects[*index].parameters()[*parameter].unit {
                     "rad/(N m)" => 1e-5,
+                    // A bump may be as small as 1e-6 where the joints stand: a step that its turn can be read from.
+                    _ if model.effects[*index].name() == "smooth-correction" => 3e-3,
                     _ => 1e-4,
                 }
             }
