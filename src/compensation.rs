@@ -2,7 +2,7 @@
 //!
 //! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
 //! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
-//! - [`verify`]: runs a program on an arm.
+//! - [`verify`]: runs a program on an arm; [`precision`]: what single precision makes of its numbers.
 //! - [`deviation`]: the points of a path and how far an arm is off at each, before and after.
 
 pub mod deviation;
@@ -12,4 +12,5 @@ pub mod why;
 pub mod rewrite;
 mod solve;
 pub mod verify;
+pub mod precision;
 mod segment;

@@ -35,7 +35,10 @@ fn rewritten(source: &[u8], program: &Program<'_>) -> Vec<u8> {
     let options = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
     let rewritten = program.rewrite(&changes(program), &options).expect("edits do not overlap");
     let edits = &rewritten.files[0].edits;
-    assert_eq!(edits.is_empty(), unified(source, edits, "a", "b").expect("edits are within the file").is_empty());
+    assert_eq!(
+        edits.is_empty(),
+        unified(source, edits, "a", "b").expect("edits are within the file").is_empty()
+    );
     edits.apply(source).expect("edits are within the file")
 }
 

@@ -7,13 +7,14 @@ use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::{After, PathReport, Status};
+use truegrind::compensation::precision::single_precision;
 use truegrind::compensation::rewrite::{Emit, Options, Plan, plan};
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::diff::unified;
 use truegrind::program::motion::Mark;
 use truegrind::program::nc::setup::Setup;
-use truegrind::program::reading::Program;
+use truegrind::program::reading::{Language, Program};
 use truegrind::program::rewrite::{Outcome, RewriteOptions};
 use truegrind::report::batch::{self, Ended, Row};
 use truegrind::report::compensation::{self as view, ProgramFile};
@@ -385,6 +386,11 @@ fn rewritten(
         });
     }
     let mut planned = plan(listing, shop.arm, &shop.cell, &shop.options);
+    if program.language() == Language::Rapid
+        && let Some(off) = single_precision(&planned.changes)
+    {
+        planned.notes.push(off.text());
+    }
     let rewrite = RewriteOptions {
         mark: Some(Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: shop.hash.to_owned() }),
         ..RewriteOptions::default()

@@ -308,3 +308,24 @@ fn the_quick_sigma_equals_the_covariance() {
         assert!((slow - quick).abs() < 1e-9 * slow, "{slow} {quick}");
     }
 }
+
+#[test]
+fn single_precision_is_stated_at_its_known_spacing() {
+    use truegrind::compensation::precision::single_precision;
+    use truegrind::program::rewrite::{Change, NewTarget};
+    assert_eq!(single_precision(&[]), None);
+    // Between 1024 and 2048 single precision has a spacing of 2^-13 mm: half of it is the most a number is off.
+    let at = |x: f64| NewTarget::Cartesian {
+        position_mm: [x, 0.0, 0.0],
+        quaternion: [1.0, 0.0, 0.0, 0.0],
+        conf: None,
+    };
+    let half = 0.5 * 2.0_f64.powi(-13);
+    let change = |target| Change { motion: 0, targets: vec![target], before: vec![] };
+    let off = single_precision(&[change(at(1500.0)), change(at(1500.0 + half))]).unwrap();
+    assert!((off.position_mm - half).abs() < 1e-12, "{off:?}");
+    assert_eq!(off.orientation_deg, 0.0);
+    let joints = NewTarget::Joint { robot_deg: [90.0 + 2.0_f64.powi(-18), 0.0, 0.0, 0.0, 0.0, 0.0] };
+    let off = single_precision(&[change(joints)]).unwrap();
+    assert!((off.joint_deg - 2.0_f64.powi(-18)).abs() < 1e-12 && off.text().contains("per joint"), "{off:?}");
+}

@@ -99,7 +99,7 @@ pub(super) fn jacobian(
     let noise = &options.noise;
     let weight = Weight { per_mm: 1.0 / noise.reading_mm, per_rad: 1.0 / noise.reading_rad };
     let weights = vec![weight; rows.len()];
-    let priors = options.tolerance.priors_within(parameters, model, wanted.frames);
+    let priors = options.tolerance.priors(parameters, model);
     let dataset = Dataset::new("plan", wanted.sensor, rows);
     let task = Calibration::new(&dataset, model, wanted.frames, parameters, &priors, &weights);
     let count = task.rows();

@@ -138,10 +138,8 @@ impl Now {
     }
 
     fn shift_at(&mut self, stated: [Option<f64>; 3]) {
-        for axis in 0..3 {
-            if stated[axis].is_some()
-                && let (Some(now), Some(meant)) = (self.position[axis], self.meant[axis])
-            {
+        for (axis, _) in stated.iter().enumerate().filter(|(_, stated)| stated.is_some()) {
+            if let (Some(now), Some(meant)) = (self.position[axis], self.meant[axis]) {
                 self.moved[axis] = now - meant;
             }
         }

@@ -85,7 +85,7 @@ pub(super) fn statement(comment: &[u8]) -> Option<Statement> {
 fn frame(text: &str) -> Option<Frame> {
     let mut numbers = [0.0_f64; 7];
     let mut found = 0;
-    for part in text.split(|c: char| matches!(c, '[' | ']' | ',' | ' ')).filter(|part| !part.is_empty()) {
+    for part in text.split(['[', ']', ',', ' ']).filter(|part| !part.is_empty()) {
         *numbers.get_mut(found)? = part.parse().ok()?;
         found += 1;
     }

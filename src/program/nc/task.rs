@@ -333,7 +333,9 @@ impl<'t, 's> Lister<'t, 's> {
     fn gather(&mut self, node: u32, said: &mut Said<'s>) {
         let mut words = std::mem::take(&mut said.words);
         let (mut g, mut m) = (std::mem::take(&mut said.g), std::mem::take(&mut said.m));
-        (words.clear(), g.clear(), m.clear());
+        words.clear();
+        g.clear();
+        m.clear();
         *said = Said { node, words, g, m, ..Said::default() };
         let kind = self.tree.nodes[node as usize].kind;
         said.skippable = kind == Syntax::Skippable;

@@ -222,7 +222,7 @@ fn left_by_geometry(found: &Plan, sensor: Sensor, frames: &Frames, effect: Effec
     let weight = Weight { per_mm: 1.0 / options.noise.reading_mm, per_rad: 1.0 / options.noise.reading_rad };
     let weights = vec![weight; rows.len()];
     let dataset = Dataset::new("made", sensor, rows);
-    let priors = Tolerance::default().priors_within(&found.parameters, &nominal, frames);
+    let priors = Tolerance::default().priors(&found.parameters, &nominal);
     let task = Calibration::new(&dataset, &nominal, frames, &found.parameters, &priors, &weights);
     lm::solve(&task, &vec![0.0; found.parameters.len()], &lm::Options::default()).cost
 }

@@ -109,11 +109,7 @@ impl Lister<'_, '_> {
                 self.state.transform = Some(Reason::Transformed);
                 self.set(Group::Transform);
             }
-            b"LBL" => {
-                if second != b"0" {
-                    self.forget();
-                }
-            }
+            b"LBL" if second != b"0" => self.forget(),
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(said, "CALL");
             }

@@ -359,8 +359,7 @@ impl Lister<'_, '_> {
     }
 
     fn work_offset(&mut self, code: u32, said: &Said<'_>) {
-        let mut name =
-            if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
+        let mut name = code_name(code);
         if code == 541
             && let Some(number) = said.p.and_then(|index| self.literal(&said.words[index]))
         {
@@ -462,12 +461,12 @@ impl Lister<'_, '_> {
     /// G92: the place where the tool stands is called this from here on.
     fn set_shift(&mut self, said: &Said<'_>) {
         let mut stated = [None; 3];
-        for axis in 0..3 {
+        for (axis, stated) in stated.iter_mut().enumerate() {
             let Some(index) = said.axes[axis] else { continue };
             let value = self.worth(&said.words[index]).0.map(|value| value * self.state.unit_mm);
             self.state.shift[axis] = match (self.state.position[axis], value) {
                 (Ok(at), Ok(value)) => {
-                    stated[axis] = Some(value);
+                    *stated = Some(value);
                     Ok(at - value)
                 }
                 (Err(reason), _) | (_, Err(reason)) => Err(reason),
@@ -479,8 +478,7 @@ impl Lister<'_, '_> {
 
     /// A motion to where the text does not tell.
     fn gone(&mut self, said: &Said<'_>, code: u32, reason: Reason) {
-        let name =
-            if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
+        let name = code_name(code);
         self.left(said, &name, reason);
         let none = said.axes.iter().chain(&said.abc).all(Option::is_none);
         let mut lost = 0;
@@ -625,12 +623,11 @@ impl Lister<'_, '_> {
         // Position.
         let from = self.state.position;
         let mut to = self.axis_values(said, &said.axes, &from, self.state.unit_mm);
-        for axis in 0..3 {
-            if let Some(index) = said.axes[axis]
-                && self.worth(&said.words[index]).1 != Some(true)
-                && (self.state.absolute || self.worth(&said.words[index]).1 == Some(false))
-            {
-                to[axis] = to[axis].and_then(|value| self.state.shift[axis].map(|shift| value + shift));
+        for (axis, to) in to.iter_mut().enumerate() {
+            let Some(index) = said.axes[axis] else { continue };
+            let increment = self.worth(&said.words[index]).1.unwrap_or(!self.state.absolute);
+            if !increment {
+                *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
             }
         }
         let (name, kind) = match mode {
@@ -908,6 +905,14 @@ impl Lister<'_, '_> {
             self.listing.zones.push(zone);
             self.listing.zones.len() - 1
         }) as u32)
+    }
+}
+
+/// A code as a program writes it: G54, G43.4.
+fn code_name(code: u32) -> String {
+    match (code / 10, code % 10) {
+        (whole, 0) => format!("G{whole}"),
+        (whole, tenth) => format!("G{whole}.{tenth}"),
     }
 }
 

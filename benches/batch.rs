@@ -1,0 +1,66 @@
+//! A folder of 1,000 programs of 1,000 targets each through the binary, file to file, all cores.
+//!
+//! `cargo bench --no-default-features --bench batch`
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+/// Programs in the folder.
+const PROGRAMS: usize = 1000;
+
+/// Targets in each.
+const TARGETS: usize = 1000;
+
+fn run(folder: &Path, arguments: &[&str]) {
+    let output = Command::new(env!("CARGO_BIN_EXE_truegrind"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("the binary starts");
+    let code = output.status.code();
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn program(number: usize) -> String {
+    let mut text = format!("MODULE Path{number}\n  PROC main()\n");
+    for k in 0..TARGETS {
+        let (x, y) = ((k % 50) as f64 * 2.0, (k / 50) as f64 * 4.0);
+        let z = 5.0 * ((x + number as f64) * 0.05).sin();
+        let _ = writeln!(
+            text,
+            "    MoveL [[{:.4},{:.4},{:.4}],[0.0000000,0.0000000,1.0000000,0.0000000],[0,0,0,0],\
+             [9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]],v100,z1,tool0;",
+            330.0 + x,
+            y - 40.0,
+            420.0 + z
+        );
+    }
+    text + "  ENDPROC\nENDMODULE\n"
+}
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = folder.path();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    fs::copy(root.join("tests/data/irb120-cable.csv"), at.join("data.csv")).expect("the sample is there");
+    run(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    fs::create_dir(at.join("in")).expect("a folder");
+    for number in 0..PROGRAMS {
+        fs::write(at.join(format!("in/path{number:04}.mod")), program(number)).expect("a program");
+    }
+    for round in 0..3 {
+        let begin = Instant::now();
+        run(
+            at,
+            &["compensate", "in", "--model", "model.toml", "-o", &format!("out{round}"), "--csv", "rows.csv"],
+        );
+        let seconds = begin.elapsed().as_secs_f64();
+        #[allow(clippy::print_stdout)]
+        {
+            println!("{PROGRAMS} programs of {TARGETS} targets: {seconds:.2} s, file to file");
+        }
+    }
+}
