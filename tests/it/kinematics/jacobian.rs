@@ -111,6 +111,8 @@ impl Numbers {
                     (_, "rad/(N m)") => 1e-5,
                     // Far from its knot a spline is almost nothing, and a short step would be all rounding.
                     ("knot", _) => 5e-4,
+                    // So is a bump near its border.
+                    ("weight", _) => 3e-3,
                     _ => 1e-4,
                 }
             }
