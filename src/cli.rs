@@ -12,7 +12,9 @@ mod progress;
 mod robots;
 mod simulate;
 mod identify;
+mod stated;
 mod diagnose;
+mod plan;
 mod compare;
 mod track;
 mod path;
@@ -47,6 +49,8 @@ enum Verb {
     Identify(identify::Arguments),
     /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
     Diagnose(diagnose::Arguments),
+    /// Which poses to measure, as a program that moves there.
+    Plan(Box<plan::Arguments>),
     /// Methods side by side under a paper's protocol.
     Compare(compare::Arguments),
     /// Keep a model accurate as measurements come in.
@@ -110,6 +114,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
+        Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),

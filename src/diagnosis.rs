@@ -26,6 +26,7 @@ pub mod intervals;
 pub mod lines;
 pub mod selection;
 pub mod validation;
+pub mod transfer;
 pub mod remaining;
 pub mod finding;
 pub mod words;

@@ -1,3 +1,4 @@
-//! From intentions to motions: surfaces to programs.
+//! From intentions to motions: surfaces to programs, and what to measure.
 
 pub mod toolpath;
+pub mod poses;

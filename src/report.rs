@@ -24,3 +24,4 @@ pub mod deviation;
 pub mod compensation;
 pub mod batch;
 pub mod robots;
+pub mod planning;

@@ -29,6 +29,6 @@ mod arm;
 pub mod path;
 pub mod measured;
 
-pub use measured::{MeasuredScene, dataset_recording, measured_recording};
+pub use measured::{MeasuredScene, dataset_recording, diagnosis_recording, measured_recording};
 pub use path::{PathScene, Workpiece, path_recording};
 pub use recording::{Recording, VisualError};

@@ -131,7 +131,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     batch.add(place("measurements.csv"), DATA.to_vec());
     batch.add(place("cell.toml"), toml::to_string(&cell)?);
     batch.add(place("actual-arm.toml"), simulate::arm_text(&simulation.actual)?);
-    batch.add(place("deviation.csv"), format::csv::table(&deviation_view::table(&reports[0])));
+    batch.add(place("deviation.csv"), format::csv::table(&deviation_view::whole_table(&reports)));
     batch.add(place("deviation.md"), format::markdown::document(&page));
     batch.add(place("deviation.html"), format::html::document(&page));
     batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))?);

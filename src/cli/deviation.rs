@@ -106,11 +106,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     summary.push(view::registered_table(&reports));
     arguments.outputs.print(&summary);
     let mut batch = Batch::sparing(&all);
-    arguments.outputs.add_to(
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&reports),
-        &view::table(&reports[0]),
-        &view::json(&reports),
+        || view::document(&reports),
+        || view::whole_table(&reports),
+        || view::json(&reports),
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use clap::Args;
 use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind::diagnosis::transfer::transfer;
 use truegrind::identification::calibration::Frames;
 use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
 use truegrind::identification::identify::observe;
@@ -39,6 +40,9 @@ pub(super) struct Arguments {
     /// Contiguous blocks that are held out in turn, beside five random folds.
     #[arg(long, default_value_t = 10)]
     blocks: usize,
+    /// Another series of the same arm, on which the models are judged with only the frames refitted.
+    #[arg(long, value_name = "DATA")]
+    also: Vec<PathBuf>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -48,7 +52,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
-    Batch::check(&[&arguments.data.data], &targets)?;
+    let mut given: Vec<&std::path::Path> = vec![&arguments.data.data];
+    given.extend(arguments.also.iter().map(PathBuf::as_path));
+    Batch::check(&given, &targets)?;
     if !(arguments.alpha > 0.0 && arguments.alpha <= 0.5) {
         bail!("--alpha {}: expected a probability above 0, up to 0.5", arguments.alpha);
     }
@@ -62,21 +68,45 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     options.selection.seed = arguments.common.seed;
     let name = robot.sheet.name.clone();
     let work = Work::start(format!("diagnosing {name} from {} rows", dataset.rows.len()));
+    let others = arguments
+        .also
+        .iter()
+        .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
+        .collect::<anyhow::Result<Vec<Dataset>>>()?;
     let found = on_threads(arguments.common.threads, || {
-        diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))
+        let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))?;
+        for other in &others {
+            work.tell(&format!("judging on {}", other.file));
+            let frames = best_start(other, &robot.model)?;
+            let models = [&robot.model, &found.geometric.model, &found.extended.model];
+            let [nominal, geometric, extended] = models;
+            found.diagnosis.transfers.push(transfer(
+                other,
+                &frames,
+                nominal,
+                geometric,
+                extended,
+                &options.tolerance,
+            ));
+        }
+        anyhow::Ok(found)
     })??;
     drop(work);
     for note in &dataset.notes {
         eprintln!("note: {note}");
     }
     arguments.outputs.print(&view::summary(&found));
-    let mut batch = Batch::sparing([&arguments.data.data]);
+    let mut batch = Batch::sparing(given);
     arguments.outputs.add_to(
         &mut batch,
         &view::document(&found, &dataset),
         &view::finding_table(&found.diagnosis),
         &serde_json::to_value(&found.diagnosis)?,
     )?;
+    #[cfg(feature = "visual")]
+    if let Some(path) = &arguments.outputs.rrd {
+        batch.add(path, super::view::diagnosis(&found, &dataset)?);
+    }
     if let Some(path) = &arguments.output {
         if found.estimated.verdict.status == Judgement::Fail {
             batch.write()?;

@@ -25,6 +25,7 @@ use truegrind::robots::Robot;
 use super::files::{self, Batch};
 use super::outputs::{Outputs, width};
 use super::progress::Work;
+use super::stated::StatedArguments;
 use super::{Common, Ending, inputs, on_threads};
 
 /// Whether logged angles are the controller's or already hold the DH offsets.
@@ -88,6 +89,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DEG")]
     tolerance_angle: Option<f64>,
     #[command(flatten)]
+    stated: StatedArguments,
+    #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
@@ -101,7 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
     let (robot, dataset) = read(&arguments.data)?;
-    let options = options(arguments)?;
+    let options = Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments)? };
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
     let found =

@@ -1,38 +1,302 @@
-//! `truegrind view FILE…`, and the recordings of the other verbs.
+//! `truegrind view FILE…`: what any verb wrote, and measurements; and the recordings of the other verbs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
-use truegrind::compensation::deviation::PathReport;
-use truegrind::identification::identify::Identification;
+use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::diagnosis::diagnose::Diagnosed;
+use truegrind::identification::fit::{Start, errors_on, fit, frame_parameters};
+use truegrind::identification::identify::{Identification, Options, observe};
+use truegrind::identification::solver::SOLVERS;
+use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::model::Model;
+use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::{Joints, Model};
+use truegrind::math::se3::Pose;
 use truegrind::measurement::dataset::Dataset;
+use truegrind::program::motion::MotionKind;
+use truegrind::program::reading::Language;
 use truegrind::surface::SurfaceFile;
-use truegrind::visual::{self, PathScene, Workpiece};
+use truegrind::visual::measured::Residuals;
+use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
 
-use super::Ending;
+use super::compensate::CellArguments;
+use super::files::{self, Batch};
+use super::inputs::NamedModel;
+use super::programs::Programs;
+use super::progress::Work;
+use super::{Common, Ending, identify, inputs, on_threads, programs};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recordings that other verbs wrote with --rrd.
+    /// Recordings (.rrd), measurements (.csv, .xlsx), models (.toml), programs (.mod and others).
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// An estimated arm: on it programs are run, and against it measurements are held.
+    #[arg(long, value_name = "MODEL.toml")]
+    model: Option<String>,
+    /// Robot; optional where the model says it, and checked against it.
+    #[arg(long)]
+    robot: Option<String>,
+    /// Sheet of a workbook; the first with the columns otherwise.
+    #[arg(long)]
+    sheet: Option<String>,
+    /// Write the one recording instead of opening it.
+    #[arg(long, value_name = "FILE.rrd")]
+    rrd: Option<PathBuf>,
+    #[command(flatten)]
+    cell: CellArguments,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What a file is, by its name and, for TOML, by its schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Recording,
+    Measurements,
+    Model,
+    Program,
+}
+
+fn kind(path: &Path) -> anyhow::Result<Kind> {
+    if !path.is_file() {
+        bail!("{}: no such file", path.display());
+    }
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    Ok(match extension.as_str() {
+        "rrd" => Kind::Recording,
+        "csv" | "xlsx" | "xls" | "xlsm" | "ods" => Kind::Measurements,
+        "toml" => {
+            let text = files::read_text(path)?;
+            let table: toml::Table = text.parse().map_err(|e| anyhow!("{}: no TOML: {e}", path.display()))?;
+            let schema = table.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
+            if schema != truegrind::kinematics::estimated::SCHEMA {
+                bail!(
+                    "{}: no model file; of TOML files only those that `truegrind identify -o` wrote can be shown (a \
+                     surface: make its program with `truegrind path`)",
+                    path.display()
+                );
+            }
+            Kind::Model
+        }
+        _ if extension == "pgf" || Language::by_name(&files::name(path)).is_some() => Kind::Program,
+        _ => bail!(
+            "{}: expected a recording (.rrd), measurements (.csv, .xlsx), a model (.toml) or a program (.mod, .prg, .sys, \
+             .pgf, .nc, .mpf and the like)",
+            path.display()
+        ),
+    })
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    for file in &arguments.files {
-        if !file.is_file() {
-            bail!("{}: no such file; other verbs write one with --rrd FILE", file.display());
+    let kinds = arguments.files.iter().map(|f| kind(f)).collect::<anyhow::Result<Vec<_>>>()?;
+    let of = |wanted: Kind| -> Vec<PathBuf> {
+        arguments.files.iter().zip(&kinds).filter(|(_, k)| **k == wanted).map(|(f, _)| f.clone()).collect()
+    };
+    let programs = of(Kind::Program);
+    let pictures = arguments.files.len() - programs.len().saturating_sub(1);
+    if let Some(path) = &arguments.rrd {
+        let inputs: Vec<&Path> = arguments.files.iter().map(PathBuf::as_path).collect();
+        Batch::check(&inputs, &[path])?;
+        if pictures != 1 || kinds[0] == Kind::Recording {
+            bail!("--rrd {}: expected measurements, a model, or the programs of one task", path.display());
         }
-        if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("rrd")) {
-            bail!("{}: expected a .rrd file, which other verbs write with --rrd FILE", file.display());
+    }
+    for file in of(Kind::Recording) {
+        Recording::open(&file)?;
+    }
+    let work = Work::start("drawing");
+    let recordings = on_threads(arguments.common.threads, || -> anyhow::Result<Vec<Recording>> {
+        let mut out = Vec::new();
+        for file in of(Kind::Measurements) {
+            out.push(measurements(arguments, &file)?);
         }
-        visual::Recording::open(file)?;
+        for file in of(Kind::Model) {
+            out.push(model(&file)?);
+        }
+        if !programs.is_empty() {
+            out.push(program(arguments, &programs)?);
+        }
+        Ok(out)
+    })??;
+    drop(work);
+    for recording in recordings {
+        match &arguments.rrd {
+            Some(path) => {
+                let mut batch = Batch::sparing(&arguments.files);
+                batch.add(path, recording.rrd()?);
+                batch.write()?;
+            }
+            None => recording.spawn()?,
+        }
     }
     Ok(Ending::Done)
+}
+
+/// The model that the command line names; `None` where it names a robot alone.
+fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Estimated>)>> {
+    let Some(name) = &arguments.model else { return Ok(None) };
+    match inputs::model(name)? {
+        NamedModel::Nominal => Ok(None),
+        model @ NamedModel::Estimated { .. } => {
+            inputs::nominal(&model, arguments.robot.as_deref())?;
+            let NamedModel::Estimated { name, arm, .. } = model else { return Ok(None) };
+            Ok(Some((name, arm)))
+        }
+    }
+}
+
+/// Measurements: with a model what it leaves of them, without one what an identification finds.
+fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
+    let stated = stated_model(arguments)?;
+    let robot = match (&arguments.robot, &stated) {
+        (Some(robot), _) => robot.clone(),
+        (None, Some((_, arm))) => arm.robot.clone(),
+        (None, None) => bail!("{}: --robot or --model says which arm was measured", file.display()),
+    };
+    let data = identify::DataArguments {
+        data: file.to_path_buf(),
+        robot,
+        sheet: arguments.sheet.clone(),
+        angles: None,
+        allow_odd_units: false,
+    };
+    let (robot, dataset) = identify::read(&data)?;
+    let options = Options {
+        tolerance: Tolerance::default(),
+        solver: &SOLVERS[0],
+        held_out: 0.2,
+        seed: arguments.common.seed,
+        sharpen: true,
+        limit_rmse_mm: None,
+        limit_max_mm: None,
+        stated_frames: None,
+    };
+    let Some((name, arm)) = stated else {
+        let found = identify::identified(&dataset, &robot.sheet.name, &robot.model, &options)?;
+        return Ok(visual::dataset_recording(&dataset, &found)?);
+    };
+    // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
+    let frames = identify::best_start(&dataset, &robot.model, &options)?;
+    let (observed, _) = observe(&dataset, &robot.model, true);
+    let sensing = frame_parameters(&dataset);
+    let mut registered = None;
+    let mut residuals = Vec::new();
+    for (stage, model) in [
+        ("nominal arm, frames fitted".to_owned(), &robot.model),
+        (format!("{name}, frames fitted"), &arm.model),
+    ] {
+        let start = Start { model, frames: &frames };
+        let fitted = fit(&observed, start, &sensing, &options.tolerance, &SOLVERS[0], options.seed);
+        let errors = errors_on(&observed, &fitted.model, &fitted.frames);
+        let rows = dataset.rows.iter().map(|row| row.number).zip(errors).collect();
+        residuals.push(Residuals { stage, rows });
+        registered = Some(fitted.frames);
+    }
+    Ok(visual::measured_recording(&MeasuredScene {
+        dataset: &dataset,
+        arm: &arm.model,
+        arm_is: &format!("{} as estimated in {name}", arm.robot),
+        frames: registered.as_ref(),
+        residuals: &residuals,
+        held_out: &[],
+        set_aside: &[],
+        identification: None,
+    })?)
+}
+
+/// A model: the arm at the poses that it was measured in, coloured by how far it stands from the nominal one there.
+fn model(file: &Path) -> anyhow::Result<Recording> {
+    let NamedModel::Estimated { name, arm, .. } = inputs::model(&file.display().to_string())? else {
+        bail!("{}: expected a model file", file.display());
+    };
+    let nominal = arm.nominal.under(&Condition::default());
+    let estimated = arm.model.under(&arm.condition);
+    let points: Vec<PathPoint> = arm
+        .region
+        .samples_deg
+        .iter()
+        .enumerate()
+        .map(|(index, sample)| {
+            let joints = Joints::from_fn(|i, _| sample[i].to_radians());
+            let intended = nominal.forward(&joints);
+            let reached = estimated.forward(&joints);
+            PathPoint {
+                index,
+                line: 0,
+                instruction: "measured pose".to_owned(),
+                kind: MotionKind::AbsoluteJoint,
+                cutting: false,
+                base_from_object: Pose::identity(),
+                flange_from_tool: Pose::identity(),
+                intended,
+                normal: None,
+                joints_before: Some(joints),
+                joints_after: None,
+                before: Some(Deviation::between(&intended, &reached, &Pose::identity(), None)),
+                after: None,
+                sigma_mm: Some(arm.position_sigma_mm(&estimated, &joints, &Pose::identity(), None)),
+                outside: None,
+                status: Status::Left,
+                reason: None,
+            }
+        })
+        .collect();
+    let report = PathReport {
+        program: "poses of the measured region".to_owned(),
+        model: name.clone(),
+        after: After::PredictedRemainder,
+        points,
+        held_out_mm: Some(arm.geometry.held_out.rmse),
+    };
+    let scene = PathScene {
+        title: &format!("{name}: {} as estimated", arm.robot),
+        arm: &arm.model,
+        arm_is: "estimated arm",
+        condition: arm.condition,
+        reports: std::slice::from_ref(&report),
+        workpiece: None,
+    };
+    Ok(visual::path_recording(&scene)?)
+}
+
+/// Programs of one task: where an estimated arm goes with them, or the nominal one.
+fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording> {
+    let programs = Programs::read(paths)?;
+    let stated = stated_model(arguments)?;
+    let knowledge = stated.as_ref().map(|(_, arm)| arm.as_ref());
+    let (cell, surface, condition) = arguments.cell.read(knowledge)?;
+    let nominal = match (&stated, &arguments.robot) {
+        (Some((_, arm)), _) => arm.nominal.clone(),
+        (None, Some(robot)) => inputs::robot(robot)?.model,
+        (None, None) => bail!("{}: --robot or --model says which arm runs it", paths[0].display()),
+    };
+    let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
+    let task = programs.task(&programs::setup(&cell, robot));
+    let program = programs.name();
+    let acting =
+        Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };
+    let report = judge(
+        &Judged {
+            original: task.listing(),
+            rewritten: None,
+            cell: &cell,
+            surface: surface.as_ref().map(|s| &s.surface),
+            program: &program,
+            name: stated.as_ref().map_or("nominal", |(name, _)| name),
+            after: After::PredictedRemainder,
+        },
+        &acting,
+    );
+    if report.points.is_empty() {
+        bail!("{program}: no motion has a target that is known from the text and in reach");
+    }
+    let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
+    recording(&program, acting.model, is, condition, std::slice::from_ref(&report), surface.as_ref())
 }
 
 /// The recording of a path.
@@ -44,16 +308,32 @@ pub(super) fn path(
     reports: &[PathReport],
     surface: Option<&SurfaceFile>,
 ) -> anyhow::Result<Vec<u8>> {
+    Ok(recording(title, arm, arm_is, condition, reports, surface)?.rrd()?)
+}
+
+fn recording(
+    title: &str,
+    arm: &Model,
+    arm_is: &str,
+    condition: Condition,
+    reports: &[PathReport],
+    surface: Option<&SurfaceFile>,
+) -> anyhow::Result<Recording> {
     let triangles = surface.map(|s| s.surface.tessellate(60));
     let workpiece = triangles.as_ref().zip(surface).map(|(triangles, surface)| Workpiece {
         triangles,
         base_from_object: surface.work_object.base_from_work_object,
     });
     let scene = PathScene { title, arm, arm_is, condition, reports, workpiece };
-    Ok(visual::path_recording(&scene)?.rrd()?)
+    Ok(visual::path_recording(&scene)?)
 }
 
 /// The recording of an identification.
 pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
     Ok(visual::dataset_recording(dataset, found)?.rrd()?)
+}
+
+/// The recording of a diagnosis.
+pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
+    Ok(visual::diagnosis_recording(dataset, found)?.rrd()?)
 }

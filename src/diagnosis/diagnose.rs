@@ -210,6 +210,7 @@ pub fn diagnose(
             p_value: n.p_value,
         }),
         measure_again,
+        transfers: Vec::new(),
         notes,
     };
     let estimated = estimated(

@@ -161,6 +161,21 @@ pub struct Step {
     pub cv_rmse_mm: f64,
 }
 
+/// The models on another series of the same arm, with only the frames refitted: RMSE (mm).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// File.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// Data sheet.
+    pub nominal_rmse_mm: f64,
+    /// Geometry of this diagnosis.
+    pub geometric_rmse_mm: f64,
+    /// Extended model of this diagnosis.
+    pub extended_rmse_mm: f64,
+}
+
 /// A diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
@@ -186,6 +201,9 @@ pub struct Diagnosis {
     pub noise_model: Option<RangeNoise>,
     /// Rows to measure again, by data row from 0.
     pub measure_again: Vec<usize>,
+    /// The models on other series of the same arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub transfers: Vec<Transfer>,
     /// What a reader should know.
     pub notes: Vec<String>,
 }

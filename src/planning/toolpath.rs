@@ -172,6 +172,7 @@ fn draft(
                 // The tool stops above the first and after the last point, and nowhere on the surface.
                 zone_mm: if comes_down || next.is_none() { None } else { zone_mm },
                 comment: pass_begins.then(|| format!("pass {}", point.pass + 1)),
+                wait_s: None,
             }
         })
         .collect();

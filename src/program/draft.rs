@@ -36,4 +36,6 @@ pub struct Step {
     pub zone_mm: Option<f64>,
     /// A comment line before it.
     pub comment: Option<String>,
+    /// Time at rest after it (s).
+    pub wait_s: Option<f64>,
 }

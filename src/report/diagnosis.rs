@@ -129,7 +129,34 @@ pub fn summary(found: &Diagnosed) -> Document {
     if !diagnosis.findings.is_empty() {
         page.push(finding_table(diagnosis));
     }
+    if !diagnosis.transfers.is_empty() {
+        page.push(transfer_table(diagnosis));
+    }
     page
+}
+
+/// The models on other series of the same arm.
+pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "On other series of this arm, only the frames refitted: RMSE",
+        vec![
+            Column::text("file", "file"),
+            Column::count("rows", "rows"),
+            Column::number("nominal_rmse_mm", "data sheet", "mm", 3),
+            Column::number("geometric_rmse_mm", "geometry", "mm", 3),
+            Column::number("extended_rmse_mm", "extended", "mm", 3),
+        ],
+    );
+    for other in &diagnosis.transfers {
+        table.push([
+            Cell::from(other.file.as_str()),
+            other.rows.into(),
+            other.nominal_rmse_mm.into(),
+            other.geometric_rmse_mm.into(),
+            other.extended_rmse_mm.into(),
+        ]);
+    }
+    table
 }
 
 /// Errors of the three stages.

@@ -23,6 +23,7 @@ use super::curve::{self, Pen, curve};
 use super::legend;
 use super::page::{Eye, Pane, View, page};
 use super::recording::{Recording, Store, VisualError};
+use crate::diagnosis::diagnose::Diagnosed;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observed, errors_on};
 use crate::identification::identify::{Identification, observe};
@@ -103,6 +104,32 @@ pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Re
         held_out: &held_out,
         set_aside: &estimated.provenance.set_aside,
         identification: Some(found),
+    })
+}
+
+/// Draws a measurement file with what a diagnosis found: the residuals that data sheet, geometry and findings leave.
+///
+/// # Errors
+/// [`VisualError::Empty`] without rows.
+pub fn diagnosis_recording(dataset: &Dataset, found: &Diagnosed) -> Result<Recording, VisualError> {
+    let observed = &found.prepared.observed;
+    let left = |stage: &str, model: &Model, frames: &Frames| Residuals {
+        stage: stage.to_owned(),
+        rows: numbered(dataset, errors_on(observed, model, frames)),
+    };
+    let residuals = [
+        left("before: geometry fitted", &found.geometric.model, &found.geometric.frames),
+        left("after: findings in the model", &found.extended.model, &found.extended.frames),
+    ];
+    measured_recording(&MeasuredScene {
+        dataset,
+        arm: &found.estimated.model,
+        arm_is: &format!("{} with everything found", found.estimated.robot),
+        frames: Some(&found.extended.frames),
+        residuals: &residuals,
+        held_out: &[],
+        set_aside: &found.estimated.provenance.set_aside,
+        identification: None,
     })
 }
 

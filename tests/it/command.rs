@@ -246,6 +246,150 @@ fn outliers_are_found_listed_and_do_no_harm() {
     assert!(dirty < 1.2 * clean, "{dirty} against {clean}");
 }
 
+/// RMSE of `raw` in the JSON of `identify` with stated frames.
+fn raw_rmse(at: &Path, data: &str, stated: &[&str]) -> f64 {
+    let json = format!("{data}.json");
+    let all = [&["identify", data, "--robot", "abb-irb-120", "--json", &json], stated].concat();
+    let (code, _, err) = truegrind(at, &all);
+    assert_eq!(code, 0, "{err}");
+    let json: serde_json::Value = serde_json::from_str(&fs::read_to_string(at.join(&json)).unwrap()).unwrap();
+    json["stages"]["raw"]["all"]["rmse"].as_f64().unwrap()
+}
+
+#[test]
+fn stated_frames_make_the_raw_error_a_number() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("cable.csv"), CABLE).unwrap();
+    // The recipe of the shipped file says where outlet, hook and zero are; the nominal arm is the catalogue's.
+    let stated =
+        ["--outlet", "742.6,183.4,38.9", "--cable-zero", "17.35", "--touched-point", "11.8,-6.4,41.7"];
+    let found = raw_rmse(at, "cable.csv", &stated);
+    let nominal = truegrind::robots::load("abb-irb-120").unwrap().model;
+    let still = truegrind::kinematics::condition::Condition::default();
+    let number = |cell: &str| cell.parse::<f64>().unwrap();
+    let header: Vec<&str> = CABLE.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let squares: Vec<f64> = CABLE
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let q = truegrind::kinematics::model::Joints::from_fn(|i, _| {
+                number(cells[place(&format!("q{}", i + 1))]).to_radians()
+            });
+            let hook = nominal.forward(&q, &still) * nalgebra::Point3::new(11.8, -6.4, 41.7);
+            let length = (hook - nalgebra::Point3::new(742.6, 183.4, 38.9)).norm() + 17.35;
+            (length - number(cells[place("L")])).powi(2)
+        })
+        .collect();
+    let expected = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert!((found - expected).abs() < 1e-3 * expected, "{found} against {expected} mm");
+    assert!(found > 1.0, "an arm out of the box is millimetres off: {found}");
+    // The tracker of the second shipped file.
+    fs::write(at.join("tracker.csv"), include_str!("../data/irb120-tracker.csv")).unwrap();
+    let recipe: toml::Table = include_str!("../data/irb120-tracker.toml").parse().unwrap();
+    let sensor = &recipe["sensor"];
+    let list = |value: &toml::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|v| v.as_float().unwrap()).collect()
+    };
+    let text = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let mut frame = list(&sensor["frame"]["position_mm"]);
+    frame.extend(list(&sensor["frame"]["wxyz"]));
+    let point = text(&list(&sensor["reflector_mm"]));
+    let tracked = raw_rmse(at, "tracker.csv", &["--sensor-frame", &text(&frame), "--touched-point", &point]);
+    assert!((0.3..10.0).contains(&tracked), "{tracked} mm");
+}
+
+#[test]
+fn stated_frames_that_make_no_sense_are_refused() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    for (stated, word) in [
+        (vec!["--sensor-frame", "1,2,3"], "cable lengths"),
+        (vec!["--outlet", "1,2,3"], "--cable-zero"),
+        (vec!["--outlet", "1,2", "--cable-zero", "3"], "2 numbers"),
+        (vec!["--outlet", "1,2,x", "--cable-zero", "3"], "`x` is no number"),
+        (vec!["--outlet", "1,2,NaN", "--cable-zero", "3"], "no number"),
+        (vec!["--outlet", "1,2,3", "--outlet", "1,2,3", "--cable-zero", "3"], "stated 2 times"),
+        (vec!["--touched-point", "1,2,3"], "says nothing"),
+        (vec!["--outlet", "1,2,3", "--cable-zero", "3", "--touched-point", "0,0,0,1,1,0,0"], "length 1.414"),
+    ] {
+        let all = [&["identify", "data.csv", "--robot", "abb-irb-120"], stated.as_slice()].concat();
+        let (code, _, err) = truegrind(at, &all);
+        assert!(code == 2 && err.contains(word), "{stated:?}: `{word}` is not in {err}");
+    }
+}
+
+#[test]
+fn plan_writes_a_program_and_the_log_to_fill_in() {
+    let dir = folder();
+    let at = dir.path();
+    let (code, out, err) = truegrind(
+        at,
+        &[
+            "plan",
+            "--robot",
+            "abb-irb-120",
+            "--sensor",
+            "cable",
+            "--outlet",
+            "750,200,40",
+            "--poses",
+            "12",
+            "--candidates",
+            "120",
+            "--range",
+            "150,1100",
+            "-o",
+            "poses.mod",
+            "--csv",
+            "rows.csv",
+            "--json",
+            "plan.json",
+            "--html",
+            "plan.html",
+        ],
+    );
+    assert!(code == 0 || code == 1, "{err}");
+    assert!(out.contains("What the rows can decide") && out.contains("backlash"), "{out}");
+    let program = fs::read_to_string(at.join("poses.mod")).unwrap();
+    let rows = fs::read_to_string(at.join("rows.csv")).unwrap();
+    // As many as rows, and one in a comment: the header line of the table makes up for it.
+    assert_eq!(program.matches("WaitTime").count(), rows.lines().count());
+    let header = rows.lines().next().unwrap();
+    for column in ["q1", "q6", "approach1", "approach6", "t", "expected_L"] {
+        assert!(header.split(',').any(|c| c == column), "{column} is not in {header}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(at.join("plan.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], "truegrind.plan/1");
+    assert_eq!(json["rows"].as_array().unwrap().len(), rows.lines().count() - 1);
+    // What was written can be shown to the other verbs: no motion is left unread.
+    let (_, out, err) = truegrind(
+        at,
+        &["compensate", "poses.mod", "--robot", "abb-irb-120", "--model", "nominal", "--dry-run"],
+    );
+    assert!(out.contains("nothing to correct"), "{out} {err}");
+    for (arguments, word) in [
+        (vec!["--sensor", "cable"], "--outlet is missing"),
+        (vec!["--sensor", "cable", "--outlet", "750,200,40", "--box", "0,0,0,1,1"], "--box"),
+        (vec!["--sensor", "cable", "--outlet", "750,200,40", "--range", "9,1"], "--range"),
+        (vec!["--sensor", "position", "--outlet", "750,200,40"], "--sensor-frame"),
+        (vec!["--sensor", "position", "--poses", "2"], "at least 4"),
+        (vec!["--sensor", "position", "--for", "plan.json"], "truegrind.diagnosis/1"),
+        (
+            vec!["--sensor", "cable", "--outlet", "750,200,40", "--range", "5000,5001", "--candidates", "50"],
+            "too far from the sensor",
+        ),
+    ] {
+        let all = [&["plan", "--robot", "abb-irb-120"], arguments.as_slice()].concat();
+        let (code, _, err) = truegrind(at, &all);
+        assert!(code == 2 && err.contains(word), "{arguments:?}: `{word}` is not in {err}");
+    }
+}
+
 #[test]
 fn wrong_names_list_what_exists() {
     let dir = folder();

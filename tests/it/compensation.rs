@@ -119,6 +119,34 @@ fn a_perfectly_known_arm_follows_the_blade_to_the_printed_decimals() {
 }
 
 #[test]
+fn the_plan_is_the_same_for_any_threads_and_whether_configurations_are_checked_or_not() {
+    let (source, joints) = blade();
+    let known = estimated(perturbed(5, 1.0), &joints);
+    let text = String::from_utf8(source).unwrap();
+    let unchecked = text.replace("ConfL\\On", "ConfL\\Off");
+    assert_ne!(text, unchecked);
+    let planned = |text: &str, threads: usize| {
+        let task = Task::read(&[("p.mod", text.as_bytes())]);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| plan(&task.listing, &known, &Cell::default(), &Options::default()))
+    };
+    let one = planned(&text, 1);
+    assert_eq!(format!("{one:?}"), format!("{:?}", planned(&text, 3)));
+    let off = planned(&unchecked, 2);
+    assert_eq!(off.points.len(), one.points.len());
+    for (a, b) in one.points.iter().zip(&off.points) {
+        let (a, b) = (a.joints_after.unwrap(), b.joints_after.unwrap());
+        assert!((a - b).amax() < 1e-9, "{a:?} {b:?}");
+    }
+    // Points are for tables; without them the rewrite is the same.
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let bare =
+        plan(&task.listing, &known, &Cell::default(), &Options { points: false, ..Options::default() });
+    assert!(bare.points.is_empty());
+    assert_eq!((bare.changes, bare.outcomes), (one.changes, one.outcomes));
+}
+
+#[test]
 fn the_nominal_arm_changes_no_byte() {
     let (source, joints) = blade();
     let known = estimated(nominal(), &joints);

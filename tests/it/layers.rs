@@ -31,7 +31,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
         ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
         ("compensation", vec!["math", "kinematics", "program", "surface"]),
-        ("planning", vec!["math", "kinematics", "identification", "program", "surface"]),
+        (
+            "planning",
+            vec!["math", "kinematics", "measurement", "estimation", "identification", "program", "surface"],
+        ),
         (
             "comparison",
             vec![

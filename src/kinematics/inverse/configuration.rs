@@ -10,7 +10,16 @@
 //! | 4, 5 | behind | in front | positive, negative |
 //! | 6, 7 | behind | behind | positive, negative |
 //!
-//! Source: ABB, "RAPID Instructions, Functions and Data types", confdata.
+//! In front and behind are seen from the arm as axis 1 has turned it: the wrist centre lies on the x side of the plane
+//! through axes 1 and 2, and on the side of the line through axes 2 and 3 to which a growing angle of axis 2 leans. The
+//! borders are the three singularities. Arms such as IRB 1400, 2400, 4400 and 6400 use cf1, cf4 and cf6 alone and ignore
+//! cfx: a reader must not insist on it.
+//!
+//! Source: ABB, Technical reference manual RAPID Instructions, Functions and Data types (3HAC16581-1), confdata. The
+//! table stands in the same order in the documentation of py-opw-kinematics (AXIS_CONFIGURATION.md) and in the toolbox
+//! ARTE (compute_configuration.m), which also takes the signs of x in frame 1 and of the side of the lower arm in frame 2.
+//! Departure: the manual leaves open to which quarter exactly −90° belongs; here, by the floor, to −1. Targets are
+//! matched with a tolerance, so that nothing hangs on it.
 
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;

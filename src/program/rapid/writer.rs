@@ -37,7 +37,9 @@ pub enum WriteError {
         expected: &'static str,
     },
     /// A number that is not finite.
-    #[error("step {step}: a number of the target, speed or zone is not finite")]
+    #[error(
+        "step {step}: a number of the target, speed, zone or wait is not finite, or the wait is negative"
+    )]
     NotFinite {
         /// The index of the step.
         step: usize,
@@ -106,7 +108,9 @@ fn check_step(index: usize, step: &Step) -> Result<(), WriteError> {
         TargetValue::Joint(t) => t.robot_deg.iter().all(|value| value.is_finite()),
     };
     let via = step.via.map(TargetValue::Cartesian);
-    let numbers = step.speed_mm_s.is_finite() && step.zone_mm.is_none_or(f64::is_finite);
+    let numbers = step.speed_mm_s.is_finite()
+        && step.zone_mm.is_none_or(f64::is_finite)
+        && step.wait_s.is_none_or(|seconds| seconds.is_finite() && seconds >= 0.0);
     if numbers && finite(&step.to) && via.as_ref().is_none_or(finite) {
         Ok(())
     } else {
@@ -262,6 +266,9 @@ impl Writer {
         }
         text.push(';');
         self.line(2, &text);
+        if let Some(seconds) = step.wait_s {
+            self.line(2, &format!("WaitTime {};", short(seconds, 3)));
+        }
     }
 }
 

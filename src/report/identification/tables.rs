@@ -49,7 +49,8 @@ pub fn stage_table(found: &Identification) -> Table {
     }
     if found.raw.is_none() {
         table.notes.push(
-            "raw: no sensor frame was stated, and an error against a fitted frame is no raw error."
+            "raw: no sensor frame was stated (--sensor-frame, or --outlet and --cable-zero), and an error against a fitted \
+             frame is no raw error."
                 .to_owned(),
         );
     }

@@ -15,6 +15,9 @@ use super::scale::Scale;
 const TICK: i32 = 4 * PIXEL;
 /// Empty edge around a picture.
 pub(super) const EDGE: i32 = 10 * PIXEL;
+/// Room below the text under the horizontal axis, which would else stand on the edge: a font with deeper descenders than
+/// expected would be cut.
+const FOOT: i32 = 6 * PIXEL;
 const LEGEND_LINE: i32 = 20 * PIXEL;
 const GLYPH: i32 = 30 * PIXEL;
 const GLYPH_GAP: i32 = 6 * PIXEL;
@@ -76,6 +79,7 @@ impl Frame<'_> {
         let mut chart = ChartBuilder::on(area)
             .margin_top(top)
             .margin_right(self.right.max(last as i32) + EDGE)
+            .margin_bottom(FOOT)
             .x_label_area_size(bottom)
             .y_label_area_size(left)
             .build_cartesian_2d(self.x.clone(), self.y.clone())?;

@@ -62,7 +62,7 @@ impl PlanView {
         let width = 800.0 / columns as f64 - 75.0;
         // Nothing to show has no shape; NaN is replaced too.
         let inside = if aspect > 0.0 { (width * aspect * 1.1).clamp(140.0, 560.0) } else { 200.0 };
-        let height = inside as u32 + 90;
+        let height = inside as u32 + 96;
         picture((900, 30 + height * rows as u32), &name, |pen| self.draw(pen, columns, rows))
     }
 
@@ -104,7 +104,7 @@ impl PlanView {
         let x = Scale::of(&linear(&self.x), points().map(|point| point[0]), Ends::Around, ticks);
         let y = Scale::of(&linear(&self.y), points().map(|point| point[1]), Ends::Around, ticks);
         // About what the frame leaves inside; exact to the width of a tick label.
-        let room = [across - 80 * PIXEL, down - 90 * PIXEL].map(|room| f64::from(room.max(PIXEL)));
+        let room = [across - 80 * PIXEL, down - 96 * PIXEL].map(|room| f64::from(room.max(PIXEL)));
         let per_unit = ((x.high - x.low) / room[0]).max((y.high - y.low) / room[1]);
         let widened = |scale: &Scale, room: f64| {
             let (middle, half) = (scale.low / 2.0 + scale.high / 2.0, per_unit * room / 2.0);

@@ -139,3 +139,19 @@ fn through_the_wrist_singularity_the_joints_run_on() {
         assert!(error.fixed_rows::<3>(0).norm() <= 1e-9 && error.fixed_rows::<3>(3).norm() <= 1e-12);
     }
 }
+
+#[test]
+fn an_interpolated_orientation_costs_no_more_steps_than_any_other() {
+    let model = Sheet::named("abb-irb-120");
+    let inverse = Inverse::new(&model, &Condition::default(), &model);
+    let joints: Vec<Joints> =
+        (0..400).map(|k| Joints::from([0.2, 0.3, -0.2, 0.4, 0.9 - 0.001 * f64::from(k), -0.3])).collect();
+    let poses: Vec<Pose> = joints.iter().map(|q| model.forward(q, &Condition::default())).collect();
+    for (pair, q) in poses.windows(2).zip(&joints) {
+        // Spherical interpolation over a small angle leaves a quaternion that is not quite of length 1.
+        let rotation = pair[0].rotation.slerp(&pair[1].rotation, 0.5);
+        let middle = pair[0].translation.vector.lerp(&pair[1].translation.vector, 0.5);
+        let solution = inverse.solve_near(&Pose::from_parts(middle.into(), rotation), q).unwrap();
+        assert!(solution.iterations <= 3, "{} steps", solution.iterations);
+    }
+}

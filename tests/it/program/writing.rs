@@ -18,8 +18,15 @@ fn pose(x: f64) -> RobTarget {
 
 fn draft(named_targets: bool) -> Draft {
     let frame = |x: f64| Frame { position_mm: [x, 2.5, -3.125], quaternion: [0.6, 0.0, 0.8, 0.0] };
-    let step =
-        |kind, to, via, speed_mm_s, zone_mm| Step { kind, to, via, speed_mm_s, zone_mm, comment: None };
+    let step = |kind, to, via, speed_mm_s, zone_mm| Step {
+        kind,
+        to,
+        via,
+        speed_mm_s,
+        zone_mm,
+        comment: None,
+        wait_s: None,
+    };
     let joints = JointTarget { robot_deg: [0.0, -30.0, 30.5, 0.0, 90.0, 180.25], external: [None; 6] };
     let cartesian = |x| TargetValue::Cartesian(pose(x));
     let mut steps = vec![

@@ -1,0 +1,256 @@
+//! `truegrind plan --robot R --sensor S --poses N -o POSES.mod`: what to measure, as a program that moves there.
+
+use std::path::PathBuf;
+
+use anyhow::{anyhow, bail};
+use clap::{Args, ValueEnum};
+use truegrind::measurement::dataset::Sensor;
+use truegrind::planning::poses::candidate::Bounds;
+use truegrind::planning::poses::design::Index;
+use truegrind::planning::poses::drive::{Drive, draft};
+use truegrind::planning::poses::rows::Noise;
+use truegrind::planning::poses::schedule::Visits;
+use truegrind::planning::poses::{Options, Wanted, plan, rival};
+use truegrind::program::rapid::writer;
+use truegrind::report::planning as view;
+
+use super::files::{self, Batch};
+use super::outputs::Outputs;
+use super::progress::Work;
+use super::stated::{StatedArguments, numbers};
+use super::{Common, Ending, inputs, on_threads};
+
+/// The sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SensorArgument {
+    /// Draw-wire: a length.
+    Cable,
+    /// Tracker with a reflector: a position.
+    Position,
+    /// Tracker with a six-dimensional target: a pose.
+    Pose,
+}
+
+/// What makes a set of poses good.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum IndexArgument {
+    /// D-optimality, priors counted in.
+    D,
+    /// Observability index O1.
+    O1,
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Robot: a name of `truegrind robots`, or a TOML file.
+    #[arg(long)]
+    robot: String,
+    /// Sensor.
+    #[arg(long, value_enum)]
+    sensor: SensorArgument,
+    /// Different poses; repeats come on top.
+    #[arg(long, default_value_t = 60)]
+    poses: usize,
+    /// The RAPID module to write.
+    #[arg(short, long, value_name = "POSES.mod")]
+    output: Option<PathBuf>,
+    /// A diagnosis (`diagnose --json`): weigh the poses that decide between what it could not tell apart.
+    #[arg(long = "for", value_name = "DIAGNOSIS.json")]
+    diagnosis: Option<PathBuf>,
+    /// What makes a set of poses good.
+    #[arg(long, value_enum, default_value_t = IndexArgument::D)]
+    index: IndexArgument,
+    /// Standard deviation of a length or coordinate, everything counted (mm); 0.05 for a cable, 0.03 for a tracker.
+    #[arg(long, value_name = "MM")]
+    sigma: Option<f64>,
+    /// Standard deviation of an orientation (°).
+    #[arg(long, value_name = "DEG", default_value_t = 0.006)]
+    sigma_angle: f64,
+    /// Box for the touched point in the base: two corners x,y,z,x,y,z (mm).
+    #[arg(long = "box", value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
+    box_mm: Option<String>,
+    /// Shortest and longest cable, or distance to the sensor: min,max (mm).
+    #[arg(long, value_name = "MIN,MAX")]
+    range: Option<String>,
+    /// Distance that a cable keeps from the lines between the joints (mm); 0 does not look. A twelfth of the reach unless
+    /// stated.
+    #[arg(long, value_name = "MM")]
+    clearance: Option<f64>,
+    /// Distance that joints keep from their limits (°); at least that of the approach.
+    #[arg(long, value_name = "DEG", default_value_t = 6.0)]
+    margin: f64,
+    /// Smallest distance to singularity.
+    #[arg(long, default_value_t = 0.05)]
+    singularity: f64,
+    /// Poses that are measured twice more, for the noise floor.
+    #[arg(long, default_value_t = 4)]
+    repeats: usize,
+    /// Poses that are measured again from the other side, for backlash.
+    #[arg(long, default_value_t = 12)]
+    both_sides: usize,
+    /// Visits of one pose over the whole run, for thermal drift.
+    #[arg(long, default_value_t = 8)]
+    warm_up: usize,
+    /// Where an approach begins, in every joint (°).
+    #[arg(long, value_name = "DEG", default_value_t = 3.0)]
+    approach: f64,
+    /// Time at rest before a reading (s).
+    #[arg(long, value_name = "S", default_value_t = 2.0)]
+    settle: f64,
+    /// Time from row to row (s), for what changes with time.
+    #[arg(long, value_name = "S", default_value_t = 12.0)]
+    seconds_per_row: f64,
+    /// Speed between poses [mm/s].
+    #[arg(long, value_name = "MM/S", default_value_t = 200.0)]
+    speed: f64,
+    /// Non-centrality from which an effect counts as decided.
+    #[arg(long, default_value_t = 25.0)]
+    decisive: f64,
+    /// Random poses to choose from.
+    #[arg(long, default_value_t = 2000)]
+    candidates: usize,
+    #[command(flatten)]
+    stated: StatedArguments,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
+    let mut targets = arguments.outputs.files();
+    targets.extend(arguments.output.as_deref());
+    let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
+    Batch::check(&inputs_of, &targets)?;
+    if arguments.outputs.rrd.is_some() {
+        bail!("--rrd: a plan has no picture; `truegrind view POSES.mod --robot R` shows its program");
+    }
+    let robot = inputs::robot(&arguments.robot)?;
+    let sensor = match arguments.sensor {
+        SensorArgument::Cable => Sensor::Cable,
+        SensorArgument::Position => Sensor::Position,
+        SensorArgument::Pose => Sensor::Pose,
+    };
+    let frames = arguments.stated.planned(sensor)?;
+    let reach: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
+    let options = options(arguments, sensor, reach)?;
+    let wanted = Wanted { nominal: &robot.model, sensor, frames: &frames };
+    let work = Work::start(format!("choosing {} of {} poses", arguments.poses, arguments.candidates));
+    let planned = on_threads(arguments.common.threads, || plan(&wanted, &options))?
+        .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
+    drop(work);
+    arguments.outputs.print(&view::summary(&planned, &robot.sheet.name));
+    let mut batch = Batch::sparing(&inputs_of);
+    let name = robot.sheet.name.as_str();
+    arguments.outputs.add_made(
+        &mut batch,
+        || view::document(&planned, &wanted, name),
+        || view::table(&planned, &wanted),
+        || view::json(&planned, &wanted, name),
+    )?;
+    if let Some(path) = &arguments.output {
+        let drive = Drive {
+            robot: name.to_owned(),
+            travel_mm_s: arguments.speed,
+            settle_s: arguments.settle,
+            ..Drive::default()
+        };
+        batch.add(path, writer::write(&draft(&planned, &wanted, &drive))?);
+    }
+    batch.write()?;
+    let rough = planned.rows.iter().any(|row| row.rough_way);
+    Ok(if rough { Ending::Flagged } else { Ending::Done })
+}
+
+fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
+    let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
+    for (name, value) in [
+        ("--sigma", sigma),
+        ("--sigma-angle", arguments.sigma_angle),
+        ("--approach", arguments.approach),
+        ("--seconds-per-row", arguments.seconds_per_row),
+        ("--speed", arguments.speed),
+        ("--decisive", arguments.decisive),
+    ] {
+        if !(value > 0.0 && value.is_finite()) {
+            bail!("{name} {value}: expected a number above 0");
+        }
+    }
+    for (name, value) in [
+        ("--settle", arguments.settle),
+        ("--margin", arguments.margin),
+        ("--singularity", arguments.singularity),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            bail!("{name} {value}: expected 0 or more");
+        }
+    }
+    if arguments.poses < 4 {
+        bail!("--poses {}: expected at least 4; some 50 to 100 are usual", arguments.poses);
+    }
+    let box_mm = match &arguments.box_mm {
+        None => None,
+        Some(text) => match numbers("--box", text)?[..] {
+            [a, b, c, d, e, f] if a < d && b < e && c < f => Some([[a, b, c], [d, e, f]]),
+            _ => bail!("--box {text}: expected x,y,z of the lower and x,y,z of the upper corner (mm)"),
+        },
+    };
+    let distance_mm = match &arguments.range {
+        None => None,
+        Some(text) => match numbers("--range", text)?[..] {
+            [low, high] if 0.0 <= low && low < high => Some([low, high]),
+            _ => bail!("--range {text}: expected min,max (mm)"),
+        },
+    };
+    let clearance_mm = match (sensor, arguments.clearance) {
+        (Sensor::Cable, None) => Some(reach_mm / 12.0),
+        (Sensor::Cable, Some(0.0)) => None,
+        (Sensor::Cable, Some(mm)) if mm > 0.0 && mm.is_finite() => Some(mm),
+        (Sensor::Cable, Some(mm)) => bail!("--clearance {mm}: expected 0 or more (mm)"),
+        (_, Some(_)) => bail!("--clearance is for a cable; a tracker's line of sight is not checked"),
+        (_, None) => None,
+    };
+    let questions = match &arguments.diagnosis {
+        None => Vec::new(),
+        Some(path) => {
+            let found =
+                rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            if found.is_empty() {
+                eprintln!(
+                    "note: {}: nothing is ambiguous or untested; planned for the geometry",
+                    path.display()
+                );
+            }
+            found
+        }
+    };
+    let approach_rad = arguments.approach.to_radians();
+    Ok(Options {
+        poses: arguments.poses,
+        index: match arguments.index {
+            IndexArgument::D => Index::D,
+            IndexArgument::O1 => Index::O1,
+        },
+        noise: Noise { reading_mm: sigma, reading_rad: arguments.sigma_angle.to_radians() },
+        candidates: arguments.candidates.max(arguments.poses),
+        bounds: Bounds {
+            margin_rad: arguments.margin.to_radians().max(approach_rad),
+            min_singularity: arguments.singularity,
+            box_mm,
+            distance_mm,
+            clearance_mm,
+        },
+        visits: Visits {
+            repeats: arguments.repeats,
+            both_sides: arguments.both_sides,
+            warm_up: arguments.warm_up,
+            approach_rad,
+            seconds_per_row: arguments.seconds_per_row,
+        },
+        questions,
+        decisive: arguments.decisive,
+        seed: arguments.common.seed,
+        ..Options::default()
+    })
+}

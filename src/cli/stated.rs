@@ -1,0 +1,153 @@
+//! Frames that were measured by other means, as options: with them the raw error of a data set is a number.
+
+use anyhow::{anyhow, bail};
+use clap::Args;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use truegrind::identification::calibration::Frames;
+use truegrind::math::se3::Pose;
+use truegrind::measurement::dataset::{Dataset, Sensor};
+
+/// Where the sensor stands, if that is known. An identification uses it for the raw error alone: the fit finds frames by
+/// itself.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct StatedArguments {
+    /// Frame of a position or pose sensor in the robot's base: x,y,z (mm), or x,y,z,qw,qx,qy,qz.
+    #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
+    sensor_frame: Option<String>,
+    /// Outlet of a cable in the robot's base: x,y,z (mm); once for each cable, in the order of `anchor`.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    outlet: Vec<String>,
+    /// What a cable reads beyond its free length (mm); once for each cable.
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    cable_zero: Vec<String>,
+    /// The touched point (hook, reflector, target) on the flange: x,y,z (mm), or x,y,z,qw,qx,qy,qz; else the flange
+    /// itself.
+    #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
+    touched_point: Option<String>,
+}
+
+/// What the frames must fit.
+struct Measured<'a> {
+    file: &'a str,
+    sensor: Sensor,
+    anchors: usize,
+}
+
+impl StatedArguments {
+    /// The frames, when they are stated; an error where they do not fit the sensor of the data.
+    pub(super) fn frames(&self, dataset: &Dataset) -> anyhow::Result<Option<Frames>> {
+        let measured = Measured { file: &dataset.file, sensor: dataset.sensor, anchors: dataset.anchors() };
+        self.frames_of(&measured)
+    }
+
+    /// The frames of a measurement that is still to be made: a tracker may stand anywhere, a cable needs its outlet.
+    pub(super) fn planned(&self, sensor: Sensor) -> anyhow::Result<Frames> {
+        let anchors = self.outlet.len().max(1);
+        if sensor == Sensor::Cable && self.outlet.is_empty() {
+            bail!("--outlet is missing: where in the robot's base does the cable come out?");
+        }
+        let zeros = if self.cable_zero.is_empty() && sensor == Sensor::Cable {
+            vec!["0".to_owned(); anchors]
+        } else {
+            self.cable_zero.clone()
+        };
+        let frame = self.sensor_frame.clone();
+        let frame = if sensor == Sensor::Cable { frame } else { frame.or(Some("0,0,0".to_owned())) };
+        let whole = Self { cable_zero: zeros, sensor_frame: frame, ..self.clone() };
+        let found = whole.frames_of(&Measured { file: "the plan", sensor, anchors })?;
+        found.ok_or_else(|| anyhow!("no frames are stated"))
+    }
+
+    fn frames_of(&self, dataset: &Measured<'_>) -> anyhow::Result<Option<Frames>> {
+        let cable = !self.outlet.is_empty() || !self.cable_zero.is_empty();
+        let framed = self.sensor_frame.is_some();
+        if !cable && !framed {
+            if self.touched_point.is_some() {
+                bail!("--touched-point says nothing without --sensor-frame, or --outlet and --cable-zero");
+            }
+            return Ok(None);
+        }
+        let anchors = dataset.anchors;
+        let mut frames = Frames::at_origin(anchors);
+        if let Some(text) = &self.touched_point {
+            frames.flange_from_target = pose("--touched-point", text)?;
+        }
+        match dataset.sensor {
+            Sensor::Cable => {
+                if framed {
+                    bail!(
+                        "--sensor-frame: {} holds cable lengths, whose sensor has no frame: state --outlet and \
+                         --cable-zero",
+                        dataset.file
+                    );
+                }
+                for (name, found) in
+                    [("--outlet", self.outlet.len()), ("--cable-zero", self.cable_zero.len())]
+                {
+                    if found != anchors {
+                        bail!(
+                            "{name}: stated {found} times, expected once for each of the {anchors} cables of {}",
+                            dataset.file
+                        );
+                    }
+                }
+                for (place, text) in frames.outlets_mm.iter_mut().zip(&self.outlet) {
+                    *place = Vector3::from(triple("--outlet", text)?);
+                }
+                for (place, text) in frames.zeros_mm.iter_mut().zip(&self.cable_zero) {
+                    let [value] = numbers("--cable-zero", text)?[..] else {
+                        bail!("--cable-zero {text}: expected one number (mm)");
+                    };
+                    *place = value;
+                }
+            }
+            Sensor::Position | Sensor::Pose => {
+                if cable {
+                    bail!(
+                        "--outlet and --cable-zero: {} holds {} and no cable lengths: state --sensor-frame",
+                        dataset.file,
+                        if dataset.sensor == Sensor::Pose { "poses" } else { "positions" }
+                    );
+                }
+                if let Some(text) = &self.sensor_frame {
+                    frames.base_from_sensor = pose("--sensor-frame", text)?;
+                }
+            }
+        }
+        Ok(Some(frames))
+    }
+}
+
+/// Numbers of a list with commas.
+pub(super) fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
+    text.split(',')
+        .map(|cell| match cell.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(anyhow!("{option} {text}: `{}` is no number", cell.trim())),
+        })
+        .collect()
+}
+
+fn triple(option: &str, text: &str) -> anyhow::Result<[f64; 3]> {
+    let values = numbers(option, text)?;
+    <[f64; 3]>::try_from(values.as_slice())
+        .map_err(|_| anyhow!("{option} {text}: {} numbers, expected x,y,z (mm)", values.len()))
+}
+
+fn pose(option: &str, text: &str) -> anyhow::Result<Pose> {
+    let values = numbers(option, text)?;
+    match values[..] {
+        [x, y, z] => Ok(Pose::translation(x, y, z)),
+        [x, y, z, qw, qx, qy, qz] => {
+            let quaternion = Quaternion::new(qw, qx, qy, qz);
+            let length = quaternion.norm();
+            if (length - 1.0).abs() > 0.01 {
+                bail!(
+                    "{option} {text}: the quaternion has length {length:.3}, expected 1 (order w, x, y, z)"
+                );
+            }
+            Ok(Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::from_quaternion(quaternion)))
+        }
+        _ => bail!("{option} {text}: {} numbers, expected x,y,z or x,y,z,qw,qx,qy,qz", values.len()),
+    }
+}
