@@ -45,7 +45,8 @@ pub(super) struct Arguments {
     /// Poses that place the sensor before tracking begins.
     #[arg(long, value_name = "N")]
     first_poses: Option<usize>,
-    /// Standard deviation of the sensor (mm); from the first poses otherwise.
+    /// Standard deviation of a reading (mm), with what the model does not explain; otherwise what the first poses leave,
+    /// but no less than the model's held-out error.
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
     /// How much a parameter may drift from pose to pose, in mm or degrees: link2.theta=0.0001. May be repeated.

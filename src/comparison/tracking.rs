@@ -72,7 +72,8 @@ pub struct Options {
     pub drift_frame_rad: f64,
     /// Random walks of single parameters in place of the above, by name (`link2.theta`), in mm or rad.
     pub drift: BTreeMap<String, f64>,
-    /// Standard deviation of the sensor (mm); from the first poses where not stated.
+    /// Standard deviation of a reading (mm), with what the model does not explain; where not stated, what the first poses
+    /// leave, but no less than the model's held-out error.
     pub sigma_mm: Option<f64>,
     /// Poses that place the sensor before tracking begins.
     pub first_poses: usize,
@@ -331,7 +332,11 @@ impl Tracker {
         let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
         let (observed, _) = observe(&first, &model.nominal, false);
         let (_, fitted) = register(&observed, &model.model)?;
-        let sigma_mm = options.sigma_mm.unwrap_or(fitted.sigma_mm);
+        // A reading cannot agree better with the model than held-out readings did when it was identified; a few poses that
+        // have just placed the sensor seem to.
+        let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+        let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
+        let sigma_mm = options.sigma_mm.unwrap_or(fitted.sigma_mm.max(unexplained_mm));
         let frames = fitted.frames;
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
