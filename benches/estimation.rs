@@ -115,3 +115,91 @@ fn recursive_least_squares(bencher: Bencher<'_, '_>, n: usize) {
     let problem = Rows::new(n);
     bencher.bench_local(|| rls::solve(&problem, &[0.0; P], &rls::Options::default()));
 }
+
+/// Rows of the recipe that the experiments ship with, and the 24 link parameters with known frames.
+mod arm {
+    use truegrind::comparison::experiment::Experiment;
+    use truegrind::comparison::simulated;
+    use truegrind::identification::calibration::{Calibration, Weight};
+    use truegrind::identification::fit::{Start, fit, frame_parameters};
+    use truegrind::identification::identify::{Options, identify, observe};
+    use truegrind::identification::solver::SOLVERS;
+    use truegrind::identification::start::starts;
+    use truegrind::identification::tolerance::Tolerance;
+    use truegrind::kinematics::estimated::Estimated;
+    use truegrind::kinematics::model::Model;
+    use truegrind::kinematics::parameter::link_parameters;
+    use truegrind::measurement::dataset::Dataset;
+    use truegrind::measurement::{import, split};
+
+    fn nominal(name: &str) -> Result<Model, String> {
+        truegrind::robots::load(name).map(|r| r.model).map_err(|e| e.to_string())
+    }
+
+    /// The first `rows` cable rows as the papers set them up.
+    pub(super) fn cable(rows: usize) -> Calibration {
+        let experiment = Experiment::by_name("ltlm-table-6").expect("ships");
+        let (dataset, simulation, _) = simulated::measure(&experiment, nominal).expect("ships");
+        let dataset = dataset.subset(&(0..rows).collect::<Vec<_>>());
+        let model = simulation.nominal;
+        let frames = starts(&dataset, &model).expect("placed").remove(0);
+        let (observed, _) = observe(&dataset, &model, false);
+        let start = Start { model: &model, frames: &frames };
+        let sensing = frame_parameters(&dataset);
+        let fitted = fit(&observed, start, &sensing, &Tolerance::default(), &SOLVERS[0], 0);
+        let parameters = link_parameters(&model);
+        let priors = Tolerance::default().priors(&parameters, &model);
+        let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows];
+        Calibration::new(&dataset, &model, &fitted.frames, &parameters, &priors, &weights)
+    }
+
+    /// A model and the rows that it comes from: a draw-wire, a tracker, or a tracker with full poses.
+    pub(super) fn measured(sensor: &str) -> (Estimated, Dataset) {
+        let (robot, csv) = match sensor {
+            "cable" => ("abb-irb-120", include_str!("../tests/data/irb120-cable.csv").to_owned()),
+            "position" => ("abb-irb-120", include_str!("../tests/data/irb120-tracker.csv").to_owned()),
+            _ => {
+                let recipe = simulated::recipe("tx60-pose", "bench").expect("ships");
+                ("staubli-tx60", recipe.simulate(nominal).expect("measured").csv)
+            }
+        };
+        let dataset = import::read("rows.csv", csv.as_bytes(), &import::Options::default()).expect("read");
+        let model = nominal(robot).expect("in the catalogue");
+        let frames = starts(&dataset, &model).expect("placed").remove(0);
+        let options = Options {
+            tolerance: Tolerance::default(),
+            solver: &SOLVERS[0],
+            held_out: 0.2,
+            seed: 0,
+            sharpen: false,
+            limit_rmse_mm: None,
+            limit_max_mm: None,
+            stated_frames: None,
+        };
+        let division = |d: &Dataset| split::random(d, 0.2, 0);
+        let found = identify(&dataset, robot, &model, &frames, &division, &options).expect("identified");
+        (found.estimated, dataset)
+    }
+}
+
+/// Every method on 100 cable rows of an arm, as the papers set it up: seconds of the whole search.
+#[divan::bench(args = truegrind::identification::solver::all().map(|s| s.name).collect::<Vec<_>>())]
+fn method_on_100_cable_rows(bencher: Bencher<'_, '_>, name: &str) {
+    let task = arm::cable(100);
+    let solver = truegrind::identification::solver::by_name(name).expect("in the list");
+    bencher.bench_local(|| solver.solve(&task, &[0.0; 24], 0));
+}
+
+/// One pose taken in by a track: process noise, linearisation, update.
+#[divan::bench(args = ["cable", "position", "pose"])]
+fn track_one_pose(bencher: Bencher<'_, '_>, sensor: &str) {
+    use truegrind::comparison::tracking::{Options, Tracker};
+    let (model, dataset) = arm::measured(sensor);
+    let mut tracker = Tracker::begin(&model, "bench", &dataset, &Options::default()).expect("placed");
+    let task = tracker.prepare(&dataset);
+    let mut pose = 0;
+    bencher.bench_local(|| {
+        pose = (pose + 1) % dataset.rows.len();
+        tracker.update(&task, pose)
+    });
+}

@@ -11,7 +11,8 @@
 //! 6. [`selection`]: the best candidate is accepted when it passes the likelihood ratio corrected for all trials and lowers
 //!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again.
 //! 7. [`validation`]: held-out errors by full refits, of all stages and of every rival.
-//! 8. [`remaining`]: outliers, a noise that grows with range, and structure that nothing in the catalogue explains.
+//! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
+//!    explains; rounding and contradicting columns; what the rows cannot show.
 //! 9. [`finding`] and [`words`]: the result, in the contract's terms and in a technician's.
 //!
 //! Every candidate's size prior takes part in its evidence, so a candidate with many parameters has to earn them.
@@ -28,6 +29,8 @@ pub mod selection;
 pub mod validation;
 pub mod transfer;
 pub mod remaining;
+mod record;
+mod silence;
 pub mod finding;
 pub mod words;
 pub mod picture;

@@ -6,19 +6,13 @@ use anyhow::bail;
 use clap::Args;
 use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::diagnosis::transfer::transfer;
-use truegrind::identification::calibration::Frames;
-use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
-use truegrind::identification::identify::observe;
-use truegrind::identification::solver::SOLVERS;
-use truegrind::identification::start::starts;
-use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::estimated::Judgement;
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
 
 use super::files::Batch;
-use super::identify::{DataArguments, read};
+use super::identify::{DataArguments, best_start, read};
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::{Common, Ending, on_threads};
@@ -35,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
     /// Most causes that are accepted.
-    #[arg(long, default_value_t = 12)]
+    #[arg(long, default_value_t = 20)]
     most: usize,
     /// Contiguous blocks that are held out in turn, beside five random folds.
     #[arg(long, default_value_t = 10)]
@@ -77,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))?;
         for other in &others {
             work.tell(&format!("judging on {}", other.file));
-            let frames = best_start(other, &robot.model)?;
+            let frames = best_start(other, &robot.model, &options.tolerance, true)?;
             let models = [&robot.model, &found.geometric.model, &found.extended.model];
             let [nominal, geometric, extended] = models;
             found.diagnosis.transfers.push(transfer(
@@ -132,20 +126,6 @@ pub(super) fn diagnosed(
     options: &Options,
     tell: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
-    let frames = best_start(dataset, nominal)?;
+    let frames = best_start(dataset, nominal, &options.tolerance, true)?;
     Ok(diagnose(dataset, robot, nominal, &frames, options, tell)?)
-}
-
-/// Where several outlets explain the rows, the one with which registered frames fit best.
-fn best_start(dataset: &Dataset, nominal: &Model) -> anyhow::Result<Frames> {
-    let candidates = starts(dataset, nominal)?;
-    let (observed, _) = observe(dataset, nominal, true);
-    let sensing = frame_parameters(dataset);
-    let rmse = |frames: &Frames| {
-        let start = Start { model: nominal, frames };
-        let fitted = fit(&observed, start, &sensing, &Tolerance::default(), &SOLVERS[0], 0);
-        summary_on(&observed, &fitted.model, &fitted.frames).rmse
-    };
-    let best = candidates.into_iter().map(|f| (rmse(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, f)| f).ok_or_else(|| anyhow::anyhow!("no starting frames"))
 }

@@ -1,7 +1,7 @@
 //! `truegrind track DATA --model MODEL.toml`: keeps an arm accurate over its life.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
@@ -45,7 +45,8 @@ pub(super) struct Arguments {
     /// Poses that place the sensor before tracking begins.
     #[arg(long, value_name = "N")]
     first_poses: Option<usize>,
-    /// Standard deviation of the sensor (mm); from the first poses otherwise.
+    /// Standard deviation of a reading (mm), with what the model does not explain; otherwise what the first poses leave,
+    /// but no less than the model's held-out error.
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
     /// How much a parameter may drift from pose to pose, in mm or degrees: link2.theta=0.0001. May be repeated.
@@ -133,6 +134,7 @@ fn pass(
     };
     let before = tracker.as_ref().map_or(0, |t| t.state().poses);
     let mut alarms: Vec<Alarm> = Vec::new();
+    let mut taking = Duration::ZERO;
     for path in &files {
         let Some(dataset) = read(arguments, arm, path)? else { continue };
         if tracker.is_none() {
@@ -147,7 +149,9 @@ fn pass(
             }
         }
         if let Some(tracker) = &mut tracker {
+            let begun = Instant::now();
             alarms.extend(tracker.take(&dataset)?);
+            taking += begun.elapsed();
         }
     }
     let Some(tracker) = tracker else {
@@ -163,6 +167,11 @@ fn pass(
         }
         return Ok(false);
     }
+    eprintln!(
+        "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
+        taking.as_secs_f64() * 1e3,
+        taking.as_secs_f64() * 1e6 / fresh as f64
+    );
     let model = tracker.model();
     let date = match &arguments.date {
         Some(date) => stamp(date)?,

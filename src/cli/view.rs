@@ -181,7 +181,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         return Ok(visual::dataset_recording(&dataset, &found)?);
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
-    let frames = identify::best_start(&dataset, &robot.model, &options)?;
+    let frames = identify::best_start(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
     let (observed, _) = observe(&dataset, &robot.model, true);
     let sensing = frame_parameters(&dataset);
     let mut registered = None;

@@ -89,7 +89,7 @@ pub struct Heat {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wear {
-    /// Of each joint [°/h].
+    /// Of each joint (° per hour).
     pub zero_deg_per_h: [f64; 6],
 }
 

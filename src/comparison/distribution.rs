@@ -1,12 +1,13 @@
-//! Distributions that the tests need: χ², Student's t, and the normal quantile.
+//! Distributions that the tests need beside the tails of [`tail`](crate::math::tail): Student's t and quantiles of χ².
 //!
-//! **Method.** Regularised incomplete gamma P(a, x) by its series below a + 1 and by Lentz' continued fraction above;
-//! regularised incomplete beta by Lentz' continued fraction; ln Γ by Lanczos' sum (g = 7, nine terms), good to 1e-14.
-//! Quantiles by bisection, which cannot fail on a monotonous function.
+//! **Method.** Regularised incomplete beta by Lentz' continued fraction; ln Γ by Lanczos' sum (g = 7, nine terms), good
+//! to 1e-14. Quantiles by bisection, which cannot fail on a monotonous function.
 //!
-//! **Source.** DLMF 8.11, 8.9, 8.17 (dlmf.nist.gov); Lanczos 1964. **Checked against** tabulated values.
+//! **Source.** DLMF 8.17 (dlmf.nist.gov); Lanczos 1964. **Checked against** tabulated values.
 
 use std::f64::consts::PI;
+
+use crate::math::tail::chi_square_tail;
 
 /// ln Γ(x) for x > 0.
 pub fn ln_gamma(x: f64) -> f64 {
@@ -31,52 +32,15 @@ pub fn ln_gamma(x: f64) -> f64 {
     0.5 * (2.0 * PI).ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
-/// Share of a χ² variable with `freedom` degrees of freedom above `x`.
-pub fn chi_square_above(x: f64, freedom: f64) -> f64 {
-    if !(x > 0.0) {
-        return if x.is_nan() { f64::NAN } else { 1.0 };
-    }
-    let (a, x) = (0.5 * freedom, 0.5 * x);
-    let front = (a * x.ln() - x - ln_gamma(a)).exp();
-    if x < a + 1.0 {
-        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
-        for _ in 0..10_000 {
-            n += 1.0;
-            term *= x / n;
-            sum += term;
-            if term < sum * 1e-17 {
-                break;
-            }
-        }
-        return (1.0 - front * sum).clamp(0.0, 1.0);
-    }
-    let tiny = 1e-300;
-    let mut b = x + 1.0 - a;
-    let (mut c, mut d) = (1.0 / tiny, 1.0 / b);
-    let mut h = d;
-    for i in 1..10_000 {
-        let i = f64::from(i);
-        let an = -i * (i - a);
-        b += 2.0;
-        d = 1.0 / guarded(an * d + b, tiny);
-        c = guarded(b + an / c, tiny);
-        h *= d * c;
-        if (d * c - 1.0).abs() < 1e-16 {
-            break;
-        }
-    }
-    (front * h).clamp(0.0, 1.0)
-}
-
-/// The value that a χ² variable exceeds with probability `above`.
-pub fn chi_square_quantile(above: f64, freedom: f64) -> f64 {
-    let (mut low, mut high) = (0.0, freedom + 1.0);
-    while chi_square_above(high, freedom) > above && high < 1e9 {
+/// The value that a χ² variable with `freedom` degrees of freedom exceeds with probability `above`.
+pub fn chi_square_quantile(above: f64, freedom: usize) -> f64 {
+    let (mut low, mut high) = (0.0, freedom as f64 + 1.0);
+    while chi_square_tail(high, freedom) > above && high < 1e9 {
         high *= 2.0;
     }
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if chi_square_above(middle, freedom) > above { low = middle } else { high = middle }
+        if chi_square_tail(middle, freedom) > above { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

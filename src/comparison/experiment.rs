@@ -412,8 +412,9 @@ const SHIPPED: [(&str, &[u8]); 10] = [
 ];
 
 /// Recipes that ship, by name.
-pub const RECIPES: [(&str, &[u8]); 2] = [
+pub const RECIPES: [(&str, &[u8]); 3] = [
     ("irb120-1024", include_bytes!("../../experiments/recipes/irb120-1024.toml")),
+    ("irb120-1024-position", include_bytes!("../../experiments/recipes/irb120-1024-position.toml")),
     ("tx60-pose", include_bytes!("../../experiments/recipes/tx60-pose.toml")),
 ];
 

@@ -14,7 +14,7 @@
 //! **Which parameter, since when.** For every parameter k and every pose s of the history, the generalised likelihood
 //! ratio of a step of k at s (Willsky and Jones 1976), against what was known before the history began. With J and r of
 //! the history at that state, P its covariance, A_s = Σ_{i≥s} JᵢᵀJᵢ, g_s = Σ_{i≥s} Jᵢᵀrᵢ and M = (P⁻¹ + A₀)⁻¹:
-//! ratio = (g_s[k] − A_s[:,k]ᵀ M g₀)² / (A_s[k,k] − A_s[:,k]ᵀ M A_s[:,k]), exact for rows of unit noise. Parameters whose
+//! ratio = (g_s(k) − A_s(:,k)ᵀ M g₀)² / (A_s(k,k) − A_s(:,k)ᵀ M A_s(:,k)), exact for rows of unit noise. Parameters whose
 //! ratio is nearly as large are named as alternatives: a sensor that was knocked and a joint that lost its zero can look
 //! the same.
 //!
@@ -72,7 +72,8 @@ pub struct Options {
     pub drift_frame_rad: f64,
     /// Random walks of single parameters in place of the above, by name (`link2.theta`), in mm or rad.
     pub drift: BTreeMap<String, f64>,
-    /// Standard deviation of the sensor (mm); from the first poses where not stated.
+    /// Standard deviation of a reading (mm), with what the model does not explain; where not stated, what the first poses
+    /// leave, but no less than the model's held-out error.
     pub sigma_mm: Option<f64>,
     /// Poses that place the sensor before tracking begins.
     pub first_poses: usize,
@@ -331,7 +332,11 @@ impl Tracker {
         let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
         let (observed, _) = observe(&first, &model.nominal, false);
         let (_, fitted) = register(&observed, &model.model)?;
-        let sigma_mm = options.sigma_mm.unwrap_or(fitted.sigma_mm);
+        // A reading cannot agree better with the model than held-out readings did when it was identified; a few poses that
+        // have just placed the sensor seem to.
+        let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+        let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
+        let sigma_mm = options.sigma_mm.unwrap_or(fitted.sigma_mm.max(unexplained_mm));
         let frames = fitted.frames;
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
@@ -463,11 +468,12 @@ impl Tracker {
         let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
         let (observed, _) = observe(&fresh, &self.begun.nominal, false);
         let seen = self.seen(&observed);
+        let task = self.task(&seen);
         let mut alarms = Vec::new();
-        for (row, seen) in observed.dataset.rows.iter().zip(seen) {
+        for (at, (row, seen)) in observed.dataset.rows.iter().zip(seen).enumerate() {
             self.condition = row.condition;
             self.joints.push(row.joints);
-            alarms.extend(self.pose(seen));
+            alarms.extend(self.pose(&task, at, seen));
         }
         let consumed =
             Consumed { file: dataset.file.clone(), rows: dataset.rows.len(), digest: digest(&dataset.rows) };
@@ -479,14 +485,13 @@ impl Tracker {
         Ok(alarms)
     }
 
-    /// One pose. Gives the alarm, where it raises one.
-    fn pose(&mut self, mut seen: Seen) -> Option<Alarm> {
-        let task = self.task(std::slice::from_ref(&seen));
-        let taken = self.update(&task, 0);
+    /// Observation `at` of `task`, which is `seen`. Gives the alarm, where it raises one.
+    fn pose(&mut self, task: &Calibration, at: usize, mut seen: Seen) -> Option<Alarm> {
+        let taken = self.update(task, at);
         seen.nis = taken.nis;
         self.state.poses += 1;
         self.state.accidents += usize::from(taken.set_aside);
-        let error_mm = self.last_error_mm(&task);
+        let error_mm = self.error_mm(task, at, seen.per_mm);
         self.errors_mm.push(error_mm);
         self.state.history.push(seen);
         if let Some(alarm) = self.alarm() {
@@ -575,9 +580,15 @@ impl Tracker {
         observed.dataset.rows.iter().zip(&weights).map(one).collect()
     }
 
-    /// Error of the pose with the state after it (mm).
-    fn last_error_mm(&self, task: &Calibration) -> f64 {
-        task.errors_mm(self.recursion.x.as_slice()).first().copied().unwrap_or(f64::NAN)
+    /// Error of a pose with the state after it (mm): signed for a cable, the norm otherwise.
+    fn error_mm(&self, task: &Calibration, at: usize, per_mm: f64) -> f64 {
+        let per = task.rows_per_observation();
+        let mut r = vec![0.0; per];
+        task.residuals(self.recursion.x.as_slice(), at * per..(at + 1) * per, &mut r);
+        match r.as_slice() {
+            [length] => length / per_mm,
+            rows => rows.iter().take(3).map(|v| v * v).sum::<f64>().sqrt() / per_mm,
+        }
     }
 
     fn rows_per_pose(&self) -> usize {
@@ -822,9 +833,8 @@ const SMALLEST_VARIANCE: f64 = 1e-14;
 fn chi_square_cut(rows: usize) -> f64 {
     use std::sync::OnceLock;
     static CUTS: OnceLock<[f64; 7]> = OnceLock::new();
-    let cuts = CUTS.get_or_init(|| {
-        std::array::from_fn(|m| if m == 0 { 0.0 } else { chi_square_quantile(ACCIDENT, m as f64) })
-    });
+    let cuts = CUTS
+        .get_or_init(|| std::array::from_fn(|m| if m == 0 { 0.0 } else { chi_square_quantile(ACCIDENT, m) }));
     cuts[rows.min(6)]
 }
 

@@ -98,6 +98,11 @@ pub enum Conclusion {
         /// In how many.
         cases: usize,
     },
+    /// The reference diverged in some cases: nothing can be compared with it.
+    ReferenceDiverged {
+        /// In how many.
+        cases: usize,
+    },
 }
 
 /// Compares every method with the reference. `held_out` is held-out rows over rows of training.
@@ -137,9 +142,12 @@ fn conclude(
     limited: &Test,
     converged: Option<&Test>,
 ) -> Conclusion {
-    let diverged = result.outcomes.iter().filter(|o| o.diverged).count();
-    if diverged > 0 {
-        return Conclusion::Diverged { cases: diverged };
+    let diverged = |r: &MethodResult| r.outcomes.iter().filter(|o| o.diverged).count();
+    if diverged(result) > 0 {
+        return Conclusion::Diverged { cases: diverged(result) };
+    }
+    if diverged(reference) > 0 {
+        return Conclusion::ReferenceDiverged { cases: diverged(reference) };
     }
     if let Some(converged) = converged
         && converged.largest_share < SAME

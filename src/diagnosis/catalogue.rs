@@ -202,7 +202,7 @@ impl Columns {
                 let has = |side: i8| dataset.rows.iter().any(|r| r.condition.approach[j] == side);
                 has(-1) && has(1)
             }),
-            hours: (times.1 - times.0 > 0.0 && times.0.is_finite()).then(|| times.1 - times.0),
+            hours: (times.1 - times.0 > 0.0 && times.0.is_finite()).then_some(times.1 - times.0),
             temperature: (heat.1 - heat.0 > 0.0 && heat.0.is_finite())
                 .then(|| (warm.iter().sum::<f64>() / warm.len() as f64, heat.1 - heat.0)),
             range_rad: std::array::from_fn(|j| {

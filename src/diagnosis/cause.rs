@@ -50,7 +50,7 @@ impl Cause {
     /// Standard deviation of each parameter before anything was measured, in its unit.
     pub fn sizes(&self) -> Vec<f64> {
         match self {
-            Cause::Arm(effect) => vec![effect_sigma(effect); effect.parameters().len()],
+            Cause::Arm(effect) => (0..effect.parameters().len()).map(|k| effect_sigma(effect, k)).collect(),
             Cause::Measurement(d) => (0..d.values.len()).map(|k| Tolerance::of_disturbance(d, k)).collect(),
         }
     }

@@ -232,17 +232,34 @@ pub(super) fn back_and_forth(lower: &DMatrix<f64>, b: &DVector<f64>) -> Option<D
 
 /// AᵀA.
 pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
-    product(&a.transpose(), a)
+    multiplied(shown(a).transpose(), shown(a))
 }
 
-/// A B on all threads; the same bits for any number, since every entry is one sum in one order.
+/// A B.
 pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    multiplied(shown(a), shown(b))
+}
+
+/// Aᵀ B.
+pub(super) fn product_of_transposed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    multiplied(shown(a).transpose(), shown(b))
+}
+
+/// A Aᵀ.
+pub(super) fn outer(a: &DMatrix<f64>) -> DMatrix<f64> {
+    multiplied(shown(a), shown(a).transpose())
+}
+
+fn shown(a: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols())
+}
+
+/// On one thread, so that the bits are the same for any number of them.
+fn multiplied(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(a.nrows(), b.ncols());
-    let left = MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols());
-    let right = MatRef::from_column_major_slice(b.as_slice(), b.nrows(), b.ncols());
     let (rows, columns) = out.shape();
     let place = MatMut::from_column_major_slice_mut(out.as_mut_slice(), rows, columns);
-    faer::linalg::matmul::matmul(place, Accum::Replace, left, right, 1.0, Par::Seq);
+    faer::linalg::matmul::matmul(place, Accum::Replace, a, b, 1.0, Par::Seq);
     out
 }
 

@@ -6,14 +6,16 @@ use super::cause::Cause;
 use super::design::{Design, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{
-    Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
-    RangeNoise, SCHEMA, Source, Stage, Step,
+    Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, RangeNoise,
+    SCHEMA, Source, Stage, Step,
 };
 use super::picture::{Picture, picture};
-use super::remaining::{self, Structure};
+use super::record::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
+use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::score::non_centrality;
-use super::selection::{self, Accepted, BLOCKS, Folds, Scored, Selection, scale_beside_growth};
+use super::selection::{self, Accepted, BLOCKS, Folds, Selection};
+use super::silence::not_testable;
 use super::validation::{StageError, Validation, nominal};
 use super::words;
 use crate::identification::calibration::Frames;
@@ -21,9 +23,7 @@ use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
 use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
 };
-use crate::identification::rounding::angle_shares;
 use crate::identification::tolerance::Tolerance;
-use crate::kinematics::effect::Effect;
 use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
 use crate::kinematics::model::Model;
 use crate::kinematics::region::Region;
@@ -81,9 +81,6 @@ const CLEAR: f64 = 6.0;
 
 /// Non-centrality from which an effect can be counted on to be found.
 pub const VISIBLE: f64 = 40.0;
-
-/// Peak rotation of a joint that an effect of practical size has (rad).
-const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 
 /// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `tell` hears of each step.
 ///
@@ -164,14 +161,14 @@ pub fn diagnose(
     };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking at what is left");
-    findings.extend(rounding_finding(dataset, &prepared, &subject, &validation, &geometric, &stages));
+    findings.extend(rounding_finding(dataset, &prepared, &subject, &geometric, &stages));
     findings.extend(mismatch_finding(dataset, &prepared, &stages[2]));
     findings.extend(outlier_finding(dataset, &wild, &stages[2]));
     let structure = remaining::structure(&subject, &extended, &set_aside);
     let noise = remaining::noise_model(&subject, &extended, &set_aside);
     let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
     let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
-    let not_testable = not_testable(&context, &left, &names, &prepared);
+    let not_testable = not_testable(&searched.observed.dataset, &whole, &left, &names, &prepared);
     let remaining = told(&structure, &stages[2], floor_mm, &mut findings);
     if let Err(why) = &prepared.sharpening
         && dataset.angle_step_rad.is_some()
@@ -298,7 +295,7 @@ fn stage(errors: &StageError) -> Stage {
 }
 
 /// Joints as on the teach pendant, from 1.
-fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
+pub(super) fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
     (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
 }
 
@@ -447,345 +444,6 @@ fn told_short(cause: &Cause) -> String {
             format!("{} of joints {}", cause.name(), list.join(" and "))
         }
     }
-}
-
-/// The rounding counts as a finding when it makes more than this share of the geometric residual's variance.
-const ROUNDING_SHARE: f64 = 0.25;
-
-fn rounding_finding(
-    dataset: &Dataset,
-    prepared: &Prepared,
-    subject: &Subject<'_>,
-    validation: &Validation,
-    geometric: &Extended,
-    stages: &[StageError; 3],
-) -> Option<Finding> {
-    let step = dataset.angle_step_rad?;
-    let logged = &prepared.logged;
-    let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
-    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
-    let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
-    let raw = Subject { observed: logged, ..*subject };
-    let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
-    let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
-    if share < ROUNDING_SHARE * before * before {
-        return None;
-    }
-    let (gain, evidence) = match &prepared.sharpening {
-        Ok(report) => (
-            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: stages[1].random.rmse },
-            format!(
-                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; fused with the read-out they are known \
-                 {:.1} times better",
-                step.to_degrees(),
-                share.sqrt(),
-                1.0 / report.narrowed.max(1e-6)
-            ),
-        ),
-        Err(_) => (
-            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
-            format!(
-                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to sharpen them",
-                step.to_degrees(),
-                share.sqrt()
-            ),
-        ),
-    };
-    let _ = validation;
-    Some(Finding {
-        effect: "angle-rounding".to_owned(),
-        cause: format!(
-            "the log rounds joint angles to {:.3}°, which alone moves the touched point by {:.3} mm RMS",
-            step.to_degrees(),
-            share.sqrt()
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: vec![FoundParameter {
-            name: "step".to_owned(),
-            value: step.to_degrees(),
-            sigma: None,
-            unit: "°".to_owned(),
-        }],
-        evidence,
-        p_value: 0.0,
-        non_centrality: None,
-        gain,
-        alternatives: Vec::new(),
-        remedy: words::remedy("angle-rounding").to_owned(),
-    })
-}
-
-fn mismatch_finding(dataset: &Dataset, prepared: &Prepared, after: &StageError) -> Option<Finding> {
-    let rows = &prepared.mismatch.rows;
-    let largest = rows.iter().map(|r| r.1).fold(f64::NAN, f64::max);
-    if rows.is_empty() {
-        return None;
-    }
-    Some(Finding {
-        effect: "readout-mismatch".to_owned(),
-        cause: format!(
-            "in {} rows the controller's x, y, z belong to another pose than its angles, up to {largest:.2} mm apart",
-            rows.len()
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: Some(rows.iter().map(|(i, _)| dataset.rows[*i].number).collect()),
-        joints: None,
-        parameters: vec![FoundParameter {
-            name: "largest mismatch".to_owned(),
-            value: largest,
-            sigma: None,
-            unit: "mm".to_owned(),
-        }],
-        evidence: format!(
-            "read-out against the nominal forward map of the angles: the other rows scatter by {:.4} mm",
-            prepared.mismatch.usual_mm
-        ),
-        p_value: 0.0,
-        non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
-        alternatives: Vec::new(),
-        remedy: words::remedy("readout-mismatch").to_owned(),
-    })
-}
-
-fn outlier_finding(dataset: &Dataset, wild: &[(usize, f64)], after: &StageError) -> Option<Finding> {
-    if wild.is_empty() {
-        return None;
-    }
-    let mut list: Vec<usize> = wild.iter().map(|(i, _)| dataset.rows[*i].number).collect();
-    list.sort_unstable();
-    Some(Finding {
-        effect: "outliers".to_owned(),
-        cause: format!(
-            "{} single readings lie far beyond the scatter of all others, up to {:.0} times",
-            list.len(),
-            wild[0].1
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: Some(list),
-        joints: None,
-        parameters: Vec::new(),
-        evidence: "sizes beyond what the tail of the other residuals gives once in a thousand data sets"
-            .to_owned(),
-        p_value: 1e-3,
-        non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
-        alternatives: Vec::new(),
-        remedy: words::remedy("outliers").to_owned(),
-    })
-}
-
-/// What sensor and rounding leave, and where that is from.
-fn noise_floor(
-    repeated: &Option<split::NoiseFloor>,
-    subject: &Subject<'_>,
-    extended: &Extended,
-) -> (Option<f64>, String) {
-    if let Some(floor) = repeated {
-        return (
-            Some(floor.sigma_mm),
-            format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
-        );
-    }
-    let observed = subject.observed;
-    let shares = angle_shares(&observed.dataset, &extended.model, &extended.frames, &observed.angles);
-    let coordinates = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
-    let mean = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
-    if mean > 0.0 {
-        (Some(mean.sqrt()), "rounding of the angles alone; no pose was repeated".to_owned())
-    } else {
-        (None, "no pose was repeated and nothing is rounded".to_owned())
-    }
-}
-
-/// Neighbours must resemble each other by this many standard deviations to be called structure.
-const STRUCTURE_Z: f64 = 5.5;
-/// And by at least this correlation: a large set makes any trifle significant.
-const STRUCTURE_R: f64 = 0.15;
-
-/// A sentence on what is left, and a finding where it has a pattern.
-fn told(
-    structure: &Structure,
-    after: &StageError,
-    floor_mm: Option<f64>,
-    findings: &mut Vec<Finding>,
-) -> Option<String> {
-    let mut patterns = Vec::new();
-    let mut strongest = 0.0_f64;
-    for (r, z, what) in [
-        (structure.neighbours, structure.neighbours_z, "neighbouring poses"),
-        (structure.order, structure.order_z, "consecutive rows"),
-    ] {
-        if z > STRUCTURE_Z && r > STRUCTURE_R {
-            patterns.push(format!("{what} share {:.0} % of it", 100.0 * r));
-            strongest = strongest.max(z);
-        }
-    }
-    let rmse = after.fitted.rmse;
-    if patterns.is_empty() {
-        return match floor_mm {
-            Some(floor) if rmse > 1.5 * floor => Some(format!(
-                "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
-            )),
-            _ => None,
-        };
-    }
-    let text = format!("{rmse:.3} mm RMS with a pattern: {}", patterns.join(", "));
-    findings.push(Finding {
-        effect: "unexplained".to_owned(),
-        cause: format!(
-            "something repeatable is left that nothing in the catalogue explains: {}",
-            patterns.join(", ")
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: Vec::new(),
-        evidence: format!(
-            "correlation of residuals: nearest poses {:.2} (z = {:.1}), consecutive rows {:.2} (z = {:.1})",
-            structure.neighbours, structure.neighbours_z, structure.order, structure.order_z
-        ),
-        p_value: crate::math::tail::normal_two_sided(strongest),
-        non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
-        alternatives: Vec::new(),
-        remedy: words::remedy("unexplained").to_owned(),
-    });
-    Some(text)
-}
-
-/// What these rows cannot show, with the smallest size that they could.
-fn not_testable(
-    context: &Context<'_>,
-    left: &[Scored],
-    found: &[String],
-    prepared: &Prepared,
-) -> Vec<NotTestable> {
-    let dataset = &context.subject.observed.dataset;
-    let columns = super::catalogue::Columns::of(dataset);
-    let mut out = Vec::new();
-    let missing = |name: &str| !found.iter().any(|f| f == name);
-    let mut add = |effect: &str, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
-        out.push(NotTestable { effect: effect.to_owned(), joints, reason, remedy: remedy.to_owned() });
-    };
-    if prepared.sides_from_order && missing("backlash") {
-        add(
-            "backlash",
-            None,
-            "no approach columns, and the order of the rows shows nothing of it".to_owned(),
-            "measure each pose from both sides and log approach1 to approach6",
-        );
-    }
-    if columns.hours.is_none() && columns.temperature.is_none() {
-        add(
-            "thermal-drift",
-            None,
-            "neither time nor temperature is logged".to_owned(),
-            "log t and temperature, and measure from a cold start",
-        );
-    }
-    if dataset.rows.iter().all(|r| r.readout_mm.is_none()) {
-        add(
-            "readout-mismatch",
-            None,
-            "the controller's own x, y, z are not logged".to_owned(),
-            "log the controller's Cartesian read-out beside the angles",
-        );
-    }
-    if missing("sensor-scale") {
-        let one = scale_beside_growth(context.whole, &DVector::from_element(1, 1e-3));
-        if one < VISIBLE {
-            add(
-                "sensor-scale",
-                None,
-                "a scale error of 0.1 % looks like links that are all longer by as much".to_owned(),
-                "measure a length standard, or distances that do not come from the arm",
-            );
-        }
-    }
-    let still: Vec<usize> = (0..6).filter(|&j| columns.range_rad[j] <= super::catalogue::STILL_RAD).collect();
-    if !still.is_empty() {
-        add(
-            "gear-eccentricity",
-            pendant(&still),
-            "these axes hardly moved".to_owned(),
-            "turn every axis through its whole range",
-        );
-    }
-    // The smallest peak rotation that would show, for every joint and effect of the arm.
-    for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
-        let mut hidden: Vec<(usize, f64)> = Vec::new();
-        for joint in 0..6 {
-            if still.contains(&joint) || (name == "backlash" && prepared.sides_from_order) {
-                continue;
-            }
-            let smallest = left
-                .iter()
-                .filter(|s| {
-                    s.candidate.cause.name() == name
-                        && s.candidate.cause.joints().last() == Some(&joint)
-                        && !matches!(
-                            s.candidate.cause,
-                            Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_))
-                        )
-                })
-                .filter_map(smallest_rad)
-                .fold(f64::NAN, f64::max);
-            if smallest > PRACTICAL_RAD {
-                hidden.push((joint, smallest));
-            }
-        }
-        let told = found.iter().any(|f| f == name);
-        if !hidden.is_empty() && !told {
-            let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
-            let sizes: Vec<String> = hidden
-                .iter()
-                .map(|(j, s)| {
-                    if s.is_finite() && s.to_degrees() < 90.0 {
-                        format!("joint {}: {:.2}°", j + 1, s.to_degrees())
-                    } else {
-                        format!("joint {}: nothing at all", j + 1)
-                    }
-                })
-                .collect();
-            add(
-                name,
-                pendant(&joints),
-                format!(
-                    "in these poses it hides inside geometry and frames; the smallest peak that would show: {}",
-                    sizes.join(", ")
-                ),
-                "measure poses that turn these joints far while the others differ: `truegrind plan` proposes them",
-            );
-        }
-    }
-    out
-}
-
-/// Smallest peak rotation with the non-centrality of [`VISIBLE`] (rad), in the least favourable phase.
-fn smallest_rad(scored: &Scored) -> Option<f64> {
-    use super::catalogue::Regressor;
-    let peak = |r: &Regressor| match r {
-        Regressor::Arm { rotation, .. } => {
-            rotation.iter().flat_map(|(_, c)| c.iter()).fold(0.0_f64, |m, v| m.max(v.abs()))
-        }
-        Regressor::Push { .. } => 0.0,
-    };
-    let information = &scored.score.information;
-    let scaled: Vec<f64> = scored.candidate.regressors.iter().map(peak).collect();
-    if scaled.iter().any(|s| *s <= 0.0) {
-        return None;
-    }
-    let k = scaled.len();
-    let per_peak = nalgebra::DMatrix::from_fn(k, k, |a, b| information[(a, b)] / (scaled[a] * scaled[b]));
-    let least = per_peak.symmetric_eigen().eigenvalues.min().max(1e-12);
-    Some((VISIBLE / least).sqrt())
 }
 
 #[allow(clippy::too_many_arguments)]

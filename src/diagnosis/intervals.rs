@@ -2,7 +2,7 @@
 //!
 //! Prefix sums of gradient, information and Q-products over the observations make the evidence of any interval a matter of
 //! p k² operations, so thousands of intervals are tried: a coarse grid of starts and ends, then the best ones refined row by
-//! row. An interval that begins with the first row is the same as its complement, and only the later one is told: what
+//! row. An interval that begins with the first rows is the same as its complement, and only the later one is told: what
 //! happened, happened at its first row. Source: the likelihood-ratio scan of circular binary segmentation, Olshen et al.
 //! 2004, with nuisance parameters projected off.
 
@@ -145,14 +145,14 @@ pub fn scan(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], count: usize
     }
     let sums = Sums::of(design, columns, sizes);
     let stride = n.div_ceil(GRID).max(1);
-    let starts: Vec<usize> = (1..n - 1).step_by(stride).collect();
+    let starts: Vec<usize> = (SHORTEST..n - 1).step_by(stride).collect();
     let mut coarse: Vec<Interval> = starts
         .par_iter()
         .map(|&from| {
             let mut work = Vec::new();
             let mut found = Vec::new();
             let ends = (from + SHORTEST - 1..n - 1).step_by(stride).chain(std::iter::once(n - 1));
-            for to in ends.filter(|&to| to + 1 >= from + SHORTEST) {
+            for to in ends.filter(|&to| to + 1 >= from + SHORTEST && ends_well(to, n)) {
                 found.push(Interval { from, to, evidence: sums.evidence(from, to, &mut work) });
             }
             found
@@ -172,6 +172,11 @@ pub fn scan(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], count: usize
     best
 }
 
+/// A shift ends with the last row, or leaves enough rows after it to be told from one that does.
+fn ends_well(to: usize, n: usize) -> bool {
+    to == n - 1 || to + SHORTEST < n
+}
+
 /// Shared rows over all rows of two intervals.
 fn overlap(a: &Interval, b: &Interval) -> f64 {
     let shared = (a.to.min(b.to) + 1).saturating_sub(a.from.max(b.from)) as f64;
@@ -184,7 +189,7 @@ fn refined(sums: &Sums, mut best: Interval, stride: usize, n: usize) -> Interval
     let mut work = Vec::new();
     for _ in 0..6 {
         let before = best;
-        for from in best.from.saturating_sub(2 * stride).max(1)..=(best.from + 2 * stride).min(n - 2) {
+        for from in best.from.saturating_sub(2 * stride).max(SHORTEST)..=(best.from + 2 * stride).min(n - 2) {
             if from + SHORTEST <= best.to + 1 {
                 let evidence = sums.evidence(from, best.to, &mut work);
                 if evidence > best.evidence {
@@ -193,7 +198,7 @@ fn refined(sums: &Sums, mut best: Interval, stride: usize, n: usize) -> Interval
             }
         }
         for to in best.to.saturating_sub(2 * stride)..=(best.to + 2 * stride).min(n - 1) {
-            if best.from + SHORTEST <= to + 1 {
+            if best.from + SHORTEST <= to + 1 && ends_well(to, n) {
                 let evidence = sums.evidence(best.from, to, &mut work);
                 if evidence > best.evidence {
                     best = Interval { to, evidence, ..best };

@@ -9,13 +9,16 @@ use crate::kinematics::effect::Effect;
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Kind};
 
+/// What an axis shows, and its unit.
+pub type Label = (String, &'static str);
+
 /// Residuals against the variable that reveals a cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Horizontal variable and its unit.
-    pub x: (String, &'static str),
+    pub x: Label,
     /// Vertical variable and its unit.
-    pub y: (String, &'static str),
+    pub y: Label,
     /// Without the cause in the model.
     pub before: Vec<[f64; 2]>,
     /// With it.
@@ -63,7 +66,7 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
             rows: None,
         };
     }
-    let (x_label, x): ((String, &'static str), Box<dyn Fn(usize) -> f64>) = match cause {
+    let (x_label, x): (Label, Box<dyn Fn(usize) -> f64>) = match cause {
         Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
             ("distance from the sensor".to_owned(), "mm"),
             Box::new(|i| match dataset.rows[i].reading {

@@ -1,7 +1,7 @@
 //! What the extended model leaves: gross outliers, noise that grows with range, and structure without a name.
 //!
 //! - Outliers: Student's t is fitted by its quantiles to the bulk of the residuals' sizes, so a heavy tail is not taken for
-//!   accidents; a row is an outlier where its size, under that tail, would come once in a thousand data sets of this length.
+//!   accidents; a row is an outlier where its size, under that tail, would come once in a hundred data sets of this length.
 //! - Range: Spearman's rank correlation of size and distance; where it is sure, σ₀ and slope by least squares on the sizes.
 //! - Structure: rows that are neighbours in joint space, and rows that follow each other, should not resemble one another.
 //!   Correlation of their residuals, with the exact variance under exchangeability (Moran 1950; von Neumann 1941).
@@ -72,67 +72,41 @@ pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
     }
     let mut sorted: Vec<f64> = fit.sizes.clone();
     sorted.sort_by(f64::total_cmp);
-    // The upper bulk: what share of the median do the 75 % and 95 % quantiles have? A heavy tail stretches them.
+    // A heavy tail stretches the 95 % quantile against the median.
     let quantile = |p: f64| sorted[((n - 1) as f64 * p) as usize];
     let (middle, high) = (quantile(0.5).max(1e-12), quantile(0.95));
     // Sizes of whole vectors: the reach of a tail is taken as that of one coordinate with the same stretch.
     let stretch = high / middle;
     // Two quantiles of a few hundred sizes cannot rule out a tail of five degrees of freedom: it is always allowed for.
-    let tail = (1.0 / heaviness(stretch)).max(0.2);
-    let limit = middle * reach(tail, n);
+    let limit = middle * reach(heaviness(stretch), n);
     let mut rows: Vec<(usize, f64)> =
         fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     rows
 }
 
-/// Degrees of freedom of Student's t by the ratio of the 95 % quantile of |t| to its median (2.906 for a normal).
+/// Degrees of freedom of Student's t, 2 to 5, by the ratio of the 95 % quantile of |t| to its median.
 fn heaviness(stretch: f64) -> f64 {
-    // Quantiles of |t|: ν, t(0.975)/t(0.75).
-    const TABLE: [(f64, f64); 9] = [
-        (2.0, 4.303 / 0.8165),
-        (3.0, 3.182 / 0.7649),
-        (4.0, 2.776 / 0.7407),
-        (5.0, 2.571 / 0.7267),
-        (7.0, 2.365 / 0.7111),
-        (10.0, 2.228 / 0.6998),
-        (20.0, 2.086 / 0.6870),
-        (60.0, 2.000 / 0.6786),
-        (1e6, 1.960 / 0.6745),
-    ];
-    if stretch >= TABLE[0].1 {
-        return TABLE[0].0;
-    }
+    // ν and t(0.975)/t(0.75), from the tables of Student's distribution.
+    const TABLE: [(f64, f64); 4] =
+        [(2.0, 4.303 / 0.8165), (3.0, 3.182 / 0.7649), (4.0, 2.776 / 0.7407), (5.0, 2.571 / 0.7267)];
     for pair in TABLE.windows(2) {
         let ((low, a), (high, b)) = (pair[0], pair[1]);
         if stretch >= b {
-            let share = (a - stretch) / (a - b);
+            let share = ((a - stretch) / (a - b)).clamp(0.0, 1.0);
             return 1.0 / (1.0 / low + share * (1.0 / high - 1.0 / low));
         }
     }
-    1e6
+    5.0
 }
 
-/// Room for what the fit of a tail by two quantiles gets wrong.
-const MARGIN: f64 = 1.1;
-
-/// Size over median beyond which one of n rows comes once in a thousand data sets, for a tail 1/ν.
-fn reach(tail: f64, n: usize) -> f64 {
-    let p = 1e-3 / n as f64;
-    // The normal's quantile by bisection, then Hill's expansion of Student's t: t = √(ν (e^(z²/ν') − 1)).
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if normal_two_sided(middle) > p { low = middle } else { high = middle }
-    }
-    let z: f64 = high;
-    if tail < 1e-5 {
-        return MARGIN * z / 0.6745;
-    }
-    let nu = 1.0 / tail;
-    let stretched = (nu * ((z * z * (nu - 1.5) / (nu * (nu - 1.0).max(0.6)).max(0.3)).exp_m1())).sqrt();
-    // Never closer than the normal's, with a margin for the coarse fit of the tail.
-    MARGIN * stretched.max(z) / 0.72
+/// Size over median beyond which one of n rows comes once in a hundred data sets, for Student's t with ν degrees of
+/// freedom: its tail falls as the power ν, tied to its 97.5 % quantile.
+fn reach(nu: f64, n: usize) -> f64 {
+    let p = 1e-2 / n as f64;
+    let quantile = 1.96 + 2.0 / nu + 5.4 / (nu * nu);
+    let median = 0.6745 + 0.26 / nu;
+    (3.0 * 0.05 * quantile.powf(nu) / p).powf(1.0 / nu) / median
 }
 
 /// Whether the noise grows with range.

@@ -84,7 +84,8 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
         for i in 1..rows.rows.len() {
             let step = dataset.rows[i].joints - dataset.rows[i - 1].joints;
             rows.rows[i].condition.approach =
-                std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { step[j].signum() as i8 });
+                // A joint that moved up came from below, which is −1.
+                std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { -step[j].signum() as i8 });
         }
     }
     let logged = Observed { angles: logged_covariance(&rows), dataset: rows.clone() };

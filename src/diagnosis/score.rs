@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::catalogue::Candidate;
-use super::design::Design;
+use super::design::{Design, product_of_transposed};
 use crate::math::tail::log_chi_square_tail;
 
 /// A scored candidate.
@@ -100,7 +100,7 @@ fn scatter_statistic(
     if k > 6 {
         return None;
     }
-    let pure = (columns - design.basis.tr_mul(shared)) * scale;
+    let pure = (columns - product_of_transposed(&design.basis, shared)) * scale;
     let left = &design.residual - &pure * step;
     let mut scatter = DMatrix::zeros(k, k);
     for i in 0..design.observations {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
 use super::cause::Cause;
-use super::design::{Design, Linear, back_and_forth, factored, gram, product};
+use super::design::{Design, Linear, back_and_forth, factored, gram, outer, product};
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::score::{Score, score};
 use super::{intervals, lines};
@@ -30,7 +30,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { alpha: 0.01, most: 12, seed: 0 }
+        Self { alpha: 0.01, most: 20, seed: 0 }
     }
 }
 
@@ -144,6 +144,12 @@ impl Catalogue {
             .chain(open.par_iter())
             .map(|candidate| Scored { candidate: candidate.clone(), score: score(design, candidate) })
             .collect();
+        // A closer description of a cause that is already in the model is likelier than one more cause.
+        for scored in &mut out {
+            if fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
+                scored.score.merit += CLOSER;
+            }
+        }
         out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
         out
     }
@@ -188,7 +194,7 @@ impl Folds {
             .par_iter()
             .map(|rows| {
                 let q = design.basis.select_columns(rows);
-                product(&q, &q.transpose())
+                outer(&q)
             })
             .collect();
         Self { tests, grams }
@@ -314,7 +320,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             let all: Vec<usize> = (0..current.causes.len()).collect();
             match review(subject, &catalogue, options, &current, &all) {
                 Review::Changed(settled) => {
-                    current = settled;
+                    current = *settled;
                     continue;
                 }
                 Review::Settled(accepted) => {
@@ -339,7 +345,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             let unsure: Vec<usize> =
                 (0..current.causes.len()).filter(|&k| already(&doubtful, &current.causes[k])).collect();
             match review(subject, &catalogue, options, &current, &unsure) {
-                Review::Changed(settled) => current = settled,
+                Review::Changed(settled) => current = *settled,
                 Review::Settled(_) => break,
             }
         }
@@ -415,13 +421,16 @@ fn near(current: &Extended, index: usize) -> Extended {
     out
 }
 
+/// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
+const CLOSER: f64 = 10.0;
+
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
 
 /// What looking again at accepted causes came to.
 enum Review {
     /// One was dropped or exchanged.
-    Changed(Extended),
+    Changed(Box<Extended>),
     /// All stand.
     Settled(Vec<Accepted>),
 }
@@ -454,13 +463,13 @@ fn review(
         let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
         if better.is_some() || !carries {
             let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
-            return Review::Changed(match better {
+            return Review::Changed(Box::new(match better {
                 Some(better) => {
                     others.push(better.candidate.cause.clone());
                     fit(subject, &others, Freedom::All, Some(&reduced))
                 }
                 None => reduced,
-            });
+            }));
         }
         accepted.push(judged);
     }

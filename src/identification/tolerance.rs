@@ -57,7 +57,7 @@ impl Tolerance {
             | Parameter::Outlet { .. }
             | Parameter::Zero { .. }
             | Parameter::Disturbance { .. } => self.frame_mm,
-            Parameter::Effect { index, .. } => effect_sigma(&model.effects[index]),
+            Parameter::Effect { index, parameter } => effect_sigma(&model.effects[index], parameter),
         };
         Prior { mean: 0.0, sigma }
     }
@@ -96,11 +96,14 @@ impl Tolerance {
 }
 
 /// Sizes that effects have on real arms, as wide priors.
-pub fn effect_sigma(effect: &Effect) -> f64 {
+pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
     match effect {
         Effect::JointCompliance(_) => 1e-4,
-        // A compliance of 1e-5 rad/(N m) times 30 kg.
-        Effect::LumpedCompliance(_) => 3e-4,
+        // A compliance of 1e-5 rad/(N m) times 30 kg, and for a link's first moment times some 0.3 kg m.
+        Effect::LumpedCompliance(load) => match load.lump.get(parameter) {
+            Some(lump) if lump.moment.is_some() => 3e-6,
+            _ => 3e-4,
+        },
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
         // The same curve over more knots, each of them smaller.
         Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),

@@ -225,7 +225,7 @@ fn quality(told: &Told, chosen: &[usize], options: &Options) -> Option<Quality> 
         Some((design::log_det(&information)?, sigma))
     };
     let (log_det, reading_sigma_mm) = of(chosen)?;
-    let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ 0x72_616e_646f_6d);
+    let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ 0x7261_6e64_6f6d);
     let mut shuffled = all.clone();
     let mut sums = (0.0, 0.0);
     for _ in 0..RANDOM_SETS {

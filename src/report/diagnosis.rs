@@ -18,18 +18,14 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
     page.figure(
         steps(diagnosis),
         "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. The \
-         gain of fitting frames is not shown: every bar has them fitted.",
+         gain of fitting frames is not shown: every bar has them fitted. Numbers count causes in the order in which \
+         they came in.",
     );
+    page.push(step_table(diagnosis));
     for (k, finding) in diagnosis.findings.iter().enumerate() {
         page.heading(2, format!("{}. {}", k + 1, title(finding)));
-        page.push(Verdict::new(
-            match finding.confidence {
-                Confidence::Identified => Status::Good,
-                Confidence::Ambiguous => Status::Warning,
-            },
-            sentence(&finding.cause),
-            reasons(finding),
-        ));
+        page.paragraph(format!("{}. ({}.)", sentence(&finding.cause), sentence(word(finding.confidence))));
+        page.push(Block::List(reasons(finding)));
         if let Some(picture) = found.pictures.get(k) {
             page.figure(drawn(picture), caption(picture));
         }
@@ -213,12 +209,17 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
             Cell::from(finding.effect.as_str()),
             place(finding).into(),
             word(finding.confidence).into(),
-            finding.p_value.into(),
+            p_value(finding.p_value),
             finding.gain.cv_rmse_before_mm.into(),
             finding.gain.cv_rmse_after_mm.into(),
         ]);
     }
     table
+}
+
+/// A p-value; those that no number can hold are told as bounds.
+fn p_value(p: f64) -> Cell {
+    if p < 1e-300 { "< 1e-300".into() } else { p.into() }
 }
 
 fn word(confidence: Confidence) -> &'static str {
@@ -269,6 +270,11 @@ fn reasons(finding: &Finding) -> Vec<String> {
         out.push(format!(
             "without it the held-out error is {:.4} mm, with it {:.4} mm",
             gain.cv_rmse_before_mm, gain.cv_rmse_after_mm
+        ));
+    }
+    if let Some(lambda) = finding.non_centrality {
+        out.push(format!(
+            "non-centrality {lambda:.0} against everything else that was free; from 40 an effect can be counted on to show"
         ));
     }
     out.push(match finding.confidence {
@@ -367,11 +373,36 @@ fn left(diagnosis: &Diagnosis) -> String {
     }
 }
 
+/// Name of a bar: the two first stages, then causes by number.
+fn step_name(index: usize) -> String {
+    match index {
+        0 => "data sheet".to_owned(),
+        1 => "geometry".to_owned(),
+        n => format!("+ {}", n - 1),
+    }
+}
+
+/// What each step added.
+pub fn step_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "Steps",
+        vec![
+            Column::text("step", "step"),
+            Column::text("added", "added"),
+            Column::number("cv_rmse_mm", "held out", "mm", 4),
+        ],
+    );
+    for (index, step) in diagnosis.steps.iter().enumerate() {
+        table.push([step_name(index).into(), step.added.as_str().into(), step.cv_rmse_mm.into()]);
+    }
+    table
+}
+
 fn steps(diagnosis: &Diagnosis) -> String {
     Bars {
         title: "Held-out error after each step".to_owned(),
         y: Axis::new("held-out RMSE", "mm"),
-        names: diagnosis.steps.iter().map(|step| step.added.clone()).collect(),
+        names: (0..diagnosis.steps.len()).map(step_name).collect(),
         groups: vec![BarGroup::new("", diagnosis.steps.iter().map(|step| Some(step.cv_rmse_mm)))],
         labels: Some(Precision::Decimals(3)),
     }

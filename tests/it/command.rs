@@ -446,3 +446,69 @@ fn a_robot_that_is_not_the_models_is_an_error_naming_both() {
     assert_eq!(code, 2);
     assert!(err.contains("abb-irb-120") && err.contains("kuka-kr6-r900-sixx"), "{err}");
 }
+
+#[test]
+fn diagnose_names_what_was_hidden_and_compensate_uses_it() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), include_str!("../data/irb120-tracker.csv")).unwrap();
+    fs::write(at.join("cable.csv"), CABLE).unwrap();
+    fs::write(at.join("blade.toml"), include_str!("../../surfaces/blade.toml")).unwrap();
+    let (code, out, err) = truegrind(
+        at,
+        &[
+            "diagnose",
+            "data.csv",
+            "--robot",
+            "abb-irb-120",
+            "-o",
+            "model.toml",
+            "--json",
+            "why.json",
+            "--html",
+            "why.html",
+            "--md",
+            "why.md",
+            "--csv",
+            "why.csv",
+            "--also",
+            "cable.csv",
+        ],
+    );
+    assert_eq!(code, 0, "{out}{err}");
+    let text = fs::read_to_string(at.join("why.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["schema"], "truegrind.diagnosis/1");
+    let found: Vec<(String, u64)> = json["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| (f["effect"].as_str().unwrap().to_owned(), f["joints"][0].as_u64().unwrap_or(0)))
+        .collect();
+    // What the recipe beside the data hid: tests/data/irb120-tracker.toml.
+    for hidden in
+        [("gear-eccentricity", 1), ("joint-compliance", 2), ("joint-compliance", 3), ("backlash", 4)]
+    {
+        assert!(found.contains(&(hidden.0.to_owned(), hidden.1)), "{hidden:?} is not in {found:?}");
+    }
+    assert_eq!(found.len(), 4, "{found:?}");
+    let error = |stage: &str| json["fits"][stage]["cv_rmse_mm"].as_f64().unwrap();
+    assert!(error("extended") < 0.4 * error("geometric") && error("geometric") < 0.4 * error("nominal"));
+    assert_eq!(json["transfers"][0]["file"], "cable.csv");
+    for file in ["why.html", "why.md", "why.csv"] {
+        let page = fs::read_to_string(at.join(file)).unwrap();
+        assert!(page.contains("gear-eccentricity") || page.contains("Gear eccentricity"), "{file}");
+    }
+    let model = fs::read_to_string(at.join("model.toml")).unwrap();
+    assert!(model.contains("effect = \"joint-compliance\""), "the model carries the findings");
+    let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "blade.mod"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = truegrind(
+        at,
+        &["compensate", "blade.mod", "--model", "model.toml", "-o", "real.mod", "--max-correction", "20"],
+    );
+    assert!(code < 2 && at.join("real.mod").exists(), "{out}{err}");
+    let (code, _, err) = truegrind(at, &["diagnose", "data.csv", "--robot", "abb-irb-120", "-o", "data.csv"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("input"), "{err}");
+}

@@ -39,7 +39,7 @@ pub struct Options {
     pub form: Form,
     /// K (sound).
     pub centres: usize,
-    /// ρ in fill distances (sound).
+    /// ρ in fill distances (sound): 6 and more follow a smooth field better, 3 ends soon beyond the last centre.
     pub reach: f64,
     /// Prior standard deviation of a weight, in the unit of the outputs.
     pub weight_sigma: f64,

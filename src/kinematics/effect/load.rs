@@ -134,7 +134,7 @@ fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
     axis.map(|a| R::splat(1e3) * a)
 }
 
-/// Weight of 1 kg [N], with metres for the millimetres of the levers.
+/// Weight of 1 kg (N), with metres for the millimetres of the levers.
 #[inline(always)]
 fn pull(statics: &Statics, lump: &Lump) -> [f64; 3] {
     match lump.axis {

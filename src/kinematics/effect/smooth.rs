@@ -3,7 +3,7 @@
 //! δθⱼ = Σₖ wₖⱼ φ(|v − cₖ| / ρ) for the first three joints, v their angles. These three place the wrist, so this is a
 //! smooth displacement of the arm as a function of where its wrist stands; put on the joints it goes through forward
 //! map, inverse and Jacobians like every other effect. φ is a bump of compact support
-//! ([`radial`](crate::math::radial)): outside the region of its centres the correction is exactly nothing.
+//! ([`crate::math::radial`]): outside the region of its centres the correction is exactly nothing.
 //!
 //! Source: M5 of ukf-vslm-2023 corrects target positions by a radial basis function network; there the network's output
 //! is a displacement in mm. Departure: here it is the turn of three joints that makes such a displacement, since a

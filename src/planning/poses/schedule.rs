@@ -116,7 +116,7 @@ pub(super) fn schedule(
     bounds: &Bounds,
     seed: u64,
 ) -> (Vec<Candidate>, Vec<Row>) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x6f72_6465_72);
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006f_7264_6572);
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.shuffle(&mut random);
     let order = smoothed(wanted, bounds, &poses, order);

@@ -77,6 +77,9 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             "P1 to P5 are spread over the cut; mean, SD (n − 1, signed), mean |d| and max over all {} points of it.",
             result.points
         ),
+        "Corrections up to 100 mm and 20° are let through here, so that the consequence of each method is seen; compensate \
+         refuses what exceeds 10 mm or 2°."
+            .to_owned(),
         "The paper's part, path and errors are not given: its mean and SD, over five points, stand beside for their kind."
             .to_owned(),
     ];

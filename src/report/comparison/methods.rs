@@ -173,6 +173,15 @@ fn named(result: &MethodResult) -> String {
     }
 }
 
+/// Mean ± deviation over the cases; of a method that diverged the size of the mean alone.
+fn figure(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> Cell {
+    let (mean, deviation) = over(result, figure);
+    if result.outcomes.iter().any(|o| o.diverged) {
+        return Cell::Text(Precision::Significant(1).format(mean));
+    }
+    Cell::with_sigma(mean, deviation)
+}
+
 /// The papers' table, ours and theirs side by side.
 fn errors(study: &Study) -> Table {
     let mut table = Table::new(
@@ -206,11 +215,11 @@ fn errors(study: &Study) -> Table {
         table.push([
             result.method.id.as_str().into(),
             named(result).into(),
-            cell(over(result, |s| s.rmse)),
+            figure(result, |s| s.rmse),
             paper.rmse_mm.into(),
-            cell(over(result, |s| s.mean_absolute)),
+            figure(result, |s| s.mean_absolute),
             paper.mean_absolute_mm.into(),
-            cell(over(result, |s| s.max)),
+            figure(result, |s| s.max),
             paper.max_mm.into(),
         ]);
     }
@@ -276,7 +285,8 @@ fn verdict(study: &Study) -> Verdict {
         .iter()
         .filter(|c| matches!(&c.conclusion, Conclusion::SameOptimum { stopped, .. } if !stopped.is_empty()));
     let headline = format!(
-        "Of {} comparisons with {}, {} are significant differences of methods and {} only of where a method was stopped",
+        "Of {} methods compared with {}, {} differ significantly; {} share its optimum and differ only by where they were \
+         stopped",
         comparisons.len(),
         name_of(study, &study.judgement.reference),
         real.count(),

@@ -21,6 +21,7 @@ pub(super) fn conclusion(comparison: &Comparison, reference: &str) -> String {
             format!("same optimum; {} stopped early", stopped.join(" and "))
         }
         Conclusion::Diverged { cases } => format!("{} diverged in {cases}", comparison.id),
+        Conclusion::ReferenceDiverged { cases } => format!("{reference} diverged in {cases}"),
     }
 }
 
@@ -93,6 +94,12 @@ fn sentence(study: &Study, comparison: &Comparison, reference: &str) -> String {
         }
         Conclusion::Diverged { cases } => {
             format!("{name} diverged in {cases} of {} cases and is not compared.", study.cases.len())
+        }
+        Conclusion::ReferenceDiverged { cases } => {
+            format!(
+                "{of} diverged in {cases} of {} cases: {name} is not compared with it.",
+                study.cases.len()
+            )
         }
         Conclusion::NotSignificant => String::new(),
     }

@@ -66,13 +66,13 @@ pub fn draw(kind: &str, rows: usize, rng: &mut ChaCha8Rng) -> Hidden {
             joint,
             order: f64::from(rng.random_range(1..3_u8)),
             peak_rad: peak,
-            phase: rng.random_range(0.0..6.28),
+            phase: rng.random_range(0.0..std::f64::consts::TAU),
         },
         "gear-transmission" => Hidden::Gear {
             joint,
             order: f64::from(rng.random_range(3..120_u8)),
             peak_rad: peak,
-            phase: rng.random_range(0.0..6.28),
+            phase: rng.random_range(0.0..std::f64::consts::TAU),
         },
         "gear-ratio" => Hidden::Ratio { joint, error: sign * peak / 1.5 },
         "joint-coupling" => {

@@ -191,7 +191,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
             })
         })
         .collect();
-    let small = (draw.random_range(0..6usize), draw.random_range(0.0..6.28));
+    let small = (draw.random_range(0..6usize), draw.random_range(0.0..std::f64::consts::TAU));
     let outlet = Vector3::new(900.0, draw.random_range(-300.0..300.0), draw.random_range(0.0..300.0));
     let (turn, place) = (draw.random_range(-3.0..3.0), Vector3::new(2200.0, -900.0, 400.0));
     let hours = 4.0;

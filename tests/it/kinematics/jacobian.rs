@@ -106,8 +106,13 @@ impl Numbers {
         };
         let step = |p: &Parameter| match (p, p.unit()) {
             (Parameter::Effect { index, parameter }, _) => {
-                match model.effects[*index].parameters()[*parameter].unit {
-                    "rad/(N m)" => 1e-5,
+                let number = &model.effects[*index].parameters()[*parameter];
+                match (number.name, number.unit) {
+                    (_, "rad/(N m)") => 1e-5,
+                    // Far from its knot a spline is almost nothing, and a short step would be all rounding.
+                    ("knot", _) => 5e-4,
+                    // So is a bump near its border.
+                    ("weight", _) => 3e-3,
                     _ => 1e-4,
                 }
             }

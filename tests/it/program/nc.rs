@@ -391,8 +391,8 @@ fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f
                 // The point half way of the new circle need not be the wanted one; the circle goes near it.
                 continue;
             }
-            for axis in 0..3 {
-                let off = new_value.position_mm[axis] - wanted[axis];
+            for (axis, (new, wanted)) in new_value.position_mm.iter().zip(&wanted).enumerate() {
+                let off = new - wanted;
                 assert!(off.abs() < 6e-4, "{place}: axis {axis} off by {off} mm");
             }
             let wanted =
