@@ -4,25 +4,30 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use rayon::prelude::*;
+use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::kinematics::arm_file::ArmFile;
+use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::kinematics::model::Model;
+use truegrind::program::nc::setup::Setup;
 use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
+use truegrind::surface::SurfaceFile;
 
 use super::compensate::CellArguments;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
-use super::programs::{self, Programs};
+use super::programs::{self, Job, Programs};
 use super::{Common, Ending, inputs, on_threads};
 
 /// Arguments of `deviation`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// RAPID modules of one task, a .pgf list of them, or NC files.
+    /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
     /// Estimated arms; one row each. With --actual the word `nominal` is enough.
@@ -57,14 +62,18 @@ struct Runner {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let programs = Programs::read(&arguments.programs)?;
+    let jobs = programs::jobs(&arguments.programs, false)?;
+    let several = jobs.len() > 1;
+    if several && !arguments.intended.is_empty() {
+        bail!("--intended states what one program meant: name one program, not {}", jobs.len());
+    }
     let originals =
         if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
-    let all: Vec<&std::path::Path> = programs
-        .files
+    let all: Vec<&std::path::Path> = jobs
         .iter()
-        .chain(originals.iter().flat_map(|o| &o.files))
-        .map(|(p, _)| p.as_path())
+        .flat_map(|job| &job.paths)
+        .chain(originals.iter().flat_map(|o| o.files.iter().map(|(path, _)| path)))
+        .map(PathBuf::as_path)
         .collect();
     Batch::check(&all, &arguments.outputs.files())?;
     let runners = runners(arguments)?;
@@ -72,35 +81,28 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
     let robot = arguments.robot.as_deref().or(first.robot.as_deref());
     let setup = programs::setup(&cell, robot);
-    let task = programs.task(&setup);
-    let original = originals.as_ref().map(|original| original.task(&setup));
-    let name = programs.name();
-    let reports: Vec<PathReport> = on_threads(arguments.common.threads, || {
-        runners
-            .iter()
-            .map(|runner| {
-                let judged = Judged {
-                    original: original.as_ref().map_or(task.listing(), |o| o.listing()),
-                    rewritten: original.as_ref().map(|_| task.listing()),
-                    cell: &cell,
-                    surface: surface.as_ref().map(|s| &s.surface),
-                    program: &name,
-                    name: &runner.name,
-                    after: runner.after,
-                };
-                let acting = Acting {
-                    nominal: &runner.nominal,
-                    model: &runner.model,
-                    knowledge: runner.knowledge.as_deref(),
-                    condition,
-                };
-                judge(&judged, &acting)
-            })
-            .collect()
+    let shop =
+        Shop { runners: &runners, originals: originals.as_ref(), cell: &cell, setup: &setup, condition };
+    let found: Vec<anyhow::Result<Vec<PathReport>>> = on_threads(arguments.common.threads, || {
+        jobs.par_iter().map(|job| shop.reports(job, surface.as_ref())).collect()
     })?;
-    if reports.iter().all(|r| r.points.is_empty()) {
-        bail!("{name}: no motion has a target that is known from the text");
+    let (mut reports, mut failed) = (Vec::new(), 0);
+    for (found, job) in found.into_iter().zip(&jobs) {
+        match found {
+            Ok(found) => reports.extend(found),
+            // A bad one among many is listed, and the others go on.
+            Err(error) if several => {
+                failed += 1;
+                let paths: Vec<String> = job.paths.iter().map(|path| path.display().to_string()).collect();
+                eprintln!("failed: {}: {error:#}", paths.join(", "));
+            }
+            Err(error) => return Err(error),
+        }
     }
+    if reports.is_empty() {
+        bail!("none of {} programs has a motion whose target is known from the text", jobs.len());
+    }
+    let name = if several { format!("{} programs", jobs.len()) } else { reports[0].program.clone() };
     let mut summary = Document::new(format!("Deviation of {name}"));
     summary.push(view::block_table(&reports));
     summary.push(view::registered_table(&reports));
@@ -119,7 +121,56 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         batch.add(path, bytes);
     }
     batch.write()?;
-    Ok(Ending::Done)
+    Ok(if failed > 0 { Ending::Flagged } else { Ending::Done })
+}
+
+/// What all programs of a run are judged by.
+struct Shop<'a> {
+    runners: &'a [Runner],
+    originals: Option<&'a Programs>,
+    cell: &'a Cell,
+    setup: &'a Setup,
+    condition: Condition,
+}
+
+impl Shop<'_> {
+    /// The reports of one program, one per arm.
+    fn reports(&self, job: &Job, surface: Option<&SurfaceFile>) -> anyhow::Result<Vec<PathReport>> {
+        let programs = Programs::read(&job.paths)?;
+        let task = programs.task(self.setup);
+        let original = self.originals.map(|original| original.task(self.setup));
+        let name = match &job.under {
+            // Below a folder the same name may be there more than once.
+            Some(under) => job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string(),
+            None => programs.name(),
+        };
+        let reports: Vec<PathReport> = self
+            .runners
+            .iter()
+            .map(|runner| {
+                let judged = Judged {
+                    original: original.as_ref().map_or(task.listing(), |o| o.listing()),
+                    rewritten: original.as_ref().map(|_| task.listing()),
+                    cell: self.cell,
+                    surface: surface.map(|s| &s.surface),
+                    program: &name,
+                    name: &runner.name,
+                    after: runner.after,
+                };
+                let acting = Acting {
+                    nominal: &runner.nominal,
+                    model: &runner.model,
+                    knowledge: runner.knowledge.as_deref(),
+                    condition: self.condition,
+                };
+                judge(&judged, &acting)
+            })
+            .collect();
+        if reports.iter().all(|report| report.points.is_empty()) {
+            bail!("{name}: no motion has a target that is known from the text");
+        }
+        Ok(reports)
+    }
 }
 
 fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {

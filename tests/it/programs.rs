@@ -218,6 +218,13 @@ fn a_folder_is_done_in_parallel_past_what_cannot_be_done() {
     let (code, text, _) = truegrind(at, &["compensate", "out", "--model", "model.toml", "-o", "out3"]);
     assert_eq!(code, 1);
     assert!(text.contains("3 already compensated"), "{text}");
+    // The deviation of all of them: what cannot be judged is listed, the others are.
+    let (code, text, err) = truegrind(at, &["deviation", "in", "--model", "model.toml", "--json"]);
+    assert_eq!(code, 1, "{err}");
+    let programs = json(&text)["programs"].as_array().unwrap().clone();
+    let names: Vec<&str> = programs.iter().map(|program| program["program"].as_str().unwrap()).collect();
+    assert_eq!(names, ["a.mod", "below/b.mod", "e.pgf"], "{err}");
+    assert!(err.contains("failed: in/f.pgf") && err.contains("failed: in/g.nc"), "{err}");
 }
 
 #[test]

@@ -65,7 +65,7 @@ pub fn write(draft: &Draft, dialect: Dialect, angles: Angles) -> Result<Vec<u8>,
             (kind, _) => return Err(WriteError::Step { step: index, kind }),
         };
         let finite = target.position_mm.iter().chain(&target.quaternion).all(|value| value.is_finite());
-        if !finite || !step.speed_mm_s.is_finite() {
+        if !finite || !step.speed_mm_s.is_finite() || !step.wait_s.is_none_or(f64::is_finite) {
             return Err(WriteError::NotFinite { step: index });
         }
         writer.step(step, &target.frame());
@@ -231,6 +231,7 @@ impl Writer {
         }
         if words.len() == before {
             // Where the tool stands already.
+            self.wait(step.wait_s);
             return;
         }
         if mode == "G1" {
@@ -245,6 +246,20 @@ impl Writer {
         }
         let text = String::from_utf8_lossy(&words).into_owned();
         self.block(&text);
+        self.wait(step.wait_s);
+    }
+
+    /// Time at rest: milliseconds for Fanuc, seconds for Siemens.
+    fn wait(&mut self, seconds: Option<f64>) {
+        let Some(seconds) = seconds.filter(|seconds| *seconds > 0.0) else { return };
+        match self.dialect {
+            Dialect::Fanuc => self.block(&format!("G4 P{:.0}", (seconds * 1000.0).round())),
+            _ => {
+                let mut text = b"G4 F".to_vec();
+                number::write_short(&mut text, seconds, 3);
+                self.block(&String::from_utf8_lossy(&text));
+            }
+        }
     }
 
     fn holds(&self, name: &str, text: &[u8]) -> bool {
