@@ -51,8 +51,8 @@ impl Decidable {
 const USUAL_DEG: f64 = 0.05;
 const USUAL_MM: f64 = 0.3;
 
-/// A size beyond which nobody believes an effect: then it is not decided at all.
-const ABSURD: f64 = 1e3;
+/// A size beyond which nobody believes an effect (° or mm): then it is not decided at all.
+const ABSURD: f64 = 20.0;
 
 /// One effect, as columns.
 struct Asked {

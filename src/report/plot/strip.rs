@@ -5,7 +5,8 @@ use super::canvas::{DrawingError, PIXEL};
 use super::color_bar::Colors;
 use super::frame::{EDGE, Frame, picture};
 use super::ink::ColorMap;
-use super::pen::{Paint, Pen, THIN};
+use super::letters;
+use super::pen::{LABEL, Paint, Pen, THIN};
 use super::scale::{Ends, Scale};
 
 /// Height of a strip in pixels.
@@ -45,7 +46,9 @@ impl HeatStrip {
     /// The picture, 900 pixels wide and as high as its strips need.
     pub fn svg(&self) -> String {
         let name = if self.title.is_empty() { self.value.text() } else { self.title.clone() };
-        let height = 100 + STRIP * self.strips.len().max(3) as u32;
+        // The text beside the colour bar stands upright and needs its length.
+        let text = letters::width(&self.value.text(), LABEL) as u32 / PIXEL as u32;
+        let height = (100 + STRIP * self.strips.len().max(3) as u32).max(text + 40);
         picture((900, height), &name, |pen| self.draw(pen))
     }
 
