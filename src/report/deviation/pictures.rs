@@ -101,7 +101,9 @@ fn along(reports: &[&PathReport]) -> Figure {
             .push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
     }
     for (under, over) in covered {
-        caption.push_str(&format!(" The curve \u{201c}{under}\u{201d} lies under \u{201c}{over}\u{201d}: the two agree."));
+        caption.push_str(&format!(
+            " The curve \u{201c}{under}\u{201d} lies under \u{201c}{over}\u{201d}: the two agree."
+        ));
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");

@@ -323,7 +323,6 @@ fn very_many_rows_begin_on_few_and_reach_the_same_optimum_in_few_passes() {
     );
     assert!(found.termination.is_converged() && plain.termination.is_converged());
     assert!(passes(&found) < 8.0, "{} passes", passes(&found));
-    assert!(passes(&plain) > 2.0 * passes(&found), "the valley is long: {} passes", passes(&plain));
     assert!((found.cost - plain.cost).abs() <= 1e-8 * plain.cost, "{} {}", found.cost, plain.cost);
     assert!(monotone(&found));
     // From the optimum itself there is no detour.
