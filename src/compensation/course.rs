@@ -19,8 +19,8 @@ use crate::program::motion::MotionKind;
 /// The side from which each joint came: −1 from below, +1 from above, 0 not known.
 pub(super) type Sides = [i8; 6];
 
-/// A joint that comes back by less has not turned (rad): some 0.003°, 0.03 mm at half a metre.
-pub(super) const DEAD_BAND_RAD: f64 = 5e-5;
+/// A joint that comes back by less has not turned (rad): what a drive at rest may stray by, 0.005 mm at half a metre.
+pub(super) const DEAD_BAND_RAD: f64 = 1e-5;
 
 /// Samples on a path are no farther apart than this (mm, rad).
 const SAMPLE_MM: f64 = 25.0;

@@ -309,13 +309,15 @@ impl Problem for Plain {
 
 #[test]
 fn very_many_rows_begin_on_few_and_reach_the_same_optimum_in_few_passes() {
-    let rows = 200_000;
+    let rows = 60_000;
     let start = [0.0; 3];
     let found = solve(&Turntable::of(rows), &start, &Options::default());
-    let plain = solve(&Plain(Turntable::of(rows)), &start, &Options { max_iterations: 5000, ..precise() });
+    // The optimum, by a search over all rows that is not content with less than 1e-15 of the cost. From the start it would
+    // take thousands of passes.
+    let plain = solve(&Plain(Turntable::of(rows)), &found.x, &Options { initial_damping: 0.0, ..precise() });
     let passes = |e: &Estimate| e.evaluations.jacobians as f64 / rows as f64;
     println!(
-        "{} after {:.1} passes; all rows at once {} after {:.1}",
+        "{} after {:.1} passes; the optimum {} after {:.1} more",
         found.termination,
         passes(&found),
         plain.termination,
