@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         anyhow::Ok(found)
     })??;
     drop(work);
-    for note in &dataset.notes {
+    for note in found.diagnosis.notes.iter().chain(&dataset.notes) {
         eprintln!("note: {note}");
     }
     arguments.outputs.print(&view::summary(&found));

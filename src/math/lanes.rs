@@ -74,13 +74,13 @@ macro_rules! lane_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let mut out = self;
+                let mut out = [0.0; WIDTH];
                 let mut k = 0;
                 while k < WIDTH {
-                    out.0[k] = out.0[k] $op other.0[k];
+                    out[k] = self.0[k] $op other.0[k];
                     k += 1;
                 }
-                out
+                Self(out)
             }
         }
     )*};

@@ -225,7 +225,8 @@ fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
     let (planned, program) = rewrite(&text, &arm, &options(tolerance, Some(loads)));
     assert!(planned.outcomes.iter().skip(2).all(|o| o.inserted > 0), "{:?}", planned.outcomes);
     let left = off_path(&program, &planned);
-    assert!(left < 1.3 * tolerance, "targets where joints turn leave {left} mm");
+    // More than the tolerance, which the planner's own arm keeps: its links jump where these wait for their flank.
+    assert!(left < 0.3 * loose, "targets where joints turn leave {left} mm of {loose}");
 }
 
 #[test]
