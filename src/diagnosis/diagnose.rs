@@ -161,7 +161,7 @@ pub fn diagnose(
         let without = |subject: &Subject<'_>, fitted: &Extended| {
             let mut causes = fitted.causes.clone();
             causes.remove(weakest);
-            fit(subject, &causes, Freedom::All, Some(&selection::near(fitted, weakest)))
+            fit(subject, &causes, Freedom::All, Some(fitted))
         };
         extended = without(&subject, &extended);
         found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
@@ -286,7 +286,9 @@ fn weakest(found: &Extended, accepted: &[Accepted]) -> Option<usize> {
 
 /// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
 fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
-    let options = crate::estimation::network::rbf::Options::default();
+    // Ten poses for each centre, so that the weights are seen.
+    let centres = (subject.observed.dataset.rows.len() / 10).clamp(12, 60);
+    let options = crate::estimation::network::rbf::Options { centres, ..Default::default() };
     let mut causes = extended.causes.clone();
     let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
     causes.extend(spread.effects.last().cloned().map(Cause::Arm));
