@@ -541,7 +541,7 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
         Treatment::Printed => 2.0 * task.row_cost(&outcome.x) / readings,
         Treatment::Sound => 1.0,
     };
-    Some(parameter_table(&result.method.id, &result.method.name, &task, &parameters, &outcome.x, variance))
+    Some(parameter_table(&result.method, &task, &parameters, &outcome.x, variance))
 }
 
 fn noise_floor(observed: &Observed, case: &Prepared) -> Option<f64> {

@@ -441,6 +441,7 @@ fn parameter_table(parameters: &ParameterTable) -> Table {
             Column::text("unit", "Unit"),
             Column::number("nominal", "nominal", "", 3),
             Column::significant("deviation", "deviation", "", 2),
+            Column::number("paper_deviation", "paper", "", 3),
             Column::number("determined", "seen by the data", "", 2),
             Column::text("observable", "Observable"),
         ],
@@ -453,9 +454,17 @@ fn parameter_table(parameters: &ParameterTable) -> Table {
             unit.into(),
             (row.nominal * scale).into(),
             Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale)),
+            row.paper.map(|v| v * scale).into(),
             row.determined.into(),
             if row.is_observable() { "yes" } else { "no" }.into(),
         ]);
+    }
+    if parameters.rows.iter().any(|row| row.paper.is_some()) {
+        table.notes = vec![
+            "paper: what it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
+             rows do not see. Its link 2 has an offset d2, ours a turn beta in its place."
+                .to_owned(),
+        ];
     }
     table
 }
@@ -672,6 +681,7 @@ pub(super) fn json(study: &Study) -> Value {
                         "nominal": row.nominal,
                         "deviation": row.deviation,
                         "sigma": row.sigma,
+                        "paper": row.paper,
                         "determined": row.determined,
                         "observable": row.is_observable(),
                     })
