@@ -212,7 +212,7 @@ pub struct Journey {
     pub steps: Vec<Step>,
     /// Mean error of the poses that verify, after, over the groups: one for each arm (mm).
     pub arms_mm: Vec<f64>,
-    /// Seconds for all groups of one arm. Not the same in every run.
+    /// Seconds for all groups of one arm, median over the arms. Not the same in every run.
     #[serde(skip)]
     pub seconds: f64,
 }

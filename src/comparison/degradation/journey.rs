@@ -8,6 +8,7 @@ use super::{Count, Degradation, Journey, Step, Way};
 use crate::estimation::least_squares::lm;
 use crate::identification::fit::Observed;
 use crate::identification::identifiability::identifiability;
+use crate::math::statistics::median;
 
 fn first_poses(rows: &Observed, count: usize) -> Observed {
     rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
@@ -58,7 +59,13 @@ pub(super) fn average(way: Way, count: usize, each: &[Journey]) -> Journey {
         })
         .collect();
     let arms_mm = each.iter().flat_map(|j| j.arms_mm.iter().copied()).collect();
-    Journey { way, count, steps, arms_mm, seconds: each.iter().map(|j| j.seconds).sum::<f64>() / n }
+    Journey {
+        way,
+        count,
+        steps,
+        arms_mm,
+        seconds: median(&each.iter().map(|j| j.seconds).collect::<Vec<_>>()).unwrap_or(f64::NAN),
+    }
 }
 
 /// The study of counts, for one of them.

@@ -241,13 +241,13 @@ pub(super) fn table(result: &DegradationResult) -> Table {
         vec![
             Column::count("poses", "Poses"),
             Column::text("method", "Method"),
-            Column::number("identification_before_mm", "id., before", "mm", 3),
-            Column::number("identification_after_mm", "after", "mm", 3),
-            Column::number("verification_before_mm", "verif., before", "mm", 3),
-            Column::number("verification_after_mm", "after", "mm", 3),
-            Column::number("improvement_percent", "better by", "%", 1),
-            Column::number("paper_after_mm", "paper", "mm", 3),
-            Column::number("paper_improvement_percent", "by", "%", 1),
+            Column::number("identification_before_mm", "id. before", "", 3),
+            Column::number("identification_after_mm", "after", "", 3),
+            Column::number("verification_before_mm", "ver. before", "", 3),
+            Column::number("verification_after_mm", "after", "", 3),
+            Column::number("paper_after_mm", "paper", "", 3),
+            Column::number("improvement_percent", "better", "", 1),
+            Column::number("paper_improvement_percent", "paper", "", 1),
         ],
     );
     let nominal = result.nominal_mm.iter().sum::<f64>() / result.nominal_mm.len().max(1) as f64;
@@ -266,15 +266,15 @@ pub(super) fn table(result: &DegradationResult) -> Table {
             figure(|s| s.identification_after_mm).into(),
             figure(|s| s.verification_before_mm).into(),
             Cell::with_sigma(after(journey), deviation),
-            percent(nominal, after(journey)).into(),
             paper.and_then(|p| p.verification_after_mm).into(),
+            percent(nominal, after(journey)).into(),
             paper.and_then(|p| p.improvement_percent).into(),
         ]);
     }
     table.notes = vec![
-        "Means over groups and arms of poses that identify (id.) and that verify (verif.), ± the standard deviation over \
+        "Errors in mm, better in %. Means over groups and arms of poses that identify (id.) and that verify (ver.), ± the standard deviation over \
          the arms. before: with what was known when \
-         the group began, for the first group the nominal arm; better by: against the nominal arm. The paper's after and its percentage are of its own measured arm and its verification poses, its 0.690698 \
+         the group began, for the first group the nominal arm; better: against the nominal arm. The paper's after and its percentage are of its own measured arm and its verification poses, its 0.690698 \
          mm before them being the nominal arm; its \"LM\" stands beside the variant that comes nearest to it."
             .to_owned(),
         format!("{} poses of a group is the paper's periodic calibration.", result.settings.identification),

@@ -49,7 +49,7 @@ fn study(text: &str, rows: Option<usize>) -> Result<(Experiment, Study, Dataset)
     let experiment = Experiment::parse(text, "small.toml")?;
     let (dataset, simulation, robot) = simulated::measure(&experiment, nominal)?;
     let Some(Kind::Methods(methods)) = experiment.kind() else { panic!("methods") };
-    let options = Options { rows, seed: 5, simulated: true };
+    let options = Options { rows, seed: 5, simulated: true, sensor_sigma_mm: 0.05 };
     let study = run(&experiment, methods, &dataset, &robot, &simulation.nominal, &options)?;
     Ok((experiment.clone(), study, dataset))
 }
