@@ -13,7 +13,6 @@ use crate::estimation::estimate::Termination;
 use crate::math::statistics::{ErrorSummary, mean_and_deviation, median};
 use crate::measurement::dataset::Sensor;
 use crate::report::document::{Block, Document, KeyFigure};
-use crate::report::number::Precision;
 use crate::report::table::Cell;
 
 pub(super) use self::data::{json, table};
@@ -183,6 +182,10 @@ fn figure(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> Cell {
     }
     let (mean, deviation) = over(result, figure);
     Cell::with_sigma(mean, deviation)
+}
+
+fn iterations(outcomes: &[Outcome]) -> f64 {
+    outcomes.iter().map(|o| o.iterations as f64).sum::<f64>() / outcomes.len().max(1) as f64
 }
 
 fn treatment(result: &MethodResult) -> &'static str {
