@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use crate::comparison::experiment::PaperPoints;
 use crate::comparison::grinding::{GrindingResult, GrindingRow};
 use crate::compensation::deviation::{Block as Deviations, PathReport};
+use crate::identification::solver::SOLVERS;
 use crate::math::statistics::mean_and_deviation;
 use crate::report::document::{Block, Document, Verdict};
 use crate::report::number::Precision;
@@ -43,12 +44,23 @@ fn label(result: &GrindingResult) -> &'static str {
     if result.simulated { "simulated actual arm" } else { "predicted on the sound estimate" }
 }
 
+/// Whether a row's model is the one that the program was judged by.
+fn stands_in(result: &GrindingResult, row: &GrindingRow) -> bool {
+    !result.simulated && row.solver.name == SOLVERS[0].name
+}
+
 /// What one part and one draw of measurements can say.
 fn verdict(result: &GrindingResult) -> Verdict {
     let mm = |v: f64| Precision::Significant(2).format(v);
     let size = |row: &GrindingRow| row.after.as_ref().map(|b| b.all.mean_absolute);
-    let mut order: Vec<(&GrindingRow, f64)> =
-        result.rows.iter().filter_map(|r| size(r).filter(|v| v.is_finite()).map(|v| (r, v))).collect();
+    // A program that was only partly rewritten is no result, and what stands in for the arm is right by definition.
+    let counts = |r: &&GrindingRow| r.refused == 0 && !stands_in(result, r);
+    let mut order: Vec<(&GrindingRow, f64)> = result
+        .rows
+        .iter()
+        .filter(counts)
+        .filter_map(|r| size(r).filter(|v| v.is_finite()).map(|v| (r, v)))
+        .collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let before = result.before.as_ref().map_or(f64::NAN, |b| b.all.mean_absolute);
     let headline = match order.first() {
@@ -62,6 +74,18 @@ fn verdict(result: &GrindingResult) -> Verdict {
         None => "no method could rewrite the program".to_owned(),
     };
     let mut reasons = Vec::new();
+    let refused: Vec<String> = result
+        .rows
+        .iter()
+        .filter(|r| r.refused > 0)
+        .map(|r| format!("{} ({} targets)", r.id, r.refused))
+        .collect();
+    if !refused.is_empty() {
+        reasons.push(format!(
+            "Not compared, since targets could not be rewritten: {}. Their figures are of a program left as it was there.",
+            refused.join(", ")
+        ));
+    }
     let worse: Vec<&str> = order.iter().filter(|(_, v)| *v > before).map(|(r, _)| r.id.as_str()).collect();
     if !worse.is_empty() {
         reasons.push(format!(
@@ -188,6 +212,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
         cells.extend(block(row.after.as_ref()));
         let note = match (&row.failure, row.refused) {
             (Some(why), _) => format!("failed: {why}"),
+            (None, 0) if stands_in(result, row) => "stands in for the arm".to_owned(),
             (None, 0) => String::new(),
             (None, n) => format!("{n} targets refused"),
         };
