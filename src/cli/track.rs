@@ -185,7 +185,6 @@ fn pass(
         taking.as_secs_f64() * 1e3,
         taking.as_secs_f64() * 1e6 / fresh as f64
     );
-    let model = tracker.model();
     let date = match &arguments.date {
         Some(date) => stamp(date)?,
         None => now()?,
