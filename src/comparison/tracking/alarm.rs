@@ -17,7 +17,7 @@ const ACCIDENT: f64 = 1e-9;
 const ALARM_DEVIATIONS: f64 = 4.265;
 
 /// A change of one parameter is named where its likelihood ratio is above this: 1 in 10⁵ for one parameter and one pose,
-/// still 1 in a hundred after looking through them all.
+/// still 1 in a hundred after looking through them all; and where it explains most of the window's excess.
 const SURE: f64 = 20.0;
 
 /// How a parameter changed, as far as the poses tell.
@@ -137,7 +137,15 @@ impl Tracker {
         }
         let found = self.what_moved()?;
         let last = self.state.history.last()?;
-        if found.best.ratio < SURE {
+        // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
+        // explains most of what was too much (0.7).
+        let measured = |at: usize| match history[at].nis {
+            _ if self.is_lone_accident(at) => per as f64,
+            nis if nis.is_finite() => nis,
+            _ => bound,
+        };
+        let all: f64 = (history.len() - window..history.len()).map(measured).sum();
+        if !(found.best.ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
             let alarm = Alarm {
                 noticed_file: last.file.clone(),
                 noticed_row: last.row,
