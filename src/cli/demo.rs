@@ -100,6 +100,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
             program: "blade.mod",
             name: &one.estimated.provenance.method,
             after: After::Achieved,
+        loads: [None, None],
         };
         let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
         let mut report = judge(&judged, &acting);
@@ -157,6 +158,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
         ("identification.html", "what the measurements told of the arm"),
         ("blade.mod, blade-compensated.mod", "the program before and after"),
         ("model.toml", "the estimated arm (method lm)"),
+        #[cfg(feature = "visual")]
         ("demo.rrd", "the picture: truegrind view, or any Rerun viewer"),
     ] {
         println!("  {name:<34} {what}");

@@ -211,6 +211,7 @@ pub fn run(
             program: &name,
             name: &format!("{} {}", method.id, solver.name),
             after,
+            loads: [None, None],
         };
         let mut report = judge(&judged, &acting);
         report.held_out_mm = Some(one.estimated.geometry.held_out.rmse);

@@ -429,6 +429,7 @@ pub(super) fn register(train: &Observed, nominal: &Model) -> Result<(Frames, Fit
         ExperimentError::NoStart(crate::identification::start::NoStart {
             file: train.dataset.file.clone(),
             rows: train.dataset.rows.len(),
+            poses: crate::identification::start::different_poses(&train.dataset, usize::MAX),
             what: "sensor",
             needed: 4,
         })

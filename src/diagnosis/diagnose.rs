@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::catalogue::{Candidate, Columns, MAP_KNOTS};
 use super::cause::Cause;
 use super::design::{Design, Linear};
 use super::extension::{Extended, Freedom, Subject, fit};
@@ -13,7 +14,7 @@ use super::picture::{Picture, picture};
 use super::record::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::remaining;
 use super::rows::{Prepared, prepare};
-use super::score::non_centrality;
+use super::score::{non_centrality, score};
 use super::selection::{self, Accepted, BLOCKS, Folds, Selection};
 use super::silence::not_testable;
 use super::validation::{StageError, Validation, nominal};
@@ -24,7 +25,10 @@ use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
 };
 use crate::identification::network::with_network;
+use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
+use crate::kinematics::effect::Effect;
+use crate::kinematics::effect::map::JointMap;
 use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
 use crate::kinematics::model::Model;
 use crate::kinematics::region::Region;
@@ -83,6 +87,12 @@ const WRONG_ARM_MM: f64 = 25.0;
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
 
+/// A rival whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
+const BETTER: f64 = 0.99;
+
+/// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
+const SHORT_ARC: f64 = 1.0;
+
 /// Non-centrality from which an effect can be counted on to be found.
 pub const VISIBLE: f64 = 40.0;
 
@@ -106,9 +116,10 @@ pub fn diagnose(
     let needed = scarce(dataset, nominal_arm);
     if let Some(needed) = needed {
         notes.push(format!(
-            "{} rows are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
+            "{} rows at {} different poses are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
              usual; what is said here rests on the priors",
-            dataset.rows.len()
+            dataset.rows.len(),
+            different_poses(dataset, usize::MAX)
         ));
     }
     let registered = nominal(&subject);
@@ -161,7 +172,7 @@ pub fn diagnose(
         let without = |subject: &Subject<'_>, fitted: &Extended| {
             let mut causes = fitted.causes.clone();
             causes.remove(weakest);
-            fit(subject, &causes, Freedom::All, Some(&selection::near(fitted, weakest)))
+            fit(subject, &causes, Freedom::All, Some(fitted))
         };
         extended = without(&subject, &extended);
         found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
@@ -286,7 +297,9 @@ fn weakest(found: &Extended, accepted: &[Accepted]) -> Option<usize> {
 
 /// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
 fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
-    let options = crate::estimation::network::rbf::Options::default();
+    // Ten poses for each centre, so that the weights are seen.
+    let centres = (subject.observed.dataset.rows.len() / 10).clamp(12, 60);
+    let options = crate::estimation::network::rbf::Options { centres, ..Default::default() };
     let mut causes = extended.causes.clone();
     let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
     causes.extend(spread.effects.last().cloned().map(Cause::Arm));
@@ -340,7 +353,7 @@ fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     };
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
     let needed = (3 * parameters).div_ceil(2 * per) + 10;
-    (dataset.rows.len() < needed).then_some(needed)
+    (different_poses(dataset, needed) < needed).then_some(needed)
 }
 
 fn stage(errors: &StageError) -> Stage {
@@ -421,6 +434,18 @@ impl Context<'_> {
         (findings, places, pictures)
     }
 
+    /// For a harmonic of a joint that moved through too small a part of its period: the joint's error map, which is any
+    /// smooth curve.
+    fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
+        let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
+        let dataset = &self.subject.observed.dataset;
+        let range = Columns::of(dataset).range_rad[harmonic.joint];
+        (range * harmonic.order < SHORT_ARC).then(|| {
+            let map = JointMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
+            Candidate::arm(Effect::GearMap(map), dataset, self.subject.nominal)
+        })
+    }
+
     fn finding(
         &self,
         index: usize,
@@ -448,7 +473,9 @@ impl Context<'_> {
                 }
             })
             .collect();
-        let mut clear = alternatives.iter().all(|a| a.beaten_by >= CLEAR);
+        let after_mm = self.held_out(self.whole, None);
+        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
+        let mut clear = alternatives.iter().all(beaten);
         if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
             alternatives.insert(
@@ -461,6 +488,23 @@ impl Context<'_> {
                     beaten_by: own.own.merit,
                 },
             );
+        }
+        if let Some(map) = self.any_curve(cause) {
+            // Over a small part of a turn every smooth error of a joint looks alike.
+            clear = false;
+            if !alternatives.iter().any(|a| a.effect == map.cause.name()) {
+                alternatives.push(Alternative {
+                    effect: map.cause.name().to_owned(),
+                    joints: pendant(&map.cause.joints()),
+                    rows: None,
+                    cv_rmse_mm: folds.rmse_mm(
+                        &without,
+                        Some((&map.columns(&without), &map.cause.sizes())),
+                        self.set_aside,
+                    ),
+                    beaten_by: own.own.merit - score(&without, &map).merit,
+                });
+            }
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
@@ -483,7 +527,7 @@ impl Context<'_> {
             parameters,
             p_value: own.log_p.exp(),
             non_centrality: Some(lambda),
-            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.held_out(self.whole, None) },
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),
         };

@@ -1,5 +1,8 @@
 //! Rewriting programs: the estimated arm follows what was meant, and nothing dangerous is ever written.
 
+mod payload;
+mod play;
+
 use nalgebra::{DMatrix, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -85,6 +88,7 @@ fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathR
         program: "p.mod",
         name: "test",
         after: After::Achieved,
+        loads: [None, None],
     };
     let nominal = nominal();
     let acting =
