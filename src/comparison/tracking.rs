@@ -7,9 +7,10 @@
 //!
 //! **Alarm.** The normalised innovations squared (NIS) of a pose are χ² with as many degrees of freedom as the pose has
 //! rows, where arm, sensor and noise are what the filter believes. A single pose beyond the 1 in 10⁹ bound is set aside
-//! as an accident; the sum over a sliding window beyond the 1 in 10⁵ bound raises the alarm. Poses set aside count in
-//! the window, each up to a third of its bound, so that a jump of the arm cannot hide as a series of accidents and a
-//! single accident is none.
+//! as an accident; the sum over a sliding window beyond the 1 in 10⁵ bound raises the alarm. Poses set aside one after
+//! the other count in the window, each up to a quarter of its bound, so that a jump of the arm cannot hide as a series of
+//! accidents; a lone one counts as expected, since what a model does not hold has longer tails than χ². An alarm that
+//! no single parameter explains says so and changes nothing.
 //!
 //! **Which parameter, since when.** A jump or a drift of one parameter from one pose of the history on, whichever explains
 //! the history best ([`locate`]). Parameters that explain it nearly as well are named as alternatives: a sensor that was
@@ -256,6 +257,7 @@ impl Tracker {
             reference: snapshot.clone(),
             middle: snapshot,
             region: model.region.clone(),
+            quiet_until: 0,
             consumed: Vec::new(),
             alarms: Vec::new(),
             history: Vec::new(),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Tracker;
 use super::locate::{Form, Found, locate};
-use super::state::{Seen, Snapshot};
+use super::state::Snapshot;
 use crate::comparison::distribution::chi_square_quantile;
 use crate::estimation::problem::Problem;
 
@@ -15,6 +15,10 @@ const ACCIDENT: f64 = 1e-9;
 
 /// A window beyond so many standard deviations, 1 in 10⁵, raises the alarm.
 const ALARM_DEVIATIONS: f64 = 4.265;
+
+/// A change of one parameter is named where its likelihood ratio is above this: 1 in 10⁵ for one parameter and one pose,
+/// still 1 in a hundred after looking through them all; and where it explains most of the window's excess.
+const SURE: f64 = 20.0;
 
 /// How a parameter changed, as far as the poses tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -44,7 +48,7 @@ pub struct Alarm {
     /// Its time, where logged (h).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since_time_h: Option<f64>,
-    /// Name of the parameter that moved.
+    /// Name of the parameter that moved; empty where no single one explains the poses.
     pub parameter: String,
     /// Unit.
     pub unit: String,
@@ -73,6 +77,14 @@ impl fmt::Display for Alarm {
             "" => (1.0, ""),
             other => (1.0, other),
         };
+        if self.parameter.is_empty() {
+            return write!(
+                f,
+                "innovations left their bounds at row {} of {} (sum of the window {:.0}, bound {:.0}), and no single parameter \
+                 explains it: look at the sensor, the target, and at effects that the model does not hold",
+                self.noticed_row, self.noticed_file, self.window_nis[0], self.window_nis[1]
+            );
+        }
         let verb = match self.course {
             Course::Open => "moved",
             Course::Jump => "jumped",
@@ -107,19 +119,53 @@ impl Tracker {
         let window = self.state.options.window.max(1);
         let history = &self.state.history;
         // The window never reaches back behind the first poses, which place the sensor.
-        if history.len() < window || self.state.poses < self.state.options.first_poses + window {
+        let earliest = self.state.quiet_until.max(self.state.options.first_poses + window);
+        if history.len() < window || self.state.poses < earliest {
             return None;
         }
         let per = self.rows_per_pose();
         let bound = window_bound(window * per);
-        // One accident alone must not raise the alarm, three do.
-        let counted = |s: &Seen| if s.nis.is_finite() { s.nis.min(bound / 3.0) } else { bound / 3.0 };
-        let sum: f64 = history[history.len() - window..].iter().map(counted).sum();
+        // A lone accident says nothing; of those that follow each other it takes three or four.
+        let counted = |at: usize| match history[at].nis {
+            _ if self.is_lone_accident(at) => per as f64,
+            nis if nis.is_finite() => nis.min(bound / 4.0),
+            _ => bound / 4.0,
+        };
+        let sum: f64 = (history.len() - window..history.len()).map(counted).sum();
         if sum <= bound {
             return None;
         }
         let found = self.what_moved()?;
         let last = self.state.history.last()?;
+        // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
+        // explains most of what was too much (0.7).
+        let measured = |at: usize| match history[at].nis {
+            _ if self.is_lone_accident(at) => per as f64,
+            nis if nis.is_finite() => nis,
+            _ => bound,
+        };
+        let all: f64 = (history.len() - window..history.len()).map(measured).sum();
+        if !(found.best.ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
+            let alarm = Alarm {
+                noticed_file: last.file.clone(),
+                noticed_row: last.row,
+                since_file: last.file.clone(),
+                since_row: last.row,
+                since_time_h: last.time_h,
+                parameter: String::new(),
+                unit: String::new(),
+                course: Course::Open,
+                shift: 0.0,
+                sigma: 0.0,
+                poses: 0,
+                ratio: found.best.ratio,
+                alternatives: Vec::new(),
+                window_nis: [sum, bound],
+            };
+            // The same poses are not complained of again.
+            self.state.quiet_until = self.state.poses + window;
+            return Some(alarm);
+        }
         let onset = &self.state.history[found.best.since];
         let name = |k: usize| self.parameters[k].to_string();
         let alarm = Alarm {
@@ -146,6 +192,16 @@ impl Tracker {
         Some(alarm)
     }
 
+    /// Whether a pose of the history was set aside and its neighbours were not. After a jump one pose after the other is
+    /// set aside; one alone is an accident and has no say.
+    fn is_lone_accident(&self, at: usize) -> bool {
+        let bound = accident_bound(self.rows_per_pose());
+        let aside = |at: Option<usize>| {
+            at.and_then(|at| self.state.history.get(at)).is_some_and(|s| !(s.nis <= bound))
+        };
+        aside(Some(at)) && !aside(at.checked_sub(1)) && !aside(Some(at + 1))
+    }
+
     fn what_moved(&self) -> Option<Found> {
         let poses = &self.state.history;
         let per = self.rows_per_pose();
@@ -153,12 +209,8 @@ impl Tracker {
         let (rows, p) = (poses.len() * per, self.parameters.len());
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.task(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
-        // After a jump one pose after the other is set aside; one alone is an accident and has no say.
-        let aside: Vec<bool> = poses.iter().map(|s| !(s.nis <= accident_bound(per))).collect();
         for pose in 0..poses.len() {
-            let alone = |at: Option<usize>| !at.and_then(|at| aside.get(at)).is_some_and(|a| *a);
-            let lone = aside[pose] && alone(pose.checked_sub(1)) && alone(Some(pose + 1));
-            if lone || !poses[pose].nis.is_finite() {
+            if self.is_lone_accident(pose) || !poses[pose].nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
                 r[of_pose.clone()].fill(0.0);
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));

@@ -131,6 +131,8 @@ pub struct State {
     pub(super) middle: Snapshot,
     /// Where the arm was measured: the model's region, and what the track reached beyond it.
     pub region: Region,
+    /// Number of poses before which no further alarm is raised, after one that no parameter explained.
+    pub quiet_until: usize,
     /// Files and rows taken in.
     pub consumed: Vec<Consumed>,
     /// Changes noticed so far.

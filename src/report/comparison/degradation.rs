@@ -192,13 +192,13 @@ fn counts(result: &DegradationResult) -> Table {
             Column::count("equations", "Equations"),
             Column::count("rank", "Rank"),
             Column::significant("condition", "Condition", "", 2),
-            Column::number("identification_mm", "identify, RLS", "mm", 4),
-            Column::number("verification_mm", "verify, RLS", "mm", 4),
-            Column::number("identification_percent", "better, id.", "%", 1),
-            Column::number("paper_identification_percent", "paper", "%", 1),
-            Column::number("verification_percent", "verif.", "%", 1),
-            Column::number("paper_verification_percent", "paper", "%", 1),
-            Column::number("without_prior_mm", "verify, no prior", "mm", 4),
+            Column::number("identification_mm", "id.", "", 4),
+            Column::number("verification_mm", "ver.", "", 4),
+            Column::number("identification_percent", "id. better", "", 1),
+            Column::number("paper_identification_percent", "paper", "", 1),
+            Column::number("verification_percent", "ver. better", "", 1),
+            Column::number("paper_verification_percent", "paper", "", 1),
+            Column::number("without_prior_mm", "no prior", "", 4),
         ],
     );
     let nominal = result.nominal_mm.first().copied().unwrap_or(f64::NAN);
@@ -219,8 +219,8 @@ fn counts(result: &DegradationResult) -> Table {
         ]);
     }
     table.notes = vec![
-        "Rank of 24 link parameters with known frames, the smallest over the arms; condition in units of the tolerances, \
-         the largest. No prior: least squares of those poses alone."
+        "RLS; errors in mm of poses that identify (id.) and that verify (ver.), better in %. Rank of 24 link parameters with known frames, the smallest over the arms; condition in units of the tolerances, \
+         the largest. No prior: error of the poses that verify after least squares of those poses alone."
             .to_owned(),
         "Better: against the nominal arm. The paper's percentages are of its own arm.".to_owned(),
     ];

@@ -219,6 +219,33 @@ fn a_model_that_leaves_effects_unexplained_raises_no_alarm_on_the_arm_that_it_wa
 }
 
 #[test]
+fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing() {
+    // Two accidents near each other are two accidents.
+    let mut dataset = measured(2, None);
+    let other = measured(7, None);
+    for at in [60, 66] {
+        dataset.rows[at].reading = other.rows[at].reading;
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    assert!(tracker.take(&dataset).unwrap().is_empty());
+    assert_eq!(tracker.state().accidents, 2);
+    // Readings that scatter five times as much as they should are no parameter's doing.
+    let mut dataset = measured(2, None);
+    for (k, row) in dataset.rows.iter_mut().enumerate().skip(80) {
+        let truegrind::measurement::dataset::Reading::Position(p) = &mut row.reading else {
+            panic!("a position")
+        };
+        let sign = |n: usize| if (k * 2_654_435_761 >> n) & 1 == 0 { 0.055 } else { -0.055 };
+        *p += nalgebra::Vector3::new(sign(7), sign(11), sign(13));
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    let first = alarms.first().expect("it is noticed");
+    assert!(first.parameter.is_empty(), "{first}");
+    assert!(first.to_string().contains("no single parameter explains it"), "{first}");
+}
+
+#[test]
 fn files_of_a_few_poses_each_begin_a_track_together() {
     let day = measured(2, None);
     let file = |k: usize| {
