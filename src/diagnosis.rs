@@ -15,7 +15,7 @@
 //! 7. [`validation`]: held-out errors by full refits, of all stages and of every rival.
 //! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
 //!    explains; rounding and contradicting columns; what the rows cannot show.
-//! 9. [`finding`] and [`words`]: the result, in the contract's terms and in a technician's.
+//! 9. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
 //! Every candidate's size prior takes part in its evidence, so a candidate with many parameters has to earn them.
 
@@ -38,4 +38,5 @@ mod silence;
 pub mod finding;
 pub mod words;
 pub mod picture;
+mod account;
 pub mod diagnose;

@@ -122,11 +122,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     arguments.outputs.print(&view::summary(&found));
     let mut batch = Batch::sparing([&arguments.data.data]);
-    arguments.outputs.add_to(
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&found, &dataset),
-        &view::parameter_table(&found),
-        &view::json(&found, &dataset),
+        || view::document(&found, &dataset),
+        || view::parameter_table(&found),
+        || view::json(&found, &dataset),
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {

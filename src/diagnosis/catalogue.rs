@@ -218,7 +218,7 @@ const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
 /// Knots of an error map over a turn: a smooth curve.
-const MAP_KNOTS: usize = 24;
+pub const MAP_KNOTS: usize = 24;
 /// Knots of one that follows the periods of a reducer's stages, tried where lines of the joint stand out.
 const FINE_KNOTS: usize = 72;
 

@@ -1,23 +1,17 @@
 //! The whole diagnosis of one data set.
 
-use nalgebra::DVector;
-
+use super::account::{Context, told_short};
 use super::cause::Cause;
-use super::design::{Design, Linear};
+use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{
-    Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, RangeNoise,
-    SCHEMA, Source, Stage, Step,
-};
-use super::picture::{Picture, picture};
+use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
+use super::picture::Picture;
 use super::record::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::remaining;
 use super::rows::{Prepared, prepare};
-use super::score::non_centrality;
-use super::selection::{self, Accepted, BLOCKS, Folds, Selection};
+use super::selection::{self, Accepted, BLOCKS, Selection};
 use super::silence::not_testable;
 use super::validation::{StageError, Validation, nominal};
-use super::words;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
 use crate::identification::identify::{
@@ -80,9 +74,6 @@ pub struct Diagnosed {
 
 /// With frames alone fitted, an error beyond this is no tolerance but a mistake (mm).
 const WRONG_ARM_MM: f64 = 25.0;
-
-/// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
-const CLEAR: f64 = 6.0;
 
 /// Non-centrality from which an effect can be counted on to be found.
 pub const VISIBLE: f64 = 40.0;
@@ -163,7 +154,7 @@ pub fn diagnose(
         let without = |subject: &Subject<'_>, fitted: &Extended| {
             let mut causes = fitted.causes.clone();
             causes.remove(weakest);
-            fit(subject, &causes, Freedom::All, Some(&selection::near(fitted, weakest)))
+            fit(subject, &causes, Freedom::All, Some(fitted))
         };
         extended = without(&subject, &extended);
         found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
@@ -288,7 +279,9 @@ fn weakest(found: &Extended, accepted: &[Accepted]) -> Option<usize> {
 
 /// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
 fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
-    let options = crate::estimation::network::rbf::Options::default();
+    // Ten poses for each centre, so that the weights are seen.
+    let centres = (subject.observed.dataset.rows.len() / 10).clamp(12, 60);
+    let options = crate::estimation::network::rbf::Options { centres, ..Default::default() };
     let mut causes = extended.causes.clone();
     let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
     causes.extend(spread.effects.last().cloned().map(Cause::Arm));
@@ -352,161 +345,6 @@ fn stage(errors: &StageError) -> Stage {
         max_mm: errors.fitted.max,
         cv_rmse_mm: errors.random.rmse,
         cv_blocks_rmse_mm: errors.blocks.rmse,
-    }
-}
-
-/// Joints as on the teach pendant, from 1.
-pub(super) fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
-    (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
-}
-
-struct Context<'a> {
-    /// Where causes were looked for: all rows, or some of very many.
-    subject: &'a Subject<'a>,
-    /// The fit there.
-    found: &'a Extended,
-    /// The fit to all rows.
-    extended: &'a Extended,
-    /// Linearised where causes were looked for.
-    linear: &'a Linear,
-    whole: &'a Design,
-    splits: &'a [split::Split],
-    set_aside: &'a [usize],
-}
-
-impl Context<'_> {
-    /// Held-out error of a design, with columns added or not, to first order (mm).
-    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
-        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
-    }
-
-    /// A finding for every story, and which finding each cause went into.
-    fn findings(
-        &self,
-        accepted: &[Accepted],
-        steps: &mut Vec<Step>,
-    ) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
-        let mut pictures = Vec::new();
-        let mut findings: Vec<Finding> = Vec::new();
-        let mut places = Vec::new();
-        let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
-        for (index, own) in accepted.iter().enumerate() {
-            let cause = &self.extended.causes[index];
-            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
-            steps.push(Step {
-                added: told_short(cause),
-                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
-            });
-            let parameters = words::parameters(self.extended, index);
-            let mergeable = cause.rows().is_none();
-            let told = findings.iter().position(|f: &Finding| {
-                mergeable
-                    && f.effect == cause.name()
-                    && f.rows.is_none()
-                    && f.joints == pendant(&cause.joints())
-            });
-            if let Some(place) = told {
-                findings[place].parameters.extend(parameters);
-                findings[place].cause = format!(
-                    "{}; {}",
-                    findings[place].cause,
-                    words::cause(cause, &words::parameters(self.extended, index), last)
-                );
-                places.push(place);
-                continue;
-            }
-            places.push(findings.len());
-            let (finding, picture) = self.finding(index, cause, own, parameters, last);
-            findings.push(finding);
-            pictures.push(picture);
-        }
-        (findings, places, pictures)
-    }
-
-    fn finding(
-        &self,
-        index: usize,
-        cause: &Cause,
-        own: &Accepted,
-        parameters: Vec<FoundParameter>,
-        last: usize,
-    ) -> (Finding, Picture) {
-        let without = self.linear.design(&self.found.places(index));
-        let folds = Folds::of(&without, self.splits);
-        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
-        let mut alternatives: Vec<Alternative> = own
-            .rivals
-            .iter()
-            .take(3)
-            .map(|rival| {
-                let columns = rival.candidate.columns(&without);
-                let sizes = rival.candidate.cause.sizes();
-                Alternative {
-                    effect: rival.candidate.cause.name().to_owned(),
-                    joints: pendant(&rival.candidate.cause.joints()),
-                    rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
-                    beaten_by: own.own.merit - rival.score.merit,
-                }
-            })
-            .collect();
-        let mut clear = alternatives.iter().all(|a| a.beaten_by >= CLEAR);
-        if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
-            clear = false;
-            alternatives.insert(
-                0,
-                Alternative {
-                    effect: "link-geometry".to_owned(),
-                    joints: None,
-                    rows: None,
-                    cv_rmse_mm: before_mm,
-                    beaten_by: own.own.merit,
-                },
-            );
-        }
-        let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
-        let lambda = non_centrality(&own.own.information, &values);
-        let picture = picture(self.subject, cause, &without, self.whole);
-        let finding = Finding {
-            effect: cause.name().to_owned(),
-            cause: words::cause(cause, &parameters, last),
-            confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
-            rows: cause.rows(),
-            row_list: None,
-            joints: pendant(&cause.joints()),
-            evidence: format!(
-                "{}: χ² falls by {:.0} for {}, everything else refitted; twice the log Bayes factor {:.0} with {} tried",
-                words::pattern(cause),
-                own.own.gain,
-                counted(own.own.estimate.len(), "parameter"),
-                own.own.evidence,
-                counted(own.tried.round() as usize, "variant"),
-            ),
-            parameters,
-            p_value: own.log_p.exp(),
-            non_centrality: Some(lambda),
-            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: self.held_out(self.whole, None) },
-            alternatives,
-            remedy: words::remedy(cause.name()).to_owned(),
-        };
-        (finding, picture)
-    }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
-fn told_short(cause: &Cause) -> String {
-    let joints = cause.joints();
-    match (joints.as_slice(), cause.rows()) {
-        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),
-        ([], None) => cause.name().to_owned(),
-        ([joint], _) => format!("{} of joint {}", cause.name(), joint + 1),
-        (many, _) => {
-            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
-            format!("{} of joints {}", cause.name(), list.join(" and "))
-        }
     }
 }
 

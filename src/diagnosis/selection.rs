@@ -249,7 +249,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
     // comes in too.
     let mut doubtful: Vec<(Cause, Vec<Cause>)> = Vec::new();
-    let mut told_again = false;
+    let (mut told_again, mut ahead, mut turned_out) = (false, EXCHANGE, Vec::new());
     for _ in 0..4 * options.most.max(1) {
         let board = Board::of(&catalogue, subject, &current);
         let design = &board.whole.design;
@@ -259,7 +259,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                 let folds = (Folds::of(design, &random), Folds::of(design, &blocks));
                 let before = (folds.0.held_out(design, None), folds.1.held_out(design, None));
                 left.iter().take_while(|s| s.score.merit > 0.0).find(|scored| {
-                    if refused.contains(&scored.candidate.cause)
+                    if already(&refused, &scored.candidate.cause)
                         || already(&current.causes, &scored.candidate.cause)
                         || !catalogue.significant(design, scored, options.alpha)
                     {
@@ -276,8 +276,14 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             .flatten();
         let Some(taken) = taken else {
             let all: Vec<usize> = (0..current.causes.len()).collect();
-            match review(&board, options, &all, false) {
+            match review(&board, options, &all, &How { quick: false, ahead }) {
                 Review::Changed(settled) => {
+                    // A cause that was turned out twice does not come back, and it gets harder to turn one out.
+                    for gone in current.causes.iter().filter(|c| !already(&settled.causes, c)) {
+                        let list = if already(&turned_out, gone) { &mut refused } else { &mut turned_out };
+                        list.push(gone.clone());
+                    }
+                    ahead *= HARDER;
                     current = *settled;
                     continue;
                 }
@@ -320,7 +326,12 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             if unsure.is_empty() {
                 break;
             }
-            match review(&Board::of(&catalogue, subject, &current), options, &unsure, true) {
+            match review(
+                &Board::of(&catalogue, subject, &current),
+                options,
+                &unsure,
+                &How { quick: true, ahead: EXCHANGE },
+            ) {
                 Review::Changed(settled) => current = *settled,
                 Review::Settled(_) => break,
             }
@@ -356,46 +367,19 @@ fn already(causes: &[Cause], candidate: &Cause) -> bool {
     })
 }
 
-/// A fit to start from when cause `index` goes: its parameters are taken out, so that the others keep their values.
-pub(super) fn near(current: &Extended, index: usize) -> Extended {
-    use crate::kinematics::parameter::Parameter;
-    let gone = current.places(index);
-    let arm = matches!(current.causes[index], Cause::Arm(_));
-    let removed = gone.first().map(|&k| current.parameters[k]);
-    let mut out = current.clone();
-    let keep = |k: &usize| !gone.contains(k);
-    let places: Vec<usize> = (0..current.parameters.len()).filter(keep).collect();
-    out.x = places.iter().map(|&k| current.x[k]).collect();
-    out.parameters = places
-        .iter()
-        .map(|&k| match (current.parameters[k], removed) {
-            (Parameter::Effect { index, parameter }, Some(Parameter::Effect { index: g, .. }))
-                if arm && index > g =>
-            {
-                Parameter::Effect { index: index - 1, parameter }
-            }
-            (Parameter::Disturbance { index, parameter }, Some(Parameter::Disturbance { index: g, .. }))
-                if !arm && index > g =>
-            {
-                Parameter::Disturbance { index: index - 1, parameter }
-            }
-            (other, _) => other,
-        })
-        .collect();
-    match removed {
-        Some(Parameter::Effect { index, .. }) => {
-            out.model.effects.remove(index);
-        }
-        Some(Parameter::Disturbance { index, .. }) => {
-            out.frames.disturbances.remove(index);
-        }
-        _ => {}
-    }
-    out
-}
-
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
+
+/// By how much that grows with every change of a whole review.
+const HARDER: f64 = 1.5;
+
+/// How accepted causes are looked at again.
+struct How {
+    /// Causes whose rows or order are listed are compared with their like only.
+    quick: bool,
+    /// Merit by which another cause must be better.
+    ahead: f64,
+}
 
 /// What looking again at accepted causes came to.
 enum Review {
@@ -407,17 +391,15 @@ enum Review {
 
 /// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
 /// explains better.
-///
-/// In a `quick` review a cause whose rows or order are listed is compared with its like only.
-fn review(board: &Board<'_>, options: &Options, which: &[usize], quick: bool) -> Review {
+fn review(board: &Board<'_>, options: &Options, which: &[usize], how: &How) -> Review {
     let (subject, catalogue, current) = (board.subject, board.catalogue, board.fit);
     let mut accepted = Vec::new();
     for &index in which {
-        let open = !quick || is_open(&board.fit.causes[index]);
+        let open = !how.quick || is_open(&board.fit.causes[index]);
         let (judged, design, scored) = looked_at(board, index, open);
         let mut others = current.causes.clone();
         others.remove(index);
-        let enough = judged.own.merit + EXCHANGE;
+        let enough = judged.own.merit + how.ahead;
         let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
             !already(&others, &s.candidate.cause) && catalogue.significant(&design, s, options.alpha)
         });
@@ -425,7 +407,7 @@ fn review(board: &Board<'_>, options: &Options, which: &[usize], quick: bool) ->
             best.filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
         let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
         if better.is_some() || !carries {
-            let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
+            let reduced = fit(subject, &others, Freedom::All, Some(current));
             return Review::Changed(Box::new(match better {
                 Some(better) => {
                     others.push(better.candidate.cause.clone());

@@ -3,10 +3,11 @@
 
 use nalgebra::DVector;
 
+use super::account::pendant;
 use super::catalogue::{Columns, Regressor, STILL_RAD};
 use super::cause::Cause;
 use super::design::Design;
-use super::diagnose::{VISIBLE, pendant};
+use super::diagnose::VISIBLE;
 use super::finding::NotTestable;
 use super::rows::Prepared;
 use super::selection::{Scored, scale_beside_growth};

@@ -1,0 +1,212 @@
+//! A finding for every accepted cause: what it is, how sure that is, what else was fitted in its place.
+
+use nalgebra::DVector;
+
+use super::catalogue::{Candidate, Columns, MAP_KNOTS};
+use super::cause::Cause;
+use super::design::{Design, Linear};
+use super::diagnose::VISIBLE;
+use super::extension::{Extended, Subject};
+use super::finding::{Alternative, Confidence, Finding, FoundParameter, Gain, Step};
+use super::picture::{Picture, picture};
+use super::score::{non_centrality, score};
+use super::selection::{Accepted, Folds};
+use super::words;
+use crate::kinematics::effect::Effect;
+use crate::kinematics::effect::map::JointMap;
+use crate::measurement::split;
+
+/// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
+const CLEAR: f64 = 6.0;
+
+/// A rival whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
+const BETTER: f64 = 0.99;
+
+/// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
+const SHORT_ARC: f64 = 1.0;
+
+/// Joints as on the teach pendant, from 1.
+pub(super) fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
+    (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
+}
+
+pub(super) struct Context<'a> {
+    /// Where causes were looked for: all rows, or some of very many.
+    pub(super) subject: &'a Subject<'a>,
+    /// The fit there.
+    pub(super) found: &'a Extended,
+    /// The fit to all rows.
+    pub(super) extended: &'a Extended,
+    /// Linearised where causes were looked for.
+    pub(super) linear: &'a Linear,
+    pub(super) whole: &'a Design,
+    pub(super) splits: &'a [split::Split],
+    pub(super) set_aside: &'a [usize],
+}
+
+impl Context<'_> {
+    /// Held-out error of a design, with columns added or not, to first order (mm).
+    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
+        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
+    }
+
+    /// A finding for every story, and which finding each cause went into.
+    pub(super) fn findings(
+        &self,
+        accepted: &[Accepted],
+        steps: &mut Vec<Step>,
+    ) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
+        let mut pictures = Vec::new();
+        let mut findings: Vec<Finding> = Vec::new();
+        let mut places = Vec::new();
+        let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
+        for (index, own) in accepted.iter().enumerate() {
+            let cause = &self.extended.causes[index];
+            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+            steps.push(Step {
+                added: told_short(cause),
+                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
+            });
+            let parameters = words::parameters(self.extended, index);
+            let mergeable = cause.rows().is_none();
+            let told = findings.iter().position(|f: &Finding| {
+                mergeable
+                    && f.effect == cause.name()
+                    && f.rows.is_none()
+                    && f.joints == pendant(&cause.joints())
+            });
+            if let Some(place) = told {
+                findings[place].parameters.extend(parameters);
+                findings[place].cause = format!(
+                    "{}; {}",
+                    findings[place].cause,
+                    words::cause(cause, &words::parameters(self.extended, index), last)
+                );
+                places.push(place);
+                continue;
+            }
+            places.push(findings.len());
+            let (finding, picture) = self.finding(index, cause, own, parameters, last);
+            findings.push(finding);
+            pictures.push(picture);
+        }
+        (findings, places, pictures)
+    }
+
+    /// For a harmonic of a joint that moved through too small a part of its period: the joint's error map, which is any
+    /// smooth curve.
+    fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
+        let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
+        let dataset = &self.subject.observed.dataset;
+        let range = Columns::of(dataset).range_rad[harmonic.joint];
+        (range * harmonic.order < SHORT_ARC).then(|| {
+            let map = JointMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
+            Candidate::arm(Effect::GearMap(map), dataset, self.subject.nominal)
+        })
+    }
+
+    fn finding(
+        &self,
+        index: usize,
+        cause: &Cause,
+        own: &Accepted,
+        parameters: Vec<FoundParameter>,
+        last: usize,
+    ) -> (Finding, Picture) {
+        let without = self.linear.design(&self.found.places(index));
+        let folds = Folds::of(&without, self.splits);
+        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
+        let mut alternatives: Vec<Alternative> = own
+            .rivals
+            .iter()
+            .take(3)
+            .map(|rival| {
+                let columns = rival.candidate.columns(&without);
+                let sizes = rival.candidate.cause.sizes();
+                Alternative {
+                    effect: rival.candidate.cause.name().to_owned(),
+                    joints: pendant(&rival.candidate.cause.joints()),
+                    rows: rival.candidate.cause.rows(),
+                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
+                    beaten_by: own.own.merit - rival.score.merit,
+                }
+            })
+            .collect();
+        let after_mm = self.held_out(self.whole, None);
+        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
+        let mut clear = alternatives.iter().all(beaten);
+        if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
+            clear = false;
+            alternatives.insert(
+                0,
+                Alternative {
+                    effect: "link-geometry".to_owned(),
+                    joints: None,
+                    rows: None,
+                    cv_rmse_mm: before_mm,
+                    beaten_by: own.own.merit,
+                },
+            );
+        }
+        if let Some(map) = self.any_curve(cause) {
+            // Over a small part of a turn every smooth error of a joint looks alike.
+            clear = false;
+            if !alternatives.iter().any(|a| a.effect == map.cause.name()) {
+                alternatives.push(Alternative {
+                    effect: map.cause.name().to_owned(),
+                    joints: pendant(&map.cause.joints()),
+                    rows: None,
+                    cv_rmse_mm: folds.rmse_mm(
+                        &without,
+                        Some((&map.columns(&without), &map.cause.sizes())),
+                        self.set_aside,
+                    ),
+                    beaten_by: own.own.merit - score(&without, &map).merit,
+                });
+            }
+        }
+        let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
+        let lambda = non_centrality(&own.own.information, &values);
+        let picture = picture(self.subject, cause, &without, self.whole);
+        let finding = Finding {
+            effect: cause.name().to_owned(),
+            cause: words::cause(cause, &parameters, last),
+            confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
+            rows: cause.rows(),
+            row_list: None,
+            joints: pendant(&cause.joints()),
+            evidence: format!(
+                "{}: χ² falls by {:.0} for {}, everything else refitted; twice the log Bayes factor {:.0} with {} tried",
+                words::pattern(cause),
+                own.own.gain,
+                counted(own.own.estimate.len(), "parameter"),
+                own.own.evidence,
+                counted(own.tried.round() as usize, "variant"),
+            ),
+            parameters,
+            p_value: own.log_p.exp(),
+            non_centrality: Some(lambda),
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
+            alternatives,
+            remedy: words::remedy(cause.name()).to_owned(),
+        };
+        (finding, picture)
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+pub(super) fn told_short(cause: &Cause) -> String {
+    let joints = cause.joints();
+    match (joints.as_slice(), cause.rows()) {
+        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),
+        ([], None) => cause.name().to_owned(),
+        ([joint], _) => format!("{} of joint {}", cause.name(), joint + 1),
+        (many, _) => {
+            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
+            format!("{} of joints {}", cause.name(), list.join(" and "))
+        }
+    }
+}
