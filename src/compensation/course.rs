@@ -202,7 +202,7 @@ fn turning_point(way: &[(f64, Joints)], k: usize, joint: usize) -> Option<(f64, 
     let d2 = ((c.1 - b.1) / (c.0 - b.0) - d1) / (c.0 - a.0);
     let vertex = 0.5 * (a.0 + b.0) - 0.5 * d1 / d2;
     let within = vertex > way[k - 1].0 && vertex < way[k].0;
-    within.then(|| (vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
+    within.then_some((vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
 }
 
 /// Points between the ends of all motions.
