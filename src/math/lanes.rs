@@ -73,6 +73,8 @@ macro_rules! lane_operator {
         impl $trait for Lanes {
             type Output = Self;
             #[inline(always)]
+            // The macro has the operator, not its assignment.
+            #[allow(clippy::assign_op_pattern)]
             fn $method(self, other: Self) -> Self {
                 let mut out = [0.0; WIDTH];
                 let mut k = 0;

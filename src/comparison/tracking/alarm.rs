@@ -209,8 +209,8 @@ impl Tracker {
         let (rows, p) = (poses.len() * per, self.parameters.len());
         let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
         self.task(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
-        for pose in 0..poses.len() {
-            if self.is_lone_accident(pose) || !poses[pose].nis.is_finite() {
+        for (pose, seen) in poses.iter().enumerate() {
+            if self.is_lone_accident(pose) || !seen.nis.is_finite() {
                 let of_pose = pose * per..(pose + 1) * per;
                 r[of_pose.clone()].fill(0.0);
                 j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));

@@ -235,7 +235,7 @@ fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing(
         let truegrind::measurement::dataset::Reading::Position(p) = &mut row.reading else {
             panic!("a position")
         };
-        let sign = |n: usize| if (k * 2_654_435_761 >> n) & 1 == 0 { 0.055 } else { -0.055 };
+        let sign = |n: usize| if ((k * 2_654_435_761) >> n) & 1 == 0 { 0.055 } else { -0.055 };
         *p += nalgebra::Vector3::new(sign(7), sign(11), sign(13));
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
