@@ -202,5 +202,6 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> anyho
             position_mm: None,
             quaternion_wxyz: None,
         }],
+        external: Vec::new(),
     })
 }

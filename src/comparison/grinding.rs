@@ -255,5 +255,6 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> Resul
             position_mm: None,
             quaternion_wxyz: None,
         }],
+        external: Vec::new(),
     })
 }

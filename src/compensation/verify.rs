@@ -7,7 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::cell::Cell;
 use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
-use super::rewrite::{Arms, Mountings, configured, monitored};
+use super::mountings::Mountings;
+use super::rewrite::{Arms, configured, monitored};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{Carried, Estimated};
@@ -151,6 +152,9 @@ fn run_motion(
     let mounted = &mountings.list[mounted];
     let (told, joints) = match value {
         TargetValue::Cartesian(t) => {
+            if let Some(why) = mountings.moving_base(&t) {
+                return Err(why);
+            }
             let told = t.pose();
             let flange = mounted.told.flange_for(&told);
             (told, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)

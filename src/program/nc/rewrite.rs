@@ -56,7 +56,10 @@ impl Task<'_> {
             let mut follower = Follower { task: self, options, edits: &mut edits, now: Now::default() };
             for event in &self.events {
                 match *event {
-                    Event::Unknown => follower.now = Now::default(),
+                    Event::Unknown => {
+                        let straightened = follower.now.straightened;
+                        follower.now = Now { straightened, ..Now::default() };
+                    }
                     Event::Lost(axes) => follower.now.lose(axes),
                     Event::Shift(stated) => follower.now.shift_at(stated),
                     Event::NoShift => follower.now.moved = [0.0; 3],
@@ -98,10 +101,13 @@ impl Task<'_> {
                 return Some(Reason::NoJointForm);
             }
         }
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
+        }
         if change.before.is_empty() {
             return None;
         }
-        if !self.written[change.motion as usize].insertable {
+        if !change.straightens() && !self.written[change.motion as usize].insertable {
             return Some(Reason::NoInsertion);
         }
         change.before.iter().find_map(|extra| match (extra.kind, &extra.target) {
@@ -123,6 +129,8 @@ struct Now {
     vector: Option<([f64; 3], f64)>,
     /// By how much a shift of G92 has moved, because it was set where the tool now stands elsewhere.
     moved: [f64; 3],
+    /// Whether G1 holds where the original has G2 or G3, because an arc before has become straight.
+    straightened: bool,
 }
 
 impl Now {
@@ -158,6 +166,10 @@ struct Slots<'s> {
     feed: Option<Word<'s>>,
     /// G90 or G91, as written.
     distance: Option<Word<'s>>,
+    /// G0 to G3, as written.
+    mode: Option<Word<'s>>,
+    /// The first word after a block number.
+    first: Option<Word<'s>>,
     /// After which token new words go.
     end: u32,
     /// The last word before that.
@@ -210,6 +222,8 @@ impl<'s> Follower<'_, 's> {
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
         let stays = motion.left.is_some_and(|reason| !stays_in_place(reason));
+        let straightens = change.is_some_and(Change::straightens);
+        self.mode_again(motion, written, straightens);
         let Some(to) = to.filter(|_| !stays) else {
             let file = motion.place.file as usize;
             self.pass(&task.trees[file], task.dialects[file], written);
@@ -227,7 +241,9 @@ impl<'s> Follower<'_, 's> {
         let mut aim = new.unwrap_or(original);
         let mut arc = None;
         let mut outcome = Outcome::Unchanged;
-        if let Some((old, positive, _)) = written.arc {
+        if let Some((old, positive, _)) = written.arc
+            && !straightens
+        {
             arc = self.arc(&aim, start, &old, positive);
             if arc.is_none() {
                 // No circle goes there: the motion stays.
@@ -239,7 +255,11 @@ impl<'s> Follower<'_, 's> {
             }
         }
         let tree = &task.trees[motion.place.file as usize];
-        let slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        let mut slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        if straightens {
+            self.straighten(motion, &mut slots, change.is_some_and(|change| change.before.is_empty()));
+            outcome = Outcome::InPlace;
+        }
         if let Some(change) = change
             && !matches!(outcome, Outcome::Refused(_))
             && !change.before.is_empty()
@@ -249,6 +269,56 @@ impl<'s> Follower<'_, 's> {
         }
         let done = self.write(motion, written, &slots, &aim, arc);
         if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
+    }
+
+    /// Says G2 or G3 again in a block that leaves it out, where an arc before has become straight.
+    fn mode_again(&mut self, motion: &Motion, written: &Written, straightens: bool) {
+        if !self.now.straightened || straightens {
+            return;
+        }
+        let task = self.task;
+        let file = motion.place.file as usize;
+        let slots = slots(&task.trees[file], task.dialects[file], written);
+        if slots.mode.is_none() && motion.kind == MotionKind::Circular {
+            let at = slots
+                .first
+                .map_or(motion.statement.start as usize, |word| task.trees[file].start(word.first));
+            let text = format!("{} ", motion.instruction);
+            self.edits[file].insert(at, text.as_bytes());
+        }
+        // A motion of another kind that stands here has been told by a word of its own.
+        self.now.straightened &= slots.mode.is_none() && motion.kind == MotionKind::Unknown;
+    }
+
+    /// An arc's block becomes a straight one: G1 for G2 or G3, and no centre or radius.
+    fn straighten(&mut self, motion: &Motion, slots: &mut Slots<'s>, alone: bool) {
+        let file = motion.place.file as usize;
+        let tree = &self.task.trees[file];
+        let edits = &mut self.edits[file];
+        match slots.mode {
+            Some(Word { belongs: Belongs::Literal { number, .. }, .. }) => {
+                let range = tree.range(number, number + 1);
+                let digits = tree.text(number).iter().rposition(u8::is_ascii_digit).unwrap_or(0);
+                // G02 to G01: the last digit before a point.
+                let whole =
+                    tree.text(number).iter().position(|&byte| byte == b'.').map_or(digits, |point| point - 1);
+                edits.replace(range.start + whole..range.start + whole + 1, b"1");
+            }
+            _ if alone && !self.now.straightened => {
+                let at = slots.first.map_or(motion.statement.start as usize, |word| tree.start(word.first));
+                edits.insert(at, b"G1 ");
+            }
+            _ => {}
+        }
+        for word in slots.centre.iter_mut().chain([&mut slots.radius]).filter_map(Option::take) {
+            let range = tree.range(word.first, word.end);
+            let blanks =
+                tree.source()[..range.start].iter().rev().take_while(|byte| matches!(byte, b' ' | b'\t'));
+            let begin = range.start - blanks.count();
+            let end = tree.start(word.end - 1) + tree.text(word.end - 1).len();
+            edits.replace(begin..end, b"");
+        }
+        self.now.straightened = true;
     }
 
     /// Whether the control stands where the original has it, so that a motion that stays needs nothing.
@@ -716,6 +786,9 @@ fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) -> Slots<'s
     for child in tree.child_nodes(written.node) {
         let word = word(tree, child);
         let name = word.name.to_ascii_uppercase();
+        if slots.first.is_none() && &*name != b"N" {
+            slots.first = Some(word);
+        }
         let at = |letter: u8, first: u8| usize::from(letter - first);
         let mut says_where = true;
         match &*name {
@@ -757,9 +830,13 @@ fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) -> Slots<'s
             b"G" | b"N" | b"L" | b"LN" => {
                 fallback = (word.end, word.first);
                 if let Belongs::Literal { sign: None, number } = word.belongs
-                    && matches!(literal(tree.text(number)), Some(90.0 | 91.0))
+                    && &*name == b"G"
                 {
-                    slots.distance = Some(word);
+                    match literal(tree.text(number)) {
+                        Some(90.0 | 91.0) => slots.distance = Some(word),
+                        Some(0.0 | 1.0 | 2.0 | 3.0) => slots.mode = Some(word),
+                        _ => {}
+                    }
                 }
                 says_where = false;
             }

@@ -190,11 +190,15 @@ impl<'r, 's> Rewriter<'r, 's> {
                 _ => {}
             }
         }
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
+        }
         if change.before.is_empty() {
             return None;
         }
         let guarded = self.task.statements[change.motion as usize].guarded;
-        let between = instruction.map_or(Between::Nothing, |instruction| instruction.between);
+        let written = instruction.and_then(|instruction| written_as(instruction, change));
+        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
         if guarded || motion.timed || between == Between::Nothing {
             return Some(Reason::NoInsertion);
         }
@@ -209,6 +213,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         None
     }
 
+    /// The instruction of a motion as the source has it.
     fn instruction(&self, motion: &Motion) -> Option<&'static Instruction> {
         instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
     }
@@ -223,6 +228,10 @@ impl<'r, 's> Rewriter<'r, 's> {
         computed: &mut Vec<Wish>,
     ) -> Outcome {
         let mut outcome = Outcome::Unchanged;
+        if change.straightens() {
+            self.straighten(motion);
+            outcome = Outcome::InPlace;
+        }
         for (position, (target, new)) in motion.targets.iter().zip(&change.targets).enumerate() {
             let Some(fresh) = fresh(new) else { continue };
             let Ok(old) = target.value else { continue };
@@ -271,6 +280,19 @@ impl<'r, 's> Rewriter<'r, 's> {
         let value = print::merged(old, fresh);
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+    }
+
+    /// The instruction becomes the one on a line, and its circle point goes with the comma behind it; a comment between
+    /// them stays.
+    fn straighten(&mut self, motion: &Motion) {
+        let Some(line) = self.instruction(motion).and_then(Instruction::line_form) else { return };
+        let start = motion.statement.start as usize;
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace(start..start + motion.instruction.len(), line.name.as_bytes());
+        let source = self.task.trees[motion.place.file as usize].source();
+        for range in circle_point(source, motion) {
+            edits.replace(range, b"");
+        }
     }
 
     /// The instruction becomes the one that takes joints.
@@ -466,7 +488,8 @@ impl<'r, 's> Rewriter<'r, 's> {
         let parts = Parts::of(tree, self.task.statements[change.motion as usize].node, instruction);
         let mut text = Vec::new();
         for extra in &change.before {
-            self.extra(&mut text, motion, instruction, tree, &parts, extra);
+            let Some(written) = written_as(instruction, change) else { return };
+            self.extra(&mut text, motion, written, tree, &parts, extra);
             text.extend_from_slice(mark::line_end(source));
             text.extend_from_slice(indent(source, start));
         }
@@ -536,6 +559,9 @@ impl<'r, 's> Rewriter<'r, 's> {
         let base = motion.statement.start as usize;
         let mut edits = Edits::new();
         edits.replace(0..motion.instruction.len(), name.as_bytes());
+        for range in circle_point(source, motion) {
+            edits.replace(range.start - base..range.end - base, b"");
+        }
         if let Some(to) = motion.targets.iter().find(|target| target.role == Role::To) {
             let range = to.argument.range();
             edits.replace(range.start - base..range.end - base, &target);
@@ -611,9 +637,43 @@ impl Parts {
     }
 }
 
+/// The instruction that a change leaves.
+fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'static Instruction> {
+    if change.straightens() { instruction.line_form() } else { Some(instruction) }
+}
+
+/// The bytes of a circle point, and those of the comma behind it with the blanks before the next argument.
+fn circle_point(source: &[u8], motion: &Motion) -> Vec<std::ops::Range<usize>> {
+    let Some(via) = motion.targets.iter().find(|target| target.role == Role::Via) else { return Vec::new() };
+    let mut argument = via.argument.range();
+    // `CirPoint := p20` goes with its name.
+    if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
+        let name = before.trim_ascii_end();
+        let long =
+            name.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
+        argument.start = name.len() - long;
+    }
+    let mut at = argument.end;
+    while let Some(&byte) = source.get(at).filter(|_| at < motion.statement.end as usize) {
+        match byte {
+            b',' => {
+                let blanks = source[at + 1..].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+                return if at == argument.end {
+                    vec![argument.start..at + 1 + blanks]
+                } else {
+                    vec![argument, at..at + 1 + blanks]
+                };
+            }
+            b'!' => at += source[at..].iter().take_while(|&&byte| byte != b'\n').count(),
+            _ => at += 1,
+        }
+    }
+    Vec::new()
+}
+
 fn fresh(new: &NewTarget) -> Option<Fresh> {
     match *new {
-        NewTarget::Keep => None,
+        NewTarget::Keep | NewTarget::Drop => None,
         NewTarget::Cartesian { position_mm, quaternion, conf } => {
             Some(Fresh::Cartesian { position_mm, quaternion, conf })
         }

@@ -58,6 +58,7 @@ fn each_sample_is_known_by_its_signs() {
     let found: Vec<(String, Dialect)> =
         samples().iter().map(|(name, bytes)| (name.clone(), Dialect::of(bytes))).collect();
     let expected = [
+        ("circles.ngc", Dialect::LinuxCnc),
         ("fanuc.nc", Dialect::Fanuc),
         ("heidenhain.h", Dialect::Heidenhain),
         ("linuxcnc.ngc", Dialect::LinuxCnc),

@@ -521,6 +521,8 @@ impl Lister<'_, '_> {
             work_object: None,
             timed: false,
             insertable: false,
+            straightens: false,
+            axis: None,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
             conditional: said.skippable,
@@ -704,6 +706,13 @@ impl Lister<'_, '_> {
             && !motion.timed
             && before.start.iter().all(Option::is_some);
         motion.insertable = insertable;
+        motion.straightens = arc.is_some()
+            && !heidenhain
+            && !said.skippable
+            && !said.opaque
+            && !motion.timed
+            && before.start.iter().all(Option::is_some);
+        motion.axis = arc.map(|(arc, positive, _)| arc.plane.axis(positive));
         let after = self.written_as(said, None);
         let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
             before.start_angles
