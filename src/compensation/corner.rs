@@ -72,6 +72,14 @@ impl Corner {
     }
 }
 
+/// [`Corner::cut_mm`] of two lines through three points.
+pub(super) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
+    let (way_in, way_out) = (points[1] - points[0], points[2] - points[1]);
+    let (long_in, long_out) = (way_in.norm(), way_out.norm());
+    let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
+    if radius > 1e-9 { 0.25 * radius * (way_out / long_out - way_in / long_in).norm() } else { 0.0 }
+}
+
 /// The ways in and out of a corner, as meant and as told.
 pub(super) struct Ways {
     pub(super) meant: [Course; 2],

@@ -11,8 +11,7 @@
 use rayon::prelude::*;
 
 use super::cell::Cell;
-use super::corner::{CUT_MM, Corner};
-use super::course::Course;
+use super::corner::{CUT_MM, cut_of_lines};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
@@ -323,28 +322,24 @@ impl<'a> Job<'a> {
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it.
     fn corner(&self, motion: &Motion, path: Option<&Path<'a>>, passage: &Passage) -> Option<f64> {
-        let (point, _) = path?;
+        let (point, to) = path?;
         passage.courses.as_ref()?;
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
-        let zone = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?;
-        // No corner is cut by more than half its zone.
-        if !(zone.tcp_mm > 2.0 * CUT_MM) {
-            return None;
+        let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
+        if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
+            // Nearly all lines go on nearly straight: that is told by three points.
+            let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
+            let points = [&first.meant, &point.meant, &to.meant].map(|pose| pose.translation.vector);
+            if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
+                return None;
+            }
         }
         let path = self.path(previous)?;
-        let turns = |course: &[Course; 2], from: &Path<'_>| {
-            let line = Course::line(from.0.meant, from.1.meant);
-            Corner::of(&line, &course[0], zone.tcp_mm).cut_mm() > CUT_MM
-        };
-        // Lines that go on straight make no corner; that much can be told before the way in is worked out.
-        if before.kind == MotionKind::Linear && !turns(passage.courses.as_ref()?, &path) {
-            return None;
-        }
-        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
         let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
+        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
         let way_in = Passage::of(before, Some(&path), &good, middle, self.arms, self.options);
-        corner(point, &way_in, passage, zone.tcp_mm, self.arms, self.options.emit)
+        corner(point, &way_in, passage, zone_mm, self.arms, self.options.emit)
     }
 
     /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
