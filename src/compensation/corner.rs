@@ -56,15 +56,15 @@ impl Corner {
         let curve = a - 2.0 * b + c;
         let along = |t: f64| 2.0 * ((b - a) + curve * t);
         let at = |t: f64| a + 2.0 * (b - a) * t + curve * (t * t);
-        // The nearest share, by Newton's method.
+        // The nearest share, by Gauss-Newton steps: the point lies close by, and they never go the wrong way.
         let mut t = t;
-        for _ in 0..8 {
+        for _ in 0..12 {
             let (off, first) = (at(t) - point, along(t));
-            let slope = first.norm_squared() + 2.0 * off.dot(&curve);
-            if slope.abs() < 1e-12 {
+            let square = first.norm_squared();
+            if square < 1e-12 {
                 break;
             }
-            t = (t - off.dot(&first) / slope).clamp(0.0, 1.0);
+            t = (t - off.dot(&first) / square).clamp(0.0, 1.0);
         }
         let off: Vector3<f64> = point - at(t);
         // Before and behind the corner its tangents are the ways themselves.

@@ -240,8 +240,10 @@ impl<'s> Follower<'_, 's> {
             let text = format!("{} ", motion.instruction);
             self.edits[file].insert(at, text.as_bytes());
         }
-        // A motion of another kind that stands here has been told by a word of its own.
-        self.now.straightened &= slots.mode.is_none() && motion.kind == MotionKind::Unknown;
+        // A motion of another kind that stands here has been told by a word of its own. A block that may be skipped
+        // may not have said it.
+        let told = slots.mode.is_some() || motion.kind != MotionKind::Unknown;
+        self.now.straightened &= !told || motion.conditional;
     }
 
     /// An arc's block becomes a straight one: G1 for G2 or G3, and no centre or radius.

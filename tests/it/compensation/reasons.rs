@@ -117,6 +117,8 @@ fn every_reason_there_is_shows_in_a_program() {
         Options { max_correction_mm: 1e-4, ..fine() },
         Options { max_turn_rad: 1e-7, ..fine() },
         Options { joint_targets: true, ..fine() },
+        Options { min_singularity: 1.0, ..fine() },
+        Options { tolerance_mm: 0.5, ..fine() },
     ];
     for options in &bounds {
         look(&planned(&refusals, &known(), &cell, options));

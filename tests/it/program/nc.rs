@@ -58,7 +58,7 @@ fn each_sample_is_known_by_its_signs() {
     let found: Vec<(String, Dialect)> =
         samples().iter().map(|(name, bytes)| (name.clone(), Dialect::of(bytes))).collect();
     let expected = [
-        ("circles.ngc", Dialect::LinuxCnc),
+        ("circles.nc", Dialect::Iso),
         ("fanuc.nc", Dialect::Fanuc),
         ("heidenhain.h", Dialect::Heidenhain),
         ("linuxcnc.ngc", Dialect::LinuxCnc),
@@ -288,7 +288,7 @@ fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
     let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
     assert_eq!(found[2], Err(Reason::UnknownFlow));
     // Nor what a variable is worth that only a condition sets.
-    let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2\n", Dialect::Fanuc);
+    let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2 Y2 Z3\n", Dialect::Iso);
     assert_eq!(found, [Err(Reason::UnknownFlow), Ok([4.0, 2.0, 3.0])]);
     // A skipped block makes unsure what it changes, no more.
     let found = ends("G1 X1 Y2 Z3 A0 B0 C0\n/X9\nY5\nX4\n", Dialect::LinuxCnc);
