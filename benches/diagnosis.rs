@@ -15,10 +15,16 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use rand::RngExt;
-use scenarios::{KINDS, Outcome, draw, outcome, stream};
-use simulator::{Hidden, Setup};
+use scenarios::{FIELD, KINDS, Outcome, draw, hide, log, outcome, stream};
+use simulator::{Hidden, Log, Setup};
 use truegrind::measurement::dataset::Sensor;
 use truegrind::robots;
+
+/// Arms in turn.
+const ARMS: [&str; 4] = ["abb-irb-120", "universal-robots-ur10", "abb-irb-120", "staubli-tx60"];
+
+/// Noise in turn, in units of the sensor's: a worse sensor hides more.
+const NOISE: [f64; 3] = [1.0, 4.0, 12.0];
 
 const BINS: [f64; 5] = [10.0, 20.0, 40.0, 80.0, 160.0];
 
@@ -44,9 +50,10 @@ fn main() {
     let wanted: Vec<&str> = KINDS
         .into_iter()
         .chain(["pair"])
+        .chain(FIELD)
         .filter(|k| arguments.len() < 3 || arguments[2..].iter().any(|a| a == k))
         .collect();
-    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let arms: Vec<_> = ARMS.iter().map(|name| robots::load(name).unwrap().model).collect();
     let mut singles: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
     let mut pairs: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
     let mut by_kind: BTreeMap<(String, &str), (usize, usize)> = BTreeMap::new();
@@ -63,15 +70,21 @@ fn main() {
                     let second = (first + rng.random_range(1..KINDS.len())) % KINDS.len();
                     [first, second].iter().map(|&k| draw(KINDS[k], rows, &mut rng)).collect()
                 } else {
-                    vec![draw(kind, rows, &mut rng)]
+                    hide(kind, rows, &mut rng)
                 };
-                if sensor != Sensor::Cable && hidden.iter().any(|h| matches!(h, Hidden::Zero { .. })) {
+                let of_cable = |h: &Hidden| matches!(h, Hidden::Zero { .. } | Hidden::Sag { .. });
+                if sensor != Sensor::Cable && hidden.iter().any(of_cable) {
                     continue;
                 }
-                let setup =
-                    Setup { sensor, rows, sigma_mm, dirty: true, seed: rng.random_range(0..1_000_000) };
+                let nominal = &arms[(run as usize / 4) % arms.len()];
+                if nominal.bodies.is_none() && hidden.iter().any(|h| matches!(h, Hidden::Payload { .. })) {
+                    continue;
+                }
+                let sigma_mm = sigma_mm * NOISE[run as usize % NOISE.len()];
+                let seed = rng.random_range(0..1_000_000);
+                let setup = Setup { sensor, rows, sigma_mm, dirty: true, seed, log: log(kind) };
                 let began = Instant::now();
-                let out: Outcome = outcome(&nominal, &hidden, &setup);
+                let out: Outcome = outcome(nominal, &hidden, &setup);
                 let took = began.elapsed().as_secs_f64();
                 let visible = out.hidden.iter().all(|(_, l)| *l > 40.0);
                 for ((h, lambda), found) in out.hidden.iter().zip(&out.found) {
@@ -95,7 +108,7 @@ fn main() {
                 if out.found.iter().zip(&out.hidden).any(|(f, (_, l))| !f && *l > 40.0)
                     || !out.wrong.is_empty()
                 {
-                    println!("{kind} {label} {run} n={rows} {took:.1} s");
+                    println!("{kind} {label} {run} n={rows} σ={sigma_mm} mm {took:.1} s");
                     for (h, l) in &out.hidden {
                         println!("   hidden {h:?} λ {l:.0}");
                     }
@@ -103,6 +116,17 @@ fn main() {
                         "   found {:?}  wrong {:?} over truth {:.3}",
                         out.all, out.wrong, out.over_truth
                     );
+                    for f in &out.diagnosed.diagnosis.findings {
+                        let rivals: Vec<String> = f
+                            .alternatives
+                            .iter()
+                            .map(|a| format!("{} {:?} {:.1}", a.effect, a.joints, a.beaten_by))
+                            .collect();
+                        println!(
+                            "   {} {:?}: λ {:.0?}, ahead of {rivals:?}",
+                            f.effect, f.joints, f.non_centrality
+                        );
+                    }
                 }
             }
         }
@@ -141,8 +165,9 @@ fn main() {
         let mut alarms = 0;
         for run in 0..clean {
             let rows = [200, 350, 600, 1000][run as usize % 4];
-            let setup = Setup { sensor, rows, sigma_mm, dirty: true, seed: 900_000 + run };
-            let out = outcome(&nominal, &[], &setup);
+            let seed = 900_000 + run;
+            let setup = Setup { sensor, rows, sigma_mm, dirty: true, seed, log: Log::default() };
+            let out = outcome(&arms[(run as usize / 4) % arms.len()], &[], &setup);
             if !out.wrong.is_empty() {
                 alarms += 1;
                 println!("clean {label} {run}: {:?}", out.wrong);

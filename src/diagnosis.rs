@@ -7,9 +7,11 @@
 //! 3. [`design`]: that fit linearised and whitened, with frames, links and accepted causes projected off.
 //! 4. [`catalogue`]: every candidate cause as regressors; [`intervals`] finds the rows of shifts, [`lines`] the orders of
 //!    reducer lines.
-//! 5. [`score`]: each candidate fitted jointly with everything else, to first order: gain, evidence, p-value.
+//! 5. [`score`]: each candidate fitted jointly with everything else, to first order: gain, evidence, p-value. [`board`] does
+//!    that for all candidates at once, and again for the model without one of its causes.
 //! 6. [`selection`]: the best candidate is accepted when it passes the likelihood ratio corrected for all trials and lowers
-//!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again.
+//!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again. [`levels`] tells shifts
+//!    that overlap as what stood where from which row to which.
 //! 7. [`validation`]: held-out errors by full refits, of all stages and of every rival.
 //! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
 //!    explains; rounding and contradicting columns; what the rows cannot show.
@@ -24,7 +26,9 @@ pub mod extension;
 pub mod design;
 pub mod score;
 pub mod intervals;
+pub mod board;
 pub mod lines;
+pub mod levels;
 pub mod selection;
 pub mod validation;
 pub mod transfer;

@@ -34,6 +34,10 @@ pub(super) struct Arguments {
     /// Contiguous blocks that are held out in turn, beside five random folds.
     #[arg(long, default_value_t = 10)]
     blocks: usize,
+    /// Let a smooth correction, without a physical name, follow what no cause explains; it is kept only where it lowers both
+    /// held-out errors.
+    #[arg(long)]
+    smooth: bool,
     /// Another series of the same arm, on which the models are judged with only the frames refitted.
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
@@ -56,7 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--blocks {}: expected at least 2", arguments.blocks);
     }
     let (robot, dataset) = read(&arguments.data)?;
-    let mut options = Options { blocks: arguments.blocks, ..Options::default() };
+    let mut options = Options { blocks: arguments.blocks, smooth: arguments.smooth, ..Options::default() };
     options.selection.alpha = arguments.alpha;
     options.selection.most = arguments.most;
     options.selection.seed = arguments.common.seed;

@@ -262,23 +262,31 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
         let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
         effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
         // With the first moments of the links between, the static torque of any masses is spanned.
-        if joint == 1 || joint == 2 {
-            let moments = (joint + 1..4).flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
+        if (1..4).contains(&joint) {
+            let moments = (joint + 1..if joint == 3 { 6 } else { 4 })
+                .flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
             let all = lumps.into_iter().chain(moments).collect();
             effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
         }
     }
     // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
     let down = nominal.gravity.iamax();
-    for joint in 0..3 {
-        let tilted = (0..3)
-            .filter(|&axis| axis != down)
-            .flat_map(|axis| {
-                let frames: &[usize] = if joint < 2 { &[2, 4] } else { &[4] };
-                frames.iter().map(move |&frame| lump(frame, Some(axis), None))
-            })
-            .collect();
-        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: tilted }), 1.0));
+    let across: Vec<usize> = (0..3).filter(|&axis| axis != down).collect();
+    for joint in 0..5 {
+        let frames: &[usize] = match joint {
+            0 | 1 => &[2, 4],
+            2 => &[4],
+            _ => &[6],
+        };
+        let tilted = |frame, moment| across.iter().map(move |&axis| lump(frame, Some(axis), moment));
+        let lumps: Vec<Lump> = frames.iter().flat_map(|&frame| tilted(frame, None)).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        let moments = (joint + 1..5)
+            .flat_map(|frame| (0..3).flat_map(move |m| tilted(frame, Some(m))))
+            .collect::<Vec<_>>();
+        let wrist = if joint < 3 { tilted(6, None).collect() } else { Vec::new() };
+        let all = lumps.into_iter().chain(wrist).chain(moments).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
     }
     for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
         effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));

@@ -53,9 +53,22 @@ pub struct Design {
     /// Residuals at the optimum of what is free, n.
     pub residual: DVector<f64>,
     /// Q transposed, p × n.
-    pub basis: DMatrix<f64>,
+    pub basis: Arc<DMatrix<f64>>,
+    /// What was taken out of the basis again.
+    pub reduction: Option<Reduction>,
     /// What candidates are made of.
     pub slopes: Arc<Slopes>,
+}
+
+/// Directions of a basis that are free no more.
+#[derive(Debug, Clone)]
+pub struct Reduction {
+    /// U, orthonormal, p × d.
+    directions: DMatrix<f64>,
+    /// (Q U)ᵀ, d × n.
+    pub removed: DMatrix<f64>,
+    /// How far the residual moved along each.
+    moved: DVector<f64>,
 }
 
 /// A fit linearised, from which the design of any smaller model follows without a refit.
@@ -72,6 +85,17 @@ pub struct Linear {
     slopes: Arc<Slopes>,
 }
 
+/// A whole design with what it takes to go on from it to smaller ones.
+#[derive(Debug, Clone)]
+pub struct Whole {
+    /// Everything free.
+    pub design: Design,
+    /// L.
+    lower: DMatrix<f64>,
+    /// The estimate after one more step.
+    x: DVector<f64>,
+}
+
 /// What a candidate's columns come to against a design.
 #[derive(Debug, Clone)]
 pub struct Projected {
@@ -81,6 +105,8 @@ pub struct Projected {
     pub information: DMatrix<f64>,
     /// QᵀC, p × k.
     pub shared: DMatrix<f64>,
+    /// The part of that along directions that are free no more, d × k.
+    pub given_back: Option<DMatrix<f64>>,
 }
 
 impl Linear {
@@ -160,7 +186,31 @@ impl Linear {
         Self { observations, per, jacobian, normal, residual, x: fit.x.clone(), precision, slopes }
     }
 
-    /// The design of the model without the parameters at `dropped`.
+    /// The design of the whole fit, from which those of smaller models follow at little cost.
+    pub fn whole(&self) -> Whole {
+        let lower = lower_factor(self.normal.clone());
+        let basis = solved(&lower, self.jacobian.transpose());
+        let x = DVector::from_column_slice(&self.x);
+        let mut gradient = self.jacobian.tr_mul(&self.residual);
+        for (g, (x, precision)) in gradient.iter_mut().zip(self.x.iter().zip(&self.precision)) {
+            *g += precision * x;
+        }
+        let half = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(gradient.len()));
+        let mut residual = self.residual.clone();
+        residual.gemv_tr(-1.0, &basis, &half, 1.0);
+        let step = lower.tr_solve_lower_triangular(&half).unwrap_or_else(|| DVector::zeros(half.len()));
+        let design = Design {
+            observations: self.observations,
+            per: self.per,
+            residual,
+            basis: Arc::new(basis),
+            reduction: None,
+            slopes: Arc::clone(&self.slopes),
+        };
+        Whole { design, lower, x: x - step }
+    }
+
+    /// The design of the model without the parameters at `dropped`, with a basis of its own.
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
@@ -182,9 +232,37 @@ impl Linear {
             observations: self.observations,
             per: self.per,
             residual,
-            basis,
+            basis: Arc::new(basis),
+            reduction: None,
             slopes: Arc::clone(&self.slopes),
         }
+    }
+}
+
+impl Whole {
+    /// The design of the model without the parameters at `dropped`, by taking directions out of the whole basis.
+    ///
+    /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller
+    /// model's projection is Q(I − UUᵀ)Qᵀ, and its residual r − QU M⁻¹x with x the dropped parameters.
+    pub fn without(&self, dropped: &[usize]) -> Design {
+        let (p, d) = (self.x.len(), dropped.len());
+        let mut out = self.design.clone();
+        if d == 0 {
+            return out;
+        }
+        let mut picked = DMatrix::zeros(p, d);
+        for (a, &k) in dropped.iter().enumerate() {
+            picked[(k, a)] = 1.0;
+        }
+        let z = solved(&self.lower, picked);
+        let m = lower_factor(gram(&z));
+        let directions = solved(&m, z.transpose()).transpose();
+        let taken = DVector::from_iterator(d, dropped.iter().map(|&k| self.x[k]));
+        let moved = m.solve_lower_triangular(&taken).unwrap_or_else(|| DVector::zeros(d));
+        let removed = product_of_transposed(&directions, &self.design.basis);
+        out.residual.gemv_tr(-1.0, &removed, &moved, 1.0);
+        out.reduction = Some(Reduction { directions, removed, moved });
+        out
     }
 }
 
@@ -198,8 +276,43 @@ impl Design {
     pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
         let shared = product(&self.basis, columns);
         let gradient = columns.tr_mul(&self.residual);
-        let information = gram(columns) - gram(&shared);
-        Projected { gradient, information, shared }
+        let mut information = gram(columns) - gram(&shared);
+        let given_back = self.reduction.as_ref().map(|r| product_of_transposed(&r.directions, &shared));
+        if let Some(back) = &given_back {
+            information += gram(back);
+        }
+        Projected { gradient, information, shared, given_back }
+    }
+
+    /// The same from the projection on the whole design of which this is a part.
+    pub fn project_on(&self, whole: &Projected) -> Projected {
+        let mut out = whole.clone();
+        if let Some(reduction) = &self.reduction {
+            let back = product_of_transposed(&reduction.directions, &whole.shared);
+            out.information += gram(&back);
+            out.gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
+            out.given_back = Some(back);
+        }
+        out
+    }
+
+    /// What is left of columns when everything free has been fitted to them, n × k.
+    pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
+        let mut out = columns.clone();
+        for a in 0..columns.ncols() {
+            // Row by row: a product of matrices would pack the whole basis for a few columns.
+            let shared = projected.shared.column(a);
+            for (place, q) in out.column_mut(a).iter_mut().zip(self.basis.column_iter()) {
+                *place -= q.dot(&shared);
+            }
+            if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
+                let back = back.column(a);
+                for (place, q) in out.column_mut(a).iter_mut().zip(reduction.removed.column_iter()) {
+                    *place += q.dot(&back);
+                }
+            }
+        }
+        out
     }
 
     /// Scalar rows.

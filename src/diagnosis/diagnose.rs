@@ -23,6 +23,7 @@ use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
 use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
 };
+use crate::identification::network::with_network;
 use crate::identification::tolerance::Tolerance;
 use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
 use crate::kinematics::model::Model;
@@ -40,6 +41,8 @@ pub struct Options {
     pub selection: selection::Options,
     /// Contiguous blocks of the second validation.
     pub blocks: usize,
+    /// Whether a smooth correction may follow what no cause explains.
+    pub smooth: bool,
 }
 
 impl Default for Options {
@@ -48,6 +51,7 @@ impl Default for Options {
             tolerance: Tolerance { length_mm: 3.0, angle_rad: 1.0_f64.to_radians(), ..Tolerance::default() },
             selection: selection::Options::default(),
             blocks: BLOCKS,
+            smooth: false,
         }
     }
 }
@@ -121,8 +125,8 @@ pub fn diagnose(
     let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
     let most = if needed.is_some() { 0 } else { options.selection.most };
     let selection = selection::select(&searched, &selection::Options { most, ..options.selection }, tell);
-    let Selection { geometric, extended: found, accepted, left, .. } = selection;
-    let (geometric, extended) = match &thinned {
+    let Selection { geometric, extended: mut found, mut accepted, left, .. } = selection;
+    let (geometric, mut extended) = match &thinned {
         None => (geometric, found.clone()),
         Some(thin) => {
             tell("fitting all rows");
@@ -142,7 +146,43 @@ pub fn diagnose(
     let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
     tell("holding rows out");
     let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
-    let stages = [&registered, &geometric, &extended].map(|fit| validation.stage(&subject, fit));
+    let mut stages = [&registered, &geometric, &extended].map(|fit| validation.stage(&subject, fit));
+    // What does not carry over to rows that were not seen together with it is no knowledge.
+    while stages[2].blocks.rmse > stages[1].blocks.rmse
+        && let Some(weakest) = weakest(&found, &accepted)
+    {
+        notes.push(format!(
+            "{} was dropped again: with it the error on held-out blocks was {:.4} mm, geometry alone has {:.4}",
+            told_short(&found.causes[weakest]),
+            stages[2].blocks.rmse,
+            stages[1].blocks.rmse
+        ));
+        accepted.remove(weakest);
+        let without = |subject: &Subject<'_>, fitted: &Extended| {
+            let mut causes = fitted.causes.clone();
+            causes.remove(weakest);
+            fit(subject, &causes, Freedom::All, Some(&selection::near(fitted, weakest)))
+        };
+        extended = without(&subject, &extended);
+        found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
+        stages[2] = validation.stage(&subject, &extended);
+    }
+    let structure = remaining::structure(&subject, &extended, &set_aside);
+    let mut smoothed = None;
+    if options.smooth && remaining::patterned(&structure) {
+        tell("fitting a smooth correction to what is left");
+        let smooth = smooth_correction(&subject, &extended);
+        let stage = validation.stage(&subject, &smooth);
+        if stage.random.rmse < stages[2].random.rmse && stage.blocks.rmse < stages[2].blocks.rmse {
+            smoothed = Some(stages[2].random.rmse);
+            (extended, stages[2]) = (smooth, stage);
+        } else {
+            notes.push(format!(
+                "a smooth correction would not carry over: held out {:.4} mm against {:.4} without it, on blocks {:.4} against {:.4}",
+                stage.random.rmse, stages[2].random.rmse, stage.blocks.rmse, stages[2].blocks.rmse
+            ));
+        }
+    }
     let mut steps = vec![
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
@@ -160,16 +200,19 @@ pub fn diagnose(
         set_aside: &aside,
     };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
+    if smoothed.is_some() {
+        let added = "smooth correction, without a physical name".to_owned();
+        steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });
+    }
     tell("looking at what is left");
     findings.extend(rounding_finding(dataset, &prepared, &subject, &geometric, &stages));
     findings.extend(mismatch_finding(dataset, &prepared, &stages[2]));
     findings.extend(outlier_finding(dataset, &wild, &stages[2]));
-    let structure = remaining::structure(&subject, &extended, &set_aside);
     let noise = remaining::noise_model(&subject, &extended, &set_aside);
     let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
     let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
     let not_testable = not_testable(&searched.observed.dataset, &whole, &left, &names, &prepared);
-    let remaining = told(&structure, &stages[2], floor_mm, &mut findings);
+    let remaining = told(&structure, &stages[2], smoothed, floor_mm, &mut findings);
     if let Err(why) = &prepared.sharpening
         && dataset.angle_step_rad.is_some()
         && let crate::identification::rounding::NotSharpened::Mismatch { found_mm, expected_mm } = why
@@ -232,6 +275,22 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// The accepted cause of least merit that is not about rows.
+fn weakest(found: &Extended, accepted: &[Accepted]) -> Option<usize> {
+    (0..accepted.len())
+        .filter(|&k| found.causes[k].rows().is_none())
+        .min_by(|&a, &b| accepted[a].own.merit.total_cmp(&accepted[b].own.merit))
+}
+
+/// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
+fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
+    let options = crate::estimation::network::rbf::Options::default();
+    let mut causes = extended.causes.clone();
+    let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
+    causes.extend(spread.effects.last().cloned().map(Cause::Arm));
+    fit(subject, &causes, Freedom::All, Some(extended))
 }
 
 /// Scalar rows in which causes are looked for, at most.
@@ -414,13 +473,12 @@ impl Context<'_> {
             row_list: None,
             joints: pendant(&cause.joints()),
             evidence: format!(
-                "{}: χ² falls by {:.0} for {} parameters, everything else refitted; twice the log Bayes factor {:.0} \
-                 after counting {} variants",
+                "{}: χ² falls by {:.0} for {}, everything else refitted; twice the log Bayes factor {:.0} with {} tried",
                 words::pattern(cause),
                 own.own.gain,
-                own.own.estimate.len(),
-                own.own.merit,
-                ((own.own.evidence - own.own.merit) / 2.0).exp().round(),
+                counted(own.own.estimate.len(), "parameter"),
+                own.own.evidence,
+                counted(own.tried.round() as usize, "variant"),
             ),
             parameters,
             p_value: own.log_p.exp(),
@@ -431,6 +489,10 @@ impl Context<'_> {
         };
         (finding, picture)
     }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 fn told_short(cause: &Cause) -> String {

@@ -149,19 +149,16 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
         None => (start_model.clone(), start_frames.clone()),
     };
     let mut round = 0;
+    let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
+    let plain_task =
+        Calibration::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
-        let task = Calibration::new(
-            dataset,
-            &start_model,
-            &start_frames,
-            &parameters,
-            &priors,
-            &trusted(&base, &trust),
-        );
+        let task = plain_task.reweighted(&trusted(&base, &trust));
         // Weights still change: what is beyond a few steps would be thrown away.
-        let rough = lm::Options { max_iterations: 3, cost_tolerance: 1e-4, ..lm::Options::default() };
+        let steps = if near.is_some() { 1 } else { 3 };
+        let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
         let estimate = lm::solve(&task, &x, &rough);
         x.clone_from(&estimate.x);
         (model, frames) = task.apply(&x);
@@ -224,14 +221,7 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
                 .iter()
                 .map(|w| Weight { per_mm: w.per_mm / by_length, per_rad: w.per_rad / by_angle })
                 .collect();
-            let task = Calibration::new(
-                dataset,
-                &start_model,
-                &start_frames,
-                &parameters,
-                &priors,
-                &trusted(&weights, &trust),
-            );
+            let task = plain_task.reweighted(&trusted(&weights, &trust));
             let estimate = lm::solve(&task, &x, &lm::Options::default());
             let (model, frames) = task.apply(&estimate.x);
             return Extended {

@@ -2,14 +2,17 @@
 //!
 //! Prefix sums of gradient, information and Q-products over the observations make the evidence of any interval a matter of
 //! p k² operations, so thousands of intervals are tried: a coarse grid of starts and ends, then the best ones refined row by
-//! row. An interval that begins with the first rows is the same as its complement, and only the later one is told: what
+//! row. The Q-products are summed once for a fit; a model without some of its parameters takes d directions off again. An interval that begins with the first rows is the same as its complement, and only the later one is told: what
 //! happened, happened at its first row. Source: the likelihood-ratio scan of circular binary segmentation, Olshen et al.
 //! 2004, with nuisance parameters projected off.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::design::Design;
+use super::design::{Design, gram};
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +31,12 @@ pub const SHORTEST: usize = 4;
 /// Starts and ends on the coarse grid.
 const GRID: usize = 96;
 
+/// Evidence of an interval on the grid below which moving its ends by less than the grid's spacing cannot make it count.
+const FAINT: f64 = 5.0;
+
+/// Evidence that is no ground to prefer one story of the same rows to the other.
+const SLIGHT: f64 = 6.0;
+
 /// Most parameters of a shift.
 const MOST: usize = 6;
 
@@ -44,75 +53,202 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// Prefix sums over observations.
-struct Sums {
+/// A kind of shift over all rows, summed up against a whole design.
+#[derive(Debug, Clone)]
+pub struct Strip {
+    n: usize,
     k: usize,
-    p: usize,
-    gradient: Vec<f64>,
+    /// Columns in units of the sizes.
+    scaled: DMatrix<f64>,
+    /// Observations at which an interval may begin on the coarse grid, and n.
+    cuts: Vec<usize>,
+    stride: usize,
+    /// Prefix sums of Q-products at the cuts, p × (k · cuts).
+    shared: DMatrix<f64>,
+    /// Their scalar products with each other.
+    products: DMatrix<f64>,
+    /// Prefix sums of squares at every observation, k × k each.
     square: Vec<f64>,
-    shared: Vec<f64>,
 }
 
-impl Sums {
-    fn of(design: &Design, columns: &DMatrix<f64>, sizes: &[f64]) -> Self {
-        let (n, per, p, k) = (design.observations, design.per, design.basis.nrows(), columns.ncols());
-        let mut out = Self {
-            k,
-            p,
-            gradient: vec![0.0; (n + 1) * k],
-            square: vec![0.0; (n + 1) * k * k],
-            shared: vec![0.0; (n + 1) * k * p],
-        };
-        for i in 0..n {
-            for a in 0..k {
-                let column = |s: usize, a: usize| columns[(s, a)] * sizes[a];
-                let scalars = i * per..(i + 1) * per;
-                let g: f64 = scalars.clone().map(|s| column(s, a) * design.residual[s]).sum();
-                out.gradient[(i + 1) * k + a] = out.gradient[i * k + a] + g;
-                for b in 0..k {
-                    let c: f64 = scalars.clone().map(|s| column(s, a) * column(s, b)).sum();
-                    out.square[((i + 1) * k + a) * k + b] = out.square[(i * k + a) * k + b] + c;
-                }
-                let (before, after) = out.shared.split_at_mut(((i + 1) * k + a) * p);
-                let last = &before[(i * k + a) * p..][..p];
-                after[..p].copy_from_slice(last);
-                for s in scalars {
-                    let c = column(s, a);
-                    if c != 0.0 {
-                        for (to, q) in after[..p].iter_mut().zip(design.basis.column(s).iter()) {
-                            *to += c * q;
-                        }
-                    }
+/// A strip against one design.
+struct Sums<'a> {
+    strip: &'a Strip,
+    design: &'a Design,
+    /// Prefix sums at every observation, k each.
+    gradient: Vec<f64>,
+    /// Prefix sums of the products with directions that are free no more at the cuts, d × (k · cuts).
+    given_back: Option<DMatrix<f64>>,
+    /// Scalar products of the prefix sums at the cuts with each other.
+    products: Cow<'a, DMatrix<f64>>,
+}
+
+/// Adds the products of one observation with the rows of `basis` to `out`, k × rows of the basis.
+fn add_products(scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usize, i: usize, out: &mut [f64]) {
+    let p = basis.nrows();
+    for (a, place) in out.chunks_exact_mut(p).enumerate() {
+        for s in i * per..(i + 1) * per {
+            let c = scaled[(s, a)];
+            if c != 0.0 {
+                for (to, q) in place.iter_mut().zip(basis.column(s).iter()) {
+                    *to += c * q;
                 }
             }
         }
+    }
+}
+
+/// Prefix sums of the products at the cuts, rows of the basis × (k · cuts).
+fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usize) -> DMatrix<f64> {
+    let (p, k) = (basis.nrows(), scaled.ncols());
+    let mut out = DMatrix::zeros(p, k * cuts.len());
+    let (mut sum, mut at) = (vec![0.0; k * p], 0);
+    for (&cut, place) in cuts.iter().zip(out.as_mut_slice().chunks_exact_mut((k * p).max(1))) {
+        for i in at..cut {
+            add_products(scaled, basis, per, i, &mut sum);
+        }
+        at = cut;
+        place.copy_from_slice(&sum);
+    }
+    out
+}
+
+impl Strip {
+    /// Sums `columns`, given for all rows, whose parameters have the standard deviations `sizes` beforehand; `None` for
+    /// too few rows or too many parameters.
+    pub fn of(whole: &Design, columns: &DMatrix<f64>, sizes: &[f64]) -> Option<Self> {
+        let (n, per, k) = (whole.observations, whole.per, columns.ncols());
+        if n < 3 * SHORTEST || k > MOST {
+            return None;
+        }
+        let mut scaled = columns.clone();
+        for (mut column, size) in scaled.column_iter_mut().zip(sizes) {
+            column *= *size;
+        }
+        let mut square = vec![0.0; (n + 1) * k * k];
+        for i in 0..n {
+            for a in 0..k {
+                for b in 0..k {
+                    let c: f64 = (i * per..(i + 1) * per).map(|s| scaled[(s, a)] * scaled[(s, b)]).sum();
+                    square[((i + 1) * k + a) * k + b] = square[(i * k + a) * k + b] + c;
+                }
+            }
+        }
+        let stride = n.div_ceil(GRID).max(1);
+        let cuts: Vec<usize> = (SHORTEST..n - 1).step_by(stride).chain([n]).collect();
+        let shared = sums_at(&cuts, &scaled, &whole.basis, per);
+        let products = gram(&shared);
+        Some(Self { n, k, scaled, cuts, stride, shared, products, square })
+    }
+
+    /// The best intervals, best first: at most `count`, none of which shares most of its rows with a better one. `design` is
+    /// the whole one of the strip, or a part of it.
+    pub fn scan(&self, design: &Design, count: usize) -> Vec<Interval> {
+        let n = self.n;
+        let sums = Sums::of(self, design);
+        let grid = self.cuts.len() - 1;
+        let mut coarse: Vec<Interval> = (0..grid)
+            .into_par_iter()
+            .map(|first| {
+                let from = self.cuts[first];
+                let mut found = Vec::new();
+                for last in first + 1..=grid {
+                    let to = self.cuts[last] - 1;
+                    if to + 1 >= from + SHORTEST && ends_well(to, n) {
+                        let evidence = sums.between_cuts(first, last);
+                        found.push(Interval { from, to, evidence });
+                    }
+                }
+                found
+            })
+            .collect::<Vec<_>>()
+            .concat();
+        coarse.sort_by(|a, b| {
+            b.evidence.total_cmp(&a.evidence).then(a.from.cmp(&b.from)).then(a.to.cmp(&b.to))
+        });
+        let mut best: Vec<Interval> = Vec::new();
+        for interval in coarse {
+            if best.len() >= count {
+                break;
+            }
+            if best.iter().all(|b| overlap(b, &interval) < 0.5) {
+                let interval = if interval.evidence > FAINT { refined(&sums, interval) } else { interval };
+                if !best.contains(&interval) {
+                    best.push(interval);
+                }
+            }
+        }
+        best
+    }
+}
+
+impl<'a> Sums<'a> {
+    fn of(strip: &'a Strip, design: &'a Design) -> Self {
+        let (n, k, per) = (strip.n, strip.k, design.per);
+        let mut gradient = vec![0.0; (n + 1) * k];
+        for i in 0..n {
+            for a in 0..k {
+                let g: f64 =
+                    (i * per..(i + 1) * per).map(|s| strip.scaled[(s, a)] * design.residual[s]).sum();
+                gradient[(i + 1) * k + a] = gradient[i * k + a] + g;
+            }
+        }
+        let given_back =
+            design.reduction.as_ref().map(|r| sums_at(&strip.cuts, &strip.scaled, &r.removed, per));
+        let products = match &given_back {
+            Some(back) => Cow::Owned(&strip.products - gram(back)),
+            None => Cow::Borrowed(&strip.products),
+        };
+        Self { strip, design, gradient, given_back, products }
+    }
+
+    /// Prefix sums at a cut: k Q-products, then k products with the directions that are free no more.
+    fn at_cut(&self, cut: usize) -> Vec<f64> {
+        let k = self.strip.k;
+        let of = |m: &DMatrix<f64>| m.columns(cut * k, k).iter().copied().collect::<Vec<f64>>();
+        let mut out = of(&self.strip.shared);
+        out.extend(self.given_back.iter().flat_map(of));
         out
     }
 
-    /// Evidence of observations from..=to.
-    fn evidence(&self, from: usize, to: usize, work: &mut Vec<f64>) -> f64 {
-        let (k, p) = (self.k, self.p);
-        work.resize(k * p, 0.0);
-        let (low, high) = (from * k, (to + 1) * k);
-        for a in 0..k {
-            let (l, h) = (&self.shared[(low + a) * p..][..p], &self.shared[(high + a) * p..][..p]);
-            for (w, (h, l)) in work[a * p..][..p].iter_mut().zip(h.iter().zip(l)) {
-                *w = h - l;
-            }
-        }
+    /// Evidence of the observations between two cuts.
+    fn between_cuts(&self, first: usize, last: usize) -> f64 {
+        let k = self.strip.k;
+        let (from, to) = (self.strip.cuts[first], self.strip.cuts[last] - 1);
+        let (g, low, high) = (&self.products, first * k, last * k);
+        self.evidence_of(from, to, |a, b| {
+            g[(high + a, high + b)] - g[(high + a, low + b)] - g[(low + a, high + b)] + g[(low + a, low + b)]
+        })
+    }
+
+    /// Evidence of observations from..=to, with the prefix sums at from and to + 1.
+    fn evidence(&self, from: usize, to: usize, low: &[f64], high: &[f64], work: &mut Vec<f64>) -> f64 {
+        let (p, d) = (self.strip.shared.nrows(), self.given_back.as_ref().map_or(0, DMatrix::nrows));
+        work.clear();
+        work.extend(high.iter().zip(low).map(|(h, l)| h - l));
+        let (shared, back) = work.split_at(self.strip.k * p);
+        self.evidence_of(from, to, |a, b| {
+            dot(&shared[a * p..][..p], &shared[b * p..][..p]) - dot(&back[a * d..][..d], &back[b * d..][..d])
+        })
+    }
+
+    /// Evidence of observations from..=to with the scalar products of what is shared with everything free.
+    fn evidence_of(&self, from: usize, to: usize, shared: impl Fn(usize, usize) -> f64) -> f64 {
+        let k = self.strip.k;
+        let square = |a: usize, b: usize| {
+            let at = |i: usize| self.strip.square[(i * k + a) * k + b];
+            at(to + 1) - at(from) - shared(a, b)
+        };
+        let gradient = |a: usize| self.gradient[(to + 1) * k + a] - self.gradient[from * k + a];
         if k == 1 {
-            let g = self.gradient[high] - self.gradient[low];
-            let s = (self.square[high] - self.square[low] - dot(work, work)).max(0.0);
+            let (g, s) = (gradient(0), square(0, 0).max(0.0));
             return g * g / (s + 1.0) - (1.0 + s).ln();
         }
         // S + I = L Lᵀ and L y = g on the stack: the gain is yᵀy.
         let (mut l, mut y, mut log_det) = ([0.0; MOST * MOST], [0.0; MOST], 0.0);
         for a in 0..k {
             for b in 0..=a {
-                let mut sum = self.square[(high + a) * k + b]
-                    - self.square[(low + a) * k + b]
-                    - dot(&work[a * p..][..p], &work[b * p..][..p])
-                    + f64::from(u8::from(a == b));
+                let mut sum = square(a, b) + f64::from(u8::from(a == b));
                 for c in 0..b {
                     sum -= l[a * MOST + c] * l[b * MOST + c];
                 }
@@ -126,7 +262,7 @@ impl Sums {
                     l[a * MOST + b] = sum / l[b * MOST + b];
                 }
             }
-            let mut sum = self.gradient[high + a] - self.gradient[low + a];
+            let mut sum = gradient(a);
             for c in 0..a {
                 sum -= l[a * MOST + c] * y[c];
             }
@@ -134,42 +270,34 @@ impl Sums {
         }
         dot(&y, &y) - log_det
     }
+
+    /// Prefix sums at any observation, kept in `known`.
+    fn at_row<'b>(&self, i: usize, known: &'b mut BTreeMap<usize, Vec<f64>>) -> &'b [f64] {
+        if !known.contains_key(&i) {
+            let cut = self.strip.cuts.partition_point(|&c| c <= i).saturating_sub(1);
+            let mut at = self.strip.cuts[cut];
+            let mut sum = self.at_cut(cut);
+            if let Some((&near, prefix)) = known.range(..i).next_back()
+                && near > at
+            {
+                (at, sum) = (near, prefix.clone());
+            }
+            let (shared, back) = sum.split_at_mut(self.strip.k * self.strip.shared.nrows());
+            for row in at..i {
+                add_products(&self.strip.scaled, &self.design.basis, self.design.per, row, shared);
+                if let Some(reduction) = &self.design.reduction {
+                    add_products(&self.strip.scaled, &reduction.removed, self.design.per, row, back);
+                }
+            }
+            known.insert(i, sum);
+        }
+        &known[&i]
+    }
 }
 
-/// The best intervals of columns that are given for all rows, best first: at most `count`, none of which shares most of
-/// its rows with a better one.
+/// The best intervals of columns that are given for all rows: [`Strip::scan`] of one design.
 pub fn scan(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], count: usize) -> Vec<Interval> {
-    let n = design.observations;
-    if n < 3 * SHORTEST || columns.ncols() > MOST {
-        return Vec::new();
-    }
-    let sums = Sums::of(design, columns, sizes);
-    let stride = n.div_ceil(GRID).max(1);
-    let starts: Vec<usize> = (SHORTEST..n - 1).step_by(stride).collect();
-    let mut coarse: Vec<Interval> = starts
-        .par_iter()
-        .map(|&from| {
-            let mut work = Vec::new();
-            let mut found = Vec::new();
-            let ends = (from + SHORTEST - 1..n - 1).step_by(stride).chain(std::iter::once(n - 1));
-            for to in ends.filter(|&to| to + 1 >= from + SHORTEST && ends_well(to, n)) {
-                found.push(Interval { from, to, evidence: sums.evidence(from, to, &mut work) });
-            }
-            found
-        })
-        .collect::<Vec<_>>()
-        .concat();
-    coarse.sort_by(|a, b| b.evidence.total_cmp(&a.evidence).then(a.from.cmp(&b.from)).then(a.to.cmp(&b.to)));
-    let mut best: Vec<Interval> = Vec::new();
-    for interval in coarse {
-        if best.len() >= count {
-            break;
-        }
-        if best.iter().all(|b| overlap(b, &interval) < 0.5) {
-            best.push(refined(&sums, interval, stride, n));
-        }
-    }
-    best
+    Strip::of(design, columns, sizes).map_or_else(Vec::new, |strip| strip.scan(design, count))
 }
 
 /// A shift ends with the last row, or leaves enough rows after it to be told from one that does.
@@ -185,21 +313,26 @@ fn overlap(a: &Interval, b: &Interval) -> f64 {
 }
 
 /// Moves one end at a time within the grid's spacing, until neither helps.
-fn refined(sums: &Sums, mut best: Interval, stride: usize, n: usize) -> Interval {
-    let mut work = Vec::new();
+fn refined(sums: &Sums<'_>, mut best: Interval) -> Interval {
+    let (n, stride) = (sums.strip.n, sums.strip.stride);
+    let (mut work, mut known) = (Vec::new(), BTreeMap::new());
     for _ in 0..6 {
         let before = best;
+        let high = sums.at_row(best.to + 1, &mut known).to_vec();
         for from in best.from.saturating_sub(2 * stride).max(SHORTEST)..=(best.from + 2 * stride).min(n - 2) {
             if from + SHORTEST <= best.to + 1 {
-                let evidence = sums.evidence(from, best.to, &mut work);
+                let low = sums.at_row(from, &mut known);
+                let evidence = sums.evidence(from, best.to, low, &high, &mut work);
                 if evidence > best.evidence {
                     best = Interval { from, evidence, ..best };
                 }
             }
         }
+        let low = sums.at_row(best.from, &mut known).to_vec();
         for to in best.to.saturating_sub(2 * stride)..=(best.to + 2 * stride).min(n - 1) {
             if best.from + SHORTEST <= to + 1 && ends_well(to, n) {
-                let evidence = sums.evidence(best.from, to, &mut work);
+                let high = sums.at_row(to + 1, &mut known);
+                let evidence = sums.evidence(best.from, to, &low, high, &mut work);
                 if evidence > best.evidence {
                     best = Interval { to, evidence, ..best };
                 }
@@ -207,6 +340,14 @@ fn refined(sums: &Sums, mut best: Interval, stride: usize, n: usize) -> Interval
         }
         if best == before {
             break;
+        }
+    }
+    // What happened right at the start and ended is told as what happened at its end, unless the first rows contradict.
+    if best.from <= 3 * SHORTEST && best.to + 1 < n {
+        let (low, high) = (sums.at_row(best.to + 1, &mut known).to_vec(), sums.at_row(n, &mut known));
+        let evidence = sums.evidence(best.to + 1, n - 1, &low, high, &mut work);
+        if evidence > best.evidence - SLIGHT {
+            return Interval { from: best.to + 1, to: n - 1, evidence };
         }
     }
     best

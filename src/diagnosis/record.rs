@@ -3,7 +3,7 @@
 
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
-use super::remaining::Structure;
+use super::remaining::{Structure, stands_out};
 use super::rows::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
@@ -172,15 +172,12 @@ pub(super) fn noise_floor(
     }
 }
 
-/// Neighbours must resemble each other by this many standard deviations to be called structure.
-const STRUCTURE_Z: f64 = 5.5;
-/// And by at least this correlation: a large set makes any trifle significant.
-const STRUCTURE_R: f64 = 0.15;
-
-/// A sentence on what is left, and a finding where it has a pattern.
+/// A sentence on what is left, and a finding where it has a pattern. `smoothed`: the held-out error before a smooth
+/// correction, where there is one (mm).
 pub(super) fn told(
     structure: &Structure,
     after: &StageError,
+    smoothed: Option<f64>,
     floor_mm: Option<f64>,
     findings: &mut Vec<Finding>,
 ) -> Option<String> {
@@ -190,7 +187,7 @@ pub(super) fn told(
         (structure.neighbours, structure.neighbours_z, "neighbouring poses"),
         (structure.order, structure.order_z, "consecutive rows"),
     ] {
-        if z > STRUCTURE_Z && r > STRUCTURE_R {
+        if stands_out(r, z) {
             patterns.push(format!("{what} share {:.0} % of it", 100.0 * r));
             strongest = strongest.max(z);
         }
@@ -205,10 +202,14 @@ pub(super) fn told(
         };
     }
     let text = format!("{rmse:.3} mm RMS with a pattern: {}", patterns.join(", "));
+    let followed = match smoothed {
+        Some(_) => "; a smooth correction follows a part of it, without saying what it is",
+        None => "",
+    };
     findings.push(Finding {
         effect: "unexplained".to_owned(),
         cause: format!(
-            "something repeatable is left that nothing in the catalogue explains: {}",
+            "something repeatable is left that nothing in the catalogue explains: {}{followed}",
             patterns.join(", ")
         ),
         confidence: Confidence::Identified,
@@ -222,7 +223,10 @@ pub(super) fn told(
         ),
         p_value: crate::math::tail::normal_two_sided(strongest),
         non_centrality: None,
-        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        gain: Gain {
+            cv_rmse_before_mm: smoothed.unwrap_or(after.random.rmse),
+            cv_rmse_after_mm: after.random.rmse,
+        },
         alternatives: Vec::new(),
         remedy: words::remedy("unexplained").to_owned(),
     });

@@ -39,6 +39,22 @@ pub struct Structure {
     pub order_z: f64,
 }
 
+/// Neighbours must resemble each other by this many standard deviations to be called structure.
+const STRUCTURE_Z: f64 = 5.5;
+
+/// And by at least this correlation: a large set makes any trifle significant.
+const STRUCTURE_R: f64 = 0.15;
+
+/// Whether a correlation of neighbours, with its z-score, is structure.
+pub fn stands_out(correlation: f64, z: f64) -> bool {
+    z > STRUCTURE_Z && correlation > STRUCTURE_R
+}
+
+/// Whether something repeatable is left.
+pub fn patterned(structure: &Structure) -> bool {
+    stands_out(structure.neighbours, structure.neighbours_z) || stands_out(structure.order, structure.order_z)
+}
+
 /// Residual vectors (whitened, position part) of all rows.
 fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
     let per = match subject.observed.dataset.sensor {

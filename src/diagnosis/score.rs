@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::catalogue::Candidate;
-use super::design::{Design, product_of_transposed};
+use super::design::{Design, Projected};
 use crate::math::tail::log_chi_square_tail;
 
 /// A scored candidate.
@@ -28,7 +28,8 @@ pub struct Score {
     pub estimate: DVector<f64>,
     /// Information, projected.
     pub information: DMatrix<f64>,
-    /// Natural logarithm of the p-value of the candidate alone, not corrected for trials.
+    /// Natural logarithm of the p-value of the candidate alone under the model's own noise, not corrected for trials:
+    /// what [`log_p`] goes on from.
     pub log_p: f64,
 }
 
@@ -39,8 +40,12 @@ pub fn score(design: &Design, candidate: &Candidate) -> Score {
 
 /// Scores columns with the standard deviations that their parameters have beforehand.
 pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tried: f64) -> Score {
-    let k = columns.ncols();
-    let projected = design.project(columns);
+    score_projected(&design.project(columns), sizes, tried)
+}
+
+/// Scores columns whose projection is known.
+pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Score {
+    let k = sizes.len();
     // In units of the sizes: well scaled.
     let scale = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
     let information = &scale * &projected.information * &scale;
@@ -62,15 +67,45 @@ pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tri
         return nothing();
     }
     let merit = evidence - 2.0 * tried.ln();
-    let log_p = if gain > 8.0 {
-        let scattered = scatter_statistic(design, columns, &projected.shared, &scale, &gradient, &step);
-        let (plain, freedom) = plain_statistic(&information, &gradient);
-        log_chi_square_tail(plain.min(scattered.unwrap_or(plain)), freedom.max(1))
+    let log_p = if gain > SOME {
+        let (statistic, freedom) = plain_statistic(&information, &gradient);
+        log_chi_square_tail(statistic, freedom.max(1))
     } else {
         log_chi_square_tail(gain, k)
     };
-    Score { gain, evidence, merit, estimate: -(&scale * step), information: projected.information, log_p }
+    Score {
+        gain,
+        evidence,
+        merit,
+        estimate: -(&scale * step),
+        information: projected.information.clone(),
+        log_p,
+    }
 }
+
+/// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
+/// the residuals. Not corrected for trials.
+pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
+    if score.gain <= SOME {
+        return score.log_p;
+    }
+    let columns = candidate.columns(design);
+    let projected = design.project(&columns);
+    let scale = DMatrix::from_diagonal(&DVector::from_vec(candidate.cause.sizes()));
+    let information = &scale * &projected.information * &scale;
+    let gradient = &scale * &projected.gradient;
+    let k = columns.ncols();
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return score.log_p };
+    let step = factor.solve(&gradient);
+    let Some(scattered) = scatter_statistic(design, &columns, &projected, &scale, &gradient, &step) else {
+        return score.log_p;
+    };
+    let (plain, freedom) = plain_statistic(&information, &gradient);
+    log_chi_square_tail(plain.min(scattered), freedom.max(1))
+}
+
+/// A fall of χ² below this is nobody's evidence, whatever the noise.
+const SOME: f64 = 8.0;
 
 /// gᵀ S⁺ g over the directions that the data see, and their number.
 fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {
@@ -91,7 +126,7 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
 fn scatter_statistic(
     design: &Design,
     columns: &DMatrix<f64>,
-    shared: &DMatrix<f64>,
+    projected: &Projected,
     scale: &DMatrix<f64>,
     gradient: &DVector<f64>,
     step: &DVector<f64>,
@@ -100,7 +135,7 @@ fn scatter_statistic(
     if k > 6 {
         return None;
     }
-    let pure = (columns - product_of_transposed(&design.basis, shared)) * scale;
+    let pure = design.pure(columns, projected) * scale;
     let left = &design.residual - &pure * step;
     let mut scatter = DMatrix::zeros(k, k);
     for i in 0..design.observations {

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::board::Board;
 use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
 use super::cause::Cause;
-use super::design::{Design, Linear, back_and_forth, factored, gram, outer, product};
+use super::design::{Design, back_and_forth, factored, gram, outer, product};
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::score::{Score, score};
-use super::{intervals, lines};
+use super::levels;
+use super::score::{Score, log_p, score};
 use crate::kinematics::effect::Effect;
 use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
@@ -50,6 +51,8 @@ pub struct Accepted {
     pub own: Score,
     /// Corrected p-value, its natural logarithm.
     pub log_p: f64,
+    /// Variants of it that were tried.
+    pub tried: f64,
     /// Other stories, best first, with their scores there.
     pub rivals: Vec<Scored>,
     /// Non-centrality that is left when all lengths may grow together without a prior; for a sensor's scale.
@@ -73,20 +76,22 @@ pub struct Selection {
 
 /// Candidates that do not depend on a fit, built once.
 pub struct Catalogue {
-    fixed: Vec<Arc<Candidate>>,
+    /// Those whose rows and orders are listed.
+    pub listed: Vec<Arc<Candidate>>,
     /// A fine error map of each joint.
-    fine: Vec<Arc<Candidate>>,
+    pub fine: Vec<Arc<Candidate>>,
     /// Kinds of shifts with their regressors over all rows.
-    shifts: Vec<Candidate>,
-    families: f64,
+    pub shifts: Vec<Candidate>,
+    /// Kinds of candidates (name and joints).
+    pub families: f64,
 }
 
 impl Catalogue {
     /// For a data set.
     pub fn of(subject: &Subject<'_>) -> Self {
         let dataset = &subject.observed.dataset;
-        let mut fixed = arm_candidates(subject);
-        fixed.extend(measurement_candidates(subject));
+        let mut listed = arm_candidates(subject);
+        listed.extend(measurement_candidates(subject));
         let mut kinds = vec![Kind::Frame { turning: false }, Kind::Tool];
         if dataset.sensor == Sensor::Cable {
             kinds.push(Kind::Zero);
@@ -102,78 +107,27 @@ impl Catalogue {
             })
             .collect();
         let mut stories: Vec<(&str, Vec<usize>)> =
-            fixed.iter().chain(&shifts).map(|c| (c.cause.name(), c.cause.joints())).collect();
+            listed.iter().chain(&shifts).map(|c| (c.cause.name(), c.cause.joints())).collect();
         stories.extend((0..6).map(|j| ("gear-transmission", vec![j])));
         stories.sort();
         stories.dedup();
         let families = stories.len() as f64;
         let fine = (0..6).map(|joint| Arc::new(fine_map(subject, joint))).collect();
-        Self { fixed: fixed.into_iter().map(Arc::new).collect(), fine, shifts, families }
+        Self { listed: listed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 
-    /// All candidates against a fit, best first.
-    pub fn scored(&self, subject: &Subject<'_>, fit: &Extended, design: &Design) -> Vec<Scored> {
-        let dataset = &subject.observed.dataset;
-        let n = dataset.rows.len();
-        let tried = (n as f64).max(2.0) * (n as f64).max(3.0).ln();
-        let mut shifts = self.shifts.clone();
-        if let Some(known) = known_load(fit) {
-            shifts.push(Candidate::measurement(
-                Disturbance::new(known, Course::Always),
-                dataset,
-                subject.nominal,
-            ));
-        }
-        let mut open: Vec<Arc<Candidate>> = Vec::new();
-        for whole in &shifts {
-            let Cause::Measurement(disturbance) = &whole.cause else { continue };
-            let found = intervals::scan(design, &whole.columns(design), &whole.cause.sizes(), 2);
-            for interval in found {
-                let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
-                let shift = Disturbance::new(disturbance.kind.clone(), Course::Rows { from, to });
-                let candidate = Candidate::measurement(shift, dataset, subject.nominal);
-                open.push(Arc::new(Candidate { tried, ..candidate }));
-            }
-        }
-        let (found, mapped) = lines::candidates(subject, design);
-        open.extend(found.into_iter().map(Arc::new));
-        open.extend(mapped.into_iter().map(|joint| Arc::clone(&self.fine[joint])));
-        let mut out: Vec<Scored> = self
-            .fixed
-            .par_iter()
-            .chain(open.par_iter())
-            .map(|candidate| Scored { candidate: candidate.clone(), score: score(design, candidate) })
-            .collect();
-        // A closer description of a cause that is already in the model is likelier than one more cause.
-        for scored in &mut out {
-            if fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
-                scored.score.merit += CLOSER;
-            }
-        }
-        out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
-        out
+    /// The corrected p-value's logarithm, against `design`.
+    fn corrected(&self, design: &Design, scored: &Scored) -> f64 {
+        let trials = (scored.candidate.tried * self.families).ln();
+        (log_p(design, &scored.candidate, &scored.score) + trials).min(0.0)
     }
 
-    /// The corrected p-value's logarithm.
-    fn corrected(&self, scored: &Scored) -> f64 {
-        (scored.score.log_p + (scored.candidate.tried * self.families).ln()).min(0.0)
+    /// Whether that lies below the chance that was allowed for; the scatter is looked at only where the model's own noise
+    /// does not settle it.
+    fn significant(&self, design: &Design, scored: &Scored, alpha: f64) -> bool {
+        let trials = (scored.candidate.tried * self.families).ln();
+        scored.score.log_p + trials <= alpha.ln() && self.corrected(design, scored) <= alpha.ln()
     }
-}
-
-/// Unlogged payload under the compliances that were already found.
-fn known_load(fit: &Extended) -> Option<Kind> {
-    let found: Vec<(usize, f64)> = fit
-        .causes
-        .iter()
-        .filter_map(|c| match c {
-            Cause::Arm(Effect::JointCompliance(c)) => Some((c.joint, c.compliance_rad_per_nm)),
-            _ => None,
-        })
-        .collect();
-    (!found.is_empty()).then(|| Kind::Load {
-        joints: found.iter().map(|f| f.0).collect(),
-        compliance: Some(found.iter().map(|f| f.1).collect()),
-    })
 }
 
 /// Grams of Q over the folds of a split, for held-out errors to first order.
@@ -184,8 +138,9 @@ pub struct Folds {
 }
 
 impl Folds {
-    /// For a design; `splits` in observations.
+    /// For a design with a basis of its own; `splits` in observations.
     pub fn of(design: &Design, splits: &[Split]) -> Self {
+        debug_assert!(design.reduction.is_none(), "held out against a basis that is not the design's own");
         let tests: Vec<Vec<usize>> = splits
             .iter()
             .map(|s| s.test.iter().flat_map(|&i| i * design.per..(i + 1) * design.per).collect())
@@ -291,39 +246,50 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let blocks = split::blocks(dataset, BLOCKS);
     let mut current = geometric.clone();
     let mut refused: Vec<Cause> = Vec::new();
-    // Causes that were not far ahead of a rival when they came in: they are looked at again after every step.
-    let mut doubtful: Vec<Cause> = Vec::new();
+    // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
+    // comes in too.
+    let mut doubtful: Vec<(Cause, Vec<Cause>)> = Vec::new();
+    let mut told_again = false;
     for _ in 0..4 * options.most.max(1) {
-        let design = Design::of(subject, &current);
-        let left = catalogue.scored(subject, &current, &design);
+        let board = Board::of(&catalogue, subject, &current);
+        let design = &board.whole.design;
+        let left = board.scored(design, true);
         let taken = (current.causes.len() < options.most)
             .then(|| {
-                let folds = (Folds::of(&design, &random), Folds::of(&design, &blocks));
-                let before = (folds.0.held_out(&design, None), folds.1.held_out(&design, None));
+                let folds = (Folds::of(design, &random), Folds::of(design, &blocks));
+                let before = (folds.0.held_out(design, None), folds.1.held_out(design, None));
                 left.iter().take_while(|s| s.score.merit > 0.0).find(|scored| {
-                    if catalogue.corrected(scored) > options.alpha.ln()
-                        || refused.contains(&scored.candidate.cause)
+                    if refused.contains(&scored.candidate.cause)
                         || already(&current.causes, &scored.candidate.cause)
+                        || !catalogue.significant(design, scored, options.alpha)
                     {
                         return false;
                     }
-                    let columns = scored.candidate.columns(&design);
+                    let columns = scored.candidate.columns(design);
                     let sizes = scored.candidate.cause.sizes();
-                    let after = folds.0.held_out(&design, Some((&columns, &sizes)));
+                    let after = folds.0.held_out(design, Some((&columns, &sizes)));
                     let local = scored.candidate.cause.rows().is_some();
-                    let in_blocks = folds.1.held_out(&design, Some((&columns, &sizes)));
+                    let in_blocks = folds.1.held_out(design, Some((&columns, &sizes)));
                     after < before.0 && (local || in_blocks < before.1 * BLOCK_SLACK)
                 })
             })
             .flatten();
         let Some(taken) = taken else {
             let all: Vec<usize> = (0..current.causes.len()).collect();
-            match review(subject, &catalogue, options, &current, &all) {
+            match review(&board, options, &all, false) {
                 Review::Changed(settled) => {
                     current = *settled;
                     continue;
                 }
                 Review::Settled(accepted) => {
+                    if !told_again && let Some(causes) = levels::disjoint(&current.causes) {
+                        told_again = true;
+                        let told = fit(subject, &causes, Freedom::All, Some(&current));
+                        if levels::as_good(&told, &current) {
+                            current = told;
+                            continue;
+                        }
+                    }
                     let families = catalogue.families;
                     return Selection { geometric, extended: current, accepted, left, families };
                 }
@@ -331,20 +297,30 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         };
         let cause = taken.candidate.cause.clone();
         tell(&format!("{}. {}", current.causes.len() + 1, cause.name()));
-        let near = left
+        let near: Vec<Cause> = left
             .iter()
-            .any(|s| !s.candidate.cause.same_story(&cause) && s.score.merit > taken.score.merit - DOUBT);
+            .filter(|s| !s.candidate.cause.same_story(&cause) && s.score.merit > taken.score.merit - DOUBT)
+            .map(|s| s.candidate.cause.clone())
+            .collect();
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
         current = fit(subject, &causes, Freedom::All, Some(&current));
-        if near {
-            doubtful.push(cause.clone());
+        let asked: Vec<Cause> = doubtful
+            .iter()
+            .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(&cause)))
+            .map(|(doubted, _)| doubted.clone())
+            .collect();
+        if !near.is_empty() {
+            doubtful.push((cause.clone(), near));
         }
         for _ in 0..options.most {
             let unsure: Vec<usize> =
-                (0..current.causes.len()).filter(|&k| already(&doubtful, &current.causes[k])).collect();
-            match review(subject, &catalogue, options, &current, &unsure) {
+                (0..current.causes.len()).filter(|&k| already(&asked, &current.causes[k])).collect();
+            if unsure.is_empty() {
+                break;
+            }
+            match review(&Board::of(&catalogue, subject, &current), options, &unsure, true) {
                 Review::Changed(settled) => current = *settled,
                 Review::Settled(_) => break,
             }
@@ -355,16 +331,13 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         }
     }
     // Causes that take turns without end: the last state is judged as it stands.
-    let design = Design::of(subject, &current);
-    let left = catalogue.scored(subject, &current, &design);
-    let linear = Linear::of(subject, &current);
-    let accepted = (0..current.causes.len())
-        .map(|index| looked_at(subject, &catalogue, &current, &linear, index).0)
-        .collect();
+    let board = Board::of(&catalogue, subject, &current);
+    let left = board.scored(&board.whole.design, true);
+    let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
     Selection { geometric, extended: current, accepted, left, families: catalogue.families }
 }
 
-/// A cause whose best rival has this much less merit, or more, is looked at again after every step.
+/// A cause is in doubt beside rivals that have less merit by no more than this.
 const DOUBT: f64 = 30.0;
 
 /// Whether a cause with the same parameters is in the model.
@@ -384,7 +357,7 @@ fn already(causes: &[Cause], candidate: &Cause) -> bool {
 }
 
 /// A fit to start from when cause `index` goes: its parameters are taken out, so that the others keep their values.
-fn near(current: &Extended, index: usize) -> Extended {
+pub(super) fn near(current: &Extended, index: usize) -> Extended {
     use crate::kinematics::parameter::Parameter;
     let gone = current.places(index);
     let arm = matches!(current.causes[index], Cause::Arm(_));
@@ -421,9 +394,6 @@ fn near(current: &Extended, index: usize) -> Extended {
     out
 }
 
-/// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
-const CLOSER: f64 = 10.0;
-
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
 
@@ -437,29 +407,22 @@ enum Review {
 
 /// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
 /// explains better.
-fn review(
-    subject: &Subject<'_>,
-    catalogue: &Catalogue,
-    options: &Options,
-    current: &Extended,
-    which: &[usize],
-) -> Review {
+///
+/// In a `quick` review a cause whose rows or order are listed is compared with its like only.
+fn review(board: &Board<'_>, options: &Options, which: &[usize], quick: bool) -> Review {
+    let (subject, catalogue, current) = (board.subject, board.catalogue, board.fit);
     let mut accepted = Vec::new();
-    if which.is_empty() {
-        return Review::Settled(accepted);
-    }
-    let linear = Linear::of(subject, current);
     for &index in which {
-        let (judged, scored) = looked_at(subject, catalogue, current, &linear, index);
+        let open = !quick || is_open(&board.fit.causes[index]);
+        let (judged, design, scored) = looked_at(board, index, open);
         let mut others = current.causes.clone();
         others.remove(index);
-        let best = scored
-            .iter()
-            .find(|s| catalogue.corrected(s) <= options.alpha.ln() && !already(&others, &s.candidate.cause));
-        let better = best.filter(|best| {
-            best.score.merit > judged.own.merit + EXCHANGE
-                && !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause)
+        let enough = judged.own.merit + EXCHANGE;
+        let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
+            !already(&others, &s.candidate.cause) && catalogue.significant(&design, s, options.alpha)
         });
+        let better =
+            best.filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
         let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
         if better.is_some() || !carries {
             let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
@@ -474,6 +437,11 @@ fn review(
         accepted.push(judged);
     }
     Review::Settled(accepted)
+}
+
+/// Whether a cause's rows or order were looked for.
+fn is_open(cause: &Cause) -> bool {
+    cause.rows().is_some() || cause.name() == "gear-transmission"
 }
 
 /// The score of a cause itself, from the list where it is there, computed otherwise (its own rows or order).
@@ -499,18 +467,13 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
     Scored { candidate, score }
 }
 
-/// A cause against the model without it: the judgement, and every candidate's score there.
-fn looked_at(
-    subject: &Subject<'_>,
-    catalogue: &Catalogue,
-    current: &Extended,
-    linear: &Linear,
-    index: usize,
-) -> (Accepted, Vec<Scored>) {
+/// A cause against the model without it: the judgement, the design there, and every candidate's score in it.
+fn looked_at(board: &Board<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
+    let current = board.fit;
     let cause = &current.causes[index];
-    let design = linear.design(&current.places(index));
-    let scored = catalogue.scored(subject, current, &design);
-    let own = own_score(subject, &design, &scored, cause);
+    let design = board.whole.without(&current.places(index));
+    let scored = board.scored(&design, open);
+    let own = own_score(board.subject, &design, &scored, cause);
     let mut rivals: Vec<Scored> = Vec::new();
     for other in &scored {
         let same =
@@ -525,8 +488,9 @@ fn looked_at(
     }
     let beside_growth =
         (cause.name() == "sensor-scale").then(|| scale_beside_growth(&design, &own.score.estimate));
-    let log_p = catalogue.corrected(&own);
-    (Accepted { own: own.score, log_p, rivals, beside_growth }, scored)
+    let log_p = board.catalogue.corrected(&design, &own);
+    let tried = own.candidate.tried;
+    (Accepted { own: own.score, log_p, tried, rivals, beside_growth }, design, scored)
 }
 
 /// Non-centrality of a sensor's scale of that size when all lengths of the arm may grow together freely.

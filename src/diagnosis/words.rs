@@ -108,6 +108,10 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
             c.driver + 1,
             value * 100.0
         ),
+        Cause::Arm(Effect::Backlash(_)) if value < 0.0 => format!(
+            "joint {joint} goes too far at a reversal: coming from below it stops {:.4}° above where it stops coming from above",
+            -value.to_degrees()
+        ),
         Cause::Arm(Effect::Backlash(_)) => format!(
             "joint {joint} has play: {:.4}° between coming from below and from above",
             value.to_degrees()

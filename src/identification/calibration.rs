@@ -145,6 +145,16 @@ impl Calibration {
         }
     }
 
+    /// The same task with other weights, one for each row.
+    pub fn reweighted(&self, weights: &[Weight]) -> Self {
+        let mut out = self.clone();
+        for (i, w) in weights.iter().enumerate().take(self.rows) {
+            out.columns.per_mm[i] = w.per_mm;
+            out.columns.per_rad[i] = w.per_rad;
+        }
+        out
+    }
+
     /// What may move, in the order of x.
     pub fn parameters_list(&self) -> &[Parameter] {
         &self.parameters
@@ -483,16 +493,17 @@ impl Columns {
                 extra[j][i] = rotation[j];
             }
             growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
-            let mut at = (usize::MAX, Vec::new());
+            let mut at = (usize::MAX, Vec::new(), Vec::new());
             for (columns, &(_, index, parameter)) in effects.iter_mut().zip(&free) {
                 if at.0 != index {
-                    at = (index, posed.effect_regressors(index, &row.joints));
+                    let growth = start.effects[index].growth_regressors(&row.condition);
+                    at = (index, posed.effect_regressors(index, &row.joints), growth);
                 }
                 let regressor = at.1[parameter];
                 for j in (0..6).filter(|&j| regressor[j] != 0.0) {
                     columns.rotation[j].get_or_insert_with(|| vec![0.0; padded])[i] = regressor[j];
                 }
-                let grown = start.effects[index].growth_regressors(&row.condition)[parameter];
+                let grown = at.2.get(parameter).copied().unwrap_or(0.0);
                 if grown != 0.0 {
                     columns.growth.get_or_insert_with(|| vec![0.0; padded])[i] = grown;
                 }

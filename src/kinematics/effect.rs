@@ -184,11 +184,11 @@ impl Effect {
         }
     }
 
-    /// Derivatives of [`Effect::growth`] with respect to the parameters.
+    /// Derivatives of [`Effect::growth`] with respect to the parameters; empty for an effect that lets nothing grow.
     pub fn growth_regressors(&self, condition: &Condition) -> Vec<f64> {
         match self {
             Effect::ThermalDrift(thermal) => thermal.growth_regressors(condition),
-            other => vec![0.0; other.parameters().len()],
+            _ => Vec::new(),
         }
     }
 }

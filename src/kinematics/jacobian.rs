@@ -139,7 +139,8 @@ pub fn effect_twist(
     for joint in (0..6).filter(|&j| rotation[j] != 0.0) {
         out += link_twist(frames, joint, LinkCoordinate::Theta, point) * rotation[joint];
     }
-    let growth = arm.model.effects[index].growth_regressors(&arm.condition)[parameter];
+    let growths = arm.model.effects[index].growth_regressors(&arm.condition);
+    let growth = growths.get(parameter).copied().unwrap_or(0.0);
     if growth != 0.0 {
         for (joint, link) in arm.model.links.iter().enumerate() {
             out += link_twist(frames, joint, LinkCoordinate::A, point) * (growth * link.a_mm);

@@ -1,12 +1,14 @@
 //! A small part of the scenario suite; `cargo bench --bench diagnosis` runs the whole of it and prints the rates.
 
+use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::diagnosis::finding::{Confidence, Diagnosis, SCHEMA};
+use truegrind::kinematics::effect::Effect;
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::dataset::Sensor;
 use truegrind::robots;
 
-use super::scenarios::{Outcome, outcome};
-use super::simulator::{Hidden, Setup};
+use super::scenarios::{Outcome, frames, hide, log, outcome, stream};
+use super::simulator::{self, Hidden, Log, Setup, run};
 
 fn arm() -> Model {
     robots::load("abb-irb-120").unwrap().model
@@ -14,7 +16,7 @@ fn arm() -> Model {
 
 fn setup(sensor: Sensor, rows: usize, seed: u64) -> Setup {
     let sigma_mm = if sensor == Sensor::Cable { 0.04 } else { 0.03 };
-    Setup { sensor, rows, sigma_mm, dirty: true, seed }
+    Setup { sensor, rows, sigma_mm, dirty: true, seed, log: Log::default() }
 }
 
 /// The hidden effects are visible, found by name and joint or rows, and nothing else is.
@@ -103,6 +105,52 @@ fn nothing_is_found_where_nothing_is_hidden() {
             let d = &out.diagnosed.diagnosis;
             assert!((d.fits.extended.cv_rmse_mm - d.fits.geometric.cv_rmse_mm).abs() < 1e-12);
         }
+    }
+}
+
+#[test]
+fn what_nothing_explains_is_said_and_a_smooth_correction_follows_it_when_asked() {
+    let run = run(&arm(), &[Hidden::Warp { mm: 0.5 }], &setup(Sensor::Position, 600, 12));
+    let plain = Options::default();
+    let asked = Options { smooth: true, ..plain.clone() };
+    let diagnosed = |options: &Options| {
+        diagnose(&run.dataset, "arm", &arm(), &frames(&run.dataset, &arm()), options, &|_| {}).unwrap()
+    };
+    let (without, with) = (diagnosed(&plain), diagnosed(&asked));
+    for found in [&without, &with] {
+        let effects: Vec<&str> = found.diagnosis.findings.iter().map(|f| f.effect.as_str()).collect();
+        assert!(effects.contains(&"unexplained"), "{effects:?}");
+        assert!(!effects.contains(&"smooth-correction"), "a correction is no cause");
+        assert!(found.diagnosis.remaining.is_some());
+    }
+    let (a, b) = (&without.diagnosis.fits.extended, &with.diagnosis.fits.extended);
+    assert!(b.cv_rmse_mm < 0.9 * a.cv_rmse_mm, "held out {} against {}", b.cv_rmse_mm, a.cv_rmse_mm);
+    assert!(b.cv_blocks_rmse_mm < a.cv_blocks_rmse_mm);
+    let smooth =
+        |d: &Diagnosed| d.estimated.model.effects.iter().any(|e| matches!(e, Effect::SmoothCorrection(_)));
+    assert!(smooth(&with) && !smooth(&without), "it goes into the model, and only when asked for");
+    // Where nothing is left it is not fitted, asked for or not.
+    let clean = simulator::run(&arm(), &[], &setup(Sensor::Position, 200, 13)).dataset;
+    let found = diagnose(&clean, "arm", &arm(), &frames(&clean, &arm()), &asked, &|_| {}).unwrap();
+    assert!(!smooth(&found));
+}
+
+#[test]
+fn what_a_shop_floor_log_hides_is_found() {
+    // Fitted with the wrong direction of gravity, without approach columns, with a thermometer and with rounded angles.
+    for (kind, sensor, rows, seed) in [
+        ("backlash/order", Sensor::Position, 300, 21),
+        ("thermal-drift/temperature", Sensor::Position, 250, 22),
+        ("thermal-drift/base", Sensor::Cable, 300, 23),
+        ("cable-sag", Sensor::Cable, 300, 24),
+        ("gear-eccentricity/rounded", Sensor::Position, 250, 25),
+        ("sensor-zero-shift/twice", Sensor::Cable, 350, 26),
+    ] {
+        let hidden = hide(kind, rows, &mut stream(kind, seed));
+        let setup = Setup { log: log(kind), ..setup(sensor, rows, seed) };
+        let out = outcome(&arm(), &hidden, &setup);
+        assert!(out.hidden.iter().all(|(_, l)| *l > 40.0), "{kind}: too small for a test, {:?}", out.hidden);
+        assert!(out.found.iter().all(|f| *f) && out.wrong.is_empty(), "{:?}: {:?}", out.hidden, out.all);
     }
 }
 

@@ -3,16 +3,22 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use truegrind::diagnosis::design::{Design, Slopes};
+use truegrind::diagnosis::cause::Cause;
+use truegrind::diagnosis::design::{Design, Linear, Slopes};
+use truegrind::diagnosis::diagnose::Options;
+use truegrind::diagnosis::extension::{Freedom, Subject, fit};
 use truegrind::diagnosis::intervals::scan;
+use truegrind::diagnosis::levels::disjoint;
 use truegrind::diagnosis::rows::{mismatches, prepare};
 use truegrind::diagnosis::score::score_columns;
 use truegrind::kinematics::condition::Condition;
 use truegrind::math::tail::{chi_square_tail, log_chi_square_tail, normal_two_sided};
 use truegrind::measurement::dataset::Sensor;
+use truegrind::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use truegrind::robots;
 
-use super::simulator::{Setup, run};
+use super::scenarios;
+use super::simulator::{Hidden, Log, Setup, run};
 
 #[test]
 fn tails_are_those_of_the_tables() {
@@ -54,7 +60,14 @@ fn plain(n: usize, residual: impl Fn(usize) -> f64) -> Design {
         mm: vec![1.0; n],
     };
     let basis = DMatrix::from_element(1, n, q);
-    Design { observations: n, per: 1, basis, residual, slopes: Arc::new(slopes) }
+    Design {
+        observations: n,
+        per: 1,
+        basis: Arc::new(basis),
+        reduction: None,
+        residual,
+        slopes: Arc::new(slopes),
+    }
 }
 
 #[test]
@@ -92,7 +105,8 @@ fn a_score_is_the_fall_of_the_squares_of_the_joint_fit() {
 #[test]
 fn rows_whose_columns_contradict_each_other_are_named() {
     let nominal = robots::load("abb-irb-120").unwrap().model;
-    let setup = Setup { sensor: Sensor::Cable, rows: 60, sigma_mm: 0.05, dirty: false, seed: 3 };
+    let setup =
+        Setup { sensor: Sensor::Cable, rows: 60, sigma_mm: 0.05, dirty: false, seed: 3, log: Log::default() };
     let mut data = run(&nominal, &[], &setup).dataset;
     let step = 0.1_f64.to_radians();
     for row in &mut data.rows {
@@ -114,4 +128,77 @@ fn rows_whose_columns_contradict_each_other_are_named() {
         "a contradicting row stays as logged"
     );
     assert_ne!(prepared.observed.dataset.rows[8].joints, data.rows[8].joints);
+}
+
+#[test]
+fn a_model_without_some_parameters_follows_from_the_whole_one() {
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let setup = Setup {
+        sensor: Sensor::Position,
+        rows: 90,
+        sigma_mm: 0.05,
+        dirty: true,
+        seed: 11,
+        log: Log::default(),
+    };
+    let hidden = [
+        Hidden::Gear { joint: 1, order: 1.0, peak_rad: 1.5e-3, phase: 0.4 },
+        Hidden::Tool { from: 20, to: 50, mm: [0.8, -0.3, 0.2] },
+    ];
+    let data = run(&nominal, &hidden, &setup).dataset;
+    let prepared = prepare(&data, &nominal);
+    let frames = scenarios::frames(&data, &nominal);
+    let options = Options::default();
+    let subject = Subject {
+        observed: &prepared.observed,
+        nominal: &nominal,
+        frames: &frames,
+        tolerance: &options.tolerance,
+    };
+    let causes: Vec<Cause> = hidden.iter().filter_map(scenarios::cause).collect();
+    let fitted = fit(&subject, &causes, Freedom::All, None);
+    let linear = Linear::of(&subject, &fitted);
+    let whole = linear.whole();
+    let columns = DMatrix::from_fn(270, 3, |i, k| ((i * (5 + k) + 3 * k) % 17) as f64 - 8.0);
+    let on_whole = whole.design.project(&columns);
+    for dropped in [fitted.places(0), fitted.places(1), vec![2, 5, 9]] {
+        // The long way: the smaller model's own basis.
+        let own = linear.design(&dropped);
+        let part = whole.without(&dropped);
+        let off = (&own.residual - &part.residual).amax();
+        assert!(off < 1e-6 * own.residual.amax(), "residuals differ by {off}");
+        let (a, b, c) = (own.project(&columns), part.project(&columns), part.project_on(&on_whole));
+        for other in [&b, &c] {
+            assert!((&a.information - &other.information).amax() < 1e-9 * a.information.amax());
+            assert!((&a.gradient - &other.gradient).amax() < 1e-6 * a.gradient.amax());
+        }
+        assert!((own.pure(&columns, &a) - part.pure(&columns, &c)).amax() < 1e-8 * columns.amax());
+        let (near, far) = (scan(&own, &columns, &[1.0; 3], 2), scan(&part, &columns, &[1.0; 3], 2));
+        for (a, b) in near.iter().zip(&far) {
+            assert_eq!((a.from, a.to), (b.from, b.to));
+            assert!((a.evidence - b.evidence).abs() < 1e-6 * (1.0 + a.evidence.abs()));
+        }
+    }
+}
+
+#[test]
+fn overlapping_shifts_are_told_as_levels() {
+    let zero = |from, to, mm| {
+        let mut d = Disturbance::new(Kind::Zero, Course::Rows { from, to });
+        d.values[0] = mm;
+        Cause::Measurement(d)
+    };
+    let frame =
+        Cause::Measurement(Disturbance::new(Kind::Frame { turning: false }, Course::Rows { from: 5, to: 9 }));
+    let told = disjoint(&[zero(72, 535, -2.2), frame.clone(), zero(300, 387, 2.25), zero(386, 537, -0.8)]);
+    let told = told.expect("they overlap");
+    let rows: Vec<_> = told.iter().map(Cause::rows).collect();
+    assert_eq!(rows, [Some([72, 299]), Some([388, 535]), Some([5, 9])], "ends two rows apart are one event");
+    let Cause::Measurement(second) = &told[1] else { panic!("a measurement's") };
+    assert!((second.values[0] + 3.0).abs() < 1e-12);
+    assert_eq!(told[2], frame, "other kinds stay as they are");
+    // A second step on top of the first: from the one state to the other.
+    let steps = disjoint(&[zero(100, 299, 1.0), zero(200, 299, 2.0)]).expect("they overlap");
+    assert_eq!(steps, [zero(100, 199, 1.0), zero(200, 299, 3.0)]);
+    assert_eq!(disjoint(&[zero(10, 20, 1.0), zero(21, 30, 2.0), frame]), None, "nothing overlaps");
 }

@@ -15,17 +15,82 @@ use truegrind::measurement::dataset::{Dataset, Reading, Row, Sensor};
 /// A hidden effect, joints from 0, rows by index.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hidden {
-    Compliance { joint: usize, peak_rad: f64 },
-    Gear { joint: usize, order: f64, peak_rad: f64, phase: f64 },
-    Ratio { joint: usize, error: f64 },
-    Coupling { driver: usize, joint: usize, factor: f64 },
-    Backlash { joint: usize, play_rad: f64 },
-    Thermal { growth: f64, time_constant_h: f64 },
-    Zero { from: usize, to: usize, mm: f64 },
-    Frame { from: usize, to: usize, mm: [f64; 3] },
-    Tool { from: usize, to: usize, mm: [f64; 3] },
-    Outliers { list: Vec<usize>, mm: f64 },
+    Compliance {
+        joint: usize,
+        peak_rad: f64,
+    },
+    Gear {
+        joint: usize,
+        order: f64,
+        peak_rad: f64,
+        phase: f64,
+    },
+    Ratio {
+        joint: usize,
+        error: f64,
+    },
+    Coupling {
+        driver: usize,
+        joint: usize,
+        factor: f64,
+    },
+    Backlash {
+        joint: usize,
+        play_rad: f64,
+    },
+    Thermal {
+        growth: f64,
+        time_constant_h: f64,
+    },
+    Zero {
+        from: usize,
+        to: usize,
+        mm: f64,
+    },
+    Frame {
+        from: usize,
+        to: usize,
+        mm: [f64; 3],
+    },
+    Tool {
+        from: usize,
+        to: usize,
+        mm: [f64; 3],
+    },
+    Outliers {
+        list: Vec<usize>,
+        mm: f64,
+    },
+    /// The sensor's stand or outlet creeps while the hall warms up.
+    Drift {
+        mm: [f64; 3],
+        time_constant_h: f64,
+    },
+    /// Links grow with the logged temperature.
+    Warm {
+        growth_per_k: f64,
+    },
+    Scale {
+        factor: f64,
+    },
+    /// A slack cable: weight per length over tension, squared (1/m²).
+    Sag {
+        square_per_m2: f64,
+    },
+    /// A mass at the flange that nobody logged, on joints 2 and 3 that yield.
+    Payload {
+        from: usize,
+        to: usize,
+        kg: f64,
+    },
+    /// A smooth push of the touched point that depends on where it is: nothing in the catalogue.
+    Warp {
+        mm: f64,
+    },
 }
+
+/// Compliance of joints 2 and 3 of an arm whose payload changes (rad/(N m)).
+pub const YIELDING: f64 = 2.0e-5;
 
 impl Hidden {
     /// The contract's name.
@@ -42,6 +107,11 @@ impl Hidden {
             Hidden::Frame { .. } => "sensor-frame-shift",
             Hidden::Tool { .. } => "tool-shift",
             Hidden::Outliers { .. } => "outliers",
+            Hidden::Drift { .. } | Hidden::Warm { .. } => "thermal-drift",
+            Hidden::Scale { .. } => "sensor-scale",
+            Hidden::Sag { .. } => "cable-sag",
+            Hidden::Payload { .. } => "payload-change",
+            Hidden::Warp { .. } => "unexplained",
         }
     }
 
@@ -62,7 +132,8 @@ impl Hidden {
         match self {
             Hidden::Zero { from, to, .. }
             | Hidden::Frame { from, to, .. }
-            | Hidden::Tool { from, to, .. } => Some([*from, *to]),
+            | Hidden::Tool { from, to, .. }
+            | Hidden::Payload { from, to, .. } => Some([*from, *to]),
             _ => None,
         }
     }
@@ -77,6 +148,29 @@ pub struct Setup {
     /// Heavy tails, noise by pose, a second small effect.
     pub dirty: bool,
     pub seed: u64,
+    /// What is logged beside the angles, and how.
+    pub log: Log,
+}
+
+/// What a log holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Log {
+    /// Approach sides in columns of their own; without them they follow from the order of the rows.
+    pub sides: bool,
+    /// Times.
+    pub clock: bool,
+    /// Temperatures, that rise by some kelvin and waver.
+    pub thermometer: bool,
+    /// Angles rounded to this (rad), with the controller's read-out beside them.
+    pub angle_step_rad: Option<f64>,
+    /// Gravity leans by this about the base's y axis, and nobody says so (rad).
+    pub lean_rad: f64,
+}
+
+impl Default for Log {
+    fn default() -> Self {
+        Self { sides: true, clock: true, thermometer: false, angle_step_rad: None, lean_rad: 0.0 }
+    }
 }
 
 /// A run: the data, and the same readings without noise, with and without the hidden effects.
@@ -93,6 +187,8 @@ struct Arm {
     joint_map: nalgebra::Matrix6<f64>,
     flange: Matrix4<f64>,
     masses: Vec<(f64, Vector3<f64>)>,
+    /// Against gravity.
+    up: Vector3<f64>,
 }
 
 impl Arm {
@@ -112,26 +208,28 @@ impl Arm {
         out
     }
 
-    /// Potential energy (N m) under gravity along −z of the base.
-    fn energy(&self, u: &[f64; 6]) -> f64 {
+    /// Potential energy (N m), with a mass at the flange besides.
+    fn energy(&self, u: &[f64; 6], flange_kg: f64) -> f64 {
         let frames = self.frames(u);
-        self.masses
+        let links: f64 = self
+            .masses
             .iter()
             .enumerate()
             .map(|(k, (mass, centre))| {
                 let at = frames[k + 1] * Vector4::new(centre.x, centre.y, centre.z, 1.0);
-                mass * 9.81 * at.z * 1e-3
+                mass * 9.81 * at.xyz().dot(&self.up) * 1e-3
             })
-            .sum()
+            .sum();
+        links + flange_kg * 9.81 * frames[6].column(3).xyz().dot(&self.up) * 1e-3
     }
 
     /// Static torque of gravity about a joint (N m): what the joint sags along.
-    fn torque(&self, u: &[f64; 6], joint: usize) -> f64 {
+    fn torque(&self, u: &[f64; 6], joint: usize, flange_kg: f64) -> f64 {
         let h = 1e-5;
         let (mut up, mut down) = (*u, *u);
         up[joint] += h;
         down[joint] -= h;
-        -(self.energy(&up) - self.energy(&down)) / (2.0 * h)
+        -(self.energy(&up, flange_kg) - self.energy(&down, flange_kg)) / (2.0 * h)
     }
 }
 
@@ -176,7 +274,14 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
             )
         })
         .collect();
-    let arm = Arm { links, joint_map: nominal.joint_map, flange: nominal.flange.to_homogeneous(), masses };
+    let lean = setup.log.lean_rad;
+    let arm = Arm {
+        links,
+        joint_map: nominal.joint_map,
+        flange: nominal.flange.to_homogeneous(),
+        masses,
+        up: Vector3::new(lean.sin(), 0.0, lean.cos()),
+    };
     let touched = Vector4::new(normal(15.0), normal(15.0), 60.0 + normal(20.0), 1.0);
     let tail = StudentT::new(5.0).expect("five degrees of freedom");
     let mut draw = ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed);
@@ -192,7 +297,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
         })
         .collect();
     let small = (draw.random_range(0..6usize), draw.random_range(0.0..std::f64::consts::TAU));
-    let outlet = Vector3::new(900.0, draw.random_range(-300.0..300.0), draw.random_range(0.0..300.0));
+    // As far in front of a larger arm as it is larger.
+    let reach: f64 = nominal.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>() / 1000.0;
+    let outlet =
+        Vector3::new(900.0, draw.random_range(-300.0..300.0), draw.random_range(0.0..300.0)) * reach.max(1.0);
     let (turn, place) = (draw.random_range(-3.0..3.0), Vector3::new(2200.0, -900.0, 400.0));
     let hours = 4.0;
     let n = setup.rows;
@@ -203,23 +311,31 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
         .map(|h| match h {
             Hidden::Compliance { joint, .. } => poses
                 .iter()
-                .map(|q| arm.torque(&(arm.joint_map * q).into(), *joint).abs())
+                .map(|q| arm.torque(&(arm.joint_map * q).into(), *joint, 0.0).abs())
                 .fold(1e-9, f64::max),
             _ => 1.0,
         })
         .collect();
     for (i, q) in poses.iter().enumerate() {
-        let approach: [i8; 6] = std::array::from_fn(|_| if draw.random_range(0..2) == 0 { -1 } else { 1 });
+        let approach: [i8; 6] = if setup.log.sides {
+            std::array::from_fn(|_| if draw.random_range(0..2) == 0 { -1 } else { 1 })
+        } else {
+            // A joint that moved up came from below.
+            let before = poses[i.max(1) - 1];
+            std::array::from_fn(|j| if i > 0 && q[j] > before[j] { -1 } else { 1 })
+        };
         let time = hours * i as f64 / n as f64;
+        let kelvin = 6.0 * (1.0 - (-time / 1.5_f64).exp()) + 1.5 * (3.0 * time).sin();
         let u: [f64; 6] = (arm.joint_map * q).into();
         let read = |skip: Option<usize>| -> Reading {
             let mut turned = u;
             let (mut scale, mut zero) = (1.0, 0.0);
+            let (mut stretched, mut slack, mut load, mut warp) = (1.0, 0.0, 0.0, 0.0);
             let (mut moved, mut slipped) = (Vector3::zeros(), Vector4::zeros());
             for (k, h) in hidden.iter().enumerate().filter(|(k, _)| Some(*k) != skip) {
                 match h {
                     Hidden::Compliance { joint, peak_rad } => {
-                        turned[*joint] += peak_rad * arm.torque(&u, *joint) / peaks[k];
+                        turned[*joint] += peak_rad * arm.torque(&u, *joint, 0.0) / peaks[k];
                     }
                     Hidden::Gear { joint, order, peak_rad, phase } => {
                         turned[*joint] += peak_rad * (order * u[*joint] + phase).cos();
@@ -239,7 +355,20 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                     Hidden::Tool { from, to, mm } if (*from..=*to).contains(&i) => {
                         slipped += Vector4::new(mm[0], mm[1], mm[2], 0.0);
                     }
+                    Hidden::Drift { mm, time_constant_h } => {
+                        moved += Vector3::from(*mm) * (1.0 - (-time / time_constant_h).exp());
+                    }
+                    Hidden::Warm { growth_per_k } => scale += growth_per_k * kelvin,
+                    Hidden::Warp { mm } => warp += mm,
+                    Hidden::Scale { factor } => stretched += factor,
+                    Hidden::Sag { square_per_m2 } => slack += square_per_m2,
+                    Hidden::Payload { from, to, kg } if (*from..=*to).contains(&i) => load += kg,
                     _ => {}
+                }
+            }
+            if hidden.iter().any(|h| matches!(h, Hidden::Payload { .. })) {
+                for joint in [1, 2] {
+                    turned[joint] += YIELDING * arm.torque(&u, joint, load);
                 }
             }
             if setup.dirty {
@@ -250,14 +379,23 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 joint_map: arm.joint_map,
                 flange: arm.flange,
                 masses: Vec::new(),
+                up: arm.up,
             };
-            let at = (grown.frames(&turned)[6] * grown.flange * (touched + slipped)).xyz();
+            let mut at = (grown.frames(&turned)[6] * grown.flange * (touched + slipped)).xyz();
+            at.z += warp * (at.x / 110.0).sin() * (at.y / 130.0).cos();
             match setup.sensor {
-                Sensor::Cable => Reading::Cable((at - outlet - moved).norm() + 7.0 + zero),
+                Sensor::Cable => {
+                    let chord = at - outlet - moved;
+                    let (span_m, d) = (chord.xy().norm() * 1e-3, chord.norm());
+                    let length = d * (1.0 + slack * span_m * span_m / 24.0);
+                    Reading::Cable((length + 7.0 + zero) * stretched)
+                }
                 _ => {
                     let away = at - place - moved;
                     let (s, c) = f64::sin_cos(turn);
-                    Reading::Position(Vector3::new(c * away.x + s * away.y, c * away.y - s * away.x, away.z))
+                    Reading::Position(
+                        Vector3::new(c * away.x + s * away.y, c * away.y - s * away.x, away.z) * stretched,
+                    )
                 }
             }
         };
@@ -292,11 +430,25 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
             }
         }
         with.push(exact);
-        let mut row = Row::new(i, *q, reading);
-        row.condition = Condition { time_h: Some(time), approach, ..Condition::default() };
+        let log = &setup.log;
+        let logged = log.angle_step_rad.map_or(*q, |step| q.map(|v| (v / step).round() * step));
+        let mut row = Row::new(i, logged, reading);
+        row.condition = Condition {
+            time_h: log.clock.then_some(time),
+            temperature_c: log.thermometer.then_some(20.0 + kelvin),
+            approach: if log.sides { approach } else { [0; 6] },
+            ..Condition::default()
+        };
+        if log.angle_step_rad.is_some() {
+            let at = nominal.forward(q, &Condition::default()) * nalgebra::Point3::new(0.0, 0.0, 35.0);
+            row.readout_mm = Some(at.coords.map(|v| (v * 100.0).round() / 100.0));
+        }
         rows.push(row);
     }
-    Run { dataset: Dataset::new("simulated.csv", setup.sensor, rows), with, without }
+    let mut dataset = Dataset::new("simulated.csv", setup.sensor, rows);
+    dataset.angle_step_rad = setup.log.angle_step_rad;
+    dataset.readout_step_mm = setup.log.angle_step_rad.map(|_| 0.01);
+    Run { dataset, with, without }
 }
 
 /// The difference that hidden effect k makes to each reading (mm), in the sensor's frame.
