@@ -72,21 +72,19 @@ impl Mountings {
                 }
             }
         }
-        for axis in 0..6 {
+        for (axis, letter) in ('a'..='f').enumerate() {
             self.base[axis] |= cell.carries(axis) == Some(Carries::Base);
-            if moves[axis] && cell.carries(axis).is_none() {
-                let letter = char::from(b'a' + axis as u8);
-                self.assumed.push(if self.base[axis] {
-                    format!(
-                        "external axis {letter}: targets lie farther away than the arm is long, so it is taken to carry \
-                         the robot's base (cell file, [[external]])"
-                    )
-                } else {
-                    format!(
-                        "external axis {letter} moves: taken not to carry the robot's base (cell file, [[external]])"
-                    )
-                });
+            if !moves[axis] || cell.carries(axis).is_some() {
+                continue;
             }
+            self.assumed.push(if self.base[axis] {
+                format!(
+                    "external axis {letter}: targets lie farther away than the arm is long, so it is taken to carry the \
+                     robot's base (cell file, [[external]])"
+                )
+            } else {
+                format!("external axis {letter} moves: taken not to carry the robot's base (cell file, [[external]])")
+            });
         }
     }
 

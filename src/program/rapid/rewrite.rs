@@ -290,7 +290,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace(start..start + motion.instruction.len(), line.name.as_bytes());
         let source = self.task.trees[motion.place.file as usize].source();
-        for range in circle_point(source, motion) {
+        for range in circle_point(source, motion).into_iter().flatten() {
             edits.replace(range, b"");
         }
     }
@@ -484,8 +484,8 @@ fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'st
 }
 
 /// The bytes of a circle point, and those of the comma behind it with the blanks before the next argument.
-fn circle_point(source: &[u8], motion: &Motion) -> Vec<std::ops::Range<usize>> {
-    let Some(via) = motion.targets.iter().find(|target| target.role == Role::Via) else { return Vec::new() };
+fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
+    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
     let mut argument = via.argument.range();
     // `CirPoint := p20` goes with its name.
     if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
@@ -499,17 +499,13 @@ fn circle_point(source: &[u8], motion: &Motion) -> Vec<std::ops::Range<usize>> {
         match byte {
             b',' => {
                 let blanks = source[at + 1..].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
-                return if at == argument.end {
-                    vec![argument.start..at + 1 + blanks]
-                } else {
-                    vec![argument, at..at + 1 + blanks]
-                };
+                return Some([argument, at..at + 1 + blanks]);
             }
             b'!' => at += source[at..].iter().take_while(|&&byte| byte != b'\n').count(),
             _ => at += 1,
         }
     }
-    Vec::new()
+    None
 }
 
 fn fresh(new: &NewTarget) -> Option<Fresh> {

@@ -175,7 +175,7 @@ fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
             for motion in &task.listing.motions[1..count - 2] {
                 assert_eq!(motion.kind, MotionKind::Linear);
                 assert_eq!(task.listing.speed(motion).unwrap().text, "v50");
-                let zone = task.listing.zone(motion).unwrap().value.clone().unwrap();
+                let zone = task.listing.zone(motion).unwrap().value.unwrap();
                 assert!(!zone.fine && 2.0 * zone.tcp_mm <= mean, "{zone:?} in pieces of {mean}");
             }
             assert_eq!(task.listing.zone(&task.listing.motions[count - 2]).unwrap().text, "z5");

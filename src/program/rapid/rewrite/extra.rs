@@ -93,7 +93,7 @@ impl Rewriter<'_, '_> {
         let base = motion.statement.start as usize;
         let mut edits = Edits::new();
         edits.replace(0..motion.instruction.len(), name.as_bytes());
-        for range in circle_point(source, motion) {
+        for range in circle_point(source, motion).into_iter().flatten() {
             edits.replace(range.start - base..range.end - base, b"");
         }
         if let Some(to) = motion.targets.iter().find(|target| target.role == Role::To) {
