@@ -125,11 +125,16 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
     }
 }
 
+/// More threads than any machine has processors only cost memory.
+const MOST_THREADS: usize = 1024;
+
 /// Runs `work` on the stated number of threads.
 fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     match threads {
         None => Ok(work()),
-        Some(0) => anyhow::bail!("--threads 0: expected at least 1"),
+        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
+            anyhow::bail!("--threads {n}: expected 1 to {MOST_THREADS}")
+        }
         Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
     }
 }

@@ -60,6 +60,8 @@ struct Measured {
     robot: String,
     nominal: Model,
     actual: Option<Model>,
+    /// Known where the rows are simulated, else 0.
+    sensor_sigma_mm: f64,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
@@ -107,7 +109,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Ok(match kind {
             Kind::Methods(methods) => {
                 let from = rows()?;
-                let options = Options { rows: arguments.rows, seed, simulated: arguments.data.is_none() };
+                let options = Options {
+                    rows: arguments.rows,
+                    seed,
+                    simulated: arguments.data.is_none(),
+                    sensor_sigma_mm: from.sensor_sigma_mm,
+                };
                 let study =
                     protocol::run(&experiment, methods, &from.dataset, &from.robot, &from.nominal, &options)?;
                 Results::Methods(Box::new(study))
@@ -136,11 +143,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         eprint!("{}", format::terminal::table(times, width()));
     }
     let mut batch = Batch::sparing(inputs);
-    arguments.outputs.add_to(
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&experiment, &results, &origin),
-        &view::table(&results),
-        &view::json(&experiment, &results, &origin),
+        || view::document(&experiment, &results, &origin),
+        || view::table(&results),
+        || view::json(&experiment, &results, &origin),
     )?;
     if let (Some(path), Some(times)) = (&arguments.times, &times) {
         batch.add(path, format::csv::table(times));
@@ -159,7 +166,14 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
             bail!("--robot without DATA: the experiment's recipe has a robot of its own");
         }
         let (dataset, simulation, robot) = simulated::measure(experiment, nominal)?;
-        return Ok(Measured { dataset, robot, nominal: simulation.nominal, actual: Some(simulation.actual) });
+        let recipe = simulated::recipe(experiment.recipe.as_deref().unwrap_or_default(), &experiment.name)?;
+        return Ok(Measured {
+            dataset,
+            robot,
+            nominal: simulation.nominal,
+            actual: Some(simulation.actual),
+            sensor_sigma_mm: recipe.noise.sigma_mm,
+        });
     };
     let robot = arguments.robot.clone().ok_or_else(|| {
         anyhow!(
@@ -174,5 +188,11 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
         angles: arguments.angles,
         allow_odd_units: arguments.allow_odd_units,
     })?;
-    Ok(Measured { dataset, robot: robot.sheet.name.clone(), nominal: robot.model, actual: None })
+    Ok(Measured {
+        dataset,
+        robot: robot.sheet.name.clone(),
+        nominal: robot.model,
+        actual: None,
+        sensor_sigma_mm: 0.0,
+    })
 }

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
+use nalgebra::Point3;
 use rayon::prelude::*;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::{After, PathReport, Status};
+use truegrind::compensation::payload::Loads;
 use truegrind::compensation::precision::single_precision;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan, plan};
 use truegrind::kinematics::condition::Condition;
@@ -54,29 +56,53 @@ pub(super) struct CellArguments {
     /// The surface that is ground, for deviations along its normal.
     #[arg(long, value_name = "SURFACE.toml")]
     pub(super) surface: Option<PathBuf>,
-    /// Mass at the flange while the program runs (kg).
-    #[arg(long, value_name = "KG")]
+    /// Mass at the flange while the program runs (kg), in place of what the program's tools and loads say; NC programs
+    /// say nothing.
+    #[arg(long, value_name = "KG", allow_negative_numbers = true)]
     pub(super) payload: Option<f64>,
+    /// Centre of that mass on the flange (mm).
+    #[arg(long, value_name = "X,Y,Z", requires = "payload", allow_hyphen_values = true)]
+    pub(super) payload_centre: Option<String>,
 }
 
 impl CellArguments {
+    /// What a program says that the arm carries, unless the command line does.
+    pub(super) fn loads(&self, program: &Program<'_>) -> Option<Loads> {
+        self.payload.is_none().then(|| Loads::of(program))
+    }
+
     /// The cell, the surface and the condition, starting from that of the model.
     pub(super) fn read(
         &self,
         model: Option<&Estimated>,
     ) -> anyhow::Result<(Cell, Option<SurfaceFile>, Condition)> {
+        if let Some(kg) = self.payload
+            && !(0.0..=LARGEST_PAYLOAD_KG).contains(&kg)
+        {
+            bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
+        }
         let cell = match &self.cell {
             Some(path) => {
-                Cell::from_toml(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?
+                Cell::from_toml(&files::read_text(path)?).map_err(|e| {
+                anyhow!("{}: {}; a cell file lists [[tool]] and [[wobj]]", path.display(), e.trim_end())
+            })?
             }
             None => Cell::default(),
         };
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
         let mut condition = model.map(|m| m.condition).unwrap_or_default();
         condition.payload_kg = self.payload.or(condition.payload_kg);
+        if let Some(text) = &self.payload_centre {
+            let on_flange = Point3::from(super::stated::triple("--payload-centre", text)?);
+            let in_last = model.map_or(on_flange, |arm| arm.model.flange * on_flange);
+            condition.payload_centre_mm = in_last.coords.into();
+        }
         Ok((cell, surface, condition))
     }
 }
+
+/// No robot carries more.
+const LARGEST_PAYLOAD_KG: f64 = 3000.0;
 
 /// Arguments of `compensate`.
 #[derive(Debug, Args)]
@@ -103,10 +129,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = CirclesArgument::Keep)]
     circles: CirclesArgument,
     /// How far the path between two targets may leave the intended line (mm).
-    #[arg(long, value_name = "MM", default_value_t = 0.05)]
+    #[arg(long, value_name = "MM", default_value_t = 0.05, allow_negative_numbers = true)]
     tolerance: f64,
     /// Largest correction that is written (mm); a larger one is refused.
-    #[arg(long, value_name = "MM", default_value_t = 10.0)]
+    #[arg(long, value_name = "MM", default_value_t = 10.0, allow_negative_numbers = true)]
     max_correction: f64,
     /// Rewrite joint targets (MoveAbsJ) too.
     #[arg(long)]
@@ -388,7 +414,18 @@ fn rewritten(
 ) -> anyhow::Result<Done> {
     let program = programs.task(&shop.setup);
     let listing = program.listing();
+    let known = programs.files.iter().any(|(path, _)| Language::by_name(&files::name(path)).is_some());
+    if listing.motions.is_empty() && !known {
+        bail!(
+            "{}: no motion was found, and the ending of the name says nothing: expected RAPID (.mod, .prg, .sys, .pgf) or NC \
+             code (.nc, .mpf, .h and the like)",
+            programs.name()
+        );
+    }
     let mut notes = Vec::new();
+    if listing.motions.is_empty() {
+        notes.push(format!("{}: no motion in it, nothing to correct", programs.name()));
+    }
     let names = programs.files.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>();
     if already(shop, &program, programs, &mut notes)? {
         return Ok(Done {
@@ -401,7 +438,8 @@ fn rewritten(
             json: Vec::new(),
         });
     }
-    let mut planned = plan(listing, shop.arm, &shop.cell, &shop.options);
+    let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
+    let mut planned = plan(listing, shop.arm, &shop.cell, &options);
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)
     {

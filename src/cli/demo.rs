@@ -6,8 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nalgebra::{Point3, Vector3};
-use truegrind::compensation::cell::{Cell, CellFrame, FrameOrigin};
+use truegrind::comparison::grinding::taught_cell;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::rewrite::{Options as RewriteBounds, plan};
 use truegrind::compensation::verify::{Acting, Judged, judge};
@@ -15,17 +14,14 @@ use truegrind::identification::identify::{Identification, Options};
 use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::inverse::Inverse;
-use truegrind::kinematics::model::Model;
-use truegrind::math::se3::Pose;
 use truegrind::measurement::import;
-use truegrind::planning::toolpath::{Toolpath, toolpath};
+use truegrind::planning::toolpath::toolpath;
 use truegrind::program::motion::Mark;
 use truegrind::program::rapid::{Task, writer};
 use truegrind::program::rewrite::RewriteOptions;
 use truegrind::report::document::Document;
 use truegrind::report::{deviation as deviation_view, format, identification as identification_view};
-use truegrind::surface::{SurfaceFile, sample};
+use truegrind::surface::sample;
 
 use super::files::{self, Batch};
 use super::outputs::width;
@@ -59,7 +55,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let path = toolpath(&surface, nominal, &robot.sheet.name)?;
     let program = writer::write(&path.draft)?;
     let task = Task::read(&[("blade.mod", program.as_slice())]);
-    let cell = taught_cell(&surface, &path, nominal)?;
+    let cell = taught_cell(&surface, &path, nominal, [&surface.tool.name, &surface.work_object.name])?;
 
     drop(work);
     let work = Work::start("identifying the arm with four methods");
@@ -104,6 +100,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
             program: "blade.mod",
             name: &one.estimated.provenance.method,
             after: After::Achieved,
+        loads: [None, None],
         };
         let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
         let mut report = judge(&judged, &acting);
@@ -161,47 +158,10 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
         ("identification.html", "what the measurements told of the arm"),
         ("blade.mod, blade-compensated.mod", "the program before and after"),
         ("model.toml", "the estimated arm (method lm)"),
+        #[cfg(feature = "visual")]
         ("demo.rrd", "the picture: truegrind view, or any Rerun viewer"),
     ] {
         println!("  {name:<34} {what}");
     }
     Ok(Ending::Done)
-}
-
-/// The blade's work object as it is set up in most cells: taught with the uncalibrated arm, by three points.
-fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> anyhow::Result<Cell> {
-    let inverse = Inverse::new(nominal, &Condition::default(), nominal);
-    let object = surface.work_object.base_from_work_object;
-    let orientation = path.points[path.points.len() / 2].orientation;
-    let near = path.joints[path.joints.len() / 2];
-    let teaching_deg =
-        [Vector3::new(-40.0, 0.0, 0.0), Vector3::new(40.0, 0.0, 0.0), Vector3::new(0.0, 60.0, 0.0)]
-            .iter()
-            .map(|p| {
-                let point = Point3::from(*p);
-                let tip = Pose::from_parts(point.coords.into(), orientation);
-                let flange = object * tip * surface.tool.flange_from_tool.inverse();
-                let joints = inverse.solve_near(&flange, &near)?.joints;
-                Ok(std::array::from_fn(|i| joints[i].to_degrees()))
-            })
-            .collect::<anyhow::Result<Vec<[f64; 6]>>>()?;
-    Ok(Cell {
-        tool: vec![CellFrame {
-            name: surface.tool.name.clone(),
-            origin: FrameOrigin::Metrology,
-            teaching_deg: Vec::new(),
-            taught_with: None,
-            position_mm: None,
-            quaternion_wxyz: None,
-        }],
-        wobj: vec![CellFrame {
-            name: surface.work_object.name.clone(),
-            origin: FrameOrigin::Taught,
-            teaching_deg,
-            taught_with: Some(surface.tool.name.clone()),
-            position_mm: None,
-            quaternion_wxyz: None,
-        }],
-        external: Vec::new(),
-    })
 }

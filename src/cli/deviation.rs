@@ -81,8 +81,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
     let robot = arguments.robot.as_deref().or(first.robot.as_deref());
     let setup = programs::setup(&cell, robot);
-    let shop =
-        Shop { runners: &runners, originals: originals.as_ref(), cell: &cell, setup: &setup, condition };
+    let shop = Shop {
+        runners: &runners,
+        originals: originals.as_ref(),
+        cell: &cell,
+        setup: &setup,
+        condition,
+        arguments: &arguments.cell,
+    };
     let found: Vec<anyhow::Result<Vec<PathReport>>> = on_threads(arguments.common.threads, || {
         jobs.par_iter().map(|job| shop.reports(job, surface.as_ref())).collect()
     })?;
@@ -131,6 +137,7 @@ struct Shop<'a> {
     cell: &'a Cell,
     setup: &'a Setup,
     condition: Condition,
+    arguments: &'a CellArguments,
 }
 
 impl Shop<'_> {
@@ -144,6 +151,9 @@ impl Shop<'_> {
             Some(under) => job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string(),
             None => programs.name(),
         };
+        // The first program is the one that states what was meant.
+        let cell = self.arguments;
+        let loads = [original.as_ref().unwrap_or(&task), &task].map(|program| cell.loads(program));
         let reports: Vec<PathReport> = self
             .runners
             .iter()
@@ -156,6 +166,7 @@ impl Shop<'_> {
                     program: &name,
                     name: &runner.name,
                     after: runner.after,
+                    loads: [loads[0].as_ref(), loads[1].as_ref()],
                 };
                 let acting = Acting {
                     nominal: &runner.nominal,
@@ -177,8 +188,9 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
     let models = arguments.model.iter().map(|m| inputs::model(m)).collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(path) = &arguments.actual {
         let text = files::read_text(path)?;
-        let file: ArmFile = toml::from_str(&text)
-            .map_err(|e| anyhow!("{}: not an arm of `simulate --arm`: {e}", path.display()))?;
+        let file: ArmFile = toml::from_str(&text).map_err(|e| {
+            anyhow!("{}: not an arm of `simulate --arm`: {}", path.display(), e.to_string().trim_end())
+        })?;
         let model = file.model().map_err(|e| anyhow!("{}: {e}", path.display()))?;
         let first = models.first().ok_or_else(|| anyhow!("--model is missing"))?;
         let (robot, nominal) = inputs::nominal(first, arguments.robot.as_deref())?;

@@ -95,11 +95,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     arguments.outputs.print(&view::summary(&found));
     let mut batch = Batch::sparing(given);
-    arguments.outputs.add_to(
+    let json = serde_json::to_value(&found.diagnosis)?;
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&found, &dataset),
-        &view::finding_table(&found.diagnosis),
-        &serde_json::to_value(&found.diagnosis)?,
+        || view::document(&found, &dataset),
+        || view::finding_table(&found.diagnosis),
+        || json,
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {

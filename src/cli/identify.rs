@@ -68,7 +68,7 @@ pub(super) struct Arguments {
     #[arg(long, default_value = "lm")]
     method: String,
     /// Share of rows held out to state the error.
-    #[arg(long, default_value_t = 0.2)]
+    #[arg(long, default_value_t = 0.2, allow_negative_numbers = true)]
     held_out: f64,
     /// Compare all methods over this many splits (seeds 0, 1, …).
     #[arg(long, value_name = "SPLITS")]
@@ -77,16 +77,16 @@ pub(super) struct Arguments {
     #[arg(long)]
     raw_columns: bool,
     /// The fit passes only with a held-out RMSE up to this (mm).
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     limit_rmse: Option<f64>,
     /// The fit passes only with a held-out maximum up to this (mm).
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     limit_max: Option<f64>,
     /// Tolerance of link lengths (mm), as a prior.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     tolerance_length: Option<f64>,
     /// Tolerance of link angles and joint offsets (°), as a prior.
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
     #[command(flatten)]
     stated: StatedArguments,
@@ -103,6 +103,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
+    for (name, limit) in [("--limit-rmse", arguments.limit_rmse), ("--limit-max", arguments.limit_max)] {
+        if let Some(limit) = limit
+            && !(limit > 0.0 && limit.is_finite())
+        {
+            bail!("{name} {limit}: expected a length above 0 in mm");
+        }
+    }
     let (robot, dataset) = read(&arguments.data)?;
     let options = Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments)? };
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
@@ -115,11 +122,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     arguments.outputs.print(&view::summary(&found));
     let mut batch = Batch::sparing([&arguments.data.data]);
-    arguments.outputs.add_to(
+    arguments.outputs.add_made(
         &mut batch,
-        &view::document(&found, &dataset),
-        &view::parameter_table(&found),
-        &view::json(&found, &dataset),
+        || view::document(&found, &dataset),
+        || view::parameter_table(&found),
+        || view::json(&found, &dataset),
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {

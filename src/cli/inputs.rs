@@ -44,8 +44,9 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     }
     let path = Path::new(argument);
     let text = files::read_text(path)?;
-    let arm = Estimated::from_toml(&text)
-        .map_err(|e| anyhow!("{argument}: {e}; a model file is what `truegrind identify -o` writes"))?;
+    let arm = Estimated::from_toml(&text).map_err(|e| {
+        anyhow!("{argument}: {}; a model file is what `truegrind identify -o` writes", e.trim_end())
+    })?;
     if arm.verdict.status == Judgement::Fail {
         bail!(
             "{argument}: the fit behind this model failed ({}); it is not used",

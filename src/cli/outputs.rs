@@ -84,17 +84,6 @@ impl Outputs {
         Ok(())
     }
 
-    /// Adds what was asked for.
-    pub(super) fn add_to(
-        &self,
-        batch: &mut Batch,
-        page: &Document,
-        table: &Table,
-        json: &serde_json::Value,
-    ) -> anyhow::Result<()> {
-        self.add_made(batch, || page.clone(), || table.clone(), || json.clone())
-    }
-
     /// Prints the summary, to stdout unless a result goes there.
     pub(super) fn print(&self, page: &Document) {
         let text = format::terminal::document(page, width());

@@ -163,6 +163,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Ok(if rough { Ending::Flagged } else { Ending::Done })
 }
 
+/// Nobody measures more poses by one plan.
+const MOST_POSES: usize = 2000;
+
 fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
     let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
     for (name, value) in [
@@ -188,6 +191,9 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
     }
     if arguments.poses < 4 {
         bail!("--poses {}: expected at least 4; some 50 to 100 are usual", arguments.poses);
+    }
+    if arguments.poses > MOST_POSES {
+        bail!("--poses {}: expected at most {MOST_POSES}; some 50 to 100 are usual", arguments.poses);
     }
     let box_mm = match &arguments.box_mm {
         None => None,

@@ -128,7 +128,7 @@ pub(super) fn numbers(option: &str, text: &str) -> anyhow::Result<Vec<f64>> {
         .collect()
 }
 
-fn triple(option: &str, text: &str) -> anyhow::Result<[f64; 3]> {
+pub(super) fn triple(option: &str, text: &str) -> anyhow::Result<[f64; 3]> {
     let values = numbers(option, text)?;
     <[f64; 3]>::try_from(values.as_slice())
         .map_err(|_| anyhow!("{option} {text}: {} numbers, expected x,y,z (mm)", values.len()))

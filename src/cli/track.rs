@@ -5,7 +5,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use truegrind::comparison::tracking::{Alarm, Options, State, TrackError, Tracker};
+use truegrind::comparison::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::convention::AngleConvention;
 use truegrind::measurement::dataset::Dataset;
@@ -61,6 +61,12 @@ pub(super) struct Arguments {
     outputs: Outputs,
 }
 
+impl Arguments {
+    fn states_settings(&self) -> bool {
+        self.sigma.is_some() || self.first_poses.is_some() || !self.drift.is_empty()
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let name = arguments.model.display().to_string();
     let NamedModel::Estimated { arm, hash, .. } = inputs::model(&name)? else {
@@ -93,6 +99,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(date) = &arguments.date {
         stamp(date)?;
     }
+    if state_path.is_file() && arguments.states_settings() {
+        eprintln!(
+            "note: {} goes on with the settings that it began with: --sigma, --drift and --first-poses are for a new track",
+            state_path.display()
+        );
+    }
     let mut flagged = false;
     loop {
         let seen = on_threads(arguments.common.threads, || {
@@ -116,7 +128,7 @@ fn pass(
     stem: &str,
     state_path: &Path,
 ) -> anyhow::Result<bool> {
-    let files = measurement_files(&arguments.data)?;
+    let datasets = datasets(arguments, arm)?;
     let mut tracker = match state_path.is_file() {
         true => {
             let text = files::read_text(state_path)?;
@@ -132,25 +144,26 @@ fn pass(
         }
         false => None,
     };
+    if tracker.is_none()
+        && let Some(first) = first_poses(&datasets, options.first_poses)
+    {
+        match Tracker::begin(arm, hash, &first, options) {
+            Ok(begun) => tracker = Some(begun),
+            // Files that are still growing: nothing is wrong, nothing can be done.
+            Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
+                eprintln!("note: {error}");
+                return Ok(false);
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
     let before = tracker.as_ref().map_or(0, |t| t.state().poses);
     let mut alarms: Vec<Alarm> = Vec::new();
     let mut taking = Duration::ZERO;
-    for path in &files {
-        let Some(dataset) = read(arguments, arm, path)? else { continue };
-        if tracker.is_none() {
-            match Tracker::begin(arm, hash, &dataset, options) {
-                Ok(begun) => tracker = Some(begun),
-                // A file that is still growing: nothing is wrong, nothing can be done.
-                Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
-                    eprintln!("note: {error}");
-                    continue;
-                }
-                Err(error) => return Err(error.into()),
-            }
-        }
-        if let Some(tracker) = &mut tracker {
+    if let Some(tracker) = &mut tracker {
+        for dataset in &datasets {
             let begun = Instant::now();
-            alarms.extend(tracker.take(&dataset)?);
+            alarms.extend(tracker.take(dataset)?);
             taking += begun.elapsed();
         }
     }
@@ -172,48 +185,65 @@ fn pass(
         taking.as_secs_f64() * 1e3,
         taking.as_secs_f64() * 1e6 / fresh as f64
     );
-    let model = tracker.model();
     let date = match &arguments.date {
         Some(date) => stamp(date)?,
         None => now()?,
     };
     let model_path = folder.join(format!("{stem}-{date}-{:06}.toml", tracker.state().poses));
-    if model_path.exists() {
-        bail!(
-            "{} is there already: it is never overwritten; give another --date or -o",
-            model_path.display()
-        );
-    }
-    let page = view::document(&tracker, fresh, &alarms, &model_path.display().to_string());
-    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &model_path.display().to_string()));
+    let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
+    let path = model_path.display().to_string();
+    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &path));
     let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
-    // The model first, the state last: what is cut off between the two is done again in the next run.
-    batch.add(&model_path, model.to_toml().map_err(anyhow::Error::msg)?);
-    arguments.outputs.add_to(
+    // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
+    if !model_path.exists() {
+        batch.add(&model_path, text);
+    } else if files::read(&model_path)? != text.as_bytes() {
+        bail!("{path} is there already: it is never overwritten; give another --date or -o");
+    }
+    arguments.outputs.add_made(
         &mut batch,
-        &page,
-        &view::table(&tracker),
-        &view::json(&tracker, fresh, &alarms),
+        || view::document(&tracker, fresh, &alarms, &path),
+        || view::table(&tracker),
+        || view::json(&tracker, fresh, &alarms),
     )?;
     batch.add(state_path, tracker.state().to_toml().map_err(anyhow::Error::msg)?);
     batch.write()?;
     Ok(!alarms.is_empty())
 }
 
-/// The file, or the files of a folder by name.
-fn measurement_files(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]);
+/// What there is to take in. Who follows waits for what cannot be read yet.
+fn datasets(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Vec<Dataset>> {
+    let waits = arguments.follow.is_some();
+    let mut out = Vec::new();
+    for path in measurement_files(arguments)? {
+        match read(arguments, arm, &path) {
+            Ok(dataset) => out.extend(dataset),
+            Err(error) if waits => eprintln!("note: {error:#}; left for the next look"),
+            Err(error) => return Err(error),
+        }
     }
+    Ok(out)
+}
+
+/// The file, or the files of a folder by name. What the track itself writes is no measurement.
+fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
+    let path = &arguments.data;
+    if !path.is_dir() {
+        let waits = arguments.follow.is_some() && !path.exists();
+        return Ok(if waits { Vec::new() } else { vec![path.clone()] });
+    }
+    let own: Vec<PathBuf> =
+        arguments.outputs.files().iter().filter_map(|o| std::fs::canonicalize(o).ok()).collect();
     let mut out: Vec<PathBuf> = std::fs::read_dir(path)
         .with_context(|| format!("{}: cannot be read", path.display()))?
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|p| {
             p.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("xlsx"))
         })
+        .filter(|p| !std::fs::canonicalize(p).is_ok_and(|p| own.contains(&p)))
         .collect();
     out.sort();
-    if out.is_empty() {
+    if out.is_empty() && arguments.follow.is_none() {
         bail!("{}: the folder has no .csv or .xlsx files", path.display());
     }
     Ok(out)

@@ -280,6 +280,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     let program = programs.name();
     let acting =
         Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };
+    let loads = arguments.cell.loads(&task);
     let report = judge(
         &Judged {
             original: task.listing(),
@@ -289,6 +290,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
             program: &program,
             name: stated.as_ref().map_or("nominal", |(name, _)| name),
             after: After::PredictedRemainder,
+            loads: [loads.as_ref(), None],
         },
         &acting,
     );

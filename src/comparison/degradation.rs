@@ -21,28 +21,22 @@
 //! between RLS and LM must have another cause, and the three LM variants show which: memory, weights, or the stop. The
 //! paper's own before-figures differ between its methods (0.571 and 0.743 mm), which no method can cause.
 
-use std::time::Instant;
+mod arm;
+mod journey;
+mod verdict;
+mod way;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::arm::{Arm, arm, group_error};
+use self::journey::{average, count_of, journey};
+use self::way::State;
 use crate::comparison::experiment::ExperimentError;
 use crate::comparison::simulated;
-use crate::estimation::filter::rls::{Memory, Recursion};
-use crate::estimation::least_squares::lm;
-use crate::estimation::problem::{Prior, Problem};
-use crate::identification::calibration::{Calibration, Frames, Weight};
-use crate::identification::fit::{Observed, Start, errors_on, fit, frame_parameters};
-use crate::identification::identifiability::identifiability;
-use crate::identification::identify::observe;
-use crate::identification::solver::SOLVERS;
-use crate::identification::start::starts;
-use crate::identification::tolerance::Tolerance;
 use crate::kinematics::model::Model;
-use crate::kinematics::parameter::{Parameter, link_parameters};
-use crate::measurement::import;
-use crate::measurement::simulation::recipe::{LinkDeviation, Recipe};
+
+pub use verdict::{AgainstRls, Outcome};
 
 /// The experiment's section.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,6 +65,9 @@ pub struct Degradation {
     /// What the paper's prose states.
     #[serde(default)]
     pub paper: Vec<PaperStatement>,
+    /// What it states of the study of counts.
+    #[serde(default)]
+    pub paper_counts: Vec<PaperCount>,
 }
 
 /// Links warm up to a steady state and grow: length · growth · rise · (1 − e^(−t/T)).
@@ -111,6 +108,21 @@ pub struct PaperStatement {
     pub verification_after_mm: Option<f64>,
     /// Improvement of the verification poses as stated (%).
     pub improvement_percent: Option<f64>,
+    /// The figure that shows it.
+    #[serde(default)]
+    pub figure: Option<String>,
+}
+
+/// What the paper's prose states of the study of counts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PaperCount {
+    /// Poses.
+    pub count: usize,
+    /// Improvement of the poses that identify (%).
+    pub identification_percent: f64,
+    /// Improvement of the poses that verify (%).
+    pub verification_percent: f64,
 }
 
 impl Degradation {
@@ -198,7 +210,9 @@ pub struct Journey {
     pub count: usize,
     /// One step for each group.
     pub steps: Vec<Step>,
-    /// Seconds for all groups of one arm. Not the same in every run.
+    /// Mean error of the poses that verify, after, over the groups: one for each arm (mm).
+    pub arms_mm: Vec<f64>,
+    /// Seconds for all groups of one arm, median over the arms. Not the same in every run.
     #[serde(skip)]
     pub seconds: f64,
 }
@@ -246,23 +260,12 @@ pub struct DegradationResult {
     pub counts: Vec<Count>,
     /// Periodic (all identification poses) and continuous calibration: Figs 9 to 14, Table 4.
     pub journeys: Vec<Journey>,
+    /// Every way against RLS, over the arms.
+    pub against_rls: Vec<AgainstRls>,
     /// What the sensor alone scatters by (mm).
     pub noise_floor_mm: f64,
     /// Seed.
     pub seed: u64,
-}
-
-/// One simulated arm with its groups.
-struct Arm {
-    nominal: Model,
-    frames: Frames,
-    groups: Vec<Group>,
-    sigma: Weight,
-}
-
-struct Group {
-    identify: Observed,
-    verify: Observed,
 }
 
 /// Runs the experiment on its recipe. `resolve` gives the nominal model of a robot by name.
@@ -289,7 +292,7 @@ pub fn run(
     for count in counts {
         ways.extend(Way::ALL.map(|way| (way, count)));
     }
-    let journeys = ways
+    let journeys: Vec<Journey> = ways
         .par_iter()
         .map(|&(way, count)| {
             let each: Vec<Journey> = arms.iter().map(|arm| journey(settings, arm, way, count)).collect();
@@ -323,312 +326,10 @@ pub fn run(
         nominal_mm,
         neglected_mm,
         counts: settings.counts.iter().map(|&count| count_of(&arms, count)).collect(),
+        against_rls: verdict::against_rls(&journeys),
         journeys,
         // The mean length of a vector of three normal numbers is σ √(8/π).
         noise_floor_mm: (noise.sigma_mm + 2.0 * noise.per_metre_mm) * (8.0 / std::f64::consts::PI).sqrt(),
         seed,
     })
-}
-
-fn arm(
-    settings: &Degradation,
-    recipe: &Recipe,
-    experiment: &str,
-    seed: u64,
-    resolve: &(impl Fn(&str) -> Result<Model, String> + Sync),
-) -> Result<Arm, ExperimentError> {
-    let fail = |message: String| ExperimentError::Recipe { experiment: experiment.to_owned(), message };
-    let nominal = resolve(&recipe.robot).map_err(fail)?;
-    let mut groups = Vec::with_capacity(settings.groups);
-    for g in 0..settings.groups {
-        let hours = settings.hours_apart * g as f64;
-        let mut now = recipe.clone();
-        now.seed = recipe.seed + 1_000 * seed + g as u64;
-        if let Some(random) = &mut now.arm.random {
-            random.seed += seed;
-        }
-        for joint in 0..6 {
-            let link = &nominal.links[joint];
-            let warm = 1.0 - (-hours / settings.heat.time_constant_h).exp();
-            let growth = settings.heat.growth_per_k * settings.heat.rise_k[joint] * warm;
-            now.arm.link.push(LinkDeviation {
-                joint,
-                a_mm: link.a_mm * growth,
-                d_mm: link.d_mm * growth,
-                theta_deg: settings.wear.zero_deg_per_h[joint] * hours,
-                ..LinkDeviation::default()
-            });
-        }
-        let simulation = now.simulate(resolve).map_err(|e| fail(e.to_string()))?;
-        let file = format!("group {} (simulated)", g + 1);
-        let dataset = import::read(&file, simulation.csv.as_bytes(), &import::Options::default())
-            .map_err(|e| fail(e.to_string()))?;
-        if dataset.rows.len() <= settings.identification {
-            return Err(fail(format!(
-                "{} poses in a group, expected more than the {} that identify",
-                dataset.rows.len(),
-                settings.identification
-            )));
-        }
-        let (observed, _) = observe(&dataset, &nominal, false);
-        let all: Vec<usize> = (0..dataset.rows.len()).collect();
-        let (identify, verify) = all.split_at(settings.identification);
-        groups.push(Group { identify: observed.subset(identify), verify: observed.subset(verify) });
-    }
-    let noise = recipe.noise;
-    // At the tracker's usual two metres.
-    let sigma_mm = (noise.sigma_mm + 2.0 * noise.per_metre_mm).max(1e-3);
-    let sigma_rad = noise.sigma_deg.to_radians().max(1e-6);
-    let first = &groups[0].identify;
-    let candidates = starts(&first.dataset, &nominal)?;
-    let frames = candidates.into_iter().next().unwrap_or_else(|| Frames::at_origin(1));
-    let parameters: Vec<Parameter> =
-        link_parameters(&nominal).into_iter().chain(frame_parameters(&first.dataset)).collect();
-    let start = Start { model: &nominal, frames: &frames };
-    let fitted = fit(first, start, &parameters, &Tolerance::default(), &SOLVERS[0], 0);
-    Ok(Arm {
-        nominal,
-        frames: fitted.frames,
-        groups,
-        sigma: Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 / sigma_rad },
-    })
-}
-
-/// What is known of an arm: link deviations and their covariance.
-struct State {
-    parameters: Vec<Parameter>,
-    x: DVector<f64>,
-    covariance: DMatrix<f64>,
-}
-
-impl State {
-    fn new(arm: &Arm) -> Self {
-        let parameters = link_parameters(&arm.nominal);
-        let priors = Tolerance::default().priors(&parameters, &arm.nominal);
-        let variances = DVector::from_iterator(priors.len(), priors.iter().map(|p| p.sigma * p.sigma));
-        Self {
-            x: DVector::zeros(parameters.len()),
-            covariance: DMatrix::from_diagonal(&variances),
-            parameters,
-        }
-    }
-
-    fn task(&self, arm: &Arm, rows: &Observed, weight: Weight, priors: &[Prior]) -> Calibration {
-        let weights = vec![weight; rows.dataset.rows.len()];
-        Calibration::new(&rows.dataset, &arm.nominal, &arm.frames, &self.parameters, priors, &weights)
-    }
-
-    fn model(&self, arm: &Arm) -> Model {
-        self.task(arm, &arm.groups[0].verify, arm.sigma, &[]).apply(self.x.as_slice()).0
-    }
-
-    /// Takes the rows in, pose by pose, each linearised at the state it meets.
-    fn rls(&mut self, arm: &Arm, rows: &Observed, forgetting: f64) {
-        let task = self.task(arm, rows, arm.sigma, &[]);
-        let covariance = self.covariance.clone();
-        let Some(mut recursion) = Recursion::new(self.x.clone(), covariance, Memory::SquareRoot) else {
-            return;
-        };
-        let (p, per) = (self.x.len(), task.rows_per_observation());
-        let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
-        let mut a = DVector::zeros(p);
-        // A pose has six rows: each forgets its share.
-        let share = forgetting.powf(1.0 / per as f64);
-        for pose in 0..rows.dataset.rows.len() {
-            let at = recursion.x.clone();
-            task.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
-            for i in 0..per {
-                (0..p).for_each(|k| a[k] = j[k * per + i]);
-                let e = r[i] + a.dot(&recursion.x) - a.dot(&at);
-                recursion.update(&a, e, share);
-            }
-        }
-        self.covariance = recursion.covariance();
-        self.x = recursion.x;
-    }
-
-    /// The rows at once, with the covariance as prior or without any.
-    fn lm(&mut self, arm: &Arm, rows: &Observed, memory: bool) {
-        let task = self.task(arm, rows, arm.sigma, &[]);
-        let estimate = if memory {
-            let problem = Remembering::new(&task, &self.x, &self.covariance);
-            lm::solve(&problem, self.x.as_slice(), &lm::Options::default())
-        } else {
-            lm::solve(&task, self.x.as_slice(), &lm::Options { priors: false, ..lm::Options::default() })
-        };
-        if estimate.x.iter().all(|x| x.is_finite()) {
-            self.x = DVector::from_vec(estimate.x);
-        }
-        if let (true, Some(covariance)) = (memory, estimate.covariance) {
-            self.covariance = covariance;
-        }
-    }
-
-    fn stopped(&mut self, arm: &Arm, rows: &Observed, steps: usize) {
-        let task = self.task(arm, rows, Weight { per_mm: 1.0, per_rad: 1.0 }, &[]);
-        let options = lm::Options { max_iterations: steps, ..lm::Options::as_printed() };
-        let estimate = lm::solve(&task, self.x.as_slice(), &options);
-        if estimate.x.iter().all(|x| x.is_finite()) {
-            self.x = DVector::from_vec(estimate.x);
-        }
-    }
-}
-
-/// A problem with a normal prior of full covariance: p more rows L⁻¹(x − m) with LLᵀ the covariance.
-struct Remembering<'a> {
-    inner: &'a Calibration,
-    mean: DVector<f64>,
-    inverse_root: DMatrix<f64>,
-}
-
-impl<'a> Remembering<'a> {
-    fn new(inner: &'a Calibration, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Self {
-        let p = mean.len();
-        let inverse_root = covariance
-            .clone()
-            .cholesky()
-            .and_then(|factor| factor.l().try_inverse())
-            .unwrap_or_else(|| DMatrix::zeros(p, p));
-        Self { inner, mean: mean.clone(), inverse_root }
-    }
-
-    fn prior_rows(&self, x: &[f64]) -> DVector<f64> {
-        &self.inverse_root * (DVector::from_column_slice(x) - &self.mean)
-    }
-}
-
-impl Problem for Remembering<'_> {
-    fn parameters(&self) -> usize {
-        self.inner.parameters()
-    }
-
-    fn rows(&self) -> usize {
-        self.inner.rows() + self.mean.len()
-    }
-
-    fn residuals(&self, x: &[f64], rows: std::ops::Range<usize>, out: &mut [f64]) {
-        let n = self.inner.rows();
-        let prior = self.prior_rows(x);
-        if rows.start < n {
-            let end = rows.end.min(n);
-            self.inner.residuals(x, rows.start..end, &mut out[..end - rows.start]);
-        }
-        for i in rows.start.max(n)..rows.end {
-            out[i - rows.start] = prior[i - n];
-        }
-    }
-
-    fn jacobian(&self, x: &[f64], rows: std::ops::Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
-        let (n, p, m) = (self.inner.rows(), self.inner.parameters(), rows.len());
-        let prior = self.prior_rows(x);
-        let end = rows.end.min(n);
-        if rows.start < n {
-            let own = end - rows.start;
-            let mut part = vec![0.0; own * p];
-            self.inner.jacobian(x, rows.start..end, &mut residuals[..own], &mut part);
-            for k in 0..p {
-                jacobian[k * m..k * m + own].copy_from_slice(&part[k * own..(k + 1) * own]);
-            }
-        }
-        for i in rows.start.max(n)..rows.end {
-            residuals[i - rows.start] = prior[i - n];
-            for k in 0..p {
-                jacobian[k * m + i - rows.start] = self.inverse_root[(i - n, k)];
-            }
-        }
-    }
-}
-
-fn first_poses(rows: &Observed, count: usize) -> Observed {
-    rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
-}
-
-fn mean_error(arm: &Arm, rows: &Observed, model: &Model) -> f64 {
-    let errors = errors_on(rows, model, &arm.frames);
-    errors.iter().sum::<f64>() / errors.len().max(1) as f64
-}
-
-fn group_error(arm: &Arm, group: usize, model: &Model) -> f64 {
-    let group = &arm.groups[group];
-    let (a, b) = (group.identify.dataset.rows.len() as f64, group.verify.dataset.rows.len() as f64);
-    (a * mean_error(arm, &group.identify, model) + b * mean_error(arm, &group.verify, model)) / (a + b)
-}
-
-fn journey(settings: &Degradation, arm: &Arm, way: Way, count: usize) -> Journey {
-    let mut state = State::new(arm);
-    let mut steps = Vec::with_capacity(settings.groups);
-    let mut seconds = 0.0;
-    for (g, group) in arm.groups.iter().enumerate() {
-        let rows = first_poses(&group.identify, count);
-        let before = state.model(arm);
-        let begun = Instant::now();
-        match way {
-            Way::Rls => state.rls(arm, &rows, 1.0),
-            Way::RlsForgetting => state.rls(arm, &rows, settings.forgetting),
-            Way::Lm => state.lm(arm, &rows, false),
-            Way::LmMemory => state.lm(arm, &rows, true),
-            Way::LmStopped => state.stopped(arm, &rows, settings.stopped_after),
-        }
-        seconds += begun.elapsed().as_secs_f64();
-        let after = state.model(arm);
-        steps.push(Step {
-            group: g,
-            identification_before_mm: mean_error(arm, &rows, &before),
-            identification_after_mm: mean_error(arm, &rows, &after),
-            verification_before_mm: mean_error(arm, &group.verify, &before),
-            verification_after_mm: mean_error(arm, &group.verify, &after),
-        });
-    }
-    Journey { way, count, steps, seconds }
-}
-
-fn average(way: Way, count: usize, each: &[Journey]) -> Journey {
-    let n = each.len().max(1) as f64;
-    let groups = each.first().map_or(0, |j| j.steps.len());
-    let mean = |g: usize, figure: fn(&Step) -> f64| each.iter().map(|j| figure(&j.steps[g])).sum::<f64>() / n;
-    let steps = (0..groups)
-        .map(|g| Step {
-            group: g,
-            identification_before_mm: mean(g, |s| s.identification_before_mm),
-            identification_after_mm: mean(g, |s| s.identification_after_mm),
-            verification_before_mm: mean(g, |s| s.verification_before_mm),
-            verification_after_mm: mean(g, |s| s.verification_after_mm),
-        })
-        .collect();
-    Journey { way, count, steps, seconds: each.iter().map(|j| j.seconds).sum::<f64>() / n }
-}
-
-fn count_of(arms: &[Arm], count: usize) -> Count {
-    let mut out = Count {
-        poses: count,
-        equations: 6 * count,
-        rank: usize::MAX,
-        condition: 0.0,
-        identification_mm: 0.0,
-        verification_mm: 0.0,
-        without_prior_mm: Some(0.0),
-    };
-    let n = arms.len().max(1) as f64;
-    for arm in arms {
-        let rows = first_poses(&arm.groups[0].identify, count);
-        let mut state = State::new(arm);
-        let task = state.task(arm, &rows, arm.sigma, &[]);
-        let scale: Vec<f64> = state.covariance.diagonal().iter().map(|v| v.sqrt()).collect();
-        if let Some(seen) = identifiability(&task, state.x.as_slice(), &scale) {
-            out.rank = out.rank.min(seen.rank);
-            out.condition = out.condition.max(seen.condition);
-        }
-        // One linearisation without priors, as eq. 9 has it.
-        let options = lm::Options { priors: false, max_iterations: 50, ..lm::Options::default() };
-        let bare = lm::solve(&task, state.x.as_slice(), &options);
-        let bare_model = task.apply(&bare.x).0;
-        state.rls(arm, &rows, 1.0);
-        let model = state.model(arm);
-        out.identification_mm += mean_error(arm, &rows, &model) / n;
-        out.verification_mm += mean_error(arm, &arm.groups[0].verify, &model) / n;
-        let error = mean_error(arm, &arm.groups[0].verify, &bare_model) / n;
-        let regular = out.condition.is_finite();
-        out.without_prior_mm = out.without_prior_mm.filter(|_| regular).map(|sum| sum + error);
-    }
-    out
 }

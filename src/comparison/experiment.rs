@@ -191,6 +191,23 @@ pub struct Method {
     /// What the paper prints.
     #[serde(default)]
     pub paper: Option<PaperFigures>,
+    /// What the paper says that the method identified: one entry for each link, or none at all.
+    #[serde(default)]
+    pub paper_links: Vec<PaperLink>,
+}
+
+/// Deviations of one link from its nominal values as a paper prints them; what cannot be read there is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PaperLink {
+    /// Length (mm).
+    pub a_mm: Option<f64>,
+    /// Offset (mm).
+    pub d_mm: Option<f64>,
+    /// Twist (°).
+    pub alpha_deg: Option<f64>,
+    /// Zero of the joint (°).
+    pub theta_deg: Option<f64>,
 }
 
 /// What a paper prints for a method.
@@ -570,6 +587,10 @@ impl Methods {
             let key = format!("methods.method {} ({})", k + 1, method.id);
             if self.method[..k].iter().any(|other| other.id == method.id) {
                 wrong(&key, method.id.clone(), "an id that no other method has")?;
+            }
+            if !matches!(method.paper_links.len(), 0 | 6) {
+                let found = format!("{} links", method.paper_links.len());
+                wrong(&format!("{key}: paper_links"), found, "one for each of 6 links, or none")?;
             }
             solver_named(&key, &method.solver, wrong)?;
             if let Ok(solver) = solver::by_name(&method.solver)

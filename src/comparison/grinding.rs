@@ -1,7 +1,7 @@
 //! A ground surface before compensation and after it with what each method identified: ltlm-2024 Table 8 and Fig. 9.
 //!
-//! The surface becomes a program; the actual arm runs it as it is, and rewritten with each method's model. The tool is
-//! measured; the work object was taught with the uncalibrated arm by three points, as in most cells: what no measurement
+//! The surface equation becomes an NC program, as in the paper; the actual arm runs it as it is, and rewritten with each
+//! method's model. The tool is measured; the work object was taught with the uncalibrated arm by three points, as in most cells: what no measurement
 //! in the cell can tell, the frame of the base against link 1, then does not count. Deviations are signed along the
 //! outward normal.
 //!
@@ -29,7 +29,11 @@ use crate::measurement::dataset::Dataset;
 use crate::measurement::split;
 use crate::planning::toolpath::{Toolpath, toolpath};
 use crate::program::motion::Mark;
-use crate::program::rapid::{Task, writer};
+use crate::program::nc::dialect::Dialect;
+use crate::program::nc::orientation::Angles;
+use crate::program::nc::setup::Setup;
+use crate::program::nc::writer;
+use crate::program::reading::Program;
 use crate::program::rewrite::RewriteOptions;
 use crate::surface::{SurfaceFile, sample};
 
@@ -40,6 +44,8 @@ pub struct GrindingResult {
     pub settings: Grinding,
     /// Name of the job.
     pub surface: String,
+    /// Name of its program.
+    pub program: String,
     /// Whether the actual arm is a simulated one, else the sound estimate stands in for it.
     pub simulated: bool,
     /// Points of the cut.
@@ -108,10 +114,14 @@ pub fn run(
     })?;
     let surface = sample.read().map_err(|e| fail(e.to_string()))?;
     let path = toolpath(&surface, nominal, robot).map_err(|e| fail(e.to_string()))?;
-    let program = writer::write(&path.draft).map_err(|e| fail(e.to_string()))?;
-    let name = format!("{}.mod", settings.surface);
-    let task = Task::read(&[(name.as_str(), program.as_slice())]);
-    let cell = taught_cell(&surface, &path, nominal).map_err(|e| fail(e.to_string()))?;
+    // A tool vector and the turn about it: no convention of A, B and C is needed.
+    let program =
+        writer::write(&path.draft, Dialect::Siemens, Angles::Wpr).map_err(|e| fail(e.to_string()))?;
+    let name = format!("{}.mpf", settings.surface);
+    // Where tool and work offset lie stands in the program's comments.
+    let setup = Setup::default();
+    let task = Program::read(&[(name.as_str(), program.as_slice())], &setup);
+    let cell = taught_cell(&surface, &path, nominal, ["T1", "G54"]).map_err(|e| fail(e.to_string()))?;
     let condition = Condition { payload_kg: Some(path.draft.tool.1.mass_kg), ..Condition::default() };
 
     let (observed, _) = observe(dataset, nominal, false);
@@ -172,7 +182,7 @@ pub fn run(
             max_turn_rad: LARGEST_TURN_RAD,
             ..RewriteBounds::default()
         };
-        let planned = plan(&task.listing, &one.estimated, &cell, &bounds);
+        let planned = plan(task.listing(), &one.estimated, &cell, &bounds);
         row.refused = planned
             .points
             .iter()
@@ -192,15 +202,16 @@ pub fn run(
                 continue;
             }
         };
-        let changed = Task::read(&[(name.as_str(), bytes.as_slice())]);
+        let changed = Program::read(&[(name.as_str(), bytes.as_slice())], &setup);
         let judged = Judged {
-            original: &task.listing,
-            rewritten: Some(&changed.listing),
+            original: task.listing(),
+            rewritten: Some(changed.listing()),
             cell: &cell,
             surface: Some(&surface.surface),
             program: &name,
             name: &format!("{} {}", method.id, solver.name),
             after,
+            loads: [None, None],
         };
         let mut report = judge(&judged, &acting);
         report.held_out_mm = Some(one.estimated.geometry.held_out.rmse);
@@ -214,6 +225,7 @@ pub fn run(
     Ok(GrindingResult {
         settings: settings.clone(),
         surface: surface.name.clone(),
+        program: name,
         simulated: matches!(actual, Actual::Simulated(_)),
         points: reports.first().map_or(0, |r| r.signed_mm(|p| p.before).len()),
         before: reports.first().and_then(|r| r.block(|p| p.before)),
@@ -222,8 +234,18 @@ pub fn run(
     })
 }
 
-/// The cell as it is set up in most shops: the tool measured, the work object taught by three points.
-fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> Result<Cell, InverseError> {
+/// The cell as it is set up in most shops: the tool measured, the work object taught with the uncalibrated arm by three
+/// points. `names` are those of tool and work object in the program.
+///
+/// # Errors
+/// [`InverseError`] where the arm does not reach the three points.
+pub fn taught_cell(
+    surface: &SurfaceFile,
+    path: &Toolpath,
+    nominal: &Model,
+    names: [&str; 2],
+) -> Result<Cell, InverseError> {
+    let [tool, work_object] = names;
     let inverse = Inverse::new(nominal, &Condition::default(), nominal);
     let object = surface.work_object.base_from_work_object;
     let middle = path.points.len() / 2;
@@ -240,7 +262,7 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> Resul
         .collect::<Result<Vec<[f64; 6]>, InverseError>>()?;
     Ok(Cell {
         tool: vec![CellFrame {
-            name: surface.tool.name.clone(),
+            name: tool.to_owned(),
             origin: FrameOrigin::Metrology,
             teaching_deg: Vec::new(),
             taught_with: None,
@@ -248,10 +270,10 @@ fn taught_cell(surface: &SurfaceFile, path: &Toolpath, nominal: &Model) -> Resul
             quaternion_wxyz: None,
         }],
         wobj: vec![CellFrame {
-            name: surface.work_object.name.clone(),
+            name: work_object.to_owned(),
             origin: FrameOrigin::Taught,
             teaching_deg,
-            taught_with: Some(surface.tool.name.clone()),
+            taught_with: Some(tool.to_owned()),
             position_mm: None,
             quaternion_wxyz: None,
         }],

@@ -8,10 +8,11 @@
 
 use nalgebra::DMatrix;
 
+use crate::comparison::experiment::{Method, PaperLink};
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::Calibration;
 use crate::identification::tolerance::Tolerance;
-use crate::kinematics::parameter::Parameter;
+use crate::kinematics::parameter::{LinkCoordinate, Parameter};
 
 /// Parameters of one method.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +38,8 @@ pub struct ParameterRow {
     pub sigma: f64,
     /// Share of the knowledge that the data brought.
     pub determined: f64,
+    /// The deviation that the paper prints (mm or rad), where it does.
+    pub paper: Option<f64>,
 }
 
 impl ParameterRow {
@@ -48,8 +51,7 @@ impl ParameterRow {
 
 /// The table of a method that ended at `x`; `variance` is what a row of weight 1 is left with.
 pub fn parameter_table(
-    id: &str,
-    name: &str,
+    method: &Method,
     task: &Calibration,
     parameters: &[Parameter],
     x: &[f64],
@@ -76,8 +78,21 @@ pub fn parameter_table(
                 deviation: x[k],
                 sigma: priors[k].sigma * share(k).sqrt(),
                 determined: 1.0 - share(k),
+                paper: method.paper_links.get(joint).and_then(|link| stated(link, coordinate)),
             })
         })
         .collect();
-    ParameterTable { id: id.to_owned(), name: name.to_owned(), rows }
+    ParameterTable { id: method.id.clone(), name: method.name.clone(), rows }
+}
+
+/// What a paper states of a coordinate (mm or rad). Its classical links have d where the axes of joints 2 and 3 are
+/// parallel; ours have a turn β there, of which it says nothing.
+fn stated(link: &PaperLink, coordinate: LinkCoordinate) -> Option<f64> {
+    match coordinate {
+        LinkCoordinate::A => link.a_mm,
+        LinkCoordinate::D => link.d_mm,
+        LinkCoordinate::Alpha => link.alpha_deg.map(f64::to_radians),
+        LinkCoordinate::Theta => link.theta_deg.map(f64::to_radians),
+        LinkCoordinate::Beta => None,
+    }
 }

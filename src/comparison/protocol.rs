@@ -56,6 +56,8 @@ pub struct Options {
     pub seed: u64,
     /// Whether the rows are simulated, so that the paper's figures belong to another arm.
     pub simulated: bool,
+    /// Standard deviation of a length or a coordinate (mm), where it is known because the rows are simulated.
+    pub sensor_sigma_mm: f64,
 }
 
 /// The result of an experiment.
@@ -83,7 +85,8 @@ pub struct Study {
     pub simulated: bool,
     /// Seed of the first case.
     pub seed: u64,
-    /// What repeated poses scatter by, else what the rounding of angles leaves in a row (mm).
+    /// What repeated poses scatter by, else what the rounding of angles leaves in a row, with the sensor's noise where it is
+    /// simulated (mm).
     pub noise_floor_mm: Option<f64>,
     /// The cases.
     pub cases: Vec<Case>,
@@ -148,6 +151,8 @@ pub struct Outcome {
     pub errors_mm: Vec<f64>,
     /// Deviations of the parameters from their start.
     pub x: Vec<f64>,
+    /// How far the farthest link parameter went, in manufacturing tolerances.
+    pub farthest: f64,
     /// Wall clock, while other threads worked too. Not the same in every run.
     pub seconds: f64,
 }
@@ -270,7 +275,7 @@ pub fn run(
         reduced: rows < protocol.rows,
         simulated: options.simulated,
         seed: options.seed,
-        noise_floor_mm: noise_floor(&observed, &prepared[0]),
+        noise_floor_mm: noise_floor(&observed, &prepared[0], options.sensor_sigma_mm),
         cases,
         results,
         parameters,
@@ -289,7 +294,7 @@ fn continued(task: &Calibration, solver: &Solver, x: &[f64]) -> Estimate {
     let options = lm::Options {
         factorisation: Factorisation::Qr,
         priors: !solver.literal,
-        max_iterations: 500,
+        max_iterations: 5_000,
         cost_tolerance: 1e-13,
         ..lm::Options::default()
     };
@@ -424,6 +429,7 @@ pub(super) fn register(train: &Observed, nominal: &Model) -> Result<(Frames, Fit
         ExperimentError::NoStart(crate::identification::start::NoStart {
             file: train.dataset.file.clone(),
             rows: train.dataset.rows.len(),
+            poses: crate::identification::start::different_poses(&train.dataset, usize::MAX),
             what: "sensor",
             needed: 4,
         })
@@ -515,7 +521,17 @@ fn judged(case: &Prepared, task: &Calibration, estimate: Estimate, seconds: f64)
             rmse: (2.0 * i.row_cost.unwrap_or(i.cost).max(0.0) / rows).sqrt(),
         })
         .collect();
+    let tolerances = Tolerance::default().priors(task.parameters_list(), task.start());
+    let farthest = task
+        .parameters_list()
+        .iter()
+        .zip(&estimate.x)
+        .zip(&tolerances)
+        .filter(|((p, _), _)| matches!(p, Parameter::Link { .. }))
+        .map(|((_, x), tolerance)| (x / tolerance.sigma).abs())
+        .fold(0.0, |most: f64, far| if far.is_nan() { f64::INFINITY } else { most.max(far) });
     Outcome {
+        farthest,
         held_out,
         fitted,
         termination: estimate.termination,
@@ -541,10 +557,10 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
         Treatment::Printed => 2.0 * task.row_cost(&outcome.x) / readings,
         Treatment::Sound => 1.0,
     };
-    Some(parameter_table(&result.method.id, &result.method.name, &task, &parameters, &outcome.x, variance))
+    Some(parameter_table(&result.method, &task, &parameters, &outcome.x, variance))
 }
 
-fn noise_floor(observed: &Observed, case: &Prepared) -> Option<f64> {
+fn noise_floor(observed: &Observed, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
     if let Some(floor) = split::noise_floor(&observed.dataset) {
         return Some(floor.sigma_mm);
     }
@@ -552,5 +568,8 @@ fn noise_floor(observed: &Observed, case: &Prepared) -> Option<f64> {
     let shares =
         rounding::angle_shares(&observed.dataset, &registered.model, &registered.frames, &observed.angles);
     let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
-    (mean > 0.0).then(|| mean.sqrt())
+    // The error of a position is the norm of three coordinates.
+    let axes = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let variance = axes * (mean + sensor_sigma_mm * sensor_sigma_mm);
+    (variance > 0.0).then(|| variance.sqrt())
 }

@@ -6,16 +6,16 @@
 //! pieces, gone by the estimated arm, is farther from the intended arc than the tolerance.
 //! Stops: after [`ROUNDS`] raises, or where the arm cannot go; the circle then stays.
 
-use super::course::{Course, between};
+use super::curve::{Curve, between};
 use super::rewrite::{Arms, Emit, Options};
-use super::segment::{CHORD_MM, Ends, PIECE_MM, extra_of, largest};
+use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, extra_of, largest};
 use crate::program::motion::Motion;
 use crate::program::rewrite::Extra;
 
 /// A circular motion: what was meant, and what the controller is told.
 pub(super) struct Circle {
-    pub(super) meant: Course,
-    pub(super) told: Course,
+    pub(super) meant: Curve,
+    pub(super) told: Curve,
 }
 
 impl Circle {
@@ -28,19 +28,20 @@ impl Circle {
         motion: &Motion,
     ) -> Option<Self> {
         Some(Self {
-            meant: Course::round(from.meant, via_meant, to.meant, motion)?,
-            told: Course::round(from.told, via_told, to.told, motion)?,
+            meant: Curve::round(from.meant, via_meant, to.meant, motion)?,
+            told: Curve::round(from.told, via_told, to.told, motion)?,
         })
     }
 
     /// Largest distance of the tool from the intended circle, sampled along the arc until the samples tell it to
     /// [`CHORD_MM`]; infinite where the arm cannot go.
-    pub(super) fn bend(&self, from: &Ends<'_>, to: &Ends<'_>, arms: &Arms<'_>) -> f64 {
+    pub(super) fn bend(&self, path: &Path<'_>, arms: &Arms<'_>) -> f64 {
+        let Path { from, to, way } = path;
         let off = |s: f64| {
             let near = from.joints.lerp(&to.joints, s);
             match arms.nominal.solve_near(&to.mounted.told.flange_for(&self.told.at(s)), &near) {
                 Ok(solution) => {
-                    let reached = arms.estimated.arm().forward(&solution.joints);
+                    let reached = arms.acting.arm(way.at(s)).forward(&solution.joints);
                     self.meant.distance(&to.mounted.real.target_of(&reached), s)
                 }
                 Err(_) => f64::INFINITY,
@@ -58,8 +59,7 @@ impl Circle {
     /// distance that is left; `None` where that is not reached.
     pub(super) fn pieces(
         &self,
-        from: &Ends<'_>,
-        to: &Ends<'_>,
+        path: &Path<'_>,
         arms: &Arms<'_>,
         options: &Options,
     ) -> Option<(Vec<Extra>, f64)> {
@@ -73,7 +73,7 @@ impl Circle {
             if count > MOST_PIECES {
                 return None;
             }
-            let (extra, left) = self.cut(count as usize, from, to, arms)?;
+            let (extra, left) = self.cut(count as usize, path, arms)?;
             if left <= options.tolerance_mm {
                 return Some((extra, left));
             }
@@ -83,13 +83,8 @@ impl Circle {
     }
 
     /// So many pieces, and how far they leave the intended arc; `None` where the arm cannot go.
-    fn cut(
-        &self,
-        count: usize,
-        from: &Ends<'_>,
-        to: &Ends<'_>,
-        arms: &Arms<'_>,
-    ) -> Option<(Vec<Extra>, f64)> {
+    fn cut(&self, count: usize, path: &Path<'_>, arms: &Arms<'_>) -> Option<(Vec<Extra>, f64)> {
+        let Path { from, to, way } = path;
         let mut extra = Vec::with_capacity(count - 1);
         let (mut told, mut joints, mut most) = (from.told, from.joints, 0.0_f64);
         for k in 1..=count {
@@ -97,7 +92,8 @@ impl Circle {
                 (to.told, to.joints)
             } else {
                 let flange = to.mounted.real.flange_for(&self.meant.at(k as f64 / count as f64));
-                let solution = arms.estimated.solve_near(&flange, &joints).ok()?;
+                let solution =
+                    arms.acting.inverse(way.at(k as f64 / count as f64)).solve_near(&flange, &joints).ok()?;
                 let told = to.mounted.told.target_of(&arms.nominal.arm().forward(&solution.joints));
                 extra.push(extra_of(&told, &solution.joints, Emit::Targets, to, arms));
                 (told, solution.joints)
@@ -106,8 +102,9 @@ impl Circle {
                 let pose = between(&told, &next, part);
                 let near = joints.lerp(&after, part);
                 let reached = arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near).ok()?;
-                let reached = to.mounted.real.target_of(&arms.estimated.arm().forward(&reached.joints));
                 let share = (k as f64 - 1.0 + part) / count as f64;
+                let reached = arms.acting.arm(way.at(share)).forward(&reached.joints);
+                let reached = to.mounted.real.target_of(&reached);
                 most = most.max(self.meant.distance(&reached, share));
             }
             (told, joints) = (next, after);

@@ -13,7 +13,7 @@
 
 use nalgebra::Vector3;
 
-use super::course::{Course, beside, between};
+use super::curve::{Curve, beside, between};
 use super::rewrite::Arms;
 use super::segment::{Ends, largest_from};
 use crate::math::se3::Pose;
@@ -30,7 +30,7 @@ pub struct Corner {
 
 impl Corner {
     /// The corner between two courses that a zone of this radius makes.
-    pub fn of(way_in: &Course, way_out: &Course, zone_mm: f64) -> Self {
+    pub fn of(way_in: &Curve, way_out: &Curve, zone_mm: f64) -> Self {
         let (long_in, long_out) = (way_in.length_mm(), way_out.length_mm());
         let radius = zone_mm.min(0.5 * long_in).min(0.5 * long_out);
         let share = |long: f64| if long > 1e-9 { radius / long } else { 0.0 };
@@ -82,13 +82,19 @@ pub(super) fn cut_of_lines(points: &[Vector3<f64>; 3], zone_mm: f64) -> f64 {
 
 /// The ways in and out of a corner, as meant and as told.
 pub(super) struct Ways {
-    pub(super) meant: [Course; 2],
-    pub(super) told: [Course; 2],
+    pub(super) meant: [Curve; 2],
+    pub(super) told: [Curve; 2],
 }
 
-/// Largest distance of the tool from the intended corner at `point`; `None` where the corner cuts off next to nothing,
+/// Largest distance of the tool from the intended corner at `point`, gone under two conditions before and behind it; `None` where the corner cuts off next to nothing,
 /// infinite where the arm cannot go.
-pub(super) fn corner_bend(point: &Ends<'_>, ways: &Ways, zone_mm: f64, arms: &Arms<'_>) -> Option<f64> {
+pub(super) fn corner_bend(
+    point: &Ends<'_>,
+    ways: &Ways,
+    zone_mm: f64,
+    places: [usize; 2],
+    arms: &Arms<'_>,
+) -> Option<f64> {
     let meant = Corner::of(&ways.meant[0], &ways.meant[1], zone_mm);
     if !(meant.cut_mm() > CUT_MM) {
         return None;
@@ -97,7 +103,7 @@ pub(super) fn corner_bend(point: &Ends<'_>, ways: &Ways, zone_mm: f64, arms: &Ar
     let off =
         |t: f64| match arms.nominal.solve_near(&point.mounted.told.flange_for(&told.at(t)), &point.joints) {
             Ok(solution) => {
-                let reached = arms.estimated.arm().forward(&solution.joints);
+                let reached = arms.acting.arm(places[usize::from(t > 0.5)]).forward(&solution.joints);
                 meant.distance(&point.mounted.real.target_of(&reached), t)
             }
             Err(_) => f64::INFINITY,

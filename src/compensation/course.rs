@@ -1,250 +1,272 @@
-//! The course of the tool from one target to the next, as controllers interpolate it.
+//! From which side each joint comes to rest, from the program's own motion.
 //!
-//! Method. Line: position straight, orientation by the shortest turn (slerp). Arc: position on the circle through
-//! start, circle point and end, or, where the program names the axis it turns about (G2, G3), on the circle in the
-//! plane across that axis, rising along it in proportion to the angle. Orientation on an arc of an NC program: slerp. On
-//! one of RAPID: in proportion within the frame that goes along with the path, R(s) = turn(axis, s θ) R₀ exp(s v) with
-//! exp(v) = R₀⁻¹ turn(axis, −θ) R₁, of whose turns v, v ± 2π the one is taken that passes nearest to the orientation of
-//! the circle point; with CirPathMode \CirPointOri from start over circle point to end.
-//! Shapes: poses of the tool in the work object (mm), shares s of the way from 0 to 1.
-//! Source: ABB, RAPID reference manual, MoveC and CirPathMode; DIN 66025 for G2 and G3. Departure: CirPathMode
-//! \ObjectFrame and the wrist modes are taken as the standard mode; the position on the circle is the same in all.
-//! Checked against: circles and helices in closed form, whole circles, a tool that keeps its orientation, one that turns
-//! with the path.
+//! A joint with play rests on the flank against which it moved last, so the side at a target follows from the joints on
+//! the way to it. Every joint has a turning point: the farthest it went in the direction in which it moves. Once it has
+//! come back from there by more than [`DEAD_BAND_RAD`] it moves the other way, and did so from the turning point on. A
+//! joint that does not move keeps its side. Nothing is known at the start of a program and after a motion that the text
+//! does not tell; side 0 then stands for the middle of the play.
+//!
+//! Lines and arcs are sampled between their ends, and a parabola through neighbouring samples tells where between them
+//! a joint turned.
 
-use std::f64::consts::TAU;
-
-use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
-
+use super::curve::{Arc, between};
+use super::mounting::Mounting;
+use crate::kinematics::inverse::Inverse;
+use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
-use crate::program::motion::{Motion, Switch};
+use crate::program::motion::MotionKind;
 
-/// Ends of an arc that are nearer than this make it a whole circle (mm).
-const CLOSED_MM: f64 = 1e-3;
+/// The side from which each joint came: −1 from below, +1 from above, 0 not known.
+pub(super) type Sides = [i8; 6];
 
-/// An arc from its start over a point to its end, perhaps rising along its axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arc {
-    /// On the axis, at the height of the start (mm).
-    pub centre: Point3<f64>,
-    /// The axis; the arc turns positively about it.
-    pub axis: Unit<Vector3<f64>>,
-    /// From the axis to the start, of length 1.
-    x: Vector3<f64>,
-    y: Vector3<f64>,
-    /// Its radius (mm).
-    pub radius: f64,
-    /// The angle that it sweeps (rad), above 0.
-    pub sweep: f64,
-    /// How far it rises along the axis on the whole way (mm).
-    rise: f64,
+/// A joint that comes back by less has not turned (rad): what a drive at rest may stray by, 0.005 mm at half a metre.
+pub(super) const DEAD_BAND_RAD: f64 = 1e-5;
+
+/// Samples on a path are no farther apart than this (mm, rad).
+const SAMPLE_MM: f64 = 25.0;
+const SAMPLE_RAD: f64 = 0.1;
+/// No path has more samples.
+const MOST_SAMPLES: usize = 24;
+
+/// Where a motion ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Stop {
+    /// The arm does not move (external axes alone).
+    Stays,
+    /// The text does not tell where the arm is afterwards.
+    Lost,
+    /// At joints that are known.
+    At(Reached),
 }
 
-impl Arc {
-    /// The arc through three points, about the axis where one is stated; `None` where they are in line or coincide.
-    pub fn through(
-        start: &Point3<f64>,
-        via: &Point3<f64>,
-        end: &Point3<f64>,
-        axis: Option<&Unit<Vector3<f64>>>,
-    ) -> Option<Self> {
-        let (mut a, mut b) = (via - start, end - start);
-        let mut rise = 0.0;
-        let axis = match axis {
-            Some(axis) => {
-                rise = axis.dot(&b);
-                a -= axis.into_inner() * axis.dot(&a);
-                b -= axis.into_inner() * rise;
-                *axis
-            }
-            None => Unit::try_new(a.cross(&b), 1e-9)?,
-        };
-        let whole = b.norm() < CLOSED_MM;
-        let to_centre = if whole {
-            0.5 * a
-        } else {
-            let normal = a.cross(&b);
-            let square = normal.norm_squared();
-            if square < 1e-9 {
-                return None;
-            }
-            (normal.cross(&a) * b.norm_squared() + b.cross(&normal) * a.norm_squared()) / (2.0 * square)
-        };
-        let radius = to_centre.norm();
-        if !(radius > CLOSED_MM) {
-            return None;
-        }
-        let x = -to_centre / radius;
-        let y = axis.cross(&x);
-        let to_end = b - to_centre;
-        let sweep = if whole { TAU } else { to_end.dot(&y).atan2(to_end.dot(&x)).rem_euclid(TAU) };
-        Some(Self { centre: start + to_centre, axis, x, y, radius, sweep, rise })
-    }
-
-    /// The point at a share of the way.
-    pub fn at(&self, s: f64) -> Point3<f64> {
-        let (sin, cos) = (self.sweep * s).sin_cos();
-        self.centre + (self.x * cos + self.y * sin) * self.radius + self.axis.into_inner() * (self.rise * s)
-    }
-
-    /// Its length (mm).
-    pub fn length_mm(&self) -> f64 {
-        (self.radius * self.sweep).hypot(self.rise)
-    }
-
-    /// The share of the way that is level with a point near `near`.
-    fn share(&self, point: &Point3<f64>, near: f64) -> f64 {
-        let off = point - self.centre;
-        let angle = off.dot(&self.y).atan2(off.dot(&self.x));
-        let turns = ((near * self.sweep - angle) / TAU).round();
-        (angle + turns * TAU) / self.sweep
-    }
-
-    /// Distance of a point from the arc and its continuation (mm), at about the share `near`.
-    pub fn distance(&self, point: &Point3<f64>, near: f64) -> f64 {
-        let s = self.share(point, near);
-        let off = point - self.at(s);
-        let (sin, cos) = (self.sweep * s).sin_cos();
-        let along =
-            (self.y * cos - self.x * sin) * (self.radius * self.sweep) + self.axis.into_inner() * self.rise;
-        beside(&off, &along)
-    }
-
-    fn turn(&self, s: f64) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_axis_angle(&self.axis, self.sweep * s)
-    }
+/// The end of a motion with what is known of the way to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reached {
+    /// How the arm goes there.
+    pub(super) kind: MotionKind,
+    /// Index of the mounting.
+    pub(super) mounted: usize,
+    /// What the controller is told, in the work object.
+    pub(super) told: Pose,
+    /// Joints there.
+    pub(super) joints: Joints,
+    /// The point on the arc of a circular motion.
+    pub(super) via: Option<Pose>,
 }
 
-/// The part of an offset that is across a direction; all of it where there is no direction.
-pub(super) fn beside(off: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
-    match along.try_normalize(1e-6) {
-        Some(direction) => (off - direction * direction.dot(off)).norm(),
-        None => off.norm(),
-    }
-}
-
-/// How the tool turns on an arc.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Turning {
-    /// By the shortest turn from start to end.
-    Shortest,
-    /// By this much within the frame that goes along with the path (rad).
-    WithPath(Vector3<f64>),
-    /// Over the orientation of the circle point, at this share.
-    Over(UnitQuaternion<f64>, f64),
-}
-
-/// The course of the tool from one pose to another.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Course {
-    /// Where it begins.
-    pub from: Pose,
-    /// Where it ends.
-    pub to: Pose,
-    arc: Option<(Arc, Turning)>,
+/// The sides on the way to the end of a motion.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Course {
+    /// At the share 0 of the way, and from each share on at which a joint turns.
+    pub(super) turns: Vec<(f64, Sides)>,
+    /// At the end.
+    pub(super) end: Sides,
 }
 
 impl Course {
-    /// A straight line.
-    pub fn line(from: Pose, to: Pose) -> Self {
-        Self { from, to, arc: None }
+    /// The sides at a share of the way.
+    pub(super) fn at(&self, s: f64) -> Sides {
+        self.turns.iter().rev().find(|(from, _)| *from <= s).map_or(self.end, |turn| turn.1)
     }
 
-    /// The arc of a circular motion; `None` where its points make none.
-    pub fn round(from: Pose, via: &Pose, to: Pose, motion: &Motion) -> Option<Self> {
-        let point = |p: &Pose| Point3::from(p.translation.vector);
-        let axis = motion.axis.and_then(|axis| Unit::try_new(Vector3::from(axis), 1e-9));
-        let arc = Arc::through(&point(&from), &point(via), &point(&to), axis.as_ref())?;
-        let middle = arc.share(&point(via), 0.5).clamp(0.0, 1.0);
-        let turning = if axis.is_some() {
-            Turning::Shortest
-        } else if motion.modal.circle_point_orientation == Switch::On {
-            Turning::Over(via.rotation, middle.clamp(0.01, 0.99))
-        } else {
-            with_path(&arc, &from.rotation, &via.rotation, middle, &to.rotation)
-        };
-        Some(Self { from, to, arc: Some((arc, turning)) })
-    }
-
-    /// The arc, where it is one.
-    pub fn arc(&self) -> Option<&Arc> {
-        self.arc.as_ref().map(|(arc, _)| arc)
-    }
-
-    /// The pose at a share of the way.
-    pub fn at(&self, s: f64) -> Pose {
-        let Some((arc, turning)) = &self.arc else { return between(&self.from, &self.to, s) };
-        let rotation = match turning {
-            Turning::Shortest => turned(&self.from.rotation, &self.to.rotation, s),
-            Turning::WithPath(v) => {
-                arc.turn(s) * self.from.rotation * UnitQuaternion::from_scaled_axis(v * s)
-            }
-            Turning::Over(via, at) if s < *at => turned(&self.from.rotation, via, s / at),
-            Turning::Over(via, at) => turned(via, &self.to.rotation, (s - at) / (1.0 - at)),
-        };
-        Pose::from_parts(arc.at(s).coords.into(), rotation)
-    }
-
-    /// Its length (mm).
-    pub fn length_mm(&self) -> f64 {
-        match &self.arc {
-            Some((arc, _)) => arc.length_mm(),
-            None => (self.to.translation.vector - self.from.translation.vector).norm(),
-        }
-    }
-
-    /// How far the tool turns (rad), in steps that see a turn of more than half round.
-    pub fn turn_rad(&self) -> f64 {
-        if self.arc.is_none() {
-            return self.from.rotation.angle_to(&self.to.rotation);
-        }
-        let at = |k: i32| self.at(f64::from(k) / 4.0).rotation;
-        (0..4).map(|k| at(k).angle_to(&at(k + 1))).sum()
-    }
-
-    /// How far a pose lies beside the course (mm), where it should be at about this share.
-    pub fn distance(&self, pose: &Pose, near: f64) -> f64 {
-        match &self.arc {
-            Some((arc, _)) => arc.distance(&Point3::from(pose.translation.vector), near),
-            None => {
-                let along = self.to.translation.vector - self.from.translation.vector;
-                let on = self.from.translation.vector + along * near;
-                beside(&(pose.translation.vector - on), &along)
+    /// Calls every side unknown in which the course ends otherwise than `other`.
+    pub(super) fn agree(&mut self, other: &Self) {
+        for joint in 0..6 {
+            if self.end[joint] != other.end[joint] {
+                self.end[joint] = 0;
+                self.turns.iter_mut().for_each(|(_, sides)| sides[joint] = 0);
             }
         }
     }
 }
 
-/// Position straight, orientation by the shortest turn.
-pub(super) fn between(from: &Pose, to: &Pose, s: f64) -> Pose {
-    let position = from.translation.vector.lerp(&to.translation.vector, s);
-    Pose::from_parts(position.into(), turned(&from.rotation, &to.rotation, s))
+/// What one joint did last.
+#[derive(Debug, Clone, Copy, Default)]
+struct Track {
+    side: i8,
+    /// The turning point, or where the joint stood when nothing was known of it (rad).
+    farthest: f64,
+    /// At which share of the present motion that was.
+    since: f64,
 }
 
-fn turned(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, s: f64) -> UnitQuaternion<f64> {
-    from.try_slerp(to, s, 1e-9).unwrap_or(*from)
+impl Track {
+    /// The joint goes on to `angle`; hands back where it turned, if it did.
+    fn go(&mut self, angle: f64, share: f64) -> Option<f64> {
+        let gone = angle - self.farthest;
+        // A joint that moves up came from below.
+        let side = if gone > 0.0 { -1 } else { 1 };
+        if self.side == side {
+            (self.farthest, self.since) = (angle, share);
+        } else if gone.abs() > DEAD_BAND_RAD {
+            let turned = self.since;
+            *self = Self { side, farthest: angle, since: share };
+            return Some(turned);
+        }
+        None
+    }
 }
 
-/// The turn within the frame of the path whose course passes nearest to the orientation of the circle point.
-fn with_path(
-    arc: &Arc,
-    from: &UnitQuaternion<f64>,
-    via: &UnitQuaternion<f64>,
-    middle: f64,
-    to: &UnitQuaternion<f64>,
-) -> Turning {
-    let short = (from.inverse() * arc.turn(-1.0) * to).scaled_axis();
-    // Once more round the same way, or about the axis of the arc where there is no turn yet.
-    let about = short.try_normalize(1e-3).unwrap_or_else(|| from.inverse() * arc.axis.into_inner());
-    let off = |v: &Vector3<f64>| {
-        (arc.turn(middle) * from * UnitQuaternion::from_scaled_axis(v * middle)).angle_to(via)
+/// The sides along all motions. `before[m]`: the motion that ended where motion m starts.
+pub(super) fn courses(
+    stops: &[Stop],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> Vec<Course> {
+    let mut samples = Samples::default();
+    for (stop, before) in stops.iter().zip(before) {
+        let from = before.and_then(|m| stops.get(m as usize));
+        samples.of(from, stop, mounting);
+    }
+    let joints = nominal.solve_seeded(&samples.flanges, &samples.seeds);
+    let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
+    let mut out = Vec::with_capacity(stops.len());
+    for (m, stop) in stops.iter().enumerate() {
+        let from = before[m].map(|b| b as usize).filter(|b| *b < m);
+        let mut track = from.and_then(|b| tracks[b]);
+        let mut course = Course::default();
+        match stop {
+            Stop::Lost => track = None,
+            Stop::Stays => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
+            Stop::At(reached) => {
+                let start = from.and_then(|b| match &stops[b] {
+                    Stop::At(start) => Some(start.joints),
+                    _ => None,
+                });
+                let mut here = track.unwrap_or_else(|| {
+                    let at = start.unwrap_or(reached.joints);
+                    std::array::from_fn(|j| Track { side: 0, farthest: at[j], since: 0.0 })
+                });
+                here.iter_mut().for_each(|t| t.since = 0.0);
+                let mut way: Vec<(f64, Joints)> = Vec::new();
+                way.extend(start.map(|joints| (0.0, joints)));
+                for k in samples.range(m) {
+                    if let Ok(solution) = &joints[k] {
+                        way.push((samples.shares[k], solution.joints));
+                    }
+                }
+                way.push((1.0, reached.joints));
+                course = follow(&mut here, &way);
+                track = Some(here);
+            }
+        }
+        tracks.push(track);
+        out.push(course);
+    }
+    out
+}
+
+/// Takes all joints along a way.
+fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)]) -> Course {
+    let mut sides = tracks.map(|t| t.side);
+    let mut turned: Vec<(f64, usize, i8)> = Vec::new();
+    for joint in 0..6 {
+        let track = &mut tracks[joint];
+        let mut go = |share: f64, angle: f64| {
+            if let Some(at) = track.go(angle, share) {
+                turned.push((at, joint, track.side));
+            }
+        };
+        for (k, (share, joints)) in way.iter().enumerate() {
+            if k > 0
+                && let Some((share, angle)) = turning_point(way, k, joint)
+            {
+                go(share, angle);
+            }
+            go(*share, joints[joint]);
+        }
+    }
+    turned.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut turns = vec![(0.0, sides)];
+    for (share, joint, side) in turned {
+        sides[joint] = side;
+        match turns.last_mut() {
+            Some(last) if share - last.0 < 1e-6 => last.1 = sides,
+            _ => turns.push((share, sides)),
+        }
+    }
+    Course { turns, end: sides }
+}
+
+/// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
+fn turning_point(way: &[(f64, Joints)], k: usize, joint: usize) -> Option<(f64, f64)> {
+    let first = match k {
+        _ if way.len() < 3 => return None,
+        1 => 0,
+        _ => k - 2,
     };
-    let mut best = short;
-    for other in [short - about * TAU, short + about * TAU] {
-        // The short way unless another is clearly nearer.
-        if off(&other) + 0.1 < off(&best) {
-            best = other;
+    let [a, b, c] = [0, 1, 2].map(|i| (way[first + i].0, way[first + i].1[joint]));
+    // Newton's form: f(s) = f(a) + d1 (s − a) + d2 (s − a)(s − b).
+    let d1 = (b.1 - a.1) / (b.0 - a.0);
+    let d2 = ((c.1 - b.1) / (c.0 - b.0) - d1) / (c.0 - a.0);
+    let vertex = 0.5 * (a.0 + b.0) - 0.5 * d1 / d2;
+    let within = vertex > way[k - 1].0 && vertex < way[k].0;
+    within.then(|| (vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
+}
+
+/// Points between the ends of all motions.
+#[derive(Default)]
+struct Samples {
+    /// Where those of each motion end.
+    ends: Vec<usize>,
+    shares: Vec<f64>,
+    flanges: Vec<Pose>,
+    seeds: Vec<Joints>,
+}
+
+impl Samples {
+    fn range(&self, motion: usize) -> std::ops::Range<usize> {
+        let begin = motion.checked_sub(1).map_or(0, |m| self.ends[m]);
+        begin..self.ends[motion]
+    }
+
+    fn of(&mut self, from: Option<&Stop>, stop: &Stop, mounting: &dyn Fn(usize) -> Mounting) {
+        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
+            && from.mounted == to.mounted
+        {
+            match to.kind {
+                MotionKind::Linear => self.line(from, to, &mounting(to.mounted)),
+                MotionKind::Circular => self.arc(from, to, &mounting(to.mounted)),
+                // Joints in proportion: none turns on the way.
+                _ => {}
+            }
+        }
+        self.ends.push(self.shares.len());
+    }
+
+    fn line(&mut self, from: &Reached, to: &Reached, mounting: &Mounting) {
+        let length = (to.told.translation.vector - from.told.translation.vector).norm();
+        let pieces = pieces(length, from.told.rotation.angle_to(&to.told.rotation));
+        for k in 1..pieces {
+            let s = k as f64 / pieces as f64;
+            self.push(s, mounting.flange_for(&between(&from.told, &to.told, s)), from, to);
         }
     }
-    Turning::WithPath(best)
+
+    fn arc(&mut self, from: &Reached, to: &Reached, mounting: &Mounting) {
+        let point = |pose: &Pose| nalgebra::Point3::from(pose.translation.vector);
+        let Some(via) = to.via else { return };
+        let Some(arc) = Arc::through(&point(&from.told), &point(&via), &point(&to.told), None) else {
+            return;
+        };
+        let pieces = pieces(arc.length_mm(), arc.sweep.max(from.told.rotation.angle_to(&to.told.rotation)));
+        for k in 1..pieces {
+            let s = k as f64 / pieces as f64;
+            let rotation = between(&from.told, &to.told, s).rotation;
+            self.push(s, mounting.flange_for(&Pose::from_parts(arc.at(s).coords.into(), rotation)), from, to);
+        }
+    }
+
+    fn push(&mut self, s: f64, flange: Pose, from: &Reached, to: &Reached) {
+        self.shares.push(s);
+        self.flanges.push(flange);
+        self.seeds.push(from.joints.lerp(&to.joints, s));
+    }
+}
+
+/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way.
+fn pieces(length_mm: f64, turn_rad: f64) -> usize {
+    let wanted = (length_mm / SAMPLE_MM).max(turn_rad / SAMPLE_RAD).ceil();
+    (wanted as usize).clamp(2, MOST_SAMPLES)
 }

@@ -105,6 +105,15 @@ pub struct PathPoint {
     pub reason: Option<String>,
 }
 
+impl PathPoint {
+    /// The reason without its measured figures, which have a decimal point; numbers of joints stay. Points with the same
+    /// fate for the same kind of reason are told of together.
+    pub fn kind_of_reason(&self) -> Option<String> {
+        let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
+        self.reason.as_ref().map(|reason| reason.split(' ').filter(plain).collect::<Vec<_>>().join(" "))
+    }
+}
+
 /// What the column "after" of a table is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

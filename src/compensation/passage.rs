@@ -2,17 +2,14 @@
 
 use super::circle::Circle;
 use super::corner::{Ways, corner_bend};
-use super::course::Course;
+use super::curve::Curve;
 use super::rewrite::{Arms, Circles, Emit, Options};
-use super::segment::{Ends, gap, insertions, joint_bend, straight_bend};
+use super::segment::{Ends, Path, gap, insertions, joint_bend, straight_bend};
 use super::solve::Solved;
 use super::why::Why;
 use crate::math::se3::Pose;
 use crate::program::motion::{Motion, MotionKind, Switch};
 use crate::program::rewrite::{Extra, NewTarget};
-
-/// The two corrected ends of a motion whose path is checked.
-pub(super) type Path<'a> = (Ends<'a>, Ends<'a>);
 
 /// What the way of one motion needs.
 #[derive(Default)]
@@ -25,7 +22,7 @@ pub(super) struct Passage {
     pub(super) straight: bool,
     pub(super) flag: Option<Why>,
     /// The whole way as meant and as told, targets that are put in left aside; `None` for joint motions.
-    pub(super) courses: Option<[Course; 2]>,
+    pub(super) courses: Option<[Curve; 2]>,
 }
 
 impl Passage {
@@ -39,26 +36,24 @@ impl Passage {
         options: &Options,
     ) -> Passage {
         let segments = options.circles == Circles::Segments && motion.kind == MotionKind::Circular;
-        let Some((from, to)) = path else {
+        let Some(path) = path else {
             return Passage { flag: segments.then_some(Why::CircleKept), ..Passage::default() };
         };
         match (motion.kind, good) {
-            (MotionKind::Linear, _) => line(motion, from, to, middle_mm, arms, options),
-            (MotionKind::Joint, _) => {
-                Passage { bend_mm: Some(joint_bend(from, to, arms)), ..Passage::default() }
-            }
-            (MotionKind::Circular, [via, _]) => circle(motion, from, via, to, segments, arms, options),
+            (MotionKind::Linear, _) => line(motion, path, middle_mm, arms, options),
+            (MotionKind::Joint, _) => Passage { bend_mm: Some(joint_bend(path, arms)), ..Passage::default() },
+            (MotionKind::Circular, [via, _]) => circle(motion, path, via, segments, arms, options),
             _ => Passage::default(),
         }
     }
 
     /// The last told piece of the way, or the first.
-    fn piece(&self, last: bool) -> Option<Course> {
+    fn piece(&self, last: bool) -> Option<Curve> {
         let [_, told] = self.courses.as_ref()?;
         let told_at = |extra: Option<&Extra>| extra.and_then(pose_of);
         Some(match (last, told_at(if last { self.before.last() } else { self.before.first() })) {
-            (true, Some(pose)) => Course::line(pose, told.to),
-            (false, Some(pose)) => Course::line(told.from, pose),
+            (true, Some(pose)) => Curve::line(pose, told.to),
+            (false, Some(pose)) => Curve::line(told.from, pose),
             (_, None) => *told,
         })
     }
@@ -73,23 +68,17 @@ fn pose_of(extra: &Extra) -> Option<Pose> {
     }
 }
 
-fn line(
-    motion: &Motion,
-    from: &Ends<'_>,
-    to: &Ends<'_>,
-    middle_mm: f64,
-    arms: &Arms<'_>,
-    options: &Options,
-) -> Passage {
-    let bend = straight_bend(from, to, arms, options.emit, middle_mm);
-    let courses = Some([Course::line(from.meant, to.meant), Course::line(from.told, to.told)]);
+fn line(motion: &Motion, path: &Path<'_>, middle_mm: f64, arms: &Arms<'_>, options: &Options) -> Passage {
+    let Path { from, to, .. } = path;
+    let bend = straight_bend(path, arms, options.emit, middle_mm);
+    let courses = Some([Curve::line(from.meant, to.meant), Curve::line(from.told, to.told)]);
     let mut out = Passage { bend_mm: Some(bend), courses, ..Passage::default() };
     if bend <= options.tolerance_mm {
         return out;
     }
     let mut left = bend;
     if motion.insertable {
-        (out.before, left) = insertions(from, to, arms, options);
+        (out.before, left) = insertions(path, arms, options);
         out.bend_mm = Some(left);
     }
     out.flag = (!(left <= options.tolerance_mm)).then_some(Why::Bend { mm: left });
@@ -98,13 +87,13 @@ fn line(
 
 fn circle(
     motion: &Motion,
-    from: &Ends<'_>,
+    path: &Path<'_>,
     via: &Solved,
-    to: &Ends<'_>,
     segments: bool,
     arms: &Arms<'_>,
     options: &Options,
 ) -> Passage {
+    let Path { from, to, .. } = path;
     let Some(circle) = Circle::of(from, &via.meant, &via.told, to, motion) else {
         let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < 1e-3;
         let flag = if closed { Why::WholeCircle } else { Why::Bend { mm: f64::INFINITY } };
@@ -113,10 +102,10 @@ fn circle(
     let courses = Some([circle.meant, circle.told]);
     // How the tool turns on the way must be known to be written out.
     let may = segments && motion.straightens && motion.modal.circle_point_orientation != Switch::Either;
-    if may && let Some((before, left)) = circle.pieces(from, to, arms, options) {
+    if may && let Some((before, left)) = circle.pieces(path, arms, options) {
         return Passage { bend_mm: Some(left), before, straight: true, flag: None, courses };
     }
-    let bend = circle.bend(from, to, arms);
+    let bend = circle.bend(path, arms);
     let flag = if !(bend <= options.tolerance_mm) {
         Some(Why::Bend { mm: bend })
     } else {
@@ -131,6 +120,7 @@ pub(super) fn corner(
     way_in: &Passage,
     way_out: &Passage,
     zone_mm: f64,
+    places: [usize; 2],
     arms: &Arms<'_>,
     emit: Emit,
 ) -> Option<f64> {
@@ -140,5 +130,5 @@ pub(super) fn corner(
     }
     let meant = [way_in.courses.as_ref()?[0], way_out.courses.as_ref()?[0]];
     let told = [way_in.piece(true)?, way_out.piece(false)?];
-    corner_bend(point, &Ways { meant, told }, zone_mm, arms)
+    corner_bend(point, &Ways { meant, told }, zone_mm, places, arms)
 }

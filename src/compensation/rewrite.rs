@@ -11,16 +11,19 @@
 use rayon::prelude::*;
 
 use super::cell::Cell;
+use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
-use super::passage::{Passage, Path, corner};
-use super::segment::{Ends, middles_off};
+use super::passage::{Passage, corner};
+use super::payload::{Load, Loads};
+use super::segment::{Ends, Path, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all};
 use super::speed::fastest;
 use super::why::Why;
 use crate::kinematics::condition::Condition;
+use crate::kinematics::effect::Effect;
 use crate::kinematics::estimated::Estimated;
 use crate::kinematics::inverse::configuration::Configuration;
 use crate::kinematics::inverse::{Inverse, InverseError};
@@ -71,8 +74,10 @@ pub struct Options {
     pub joint_targets: bool,
     /// Decimals of positions as they will be written, to state what rounding leaves.
     pub position_decimals: u8,
-    /// What circumstances the program will run under.
+    /// What circumstances the program will run under. The sides from which joints come follow from its motion.
     pub condition: Condition,
+    /// What the program says that the arm carries; absent where the payload of `condition` counts throughout.
+    pub loads: Option<Loads>,
     /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
     pub points: bool,
 }
@@ -89,6 +94,7 @@ impl Default for Options {
             joint_targets: false,
             position_decimals: 4,
             condition: Condition::default(),
+            loads: None,
             points: true,
         }
     }
@@ -131,25 +137,37 @@ pub struct Plan {
 /// The two arms and their inverses, shared by all targets.
 pub(super) struct Arms<'a> {
     pub(super) nominal: Inverse<'a>,
+    /// The arm in the middle of every play, under the stated condition.
     pub(super) estimated: Inverse<'a>,
+    /// The same under each condition that the program brings about.
+    pub(super) acting: Circumstances<'a>,
     pub(super) knowledge: Option<&'a Estimated>,
 }
 
 impl<'a> Arms<'a> {
     pub(super) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
-        Self {
-            nominal: Inverse::new(&estimated.nominal, &Condition::default(), &estimated.nominal),
-            estimated: Inverse::new(&estimated.model, condition, &estimated.nominal),
-            knowledge: Some(estimated),
-        }
+        let arms = Self::simulated(&estimated.nominal, &estimated.model, condition);
+        Self { knowledge: Some(estimated), ..arms }
     }
 
     pub(super) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
+        let condition = Condition { approach: [0; 6], ..*condition };
         Self {
             nominal: Inverse::new(nominal, &Condition::default(), nominal),
-            estimated: Inverse::new(actual, condition, nominal),
+            estimated: Inverse::new(actual, &condition, nominal),
+            acting: Circumstances::new(actual, nominal, &condition),
             knowledge: None,
         }
+    }
+
+    /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
+    pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
+        let model = self.estimated.arm().model;
+        let Some(loads) = loads.filter(|_| model.effects.iter().any(Effect::needs_torque)) else {
+            return Vec::new();
+        };
+        let motions = listing.motions.iter().enumerate();
+        motions.map(|(index, motion)| loads.at(index, motion, listing, model)).collect()
     }
 }
 
@@ -158,17 +176,19 @@ impl<'a> Arms<'a> {
 /// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
 /// before; the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
-    let arms = Arms::of(estimated, &options.condition);
+    let mut arms = Arms::of(estimated, &options.condition);
     let mountings = Mountings::of(listing, &arms, cell);
-    let solved = solve_all(listing, &arms, &mountings, options);
+    let solved = solve_all(listing, &mut arms, &mountings, options);
     let job = Job { listing, solved: &solved, mountings: &mountings, arms: &arms, options };
     let portions: Vec<Portion> = (0..listing.motions.len())
         .into_par_iter()
         .step_by(PORTION)
         .map(|first| job.portion(first..(first + PORTION).min(listing.motions.len())))
         .collect();
-    let mut plan =
-        Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes: mountings.notes() };
+    let mut notes = mountings.notes();
+    notes.extend(play_note(&arms, &solved));
+    notes.extend(load_notes(listing, &arms, options));
+    let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
     plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
     plan.outcomes.reserve_exact(listing.motions.len());
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
@@ -179,6 +199,67 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     }
     plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
     plan
+}
+
+/// What backlash means for this program.
+fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
+    let plays = arms.acting.play_rad.iter().enumerate().filter(|(_, play)| **play != 0.0);
+    let plays: Vec<String> =
+        plays.map(|(j, play)| format!("joint {}: {:.4}°", j + 1, play.abs().to_degrees())).collect();
+    if plays.is_empty() {
+        return None;
+    }
+    let unknown = match solved.in_play() {
+        (0, _) => String::new(),
+        (count, most) => format!(
+            "; at {count} targets the side of a joint cannot be told from the text (nothing moved it yet, or the motion \
+             before is not known): the middle of its play is taken, and half of it is in their σ (up to {most:.3} mm)"
+        ),
+    };
+    Some(format!(
+        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
+        plays.join(", ")
+    ))
+}
+
+/// What was taken for the load of the arm.
+fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
+    let model = arms.estimated.arm().model;
+    let yields = model.effects.iter().any(Effect::needs_torque);
+    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)));
+    let Some(loads) = options.loads.as_ref().filter(|_| yields || lumped) else { return Vec::new() };
+    let mut out = Vec::new();
+    let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());
+    let at = |(index, motion): (usize, &Motion)| loads.at(index, motion, listing, model);
+    let stated: Vec<f64> = motions().filter_map(at).map(|load| load.mass_kg).collect();
+    let silent = motions().count() - stated.len();
+    let base = options.condition.payload_kg.map_or("no payload".to_owned(), |kg| format!("{kg} kg"));
+    if yields && let Some(&first) = stated.first() {
+        let (low, high) = stated.iter().fold((first, first), |(a, b), kg| (a.min(*kg), b.max(*kg)));
+        let range = if low == high { format!("{low} kg") } else { format!("{low} to {high} kg") };
+        out.push(format!(
+            "payload: {range}, as the program's tools and loads say (--payload states another)"
+        ));
+    }
+    if yields && silent > 0 {
+        out.push(format!(
+            "payload: at {silent} motions the tool states no mass, and that of the measurement is taken ({base}); \
+             --payload states it"
+        ));
+    }
+    if loads.unknown() > 0 {
+        out.push(format!(
+            "payload: at {} motions what GripLoad sets is not known from the text; the tool alone is counted",
+            loads.unknown()
+        ));
+    }
+    if lumped {
+        out.push(format!(
+            "compliance was found without the masses of the arm: it holds for the load of the measurement ({base}) and does \
+             not follow that of the program"
+        ));
+    }
+    out
 }
 
 /// Motions that one thread takes at a time.
@@ -261,6 +342,7 @@ fn ends_of<'a>(
         meant: to.meant,
         told: to.told,
         joints: to.after,
+        place: to.place,
         before: to.before,
         conf: stated.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
     })
@@ -317,12 +399,13 @@ impl<'a> Job<'a> {
         }
         let from = ends_of(before, targets, self.mountings)?;
         let to = ends_of(motion, self.solved.of(index), self.mountings)?;
-        (from.index == to.index).then_some((from, to))
+        let way = self.solved.way(index, to.place);
+        (from.index == to.index).then_some(Path { from, to, way })
     }
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it.
     fn corner(&self, motion: &Motion, path: Option<&Path<'a>>, passage: &Passage) -> Option<f64> {
-        let (point, to) = path?;
+        let Path { from: point, to, way } = path?;
         passage.courses.as_ref()?;
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
@@ -339,7 +422,8 @@ impl<'a> Job<'a> {
         let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
         let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
         let way_in = Passage::of(before, Some(&path), &good, middle, self.arms, self.options);
-        corner(point, &way_in, passage, zone_mm, self.arms, self.options.emit)
+        let places = [point.place, way.at(0.0)];
+        corner(point, &way_in, passage, zone_mm, places, self.arms, self.options.emit)
     }
 
     /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
@@ -426,7 +510,7 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
-fn may_change(motion: &Motion, options: &Options) -> bool {
+pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }
 
@@ -456,7 +540,7 @@ fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why>
 fn too_fast(
     motion: &Motion,
     listing: &Listing,
-    (from, to): &Path<'_>,
+    Path { from, to, .. }: &Path<'_>,
     passage: &Passage,
     arms: &Arms<'_>,
 ) -> Option<Why> {

@@ -2,21 +2,32 @@
 //! controller must be told for them.
 //!
 //! Targets go in blocks, so that the kinematics runs in lanes. First the joints of the program as it is: along runs of
-//! neighbours, each from the one before. Then everything else, target by target. Blocks are cut by count alone, so the
-//! result does not depend on the number of threads.
+//! neighbours, each from the one before. Then everything else, target by target, each under the condition in which the
+//! arm comes there ([`Circumstances`](super::circumstance::Circumstances)). Blocks are cut by count alone, so the result
+//! does not depend on the number of threads.
+//!
+//! Where joints have play, the sides from which they come follow from the motion, and the corrected motion depends on the
+//! sides: both are worked out in turn, from the sides of the program as it is, until the sides stay as they are. A side
+//! that does not settle counts as not known.
 
 use rayon::prelude::*;
 
+use super::circumstance::picked;
+use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
 use super::mountings::Mountings;
-use super::rewrite::{Arms, Emit, Options, configured, monitored};
+use super::payload::Load;
+use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
+use super::segment::Way;
 use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
 use crate::kinematics::inverse::configuration::Configuration;
 use crate::kinematics::model::Joints;
 use crate::kinematics::region::Outside;
 use crate::math::se3::Pose;
-use crate::program::motion::{Listing, Motion, MotionTarget, Reason, RobTarget, Switch, TargetValue};
+use crate::program::motion::{
+    Listing, Motion, MotionKind, MotionTarget, Reason, RobTarget, Role, Switch, TargetValue,
+};
 
 /// Motions that one thread takes at a time.
 const PORTION: usize = 256;
@@ -38,8 +49,12 @@ pub(super) struct Solved {
     pub(super) deviation_before: Deviation,
     pub(super) deviation_after: Deviation,
     pub(super) sigma_mm: f64,
+    /// What of it comes from joints whose side is not known (mm).
+    pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
+    /// The condition under which the arm comes there.
+    pub(super) place: usize,
 }
 
 /// The targets of all motions.
@@ -48,6 +63,8 @@ pub(super) struct SolvedTargets {
     first: Vec<usize>,
     /// The targets of so many motions each: one list of all would be copied together once more.
     portions: Vec<Vec<Result<Solved, Why>>>,
+    /// The conditions on the way to the end of each motion; empty where no joint has play.
+    ways: Vec<Way>,
 }
 
 impl SolvedTargets {
@@ -56,6 +73,17 @@ impl SolvedTargets {
         let portion = motion / PORTION;
         let begin = self.first[portion * PORTION];
         &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
+    }
+
+    /// The conditions on the way to the end of a motion, at which the arm comes under `place`.
+    pub(super) fn way(&self, motion: usize, place: usize) -> Way {
+        self.ways.get(motion).cloned().unwrap_or(Way { first: place, later: Vec::new() })
+    }
+
+    /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
+    pub(super) fn in_play(&self) -> (usize, f64) {
+        let open = self.portions.iter().flatten().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
+        open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
     }
 }
 
@@ -77,7 +105,7 @@ struct Start {
 /// Works out all targets.
 pub(super) fn solve_all(
     listing: &Listing,
-    arms: &Arms<'_>,
+    arms: &mut Arms<'_>,
     mountings: &Mountings,
     options: &Options,
 ) -> SolvedTargets {
@@ -91,16 +119,165 @@ pub(super) fn solve_all(
     }
     first.push(asked.len());
     let starts = starts(listing, &first, &asked, arms, mountings);
-    let count = listing.motions.len();
-    let portions = (0..count)
-        .into_par_iter()
-        .step_by(PORTION)
-        .map(|begin| {
-            let targets = first[begin]..first[(begin + PORTION).min(count)];
-            finish(&asked[targets.clone()], &starts[targets], arms, mountings, options)
-        })
-        .collect();
-    SolvedTargets { first, portions }
+    let work = Work { listing, first, asked, starts, mountings, options };
+    work.solve(arms)
+}
+
+/// What all targets are worked out from.
+struct Work<'a> {
+    listing: &'a Listing,
+    first: Vec<usize>,
+    asked: Vec<Asked<'a>>,
+    starts: Starts,
+    mountings: &'a Mountings,
+    options: &'a Options,
+}
+
+/// How often sides and motion are worked out in turn.
+const ROUNDS: usize = 4;
+
+impl Work<'_> {
+    fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets {
+        let count = self.listing.motions.len();
+        let loads = arms.loads(self.listing, self.options.loads.as_ref());
+        let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
+        if !arms.acting.has_play() {
+            let places: Vec<usize> = if loads.iter().all(Option::is_none) {
+                let only = arms.acting.place([0; 6], None);
+                vec![only; self.asked.len()]
+            } else {
+                let motions = (0..count).flat_map(|m| (self.first[m]..self.first[m + 1]).map(move |_| m));
+                motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
+            };
+            let portions = self.portions(arms, &places, &places, None);
+            return SolvedTargets { first: self.first, portions, ways: Vec::new() };
+        }
+        let as_is = self.sides(arms, None);
+        let before = self.places(arms, &as_is, &load);
+        let mut sides = as_is;
+        let mut places = before.clone();
+        let mut portions = self.portions(arms, &before, &places, None);
+        for round in 1..=ROUNDS {
+            let mut next = self.sides(arms, Some(&portions));
+            if round == ROUNDS {
+                // What still goes to and fro is not known.
+                for (next, last) in next.iter_mut().zip(&sides) {
+                    next.agree(last);
+                }
+            }
+            sides = next;
+            let new = self.places(arms, &sides, &load);
+            if new == places {
+                break;
+            }
+            let stale: Vec<bool> = (0..count)
+                .step_by(PORTION)
+                .map(|begin| {
+                    let targets = self.targets(begin);
+                    new[targets.clone()] != places[targets]
+                })
+                .collect();
+            places = new;
+            let fresh = self.portions(arms, &before, &places, Some(&stale));
+            for ((portion, fresh), stale) in portions.iter_mut().zip(fresh).zip(stale) {
+                if stale {
+                    *portion = fresh;
+                }
+            }
+        }
+        let ways = sides.iter().enumerate().map(|(m, course)| {
+            let mut later =
+                course.turns.iter().map(|(share, sides)| (*share, arms.acting.place(*sides, load(m))));
+            let first = later.next().map(|turn| turn.1);
+            let later: Vec<(f64, usize)> = later.collect();
+            Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
+        });
+        let ways = ways.collect();
+        SolvedTargets { first: self.first, portions, ways }
+    }
+
+    /// The targets of the portion that begins with a motion.
+    fn targets(&self, begin: usize) -> std::ops::Range<usize> {
+        self.first[begin]..self.first[(begin + PORTION).min(self.listing.motions.len())]
+    }
+
+    /// All targets, `before` under the conditions of the program as it is, or those portions that are `stale`.
+    fn portions(
+        &self,
+        arms: &Arms<'_>,
+        before: &[usize],
+        places: &[usize],
+        stale: Option<&[bool]>,
+    ) -> Vec<Vec<Result<Solved, Why>>> {
+        (0..self.listing.motions.len())
+            .into_par_iter()
+            .step_by(PORTION)
+            .map(|begin| {
+                if stale.is_some_and(|stale| !stale[begin / PORTION]) {
+                    return Vec::new();
+                }
+                let targets = self.targets(begin);
+                let places = [&before[targets.clone()], &places[targets.clone()]];
+                let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
+                finish(asked, starts, places, arms, self.mountings, self.options)
+            })
+            .collect()
+    }
+
+    /// The sides along the program: as it is, or as rewritten.
+    fn sides(&self, arms: &Arms<'_>, solved: Option<&[Vec<Result<Solved, Why>>]>) -> Vec<Course> {
+        let motions = &self.listing.motions;
+        let stop = |m: usize| {
+            let motion = &motions[m];
+            if motion.kind == MotionKind::External {
+                return Stop::Stays;
+            }
+            let rewritten = solved.filter(|_| may_change(motion, self.options));
+            let begin = self.first[m / PORTION * PORTION];
+            // What the controller is told, and the joints there.
+            let at = |target: usize| match rewritten {
+                Some(portions) => match portions[m / PORTION].get(target - begin)? {
+                    Ok(solved) => Some((solved.mounted, solved.told, solved.after)),
+                    // A target that is refused stays as it is.
+                    Err(_) => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
+                },
+                None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
+            };
+            let targets = self.first[m]..self.first[m + 1];
+            let role = |target: &usize| self.asked[*target].target.role;
+            let Some((mounted, told, joints)) =
+                targets.clone().rev().find(|t| role(t) == Role::To).and_then(at)
+            else {
+                return Stop::Lost;
+            };
+            let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
+            Stop::At(Reached { kind: motion.kind, mounted, told, joints, via })
+        };
+        let stops: Vec<Stop> = (0..motions.len()).map(stop).collect();
+        let before: Vec<Option<u32>> = motions.iter().map(|m| m.previous).collect();
+        courses(&stops, &before, &arms.nominal, &|mounted| self.mountings.list[mounted].told)
+    }
+
+    /// The condition of each target.
+    fn places<'l>(
+        &self,
+        arms: &mut Arms<'_>,
+        sides: &[Course],
+        load: &dyn Fn(usize) -> Option<&'l Load>,
+    ) -> Vec<usize> {
+        let mut out = Vec::with_capacity(self.asked.len());
+        for (m, course) in sides.iter().enumerate() {
+            for target in self.first[m]..self.first[m + 1] {
+                let sides: Sides = match self.asked[target].target.role {
+                    // Somewhere on the arc: half way is near enough for a point that is passed, not reached.
+                    Role::Via => course.at(0.5),
+                    Role::To => course.end,
+                };
+                out.push(arms.acting.place(sides, load(m)));
+            }
+        }
+        out
+    }
 }
 
 // ---- the program as it is ----
@@ -292,11 +469,12 @@ fn start(
 fn finish(
     asked: &[Asked<'_>],
     starts: &[Result<Start, Why>],
+    places: [&[usize]; 2],
     arms: &Arms<'_>,
     mountings: &Mountings,
     options: &Options,
 ) -> Vec<Result<Solved, Why>> {
-    let (nominal, acting) = (arms.nominal.arm(), arms.estimated.arm());
+    let (nominal, acting) = (arms.nominal.arm(), &arms.acting);
     let mut out: Vec<Result<Solved, Why>> = Vec::with_capacity(asked.len());
     // What is still on its way, and where in `out` it belongs.
     let mut open: Vec<(usize, Start)> = Vec::with_capacity(asked.len());
@@ -310,16 +488,21 @@ fn finish(
     let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
     let real = |start: &Start| &mountings.list[start.mounted].real;
     let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
-    let reached_before = acting.forward_many(&before);
+    let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
+    let reached_before = acting.forward(&places_before, &before);
     let conf_before = arms.nominal.configurations(&before);
     // Joints that reach what was meant.
-    let solutions = arms.estimated.solve_seeded(&flanges, &before);
+    let solutions = acting.each(&places, |place, items| match items {
+        None => acting.inverse(place).solve_seeded(&flanges, &before),
+        Some(items) => acting.inverse(place).solve_seeded(&picked(&flanges, items), &picked(&before, items)),
+    });
     let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
         match solution {
             Ok(solution) => way.push(OnItsWay {
                 index: *index,
                 start: *start,
+                place: places[k],
                 flange: flanges[k],
                 after: solution.joints,
                 singularity: solution.singularity,
@@ -362,7 +545,8 @@ fn finish(
             _ => w.after,
         });
     }
-    let reached_after = acting.forward_many(&last);
+    let places: Vec<usize> = way.iter().map(|w| w.place).collect();
+    let reached_after = acting.forward(&places, &last);
     let conf = arms.nominal.configurations(&after);
     let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
     let sigmas = match arms.knowledge {
@@ -376,7 +560,10 @@ fn finish(
                     carried: mountings.list[w.start.mounted].carried.as_ref(),
                 })
                 .collect();
-            knowledge.position_sigmas_mm(acting, &points)
+            acting.each(&places, |place, items| match items {
+                None => knowledge.position_sigmas_mm(acting.arm(place), &points),
+                Some(items) => knowledge.position_sigmas_mm(acting.arm(place), &picked(&points, items)),
+            })
         }
         None => vec![0.0; way.len()],
     };
@@ -388,6 +575,7 @@ fn finish(
         let real = real(&w.start);
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
+        let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
         out[w.index] = Ok(Solved {
             mounted: w.start.mounted,
             meant,
@@ -398,7 +586,9 @@ fn finish(
             conf: conf[k],
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
-            sigma_mm: sigmas[k],
+            sigma_mm: sigmas[k].hypot(in_play_mm),
+            in_play_mm,
+            place: w.place,
             outside: arms.knowledge.and_then(|knowledge| knowledge.region.outside(&w.after)),
             singularity: w.singularity,
         });
@@ -410,6 +600,7 @@ fn finish(
 struct OnItsWay {
     index: usize,
     start: Start,
+    place: usize,
     flange: Pose,
     after: Joints,
     singularity: f64,

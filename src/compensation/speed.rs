@@ -5,7 +5,7 @@
 //! at the ends are not looked at: a motion that is flagged here is slowed down or stopped by the controller.
 //! Checked against: the analytic joint speed of a circle about axis 1.
 
-use super::course::Course;
+use super::curve::Curve;
 use super::rewrite::Arms;
 use super::segment::Ends;
 use crate::program::motion::SpeedValue;
@@ -15,7 +15,7 @@ use crate::program::motion::SpeedValue;
 pub(super) fn fastest(
     from: &Ends<'_>,
     to: &Ends<'_>,
-    course: &Course,
+    course: &Curve,
     speed: &SpeedValue,
     arms: &Arms<'_>,
 ) -> Option<(usize, f64)> {

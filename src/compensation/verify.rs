@@ -1,21 +1,33 @@
 //! Running a program on an arm that is not the controller's: what the tool does, against what was meant.
 //!
 //! The controller computes joints with the nominal arm; the acting arm (estimated, or a simulated actual one) goes
-//! where those joints take it. Intended poses come from the original program.
+//! where those joints take it, from the sides from which they come. Intended poses come from the original program.
 
 use nalgebra::{Point3, Vector3};
 
 use super::cell::Cell;
+use super::course::{Reached, Stop, courses};
 use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use super::mountings::Mountings;
+use super::payload::Loads;
 use super::rewrite::{Arms, configured, monitored};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{Carried, Estimated};
 use crate::kinematics::model::{Joints, Model};
 use crate::math::se3::Pose;
-use crate::program::motion::{Listing, MotionKind, Reason, TargetValue};
+use crate::program::motion::{Listing, MotionKind, Reason, Role, TargetValue};
 use crate::surface::Surface;
+
+/// Where the controller sends the arm at the end of a motion.
+#[derive(Debug, Clone)]
+struct Sent {
+    motion: usize,
+    mounted: usize,
+    /// Told pose in the work object.
+    told: Pose,
+    joints: Joints,
+}
 
 /// One end of a motion, run.
 #[derive(Debug, Clone)]
@@ -29,6 +41,8 @@ struct Run {
     base_from_object: Pose,
     flange_from_tool: Pose,
     carried: Option<Carried>,
+    /// The condition under which the arm came there.
+    place: usize,
 }
 
 /// The arm that runs a program.
@@ -61,16 +75,17 @@ pub struct Judged<'a> {
     pub name: &'a str,
     /// What "after" means.
     pub after: After,
+    /// What the two programs say that the arm carries; absent where the payload of the condition counts throughout.
+    pub loads: [Option<&'a Loads>; 2],
 }
 
 /// Runs a program on an arm.
 pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
     let mut arms = Arms::simulated(acting.nominal, acting.model, &acting.condition);
     arms.knowledge = acting.knowledge;
-    let before = run(task.original, &arms, task.cell);
-    let after = task.rewritten.map(|listing| (listing, run(listing, &arms, task.cell)));
+    let before = run(task.original, task.loads[0], &mut arms, task.cell);
+    let after = task.rewritten.map(|listing| (listing, run(listing, task.loads[1], &mut arms, task.cell)));
     let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
-    let posed = acting.model.under(&acting.condition);
     let points = before
         .iter()
         .enumerate()
@@ -85,7 +100,7 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
                 _ => None,
             };
-            let joints = second.map_or(first.joints, |s| s.joints);
+            let (joints, place) = second.map_or((first.joints, first.place), |s| (s.joints, s.place));
             let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
             PathPoint {
                 index,
@@ -102,7 +117,9 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                 before: Some(deviation(&first.reached)),
                 after: second.map(|s| deviation(&s.reached)),
                 sigma_mm: acting.knowledge.map(|k| {
-                    k.position_sigma_mm(&posed, &joints, &first.flange_from_tool, first.carried.as_ref())
+                    let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
+                    let known = k.position_sigma_mm(arms.acting.arm(place), &joints, tool, carried);
+                    known.hypot(arms.acting.in_play_mm(place, &joints, tool))
                 }),
                 outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
@@ -122,58 +139,102 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
 /// A point nearer to the surface than this is a cut (mm).
 const ON_SURFACE_MM: f64 = 0.5;
 
-fn run(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Vec<Run> {
+fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<Run> {
     let mountings = Mountings::of(listing, arms, cell);
-    let mut out: Vec<Run> = Vec::new();
+    let mut sent: Vec<Sent> = Vec::new();
     let mut near: Option<Joints> = None;
     for (index, motion) in listing.motions.iter().enumerate() {
         if motion.left.is_some() {
             continue;
         }
-        if let Ok(run) = run_motion(index, listing, arms, &mountings, near.as_ref()) {
-            near = Some(run.joints);
-            out.push(run);
+        if let Ok(there) = send(index, listing, arms, &mountings, near.as_ref()) {
+            near = Some(there.joints);
+            sent.push(there);
         }
     }
-    out
+    let places = places(listing, loads, &sent, arms, &mountings);
+    let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
+    let flanges = arms.acting.forward(&places, &joints);
+    sent.into_iter()
+        .zip(flanges)
+        .zip(places)
+        .map(|((sent, flange), place)| {
+            let mounted = &mountings.list[sent.mounted];
+            Run {
+                motion: sent.motion,
+                told: sent.told,
+                joints: sent.joints,
+                reached: mounted.real.target_of(&flange),
+                base_from_object: mounted.real.base_from_object(&flange),
+                flange_from_tool: mounted.real.flange_from_tool(&flange),
+                carried: mounted.carried.clone(),
+                place,
+            }
+        })
+        .collect()
 }
 
-fn run_motion(
+/// The condition under which the arm comes to each end.
+fn places(
+    listing: &Listing,
+    loads: Option<&Loads>,
+    sent: &[Sent],
+    arms: &mut Arms<'_>,
+    mountings: &Mountings,
+) -> Vec<usize> {
+    let loads = arms.loads(listing, loads);
+    let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
+    if !arms.acting.has_play() {
+        return sent.iter().map(|s| arms.acting.place([0; 6], load(s.motion))).collect();
+    }
+    let mut stops: Vec<Stop> = listing
+        .motions
+        .iter()
+        .map(|m| if m.kind == MotionKind::External { Stop::Stays } else { Stop::Lost })
+        .collect();
+    for there in sent {
+        let motion = &listing.motions[there.motion];
+        let via = motion.targets.iter().find(|target| target.role == Role::Via);
+        stops[there.motion] = Stop::At(Reached {
+            kind: motion.kind,
+            mounted: there.mounted,
+            told: there.told,
+            joints: there.joints,
+            via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
+        });
+    }
+    let before: Vec<Option<u32>> = listing.motions.iter().map(|m| m.previous).collect();
+    let courses = courses(&stops, &before, &arms.nominal, &|mounted| mountings.list[mounted].told);
+    sent.iter().map(|s| arms.acting.place(courses[s.motion].end, load(s.motion))).collect()
+}
+
+fn send(
     index: usize,
     listing: &Listing,
     arms: &Arms<'_>,
     mountings: &Mountings,
     near: Option<&Joints>,
-) -> Result<Run, Why> {
+) -> Result<Sent, Why> {
     let motion = &listing.motions[index];
     let target = motion.to().ok_or(Why::Program(Reason::ExternalOnly))?;
     let value = target.value.map_err(Why::Program)?;
     let mounted = mountings.of_motion(motion).ok_or(Why::Program(Reason::ToolUnknown))?;
-    let mounted = &mountings.list[mounted];
+    let mounting = &mountings.list[mounted].told;
     let (told, joints) = match value {
         TargetValue::Cartesian(t) => {
             if let Some(why) = mountings.moving_base(&t) {
                 return Err(why);
             }
             let told = t.pose();
-            let flange = mounted.told.flange_for(&told);
+            let flange = mounting.flange_for(&told);
             (told, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
-            (mounted.told.target_of(&arms.nominal.arm().forward(&joints)), joints)
+            (mounting.target_of(&arms.nominal.arm().forward(&joints)), joints)
         }
     };
-    let flange = arms.estimated.arm().forward(&joints);
-    Ok(Run {
-        motion: index,
-        told,
-        joints,
-        reached: mounted.real.target_of(&flange),
-        base_from_object: mounted.real.base_from_object(&flange),
-        flange_from_tool: mounted.real.flange_from_tool(&flange),
-        carried: mounted.carried.clone(),
-    })
+    Ok(Sent { motion: index, mounted, told, joints })
 }
 
 /// The rewritten run that belongs to each original one: the same number means one to one; where targets were put in,

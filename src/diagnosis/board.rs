@@ -12,7 +12,7 @@ use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::{Design, Linear, Projected, Whole};
 use super::extension::{Extended, Subject};
-use super::intervals::Strip;
+use super::intervals::{self, Strip};
 use super::lines;
 use super::score::{score, score_projected};
 use super::selection::{Catalogue, Scored};
@@ -105,14 +105,13 @@ impl<'a> Board<'a> {
     /// Shifts between rows that are found, lines of orders that are found, and maps where lines stand out.
     fn add_open(&self, design: &Design, out: &mut Vec<Scored>) {
         let dataset = &self.subject.observed.dataset;
-        let n = dataset.rows.len();
-        let tried = (n as f64).max(2.0) * (n as f64).max(3.0).ln();
+        let tried = intervals::tried(dataset.rows.len() as f64);
         let found: Vec<Candidate> = self
             .shifts
             .par_iter()
             .flat_map_iter(|shift| {
-                let intervals = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
-                intervals.into_iter().map(|interval| {
+                let found = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
+                found.into_iter().map(|interval| {
                     let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
                     let disturbance = Disturbance::new(shift.kind.clone(), Course::Rows { from, to });
                     let candidate = Candidate::measurement(disturbance, dataset, self.subject.nominal);

@@ -24,6 +24,7 @@ use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
 };
 use crate::identification::network::with_network;
+use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
 use crate::kinematics::model::Model;
@@ -106,9 +107,10 @@ pub fn diagnose(
     let needed = scarce(dataset, nominal_arm);
     if let Some(needed) = needed {
         notes.push(format!(
-            "{} rows are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
+            "{} rows at {} different poses are too few to tell effects from geometry: at least {needed} poses are needed, some hundred are \
              usual; what is said here rests on the priors",
-            dataset.rows.len()
+            dataset.rows.len(),
+            different_poses(dataset, usize::MAX)
         ));
     }
     let registered = nominal(&subject);
@@ -161,7 +163,7 @@ pub fn diagnose(
         let without = |subject: &Subject<'_>, fitted: &Extended| {
             let mut causes = fitted.causes.clone();
             causes.remove(weakest);
-            fit(subject, &causes, Freedom::All, Some(&selection::near(fitted, weakest)))
+            fit(subject, &causes, Freedom::All, Some(fitted))
         };
         extended = without(&subject, &extended);
         found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
@@ -286,7 +288,9 @@ fn weakest(found: &Extended, accepted: &[Accepted]) -> Option<usize> {
 
 /// The extended model with a smooth correction spread over its poses: a network of bumps on the first three joints.
 fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
-    let options = crate::estimation::network::rbf::Options::default();
+    // Ten poses for each centre, so that the weights are seen.
+    let centres = (subject.observed.dataset.rows.len() / 10).clamp(12, 60);
+    let options = crate::estimation::network::rbf::Options { centres, ..Default::default() };
     let mut causes = extended.causes.clone();
     let spread = with_network(subject.nominal, &subject.observed.dataset, &options);
     causes.extend(spread.effects.last().cloned().map(Cause::Arm));
@@ -340,7 +344,7 @@ fn scarce(dataset: &Dataset, nominal: &Model) -> Option<usize> {
     };
     let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
     let needed = (3 * parameters).div_ceil(2 * per) + 10;
-    (dataset.rows.len() < needed).then_some(needed)
+    (different_poses(dataset, needed) < needed).then_some(needed)
 }
 
 fn stage(errors: &StageError) -> Stage {

@@ -77,28 +77,42 @@ const BEND: f64 = 2.0;
 /// At most this many rounds of solver and weights: from scratch, and from a fit nearby.
 const ROUNDS: [usize; 2] = [8, 4];
 
-/// The start of a fit: nominal arm and frames with the causes at size 0, and what is free.
-fn start(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom) -> (Model, Frames, Vec<Parameter>) {
+/// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have.
+fn start(
+    subject: &Subject<'_>,
+    causes: &[Cause],
+    freedom: Freedom,
+) -> (Model, Frames, Vec<(Parameter, Option<f64>)>) {
     let (mut model, mut frames) = (subject.nominal.clone(), subject.frames.clone());
-    let mut links = if freedom == Freedom::All { link_parameters(&model) } else { Vec::new() };
-    let mut sensing = frame_parameters(&subject.observed.dataset);
+    let links = if freedom == Freedom::All { link_parameters(&model) } else { Vec::new() };
+    let mut links: Vec<_> = links.into_iter().map(|p| (p, None)).collect();
+    let mut sensing: Vec<_> =
+        frame_parameters(&subject.observed.dataset).into_iter().map(|p| (p, None)).collect();
     for cause in causes {
         match cause {
             Cause::Arm(effect) => {
                 let mut effect = effect.clone();
-                let count = effect.parameters().len();
-                (0..count).for_each(|k| effect.set(k, 0.0));
                 let index = model.effects.len();
+                let values = effect.parameters();
+                links.extend(
+                    values
+                        .iter()
+                        .enumerate()
+                        .map(|(parameter, p)| (Parameter::Effect { index, parameter }, Some(p.value))),
+                );
+                (0..values.len()).for_each(|k| effect.set(k, 0.0));
                 model.effects.push(effect);
-                links.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
             }
             Cause::Measurement(disturbance) => {
                 let mut disturbance = disturbance.clone();
-                disturbance.values.iter_mut().for_each(|v| *v = 0.0);
                 let index = frames.disturbances.len();
-                let count = disturbance.values.len();
+                sensing.extend(
+                    disturbance.values.iter().enumerate().map(|(parameter, value)| {
+                        (Parameter::Disturbance { index, parameter }, Some(*value))
+                    }),
+                );
+                disturbance.values.iter_mut().for_each(|v| *v = 0.0);
                 frames.disturbances.push(disturbance);
-                sensing.extend((0..count).map(|parameter| Parameter::Disturbance { index, parameter }));
             }
         }
     }
@@ -106,12 +120,11 @@ fn start(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom) -> (Model, F
     (model, frames, links)
 }
 
-/// Values of `x` carried over from another fit by parameter.
-fn carried(parameters: &[Parameter], from: &Extended) -> Vec<f64> {
-    parameters
-        .iter()
-        .map(|p| from.parameters.iter().position(|q| q == p).map_or(0.0, |k| from.x[k]))
-        .collect()
+/// Where a parameter starts: at the size that its cause has, or where links and frames were in another fit.
+fn starting((parameter, size): &(Parameter, Option<f64>), near: Option<&Extended>) -> f64 {
+    size.unwrap_or_else(|| {
+        near.and_then(|e| e.parameters.iter().position(|q| q == parameter).map(|k| e.x[k])).unwrap_or(0.0)
+    })
 }
 
 /// Scalars of one observation: lengths, angles.
@@ -132,26 +145,25 @@ fn median_size(k: usize) -> f64 {
     }
 }
 
-/// Fits the nominal arm extended by `causes` robustly. `near` gives starting values: causes must come in the same order.
+/// Fits the nominal arm extended by `causes` robustly, from the sizes that the causes have. `near` gives starting values of
+/// links and frames, and of the noise.
 pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
     let observed = subject.observed;
     let dataset = &observed.dataset;
-    let (start_model, start_frames, parameters) = start(subject, causes, freedom);
+    let (start_model, start_frames, free) = start(subject, causes, freedom);
+    let mut x: Vec<f64> = free.iter().map(|p| starting(p, near)).collect();
+    let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
     let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
     let n = dataset.rows.len();
     let (lengths, angles) = components(dataset.sensor);
     let per = lengths + angles;
-    let mut x = near.map_or_else(|| vec![0.0; parameters.len()], |e| carried(&parameters, e));
     let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
     let mut trust = near.filter(|e| e.trust.len() == n).map_or_else(|| vec![1.0; n], |e| e.trust.clone());
-    let (mut model, mut frames) = match near {
-        Some(e) => (e.model.clone(), e.frames.clone()),
-        None => (start_model.clone(), start_frames.clone()),
-    };
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
     let plain_task =
         Calibration::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
+    let (mut model, mut frames) = plain_task.apply(&x);
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);

@@ -28,6 +28,11 @@ pub struct Interval {
 /// Shortest interval: fewer rows are outliers, not a shift.
 pub const SHORTEST: usize = 4;
 
+/// Intervals among n rows that are told apart, for the price of having looked for the best.
+pub fn tried(n: f64) -> f64 {
+    n.max(2.0) * n.max(3.0).ln()
+}
+
 /// Starts and ends on the coarse grid.
 const GRID: usize = 96;
 

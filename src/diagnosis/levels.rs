@@ -7,7 +7,7 @@
 
 use super::cause::Cause;
 use super::extension::Extended;
-use super::intervals::SHORTEST;
+use super::intervals::{SHORTEST, tried};
 use crate::estimation::problem::Problem;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
@@ -15,7 +15,8 @@ use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 /// A piece whose level is below this share of the largest comes to nothing.
 const NOTHING: f64 = 0.25;
 
-/// How much worse the levels may fit, in χ² with ln n for each parameter: they are the plainer story.
+/// How much worse the levels may fit, in χ² with ln n for each parameter and the ends that were tried: they are the plainer
+/// story.
 const PLAINER: f64 = 4.0;
 
 /// A shift and its rows.
@@ -123,7 +124,10 @@ pub fn as_good(told: &Extended, before: &Extended) -> bool {
                 trust * square
             })
             .sum();
-        rows + fit.parameters.len() as f64 * (plain.len() as f64).ln()
+        let n = (plain.len() / per.max(1)) as f64;
+        let shifts = fit.causes.iter().filter(|c| shift(c).is_some()).count() as f64;
+        // The ends of a shift were looked for among all rows.
+        rows + fit.parameters.len() as f64 * (plain.len() as f64).ln() + shifts * 2.0 * tried(n).ln()
     };
     criterion(told) <= criterion(before) + PLAINER
 }

@@ -356,44 +356,6 @@ fn already(causes: &[Cause], candidate: &Cause) -> bool {
     })
 }
 
-/// A fit to start from when cause `index` goes: its parameters are taken out, so that the others keep their values.
-pub(super) fn near(current: &Extended, index: usize) -> Extended {
-    use crate::kinematics::parameter::Parameter;
-    let gone = current.places(index);
-    let arm = matches!(current.causes[index], Cause::Arm(_));
-    let removed = gone.first().map(|&k| current.parameters[k]);
-    let mut out = current.clone();
-    let keep = |k: &usize| !gone.contains(k);
-    let places: Vec<usize> = (0..current.parameters.len()).filter(keep).collect();
-    out.x = places.iter().map(|&k| current.x[k]).collect();
-    out.parameters = places
-        .iter()
-        .map(|&k| match (current.parameters[k], removed) {
-            (Parameter::Effect { index, parameter }, Some(Parameter::Effect { index: g, .. }))
-                if arm && index > g =>
-            {
-                Parameter::Effect { index: index - 1, parameter }
-            }
-            (Parameter::Disturbance { index, parameter }, Some(Parameter::Disturbance { index: g, .. }))
-                if !arm && index > g =>
-            {
-                Parameter::Disturbance { index: index - 1, parameter }
-            }
-            (other, _) => other,
-        })
-        .collect();
-    match removed {
-        Some(Parameter::Effect { index, .. }) => {
-            out.model.effects.remove(index);
-        }
-        Some(Parameter::Disturbance { index, .. }) => {
-            out.frames.disturbances.remove(index);
-        }
-        _ => {}
-    }
-    out
-}
-
 /// A cause must be better than another by this much merit to take its place.
 const EXCHANGE: f64 = 2.0;
 
@@ -425,7 +387,7 @@ fn review(board: &Board<'_>, options: &Options, which: &[usize], quick: bool) ->
             best.filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
         let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
         if better.is_some() || !carries {
-            let reduced = fit(subject, &others, Freedom::All, Some(&near(current, index)));
+            let reduced = fit(subject, &others, Freedom::All, Some(current));
             return Review::Changed(Box::new(match better {
                 Some(better) => {
                     others.push(better.candidate.cause.clone());

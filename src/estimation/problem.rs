@@ -80,6 +80,11 @@ pub trait Problem: Sync {
         &[]
     }
 
+    /// The same task with `observations` alone, by their index; `None` where that is not offered.
+    fn thinned(&self, _observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+        None
+    }
+
     /// ½ Σ r² over all rows at `x`, without priors.
     fn row_cost(&self, x: &[f64]) -> f64 {
         let parts = map_chunks(self, |rows| {

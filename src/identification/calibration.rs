@@ -269,6 +269,18 @@ impl Problem for Calibration {
         &self.priors
     }
 
+    fn thinned(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+        Some(Box::new(Self {
+            start: self.start.clone(),
+            frames: self.frames.clone(),
+            sensor: self.sensor,
+            parameters: self.parameters.clone(),
+            priors: self.priors.clone(),
+            columns: self.columns.subset(observations),
+            rows: observations.len(),
+        }))
+    }
+
     fn row_cost(&self, x: &[f64]) -> f64 {
         let state = kernel::State::of(self, x);
         let c = self.components();
@@ -367,6 +379,43 @@ impl Calibration {
 }
 
 impl Columns {
+    /// The rows at `rows`, padded as all are.
+    fn subset(&self, rows: &[usize]) -> Self {
+        let n = rows.len();
+        let padded = n.div_ceil(WIDTH) * WIDTH;
+        let row = |i: usize| rows[i.min(n.saturating_sub(1))];
+        let picked = |all: &[f64]| -> Vec<f64> {
+            if all.is_empty() || n == 0 { Vec::new() } else { (0..padded).map(|i| all[row(i)]).collect() }
+        };
+        let weights = |all: &[f64]| -> Vec<f64> {
+            (0..padded).map(|i| if i < n { all[row(i)] } else { 0.0 }).collect()
+        };
+        if n == 0 {
+            return Self::default();
+        }
+        Self {
+            sin: std::array::from_fn(|j| picked(&self.sin[j])),
+            cos: std::array::from_fn(|j| picked(&self.cos[j])),
+            reading: self.reading.iter().map(|column| picked(column)).collect(),
+            per_mm: weights(&self.per_mm),
+            per_rad: weights(&self.per_rad),
+            anchor: (0..padded).map(|i| self.anchor[row(i)]).collect(),
+            extra: self.extra.as_ref().map(|extra| std::array::from_fn(|j| picked(&extra[j]))),
+            growth: picked(&self.growth),
+            effects: self
+                .effects
+                .iter()
+                .map(|effect| EffectColumns {
+                    place: effect.place,
+                    rotation: std::array::from_fn(|j| effect.rotation[j].as_deref().map(&picked)),
+                    growth: effect.growth.as_deref().map(&picked),
+                })
+                .collect(),
+            effect_at: self.effect_at.clone(),
+            courses: self.courses.iter().map(|course| picked(course)).collect(),
+        }
+    }
+
     fn of(
         dataset: &Dataset,
         start: &Model,

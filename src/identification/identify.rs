@@ -11,6 +11,7 @@ use crate::identification::fit::{
 use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{NotSharpened, Sharpening, logged_covariance, sharpen};
 use crate::identification::solver::{Family, Solver};
+use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{
@@ -49,14 +50,16 @@ pub struct Options {
 pub enum IdentifyError {
     /// Fewer scalar readings than parameters.
     #[error(
-        "{file}: {rows} rows give {scalars} readings after {held_out} are held out, for {parameters} parameters: \
-         measure at least {needed} poses (some hundred are usual)"
+        "{file}: {rows} rows at {poses} different poses of the arm give {scalars} readings that count after {held_out} are \
+         held out, for {parameters} parameters: measure at least {needed} poses (some hundred are usual)"
     )]
     TooFewRows {
         /// File.
         file: String,
         /// Rows there are.
         rows: usize,
+        /// Different poses among them: a reading taken again tells nothing new of the arm.
+        poses: usize,
         /// Scalar readings left for the fit.
         scalars: usize,
         /// Rows held out.
@@ -69,8 +72,8 @@ pub enum IdentifyError {
     /// Frames alone leave an error that no arm has.
     #[error(
         "{file}: with the frames fitted, robot {robot} still misses the readings by {rmse_mm:.1} mm RMS; no arm is that far \
-         from its data sheet: check that --robot is the arm that was measured, that lengths are mm and angles are \
-         degrees, and try --angles dh"
+         from its data sheet: check that --robot is the arm that was measured, that no two columns changed places, that \
+         lengths are mm and angles are degrees, and try --angles dh"
     )]
     WrongArm {
         /// File.
@@ -270,15 +273,17 @@ fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), Ident
         Sensor::Pose => 6,
     };
     let rows = dataset.rows.len();
-    let held = (rows as f64 * held_out).round() as usize;
-    let scalars = (rows - held.min(rows)) * per;
+    let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
+    let poses = different_poses(dataset, 2 * needed);
+    let held = (poses as f64 * held_out).round() as usize;
+    let scalars = (poses - held.min(poses)) * per;
     if scalars > parameters {
         return Ok(());
     }
-    let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
     Err(IdentifyError::TooFewRows {
         file: dataset.file.clone(),
         rows,
+        poses,
         scalars,
         held_out: held,
         parameters,

@@ -1,5 +1,7 @@
 //! Where a fit starts: sensor frame, outlet and touched point from closed forms under the nominal arm.
 
+use std::collections::HashSet;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use thiserror::Error;
 
@@ -13,14 +15,16 @@ use crate::measurement::registration;
 /// The rows do not place the sensor.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "{file}: the {rows} rows do not tell where the {what} is: measure at least {needed} poses that are not all in one \
-     line and turn the wrist between them"
+    "{file}: the {rows} rows, at {poses} different poses of the arm, do not tell where the {what} is: measure at least \
+     {needed} poses that are not all in one line and turn the wrist between them"
 )]
 pub struct NoStart {
     /// File.
     pub file: String,
     /// Rows.
     pub rows: usize,
+    /// Different poses among them.
+    pub poses: usize,
     /// Outlet or frame.
     pub what: &'static str,
     /// Least number of poses.
@@ -32,7 +36,18 @@ pub struct NoStart {
 /// # Errors
 /// [`NoStart`] when the rows do not determine them.
 pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart> {
-    let none = |what, needed| NoStart { file: dataset.file.clone(), rows: dataset.rows.len(), what, needed };
+    let none = |what, needed| {
+        let poses = different_poses(dataset, usize::MAX);
+        NoStart { file: dataset.file.clone(), rows: dataset.rows.len(), poses, what, needed }
+    };
+    let (what, needed) = match dataset.sensor {
+        Sensor::Cable => ("cable outlet", 4),
+        Sensor::Position => ("sensor frame", 4),
+        Sensor::Pose => ("sensor frame", 3),
+    };
+    if different_poses(dataset, needed) < needed {
+        return Err(none(what, needed));
+    }
     let posed = nominal.under(&Condition::default());
     let flanges: Vec<Pose> = dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect();
     let mut frames = Frames::at_origin(dataset.anchors());
@@ -82,6 +97,19 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart
             Ok(vec![frames])
         }
     }
+}
+
+/// How many rows differ in their joint angles or their cable; counted up to `enough`.
+pub fn different_poses(dataset: &Dataset, enough: usize) -> usize {
+    let mut met = HashSet::new();
+    for row in &dataset.rows {
+        let angles: [i64; 6] = std::array::from_fn(|j| (row.joints[j] * 1e6).round() as i64);
+        met.insert((angles, row.anchor));
+        if met.len() >= enough {
+            break;
+        }
+    }
+    met.len()
 }
 
 fn positions(dataset: &Dataset) -> Vec<Vector3<f64>> {

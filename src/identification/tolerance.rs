@@ -97,12 +97,14 @@ impl Tolerance {
 
 /// Sizes that effects have on real arms, as wide priors.
 pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
+    // The gears of a wrist are smaller and yield ten times as much.
+    let soft = |joint: usize| if joint < 3 { 1.0 } else { 10.0 };
     match effect {
-        Effect::JointCompliance(_) => 1e-4,
+        Effect::JointCompliance(compliance) => 1e-4 * soft(compliance.joint),
         // A compliance of 1e-5 rad/(N m) times 30 kg, and for a link's first moment times some 0.3 kg m.
         Effect::LumpedCompliance(load) => match load.lump.get(parameter) {
-            Some(lump) if lump.moment.is_some() => 3e-6,
-            _ => 3e-4,
+            Some(lump) if lump.moment.is_some() => 3e-6 * soft(load.joint),
+            _ => 3e-4 * soft(load.joint),
         },
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
         // The same curve over more knots, each of them smaller.

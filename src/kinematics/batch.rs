@@ -114,7 +114,7 @@ impl Posed<'_> {
     }
 
     /// The last frame of eight rows.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn end_lanes(&self, joints: &JointColumns, from: usize) -> End<Lanes> {
         let zero = Lanes::splat(0.0);
         let mut angle = [zero; 6];

@@ -77,13 +77,13 @@ fn blend<R: Real>(p: R, a: &[R; 3], q: R, b: &[R; 3]) -> [R; 3] {
 }
 
 /// Frames of the chain for joint rotations given by sine and cosine (joint offsets of the links not included).
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Chain<R> {
     scaled_chain(links, sin, cos, R::splat(1.0))
 }
 
 /// Like [`chain`], with all lengths times `scale`, which may differ from row to row (links that grow).
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6], scale: R) -> Chain<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let mut out = Chain {
@@ -106,7 +106,7 @@ pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6],
 }
 
 /// The last frame alone, with the bits of [`chain`].
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let mut end = End { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] };
@@ -127,7 +127,7 @@ pub struct End<R> {
 
 impl<R: Real> End<R> {
     /// Goes on over one link; hands back the x axis after the joint's rotation.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn advance(&mut self, link: &LinkTable, sin: R, cos: R, scale: R) -> [R; 3] {
         let [x, y, z] = self.axes;
         // sin and cos of joint angle plus offset
@@ -155,7 +155,7 @@ impl<R: Real> End<R> {
     }
 
     /// A frame that is fixed to this one, in the base.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn then(&self, fixed: &End<f64>) -> Self {
         let carried = |v: &[f64; 3]| {
             let mut out = [R::splat(0.0); 3];

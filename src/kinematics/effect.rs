@@ -127,7 +127,7 @@ impl Effect {
     }
 
     /// Adds [`Effect::rotation`] for one row or eight in lanes; `torque` from [`Statics::loads`].
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn turn<R: SinCos>(
         &self,
         statics: &Statics,
@@ -151,7 +151,7 @@ impl Effect {
 
     /// Adds the slope times a step of u, for one row or eight in lanes, where that is cheap: the slope of compliance,
     /// some 1e-3, is left out. For Newton's method, which forgives it.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         match self {
             Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
@@ -224,7 +224,7 @@ impl Statics {
     }
 
     /// The torques alone, for one row or eight in lanes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
         let (frames, levers) = self.levers(u, condition);
         let g = self.gravity_newton().map(R::splat);
@@ -242,7 +242,7 @@ impl Statics {
     }
 
     /// The frames at mapped angles `u`.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn frames<R: SinCos>(&self, u: &[R; 6]) -> Chain<R> {
         let zero = R::splat(0.0);
         let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
@@ -253,7 +253,7 @@ impl Statics {
     }
 
     /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
         let zero = R::splat(0.0);
         let frames = self.frames(u);

@@ -152,7 +152,7 @@ pub struct RidingPoint<'a> {
 
 /// Velocities of a point that rides on the last frame at `rides`, for the parameters of links (zero for all others);
 /// hands back the point in the base (mm).
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn link_velocities<R: Real>(
     frames: &Chain<R>,
     rides: &[R; 3],
@@ -183,7 +183,7 @@ fn link_velocities<R: Real>(
 }
 
 /// Σᵢⱼ Cᵢⱼ vᵢ·vⱼ for a symmetric C, given column by column.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
     let n = velocities.len();
     let mut out = R::splat(0.0);

@@ -115,7 +115,7 @@ impl Posed<'_> {
     }
 
     /// All joint frames in the base, for one row or eight in lanes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
         let rotation = self.affected(&self.mapped(q));
         let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
@@ -131,7 +131,7 @@ impl Posed<'_> {
     }
 
     /// Joint angles after the joint map, for one row or eight in lanes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn mapped<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
         let map = &self.model.joint_map;
         let mut out = [R::splat(0.0); 6];
@@ -146,7 +146,7 @@ impl Posed<'_> {
     }
 
     /// DH joint rotations for mapped joint angles: the effects alone, for one row or eight in lanes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn affected<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
         let mut out = *mapped;
         if let Some(statics) = &self.statics {

@@ -67,17 +67,20 @@ impl Real for f64 {
 #[repr(align(64))]
 pub struct Lanes(pub [f64; WIDTH]);
 
+// Plain counting: without optimisation the parts of an iterator would all be on the stack, at every operator.
 macro_rules! lane_operator {
     ($($trait:ident $method:ident $op:tt),*) => {$(
         impl $trait for Lanes {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let mut out = [0.0; WIDTH];
-                for ((o, a), b) in out.iter_mut().zip(self.0).zip(other.0) {
-                    *o = a $op b;
+                let mut out = self;
+                let mut k = 0;
+                while k < WIDTH {
+                    out.0[k] = out.0[k] $op other.0[k];
+                    k += 1;
                 }
-                Self(out)
+                out
             }
         }
     )*};
@@ -183,7 +186,9 @@ impl Lanes {
 /// `#[inline(always)]` to be compiled along with it.
 ///
 /// Products and sums are never fused, so every instruction set gives the same bits; builds with debug assertions
-/// compile one set only, which more than halves their time.
+/// compile one set only, which more than halves their time. There what is large need not be inlined, and is not
+/// (`cfg_attr`): without optimisation every intermediate result of everything that is inlined has a place of its own on
+/// the stack, and all of them together are more than a thread has.
 #[inline]
 pub fn vectorised<T>(kernel: impl FnOnce() -> T) -> T {
     #[cfg(debug_assertions)]
@@ -208,14 +213,14 @@ pub trait SinCos: Real {
 }
 
 impl SinCos for f64 {
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn sin_cos_wide(self) -> (Self, Self) {
         sin_cos_one(self)
     }
 }
 
 impl SinCos for Lanes {
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn sin_cos_wide(self) -> (Self, Self) {
         let (mut s, mut c) = ([0.0; WIDTH], [0.0; WIDTH]);
         for k in 0..WIDTH {
@@ -234,12 +239,12 @@ impl SinCos for Lanes {
 /// Up to here three parts of π/2 leave no error that shows.
 const LARGEST_REDUCED: f64 = 1.0e5;
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn sin_cos_one(x: f64) -> (f64, f64) {
     if x.abs() < LARGEST_REDUCED { sin_cos_reduced(x) } else { x.sin_cos() }
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 #[expect(clippy::excessive_precision, reason = "the constants as fdlibm prints them")]
 fn sin_cos_reduced(x: f64) -> (f64, f64) {
     const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;

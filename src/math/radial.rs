@@ -7,7 +7,7 @@
 use super::lanes::Real;
 
 /// Value of the bump at `u` around `centre`, for one point or eight in lanes.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn bump<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> R {
     let (t, r) = inside(u, centre, reach);
     let square = t * t;
@@ -15,7 +15,7 @@ pub fn bump<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) 
 }
 
 /// Derivative of [`bump`] along `step`.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn slope_along<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64, step: &[R; D]) -> R {
     let (t, _) = inside(u, centre, reach);
     let mut along = R::splat(0.0);
@@ -26,7 +26,7 @@ pub fn slope_along<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach
 }
 
 /// 1 − r, not below 0, and r.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn inside<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> (R, R) {
     let mut square = R::splat(0.0);
     for k in 0..D {

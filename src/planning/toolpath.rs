@@ -92,7 +92,12 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     for start in starts {
         match follow(&inverse, &flanges, start.joints) {
             Ok((singularity, joints)) => {
-                if best.as_ref().is_none_or(|(s, _)| singularity > *s) {
+                let better = best.as_ref().is_none_or(|(s, others)| {
+                    // Turns of one joint are equally far from every singularity.
+                    let same = (singularity - s).abs() <= 1e-6 * s.abs();
+                    if same { wound_up(nominal, &joints) < wound_up(nominal, others) } else { singularity > *s }
+                });
+                if better {
                     best = Some((singularity, joints));
                 }
             }
@@ -114,6 +119,14 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     };
     let draft = draft(file, robot, &points, &joints, &inverse);
     Ok(Toolpath { draft, points, joints, singularity })
+}
+
+/// How far any joint goes from the middle of its range at most (rad): what is wound up least leaves cables and hoses
+/// alone, and stands where arms are measured.
+fn wound_up(nominal: &Model, joints: &[Joints]) -> f64 {
+    let limits = &nominal.limits;
+    let middle = Joints::from_fn(|j, _| 0.5 * (limits.min_rad[j] + limits.max_rad[j]));
+    joints.iter().map(|q| (q - middle).amax()).fold(0.0, f64::max)
 }
 
 fn follow(

@@ -12,7 +12,7 @@ mod degradation;
 
 use serde_json::{Value, json};
 
-use super::document::{Document, Provenance, Source};
+use super::document::{Block, Document, Provenance, Source};
 use super::table::Table;
 use crate::comparison::Results;
 use crate::comparison::experiment::Experiment;
@@ -34,7 +34,7 @@ pub struct Origin {
 
 /// What the terminal shows.
 pub fn summary(experiment: &Experiment, results: &Results) -> Document {
-    let mut page = opening(experiment);
+    let mut page = opening(experiment, results);
     match results {
         Results::Methods(study) => methods::summary(&mut page, study),
         Results::Grinding(result) => grinding::summary(&mut page, result),
@@ -47,7 +47,7 @@ pub fn summary(experiment: &Experiment, results: &Results) -> Document {
 
 /// The page, with pictures.
 pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> Document {
-    let mut page = opening(experiment);
+    let mut page = opening(experiment, results);
     match results {
         Results::Methods(study) => methods::page(&mut page, study),
         Results::Grinding(result) => grinding::page(&mut page, result),
@@ -140,16 +140,20 @@ pub fn list(experiments: &[Experiment]) -> Table {
     table
 }
 
-fn opening(experiment: &Experiment) -> Document {
+fn opening(experiment: &Experiment, results: &Results) -> Document {
     let mut page = Document::new(experiment.title.clone());
     page.subtitle = format!("{}: {}", experiment.paper, experiment.figures.join(", "));
     if !experiment.about.is_empty() {
         page.paragraph(experiment.about.clone());
     }
+    // Methods over cases add what follows from the rows.
+    if !matches!(results, Results::Methods(_)) && !experiment.caveats.is_empty() {
+        page.push(Block::List(caveats(experiment)));
+    }
     page
 }
 
-/// The caveats of an experiment, folded in a page.
+/// The caveats of an experiment.
 pub(super) fn caveats(experiment: &Experiment) -> Vec<String> {
     experiment.caveats.clone()
 }

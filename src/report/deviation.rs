@@ -169,7 +169,7 @@ pub fn flag_table(report: &PathReport) -> Table {
             Column::text("reason", "Reason"),
         ],
     );
-    let kind = |point: &PathPoint| (point.status, point.reason.as_deref().map(without_figures));
+    let kind = |point: &PathPoint| (point.status, point.kind_of_reason());
     for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
         let [first, ..] = run else { continue };
         if first.status == Fate::Changed {
@@ -199,12 +199,6 @@ fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
         std::cmp::Ordering::Equal => Some(low.to_string()),
         std::cmp::Ordering::Greater => None,
     }
-}
-
-/// A reason without its measured figures, which have a decimal point; numbers of joints stay.
-fn without_figures(reason: &str) -> String {
-    let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
-    reason.split(' ').filter(plain).collect::<Vec<_>>().join(" ")
 }
 
 /// The page: one section per program. Reports of one program with several models stand together.

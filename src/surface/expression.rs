@@ -7,7 +7,8 @@
 //! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
 //! rows zero).
 //!
-//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused.
+//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused. exmex goes into
+//! itself once for every term, with some 100 kB each time: it runs on a thread with a stack for the longest text.
 //!
 //! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a
 //! position; hence the grammar in front. `abs(f)` is handed on as √(f²), because exmex has no derivative of it.
@@ -68,6 +69,17 @@ pub struct Expression {
     second: Vec<FlatEx<f64>>,
 }
 
+/// Stack for the longest text (bytes): only what is used takes memory.
+const STACK: usize = 512 << 20;
+
+/// Runs `work` on a thread with much room; `None` where there is no such thread.
+fn on_ample_stack<T: Send>(work: impl FnOnce() -> T + Send) -> Option<T> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
+        thread.ok()?.join().ok()
+    })
+}
+
 impl Expression {
     /// Reads `text` as an expression in `variables` (at most three, in alphabetical order).
     ///
@@ -76,6 +88,18 @@ impl Expression {
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {
         let mut reader = Reader::new(text, variables);
         let written = reader.whole()?.written();
+        on_ample_stack(|| Self::differentiated(text, variables, &written)).unwrap_or_else(|| {
+            Err(ExpressionError {
+                text: text.to_owned(),
+                column: 1,
+                found: "no memory to take its derivatives".to_owned(),
+                expected: "a shorter expression".to_owned(),
+            })
+        })
+    }
+
+    /// `written` is `text` with every pair of parentheses.
+    fn differentiated(text: &str, variables: &[&str], written: &str) -> Result<Self, ExpressionError> {
         // The grammar admits only what exmex knows, so a refusal here names the whole text.
         let refused = |e: exmex::ExError| ExpressionError {
             text: text.to_owned(),
@@ -83,7 +107,7 @@ impl Expression {
             found: format!("something that has no derivative ({e})"),
             expected: "a smooth expression".to_owned(),
         };
-        let value = exmex::parse::<f64>(&written).map_err(refused)?;
+        let value = exmex::parse::<f64>(written).map_err(refused)?;
         let used: Vec<usize> = variables
             .iter()
             .enumerate()

@@ -321,7 +321,7 @@ fn layout(scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<Store, V
     let residuals = !scene.residuals.is_empty();
     let space = if residuals {
         Pane::Column(vec![
-            (8.0, space),
+            (5.0, space),
             (1.0, legend::pane("Colour: size of the residual after the fit [mm]")),
         ])
     } else {

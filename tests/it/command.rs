@@ -183,6 +183,29 @@ fn a_full_disk_leaves_nothing() {
 }
 
 #[test]
+fn a_file_that_does_not_fit_is_not_there_at_all() {
+    // No file may grow beyond some kilobytes, which is what a full disk comes to.
+    if cfg!(not(target_os = "linux")) {
+        return;
+    }
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    fs::write(at.join("model.toml"), "old").unwrap();
+    let command = "trap '' XFSZ; ulimit -f 8; exec \"$0\" identify data.csv --robot abb-irb-120 -o model.toml --csv few.csv";
+    let output = std::process::Command::new("sh")
+        .current_dir(at)
+        .args(["-c", command, env!("CARGO_BIN_EXE_truegrind")])
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(err.contains("model.toml") && err.contains("nothing was changed"), "{err}");
+    assert_eq!(files(at).len(), 2, "neither the other file nor a part of one: {:?}", files(at));
+    assert_eq!(fs::read_to_string(at.join("model.toml")).unwrap(), "old", "what was there stays");
+}
+
+#[test]
 fn wrong_units_are_noticed_and_named() {
     let number = |c: &str| c.parse::<f64>().unwrap();
     let angles = ["q1", "q2", "q3", "q4", "q5", "q6"];
@@ -205,6 +228,76 @@ fn broken_cells_get_file_row_column_and_remedy() {
     refused("", &["data.csv"]);
     let seven = CABLE.replacen("q6,", "q6,q7,", 1).replace('\n', ",0\n");
     refused(&seven, &["q7"]);
+}
+
+#[test]
+fn numbers_that_no_measurement_has_are_named_by_cell() {
+    let at = |row: usize, text: &'static str| {
+        move |k: usize, c: &str| if k == row { text.to_owned() } else { c.to_owned() }
+    };
+    refused(&changed(&["L"], at(4, "1e300")), &["data.csv", "row 6", "column L", "1e300", "kilometre"]);
+    refused(&changed(&["q2"], at(9, "1e9")), &["data.csv", "row 11", "column q2", "3600"]);
+    // Two columns that changed places, and a file whose header is missing.
+    let swapped = CABLE.replacen("q2,q3", "q3,q2", 1);
+    refused(&swapped, &["data.csv", "columns changed places"]);
+    let headless: String = CABLE.lines().skip(1).map(|line| format!("{line}\n")).collect();
+    refused(&headless, &["put a header line"]);
+}
+
+#[test]
+fn rows_of_one_pose_are_no_measurement_of_an_arm() {
+    let mut lines = CABLE.lines();
+    let (header, row) = (lines.next().unwrap(), lines.next().unwrap());
+    let same = format!("{header}\n{}", format!("{row}\n").repeat(200));
+    refused(&same, &["200 rows", "1 different poses"]);
+    let ten: String = CABLE.lines().skip(1).take(10).map(|line| format!("{line}\n")).collect();
+    refused(&format!("{header}\n{}", ten.repeat(30)), &["300 rows", "10 different poses", "at least"]);
+}
+
+#[test]
+fn what_an_option_cannot_mean_is_refused_before_the_work() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), CABLE).unwrap();
+    fs::write(at.join("text.txt"), "no program\n").unwrap();
+    let identify = ["identify", "data.csv", "--robot", "abb-irb-120", "-o", "m.toml"];
+    assert_eq!(truegrind(at, &identify).0, 0);
+    let before = files(at);
+    let compensate = ["compensate", "p.mod", "--model", "m.toml", "-o", "q.mod"];
+    let plan = ["plan", "--robot", "abb-irb-120", "--sensor", "position", "-o", "q.mod"];
+    for (verb, more, words) in [
+        (&identify[..], &["--limit-rmse", "nan"][..], &["--limit-rmse", "above 0"][..]),
+        (&identify, &["--limit-max", "-1"], &["--limit-max -1", "above 0"]),
+        (&identify, &["--held-out", "-0.2"], &["--held-out -0.2", "share"]),
+        (&identify, &["--threads", "0"], &["--threads 0"]),
+        (&identify, &["--threads", "100000"], &["--threads 100000"]),
+        (&compensate, &["--tolerance", "-1"], &["--tolerance -1", "above 0"]),
+        (&compensate, &["--max-correction", "inf"], &["--max-correction", "above 0"]),
+        (&plan, &["--poses", "100000000"], &["--poses 100000000", "at most"]),
+    ] {
+        fs::write(at.join("p.mod"), "MODULE m\nENDMODULE\n").unwrap();
+        let arguments: Vec<&str> = verb.iter().chain(more).copied().collect();
+        let (code, out, err) = truegrind(at, &arguments);
+        assert_eq!(code, 2, "{arguments:?}: {out}{err}");
+        for word in words {
+            assert!(err.contains(word), "{arguments:?}: `{word}` is not in: {err}");
+        }
+    }
+    for payload in ["nan", "-3", "1e9"] {
+        let arguments = ["compensate", "p.mod", "--model", "m.toml", "-o", "q.mod", "--payload", payload];
+        let (code, _, err) = truegrind(at, &arguments);
+        assert!(code == 2 && err.contains("--payload") && err.contains("kg"), "{err}");
+    }
+    // A file that is no program, and one that is an arm's model.
+    for file in ["text.txt", "data.csv"] {
+        let (code, _, err) = truegrind(at, &["compensate", file, "--model", "m.toml", "-o", "q.mod"]);
+        assert!(code == 2 && err.contains(file) && err.contains("no motion"), "{err}");
+    }
+    let (code, _, err) = truegrind(at, &["compensate", "p.mod", "--model", "data.csv", "-o", "q.mod"]);
+    assert!(code == 2 && err.contains("identify -o") && !err.contains("\n;"), "{err}");
+    let mut left = files(at);
+    left.retain(|path| !path.ends_with("p.mod"));
+    assert_eq!(left, before, "nothing was written");
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod statistics;
 mod experiment;
 mod protocol;
 mod degradation;
+mod grinding;
 mod tracking;
 mod fixture;
 mod command;

@@ -1,6 +1,8 @@
 //! Rewriting programs: the estimated arm follows what was meant, and nothing dangerous is ever written.
 
 mod path;
+mod payload;
+mod play;
 mod reasons;
 
 use nalgebra::{DMatrix, Vector3};
@@ -88,6 +90,7 @@ fn run_on(actual: &Model, original: &[u8], program: &[u8], cell: &Cell) -> PathR
         program: "p.mod",
         name: "test",
         after: After::Achieved,
+        loads: [None, None],
     };
     let nominal = nominal();
     let acting =

@@ -9,9 +9,9 @@
 //! with equal weights (W_i is not defined), no Q, no R, P set to a random number at the beginning of each sweep
 //! and the gain to zero. What it does: the points are not symmetric, so that their mean, which becomes the
 //! state, drifts along the columns of P even where the residual vanishes; without R each scalar observation is
-//! believed entirely and takes one dimension out of P, which after p rows is singular: from there on the filter
-//! no longer listens (S = 0, and its gain stays at the zero it was set to). What it reports is what the first p
-//! rows of the last sweep say.
+//! believed entirely and takes one dimension out of P, which after p rows is singular to rounding: from there on S
+//! is rounding or zero (then the gain stays at the zero it was set to), and the filter no longer listens. What it
+//! reports is what the first p rows of the last sweep say, and rounding.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
 //!
@@ -208,24 +208,26 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
     let mut trace = vec![entry(&mut objective, &x, 0.0)];
     let m = problem.rows_per_observation().max(1);
     let share = 1.0 / (p + 2) as f64;
+    let mut root = DMatrix::zeros(p, p);
+    let mut states = DMatrix::zeros(p, p + 2);
+    let mut residuals = DMatrix::zeros(m, p + 2);
     for _ in 0..options.sweeps {
         let before = x.clone();
         covariance = &unit * rng.random_range(0.0..1.0);
         for rows in observations(problem) {
-            let root = semidefinite_root(&(&covariance * (p + 1) as f64));
-            let mut states = DMatrix::from_fn(p, p + 2, |i, _| x[i]);
+            covariance *= (p + 1) as f64;
+            semidefinite_root(&covariance, &mut root);
+            states.column_iter_mut().for_each(|mut column| column.copy_from(&x));
             for k in 0..p {
-                let moved = states.column(1 + k) + root.column(k);
-                states.set_column(1 + k, &moved);
+                states.column_mut(1 + k).axpy(1.0, &root.column(k), 1.0);
             }
             if p > 0 {
-                let moved = states.column(p + 1) - root.column(0);
-                states.set_column(p + 1, &moved);
+                states.column_mut(p + 1).axpy(-1.0, &root.column(0), 1.0);
             }
-            let mut residuals = DMatrix::zeros(m, p + 2);
-            for (k, state) in states.column_iter().enumerate() {
+            for k in 0..p + 2 {
+                let state = &states.as_slice()[k * p..(k + 1) * p];
                 let out = &mut residuals.as_mut_slice()[k * m..(k + 1) * m];
-                objective.residuals(state.clone_owned().as_slice(), rows.clone(), out);
+                objective.residuals(state, rows.clone(), out);
             }
             // Equations 9 to 11 with W = 1 / (p + 2).
             let (state, mean) = (states.column_sum() * share, residuals.column_sum() * share);
@@ -259,20 +261,31 @@ fn printed(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate 
 }
 
 /// Cholesky factor of a matrix that rounding may have made indefinite: what is left of a pivot below rounding
-/// is dropped.
-fn semidefinite_root(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+/// is dropped. Column by column, so that the inner loops run along memory.
+fn semidefinite_root(matrix: &DMatrix<f64>, root: &mut DMatrix<f64>) {
     let p = matrix.nrows();
-    let mut root = DMatrix::<f64>::zeros(p, p);
+    root.fill(0.0);
+    let (from, to) = (matrix.as_slice(), root.as_mut_slice());
+    let mut sums = vec![0.0; p];
     for j in 0..p {
-        let pivot = matrix[(j, j)] - (0..j).map(|k| root[(j, k)].powi(2)).sum::<f64>();
-        if pivot <= f64::EPSILON * p as f64 * matrix[(j, j)] {
+        // Σ_k root(i, k) root(j, k) for all i at once.
+        sums[j..].fill(0.0);
+        for k in 0..j {
+            let column = &to[k * p + j..(k + 1) * p];
+            let own = column[0];
+            if own != 0.0 {
+                sums[j..].iter_mut().zip(column).for_each(|(sum, other)| *sum += other * own);
+            }
+        }
+        let whole = from[j * p + j];
+        let pivot = whole - sums[j];
+        if pivot <= f64::EPSILON * p as f64 * whole {
             continue;
         }
-        root[(j, j)] = pivot.sqrt();
+        let pivot = pivot.sqrt();
+        to[j * p + j] = pivot;
         for i in j + 1..p {
-            let sum: f64 = (0..j).map(|k| root[(i, k)] * root[(j, k)]).sum();
-            root[(i, j)] = (matrix[(i, j)] - sum) / root[(j, j)];
+            to[j * p + i] = (from[j * p + i] - sums[i]) / pivot;
         }
     }
-    root
 }

@@ -153,7 +153,7 @@ fn store(out: &mut [f64], at: usize, value: Lanes) {
 }
 
 /// Frames of eight rows, and the factor by which their lengths have grown.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn frames(task: &Calibration, state: &State, at: usize) -> (Chain<Lanes>, Lanes) {
     let columns = &task.columns;
     let mut sin: [Lanes; 6] = std::array::from_fn(|j| Lanes::load(&columns.sin[j], at));
@@ -188,7 +188,7 @@ fn in_base(frames: &Chain<Lanes>, v: &Vector3<f64>) -> V {
     std::array::from_fn(|k| w[0] * x[k] + w[1] * y[k] + w[2] * z[k])
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn point(frames: &Chain<Lanes>, state: &State, at: usize) -> V {
     let shift = in_base(frames, &state.target.translation.vector);
     let mut out: V = std::array::from_fn(|k| frames.origin[6][k] + shift[k]);
@@ -222,7 +222,7 @@ fn of_anchor(task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> Lan
     Lanes(std::array::from_fn(|k| value(task.columns.anchor[at + k])))
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn cable(
     task: &Calibration,
     state: &State,
@@ -329,7 +329,7 @@ fn is_load(task: &Calibration, index: usize) -> bool {
 }
 
 /// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn turned_by(turn: &V, v: &V) -> V {
     let first = cross(turn, v);
     let second = cross(turn, &first);
@@ -337,7 +337,7 @@ fn turned_by(turn: &V, v: &V) -> V {
 }
 
 /// u · ∂p for a coordinate of a link; `moment[i]` is (p − oᵢ) × u, since u·(z × r) = z·(r × u).
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn link_pull(
     frames: &Chain<Lanes>,
     u: &V,
@@ -357,7 +357,7 @@ fn link_pull(
 /// Velocity of the point and angular velocity, in the base.
 type Twist = (V, V);
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn link_twist(frames: &Chain<Lanes>, p: &V, joint: usize, coordinate: LinkCoordinate) -> Twist {
     let none = [Lanes::splat(0.0); 3];
     let turning = |axis: &V, through: &V| (cross(axis, &minus(p, through)), *axis);
@@ -385,7 +385,7 @@ fn times(columns: &[V; 3], v: &V) -> V {
 }
 
 #[allow(clippy::too_many_arguments)]
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn space(
     task: &Calibration,
     state: &State,

@@ -41,7 +41,7 @@ impl Backlash {
         self.regressors(statics, u, condition)[0] * self.play_rad
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
         let side = f64::from(condition.approach[self.joint]);
         out[self.joint] += R::splat(self.play_rad * 0.5 * side);

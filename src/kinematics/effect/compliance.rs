@@ -44,7 +44,7 @@ impl Compliance {
         self.regressors(statics, u, condition)[0] * self.compliance_rad_per_nm
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += R::splat(self.compliance_rad_per_nm) * torque[self.joint];
     }

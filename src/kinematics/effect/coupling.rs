@@ -43,12 +43,12 @@ impl Coupling {
         self.regressors(statics, u, condition)[0] * self.factor
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += R::splat(self.factor) * u[self.driver];
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
         self.turn(step, out);
     }

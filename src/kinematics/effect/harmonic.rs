@@ -66,13 +66,13 @@ impl Harmonic {
         out
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
         let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
         out[self.joint] += R::splat(self.sine_rad) * sin + R::splat(self.cosine_rad) * cos;
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
         let slope = R::splat(self.order * self.sine_rad) * cos - R::splat(self.order * self.cosine_rad) * sin;

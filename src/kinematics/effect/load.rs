@@ -72,7 +72,7 @@ impl GravityLoad {
     }
 
     /// Torque of 1 kg at a lump's place.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn torque<R: Real>(&self, statics: &Statics, frames: &Chain<R>, lump: &Lump) -> R {
         let g = pull(statics, lump).map(R::splat);
         let lever = lever(frames, lump, self.joint);
@@ -97,7 +97,7 @@ impl GravityLoad {
         out.into()
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: SinCos>(&self, statics: &Statics, u: &[R; 6], out: &mut [R; 6]) {
         let frames = statics.frames(u);
         for lump in &self.lump {
@@ -123,7 +123,7 @@ impl GravityLoad {
 }
 
 /// From the axis of a joint to the lump, or the stand-off of a first moment (mm).
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
     let axis = match lump.moment {
         None => return minus(&frames.origin[lump.frame], &frames.origin[joint]),

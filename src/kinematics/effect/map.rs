@@ -92,7 +92,7 @@ impl JointMap {
         out
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += u[self.joint].each(|u| {
             let (first, weights, _) = self.near(u);
@@ -100,7 +100,7 @@ impl JointMap {
         });
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn carry<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let slope = u[self.joint].each(|u| {
             let (first, _, slopes) = self.near(u);

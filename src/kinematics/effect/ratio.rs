@@ -41,12 +41,12 @@ impl Ratio {
         self.regressors(statics, u, condition)[0] * self.error
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += R::splat(self.error) * u[self.joint];
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
         self.turn(step, out);
     }

@@ -81,7 +81,7 @@ impl Smooth {
         out.into()
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         let v = [u[0], u[1], u[2]];
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
@@ -92,7 +92,7 @@ impl Smooth {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn carry<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let (v, along) = ([u[0], u[1], u[2]], [step[0], step[1], step[2]]);
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {

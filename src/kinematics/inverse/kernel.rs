@@ -59,7 +59,7 @@ fn at<R: SinCos>(origin: &[R; 3], axes: &[[R; 3]; 3], point: &[f64; 3]) -> [R; 3
 }
 
 /// Rows of the inverse of a 3 × 3 matrix given by its columns.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn inverse_rows<R: SinCos>(columns: &[[R; 3]; 3]) -> [[R; 3]; 3] {
     let [a, b, c] = columns;
     let mut rows = [cross(b, c), cross(c, a), cross(a, b)];
@@ -99,7 +99,7 @@ struct Factored<R> {
 }
 
 impl<R: SinCos> Factored<R> {
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn of(frames: &Chain<R>, wrist: &[R; 3]) -> Self {
         let zero = R::splat(0.0);
         let mut shifts = [[zero; 3]; 6];
@@ -117,7 +117,7 @@ impl<R: SinCos> Factored<R> {
     }
 
     /// Joint rotations for a twist.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn solve(&self, shift: &[R; 3], turn: &[R; 3]) -> [R; 6] {
         let alone = times(&self.first, shift);
         let wrist = times(&self.last, &minus(turn, &combine(&self.turns, &alone)));
@@ -126,7 +126,7 @@ impl<R: SinCos> Factored<R> {
     }
 
     /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn distance(&self, lever: &[R; 3], length: f64) -> R {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let mut square = zero;
@@ -147,7 +147,7 @@ impl<R: SinCos> Factored<R> {
 
 impl Kernel {
     /// Runs from mapped angles `start` to where the last frame is at `goal`.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn solve<R: SinCos>(
         &self,
         arm: &Posed<'_>,
@@ -217,7 +217,7 @@ impl Kernel {
     }
 
     /// [`Structure::margins`] of joints, for one row or eight in lanes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn margins<R: SinCos>(
         &self,
         arm: &Posed<'_>,
@@ -230,7 +230,7 @@ impl Kernel {
     }
 
     /// Joint frames for mapped angles.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn frames<R: SinCos>(&self, arm: &Posed<'_>, mapped: &[R; 6]) -> Chain<R> {
         let rotations = arm.affected(mapped);
         let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);

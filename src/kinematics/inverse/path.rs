@@ -153,7 +153,7 @@ impl Inverse<'_> {
     ///
     /// The quaternion need not have length 1 to the last bit: an interpolated one seldom has, and axes that are longer
     /// than 1 by 1e-11 ask for a place that no joints reach.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn place<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> End<R> {
         let [x, y, z, w] = *quaternion;
         let one = R::splat(1.0);

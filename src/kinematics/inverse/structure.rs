@@ -82,7 +82,7 @@ impl Structure {
     /// Signed distances from the borders between branches: how far the wrist point lies in front of axis 1 (as part of the
     /// arm's extent), the sine of the elbow, the sine of the wrist. Behind, elbow back and axis 5 negative count as
     /// negative. All 1 for an arm without a closed form, which has no branches.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn margins<R: Real>(&self, frames: &Chain<R>, wrist: &[R; 3]) -> [R; 3] {
         let (z, o) = (&frames.z, &frames.origin);
         let (end, reference) = match self.family {

@@ -37,6 +37,8 @@ impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Cell::Empty => Ok(()),
+            // Three hundred digits say less than an exponent.
+            Cell::Number { value, .. } if value.abs() >= 1e16 => write!(f, "{value:e}"),
             Cell::Number { value, .. } => write!(f, "{value}"),
             Cell::Text(text) => f.write_str(text),
         }

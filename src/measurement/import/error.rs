@@ -84,7 +84,7 @@ pub enum ImportError {
         sheet: String,
     },
     /// Columns are missing.
-    #[error("{place}: {}; found the columns {}", missing.join("; "), list(found))]
+    #[error("{place}: {}; found the columns {}{}", missing.join("; "), list(found), headless(found))]
     MissingColumns {
         /// The file or sheet, with the row of the header.
         place: Place,
@@ -179,7 +179,23 @@ fn list(names: &[String]) -> String {
     if names.is_empty() {
         return "none".into();
     }
-    names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+    let shown = |name: &String| match name.char_indices().nth(LONGEST_NAME) {
+        Some((end, _)) => format!("`{}…`", &name[..end]),
+        None => format!("`{name}`"),
+    };
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let shown = names.iter().take(MOST_NAMES).map(shown).collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{shown} and {more} more") } else { shown }
+}
+
+/// Names of columns are shown up to this many characters, and this many of them.
+const LONGEST_NAME: usize = 32;
+const MOST_NAMES: usize = 40;
+
+/// A first line of numbers alone is no header.
+fn headless(found: &[String]) -> &'static str {
+    let numbers = !found.is_empty() && found.iter().all(|name| name.trim().parse::<f64>().is_ok());
+    if numbers { "; these are numbers: put a header line with the names of the columns above them" } else { "" }
 }
 
 fn suggestion(near: &[(String, String)]) -> String {

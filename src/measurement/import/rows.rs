@@ -87,6 +87,14 @@ pub(super) fn dataset(
     })
 }
 
+/// No joint angle is larger: ten turns.
+const LARGEST_DEG: f64 = 3600.0;
+/// No reading is larger: a kilometre.
+const LARGEST_MM: f64 = 1e6;
+const LENGTH: &str = "a length in mm, below a kilometre";
+/// No arm carries more.
+const LARGEST_KG: f64 = 1e4;
+
 struct Reader<'a> {
     file: &'a str,
     sheet: Option<&'a str>,
@@ -125,6 +133,21 @@ impl Reader<'_> {
         }
     }
 
+    /// A number that no measurement exceeds.
+    fn bounded(
+        &self,
+        line: &Line,
+        column: usize,
+        largest: f64,
+        expected: &'static str,
+    ) -> Result<f64, ImportError> {
+        let value = self.number(line, column)?;
+        if value.abs() <= largest {
+            return Ok(value);
+        }
+        Err(self.wrong(line, column, expected, "correct the cell, or delete the row"))
+    }
+
     /// A number that may be absent.
     fn optional(&self, line: &Line, column: Option<usize>) -> Result<Option<f64>, ImportError> {
         match column {
@@ -136,10 +159,14 @@ impl Reader<'_> {
     fn row(&self, number: usize, line: &Line, columns: &Columns) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
         for (q, &column) in joints.iter_mut().zip(&columns.joints) {
-            *q = self.number(line, column)?.to_radians();
+            let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
+            *q = angle.to_radians();
         }
-        let values: Vec<f64> =
-            columns.reading.iter().map(|&c| self.number(line, c)).collect::<Result<_, _>>()?;
+        let values: Vec<f64> = columns
+            .reading
+            .iter()
+            .map(|&c| self.bounded(line, c, LARGEST_MM, LENGTH))
+            .collect::<Result<_, _>>()?;
         let reading = match (columns.sensor, values.as_slice()) {
             (Sensor::Cable, [length]) => Reading::Cable(*length),
             (_, [x, y, z]) => Reading::Position(Vector3::new(*x, *y, *z)),
@@ -151,9 +178,13 @@ impl Reader<'_> {
             _ => return Err(ImportError::Empty { place: self.place() }),
         };
         let readout_mm = match columns.readout {
-            Some(c) if c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty)) => Some(
-                Vector3::new(self.number(line, c[0])?, self.number(line, c[1])?, self.number(line, c[2])?),
-            ),
+            Some(c) if c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty)) => {
+                Some(Vector3::new(
+                    self.bounded(line, c[0], LARGEST_MM, LENGTH)?,
+                    self.bounded(line, c[1], LARGEST_MM, LENGTH)?,
+                    self.bounded(line, c[2], LARGEST_MM, LENGTH)?,
+                ))
+            }
             _ => None,
         };
         let mut approach = [0i8; 6];
@@ -168,10 +199,20 @@ impl Reader<'_> {
                 }
             };
         }
+        let payload_kg = self.optional(line, columns.payload)?;
+        if payload_kg.is_some_and(|kg| !(0.0..=LARGEST_KG).contains(&kg)) {
+            let remedy = "state what hangs on the flange, or leave the cell empty";
+            return Err(self.wrong(
+                line,
+                columns.payload.unwrap_or_default(),
+                "a mass in kg, 0 to 10,000",
+                remedy,
+            ));
+        }
         let condition = Condition {
             time_h: self.optional(line, columns.time)?,
             temperature_c: self.optional(line, columns.temperature)?,
-            payload_kg: self.optional(line, columns.payload)?,
+            payload_kg,
             approach,
             ..Condition::default()
         };

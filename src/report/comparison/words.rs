@@ -17,9 +17,10 @@ pub(super) fn conclusion(comparison: &Comparison, reference: &str) -> String {
         Conclusion::MethodBetter => format!("{} better", comparison.id),
         Conclusion::NotSignificant => "no significant difference".to_owned(),
         Conclusion::SameOptimum { stopped, .. } if stopped.is_empty() => "same optimum".to_owned(),
-        Conclusion::SameOptimum { stopped, .. } => {
-            format!("same optimum; {} stopped early", stopped.join(" and "))
-        }
+        Conclusion::SameOptimum { stopped, .. } => match stopped.as_slice() {
+            [one] => format!("same optimum; {one} stopped"),
+            _ => "same optimum; both stopped".to_owned(),
+        },
         Conclusion::Diverged { cases } => format!("{} diverged in {cases}", comparison.id),
         Conclusion::ReferenceDiverged { cases } => format!("{reference} diverged in {cases}"),
     }
@@ -44,6 +45,7 @@ pub(super) fn sentences(study: &Study) -> Vec<String> {
             alike.join(", ")
         ));
     }
+    out.extend(treatments(study));
     if !judgement.can_be_significant {
         out.push(format!(
             "With {} cases and {} comparisons no difference could be significant at 5 %, whatever the figures.",
@@ -58,6 +60,23 @@ pub(super) fn sentences(study: &Study) -> Vec<String> {
             .to_owned(),
     );
     out
+}
+
+/// What separates printed from sound methods, where both are compared.
+fn treatments(study: &Study) -> Option<String> {
+    let of = |id: &str| study.results.iter().find(|r| r.method.id == id).map(|r| r.treatment);
+    let reference = of(&study.judgement.reference)?;
+    let others: Vec<&str> =
+        study.results.iter().filter(|r| r.treatment != reference).map(|r| r.method.id.as_str()).collect();
+    (!others.is_empty()).then(|| {
+        format!(
+            "{} solve another problem than {}: as printed the frames stay where a fit of the frames alone put them, rows are \
+             not weighed and there are no priors; in sound form links and frames are found together. A difference between \
+             the two kinds is one of the problem, not of the search.",
+            others.join(", "),
+            study.judgement.reference
+        )
+    })
 }
 
 fn sentence(study: &Study, comparison: &Comparison, reference: &str) -> String {

@@ -64,7 +64,7 @@ fn quantity(reports: &[&PathReport]) -> &'static str {
 fn along(reports: &[&PathReport]) -> Figure {
     let single = reports.len() == 1;
     let mut band = false;
-    let series = shown(reports)
+    let series: Vec<Series> = shown(reports)
         .into_iter()
         .map(|Shown { name, report, side, after, ink }| {
             let kept = thinned(report, side);
@@ -86,6 +86,7 @@ fn along(reports: &[&PathReport]) -> Figure {
             series
         })
         .collect();
+    let covered = covered(&series);
     let graph = Graph {
         title: "Deviation along the path".to_owned(),
         x: Axis::new("path point", ""),
@@ -99,6 +100,11 @@ fn along(reports: &[&PathReport]) -> Figure {
         caption
             .push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
     }
+    for (under, over) in covered {
+        caption.push_str(&format!(
+            " The curve \u{201c}{under}\u{201d} lies under \u{201c}{over}\u{201d}: the two agree."
+        ));
+    }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
     }
@@ -106,6 +112,23 @@ fn along(reports: &[&PathReport]) -> Figure {
         caption.push_str(" Of neighbouring points the one with the largest deviation is drawn.");
     }
     Figure::new(graph.svg(), caption)
+}
+
+/// Curves that nobody sees because a later one runs over them: nowhere apart by more than a line's width.
+fn covered(series: &[Series]) -> Vec<(String, String)> {
+    let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
+    let (low, high) =
+        heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
+    let line = 0.005 * (high - low);
+    let agree = |a: &Series, b: &Series| {
+        a.points.len() == b.points.len()
+            && a.points.iter().zip(&b.points).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= line)
+    };
+    let pairs = series.iter().enumerate().filter_map(|(k, under)| {
+        let over = series[k + 1..].iter().find(|over| agree(under, over))?;
+        Some((under.name.clone(), over.name.clone()))
+    });
+    pairs.collect()
 }
 
 fn frequency(reports: &[&PathReport]) -> Figure {

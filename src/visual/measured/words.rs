@@ -35,10 +35,12 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
     } else {
         text.push_str(
             "- Points: where the touched point stood, all rows; dark blue is a residual of 0, yellow a large one (bar \
-             below). Orange: sensor, and its reading at the row.\n\
-             - Curves: orange with frames alone fitted, blue with geometry; green points: rows that were held out of \
-             the fit they are judged by.\n",
+             below). Orange: sensor, and its reading at the row.\n",
         );
+        let stages: Vec<String> = scene.residuals.iter().map(|r| line(&r.stage)).collect();
+        let _ = write!(text, "- Curves: the residual of each row, {}", stages.join("; "));
+        let held = "; green points: rows that were held out of the fit they are judged by";
+        let _ = writeln!(text, "{}.", if scene.held_out.is_empty() { "" } else { held });
     }
     text.push_str("\nLengths are mm, in the base of the arm with z up. Time counts data rows from 0.\n");
     text

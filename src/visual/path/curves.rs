@@ -9,6 +9,9 @@ use crate::visual::curve::{self, Pen, curve};
 use crate::visual::page::{Pane, View};
 use crate::visual::recording::{Store, VisualError};
 
+/// Marks on a curve at most.
+const MARKS: usize = 40;
+
 /// A figure of a deviation.
 type Figure = fn(&Deviation) -> Option<f64>;
 
@@ -62,7 +65,7 @@ fn sigma(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError> {
     Ok(())
 }
 
-/// Flagged and refused points, on the curve of sizes.
+/// Flagged and refused points, on the curve of sizes; of very many so few that the curve still shows.
 fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
     for (status, name, colour, shape) in [
         (Status::Flagged, "flagged", FLAGGED, MarkerShape::Diamond),
@@ -75,6 +78,8 @@ fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
         if marked.is_empty() {
             continue;
         }
+        let every = marked.len().div_ceil(MARKS);
+        let marked: Vec<(i64, f64)> = marked.into_iter().step_by(every).collect();
         let path = format!("deviation/size/{name}");
         curve::points(store, &path, AXIS, (name, colour, shape), &marked)?;
     }

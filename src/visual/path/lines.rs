@@ -15,7 +15,7 @@ const AXES: usize = 40;
 /// Length of a tool axis over the size of the path.
 const AXIS_LENGTH: f64 = 0.10;
 /// Marks that carry a label at most; the others are drawn without.
-const LABELS: usize = 12;
+const LABELS: usize = 4;
 
 pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
     workpiece(store, scene)?;
@@ -155,7 +155,7 @@ fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
             continue;
         }
         let points = Points3D::new(marked.iter().map(|p| xyz(&intended(p))))
-            .with_radii([Radius::new_ui_points(4.0)])
+            .with_radii([Radius::new_ui_points(2.5)])
             .with_colors([Color::from(colour)]);
         store.fixed(format!("marks/{name}"), &points)?;
         let labels: Vec<(Point3<f64>, String)> =
@@ -170,13 +170,15 @@ fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
     Ok(())
 }
 
-/// Neighbouring points that are marked for the same reason.
+/// Neighbouring points that are marked for the same kind of reason.
 fn runs<'a>(marked: &[&'a PathPoint]) -> Vec<Vec<&'a PathPoint>> {
     let mut runs: Vec<Vec<&PathPoint>> = Vec::new();
     for &point in marked {
         match runs.last_mut() {
             Some(run)
-                if run.last().is_some_and(|l| l.index + 1 == point.index && l.reason == point.reason) =>
+                if run.last().is_some_and(|l| {
+                    l.index + 1 == point.index && l.kind_of_reason() == point.kind_of_reason()
+                }) =>
             {
                 run.push(point);
             }
@@ -195,7 +197,9 @@ fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
         (a, b) if a == b => format!("line {a}"),
         (a, b) => format!("lines {a}–{b}"),
     };
-    let reason = first.reason.as_deref().map(|r| format!(": {r}")).unwrap_or_default();
+    let same = run.iter().all(|point| point.reason == first.reason);
+    let which = if same { "" } else { " (the first)" };
+    let reason = first.reason.as_deref().map(|r| format!(": {r}{which}")).unwrap_or_default();
     (intended(middle), format!("{place} {status}{reason}"))
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use rerun::TextDocument;
 
 use super::{PathScene, Plan};
-use crate::compensation::deviation::{After, Block, PathReport, Status};
+use crate::compensation::deviation::{After, Block, PathPoint, PathReport, Status};
 use crate::visual::markdown::{cell, line, number};
 use crate::visual::recording::{Store, VisualError};
 
@@ -95,16 +95,17 @@ fn fate(text: &mut String, report: &PathReport) {
         count(Status::Refused),
         report.points.iter().filter(|p| p.outside.is_some()).count()
     );
-    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    let mut reasons: Vec<(&PathPoint, usize, bool)> = Vec::new();
     let marked = report.points.iter().filter(|p| matches!(p.status, Status::Flagged | Status::Refused));
-    for reason in marked.filter_map(|p| p.reason.as_deref()) {
-        match reasons.iter_mut().find(|(known, _)| *known == reason) {
-            Some((_, n)) => *n += 1,
-            None => reasons.push((reason, 1)),
+    for point in marked.filter(|p| p.reason.is_some()) {
+        match reasons.iter_mut().find(|(known, ..)| known.kind_of_reason() == point.kind_of_reason()) {
+            Some((known, n, same)) => (*n, *same) = (*n + 1, *same && known.reason == point.reason),
+            None => reasons.push((point, 1, true)),
         }
     }
-    for (reason, n) in reasons.iter().take(8) {
-        let _ = writeln!(text, "- {n} × {}", line(reason));
+    for (first, n, same) in reasons.iter().take(8) {
+        let which = if *same { "" } else { " (the first)" };
+        let _ = writeln!(text, "- {n} × {}{which}", line(first.reason.as_deref().unwrap_or_default()));
     }
     if reasons.len() > 8 {
         let _ = writeln!(text, "- and {} other reasons", reasons.len() - 8);

@@ -163,3 +163,96 @@ fn identify_takes_every_sound_method_and_lists_them() {
     let (code, _, err) = truegrind(at, &["track", "data.csv", "--model", "m.toml", "-o", "out"]);
     assert!(code == 0, "{err}");
 }
+
+#[test]
+fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
+    use std::io::Write;
+    use std::process::{Command as Process, Stdio};
+    use std::time::Duration;
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("first.csv"), TRACKER).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(code == 0, "{err}");
+    let lines: Vec<&str> = TRACKER.lines().collect();
+    // Rows come in while the follower is killed at whatever it is doing, from before it began to after it wrote.
+    fs::write(at.join("day.csv"), format!("{}\n", lines[0])).unwrap();
+    let arguments = ["track", "day.csv", "--model", "model.toml", "-o", "out", "--date", "2026-05-05"];
+    let mut written = 1;
+    for kill in 0..14_u64 {
+        let mut follower = Process::new(env!("CARGO_BIN_EXE_truegrind"))
+            .current_dir(at)
+            .args(arguments)
+            .args(["--follow", "0.01"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut day = fs::OpenOptions::new().append(true).open(at.join("day.csv")).unwrap();
+        let more = (written + 12).min(151);
+        for line in &lines[written..more] {
+            // In two pieces, so that half lines are met as well.
+            let (a, b) = line.split_at(line.len() / 2);
+            day.write_all(a.as_bytes()).unwrap();
+            std::thread::sleep(Duration::from_millis(1 + kill % 3));
+            writeln!(day, "{b}").unwrap();
+        }
+        written = more;
+        std::thread::sleep(Duration::from_millis(17 * kill % 90));
+        follower.kill().unwrap();
+        follower.wait().unwrap();
+        // Whatever is there is whole.
+        if let Ok(state) = fs::read_to_string(at.join("out/model.track.toml")) {
+            assert!(truegrind::comparison::tracking::State::from_toml(&state).is_ok());
+        }
+    }
+    assert_eq!(written, 151);
+    let (code, _, err) = truegrind(at, &arguments);
+    assert!(code == 0, "{err}");
+    let mut whole = arguments;
+    whole[5] = "whole";
+    let (code, _, err) = truegrind(at, &whole);
+    assert!(code == 0, "{err}");
+    let of = |folder: &str, name: &str| fs::read_to_string(at.join(folder).join(name)).unwrap();
+    assert_eq!(of("out", "model.track.toml"), of("whole", "model.track.toml"));
+    assert_eq!(of("out", "model-20260505-000150.toml"), of("whole", "model-20260505-000150.toml"));
+    // Every model that was written is a model.
+    for name in names(&at.join("out")).iter().filter(|n| !n.starts_with('.') && n.starts_with("model-")) {
+        assert!(truegrind::kinematics::estimated::Estimated::from_toml(&of("out", name)).is_ok(), "{name}");
+    }
+}
+
+#[test]
+fn track_takes_a_folder_of_small_files_and_none_twice() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    fs::write(at.join("first.csv"), TRACKER).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(code == 0, "{err}");
+    let lines: Vec<&str> = TRACKER.lines().collect();
+    fs::create_dir(at.join("days")).unwrap();
+    let day = |k: usize| {
+        let rows = lines[1 + 15 * k..16 + 15 * k].join("\n");
+        fs::write(at.join(format!("days/day-{k}.csv")), format!("{}\n{rows}\n", lines[0])).unwrap();
+    };
+    let track = |arguments: &[&str]| {
+        let mut all = vec!["track", "days", "--model", "model.toml", "-o", "out"];
+        all.extend(arguments);
+        truegrind(at, &all)
+    };
+    assert!(track(&[]).2.contains("no .csv or .xlsx"));
+    day(0);
+    let (code, _, err) = track(&[]);
+    assert!(code == 2 && err.contains("15 poses so far, 30 are needed"), "{err}");
+    (1..4).for_each(day);
+    // A table among the measurements is no measurement.
+    let (code, out, err) = track(&["--date", "2026-05-04", "--csv", "days/parameters.csv"]);
+    assert!(code == 0 && out.contains("60 new poses"), "{out}{err}");
+    (4..6).for_each(day);
+    let (code, out, err) = track(&["--date", "2026-05-05", "--csv", "days/parameters.csv", "--sigma", "0.1"]);
+    assert!(code == 0 && out.contains("30 new poses"), "{out}{err}");
+    assert!(err.contains("goes on with the settings that it began with"), "{err}");
+    assert!(track(&["--csv", "days/parameters.csv"]).2.contains("no new measurements"));
+}

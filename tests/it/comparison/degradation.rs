@@ -37,6 +37,32 @@ fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
 }
 
 #[test]
+fn all_figures_of_the_paper_are_shown_and_every_table_says_that_it_is_simulated() {
+    use truegrind::comparison::Results;
+    use truegrind::report::comparison as view;
+    use truegrind::report::format;
+    let settings = Degradation { arms: 6, groups: 2, counts: vec![4, 15, 50], ..small() };
+    let result = run(&settings, "test", "tx60-pose", 3, nominal).unwrap();
+    // Two ways with the same memory are the same, and with six arms nothing small is called a difference.
+    let memory = result.against_rls.iter().find(|a| a.way == Way::LmMemory && a.count == 50).unwrap();
+    assert_eq!(memory.outcome, truegrind::comparison::degradation::Outcome::Same);
+    assert!(result.against_rls.iter().all(|a| a.arms == 6 && (0.0..=1.0).contains(&a.p)));
+    let experiment = Experiment::by_name("rls-degradation").unwrap();
+    let results = Results::Degradation(Box::new(result));
+    let page = view::document(&experiment, &results, &view::Origin::default());
+    let html = format::html::document(&page);
+    for figure in [
+        "Fig. 4", "Fig. 7", "Fig. 9", "Fig. 10", "Fig. 11", "Fig. 12", "Fig. 13", "Fig. 14", "Table 2",
+        "Table 4",
+    ] {
+        assert!(html.contains(figure), "{figure} is not shown");
+    }
+    let text = format::markdown::document(&page);
+    let tables = text.matches("simulated degradation").count();
+    assert!(tables >= 6, "{tables} tables and figures say so");
+}
+
+#[test]
 fn few_poses_are_stated_with_rank_and_condition() {
     let result = run(&small(), "test", "tx60-pose", 3, nominal).unwrap();
     let [four, five, fifteen] = result.counts.as_slice() else { panic!("three counts") };
@@ -54,7 +80,7 @@ fn what_cannot_be_used_is_said() {
     for (from, to, word) in [
         ("continuous = [15, 20]", "continuous = [60]", "no more than identify"),
         ("forgetting = 0.95", "forgetting = 1.5", "up to 1"),
-        ("arms = 8", "arms = 0", "1 of each"),
+        ("arms = 10", "arms = 0", "1 of each"),
     ] {
         let message = Experiment::parse(&text.replace(from, to), "mine.toml").unwrap_err().to_string();
         assert!(message.contains(word), "{message}");

@@ -49,7 +49,7 @@ fn study(text: &str, rows: Option<usize>) -> Result<(Experiment, Study, Dataset)
     let experiment = Experiment::parse(text, "small.toml")?;
     let (dataset, simulation, robot) = simulated::measure(&experiment, nominal)?;
     let Some(Kind::Methods(methods)) = experiment.kind() else { panic!("methods") };
-    let options = Options { rows, seed: 5, simulated: true };
+    let options = Options { rows, seed: 5, simulated: true, sensor_sigma_mm: 0.05 };
     let study = run(&experiment, methods, &dataset, &robot, &simulation.nominal, &options)?;
     Ok((experiment.clone(), study, dataset))
 }
@@ -77,6 +77,11 @@ fn rows_that_say_what_they_are_whatever_the_method_does() {
     let text = format::terminal::document(&view::summary(&experiment, &results), 120);
     assert!(text.contains("diverged in 3 of 3"), "{text}");
     assert!(text.contains("simulated") && !text.contains("Reduced"));
+    // Budget in passes over the rows, cost of an iteration, and every least-squares method run to convergence.
+    for word in ["residuals", "Jacobians", "each", "Stopped and converged", "further steps", "Holm"] {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+    assert!(study.results.iter().all(|r| r.converged.as_ref().is_some_and(|c| c.len() == 3)));
     // Three cases can show nothing, and the verdict says so.
     assert!(!study.judgement.can_be_significant && text.contains("no difference could be significant"));
 }
@@ -130,6 +135,25 @@ fn parameters_that_one_cable_cannot_see_are_marked() {
     assert!(!of("link6.theta").is_observable() && !of("link6.alpha").is_observable());
     assert!(of("link3.theta").is_observable());
     assert!(table.rows.iter().all(|r| r.sigma.is_finite() && (0.0..=1.0).contains(&r.determined)));
+    assert!(table.rows.iter().all(|r| r.paper.is_none()));
+}
+
+#[test]
+fn what_a_paper_identified_stands_beside_and_is_no_target() {
+    let links =
+        (1..=6).map(|k| format!("{{ a_mm = {k}.0, theta_deg = 0.5 }}")).collect::<Vec<_>>().join(", ");
+    let stated = METHODS.replace("name = \"LM\"\n", &format!("name = \"LM\"\npaper_links = [{links}]\n"));
+    let (experiment, study, _) = study(&stated, None).unwrap();
+    let table = study.parameters.iter().find(|t| t.id == "B").unwrap();
+    let of = |name: &str| table.rows.iter().find(|r| r.parameter.to_string() == name).unwrap().paper;
+    assert_eq!((of("link3.a"), of("link3.alpha"), of("link2.beta")), (Some(3.0), None, None));
+    assert!((of("link1.theta").unwrap().to_degrees() - 0.5).abs() < 1e-12);
+    let results = Results::Methods(Box::new(study));
+    let page = format::markdown::document(&view::document(&experiment, &results, &view::Origin::default()));
+    assert!(page.contains("no target"), "{page}");
+    let five = stated.replace(", { a_mm = 6.0, theta_deg = 0.5 }", "");
+    let message = Experiment::parse(&five, "small.toml").unwrap_err().to_string();
+    assert!(message.contains("5 links") && message.contains("6 links"), "{message}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::corner::Corner;
-use truegrind::compensation::course::{Arc, Course};
+use truegrind::compensation::curve::{Arc, Curve};
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::{Circles, Options, Plan, plan};
 use truegrind::compensation::why::Why;
@@ -345,8 +345,8 @@ fn an_arc_that_stays_says_its_word_again_after_one_that_became_straight() {
 #[test]
 fn a_right_angle_is_rounded_by_a_parabola() {
     let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
-    let way_in = Course::line(at(-100.0, 0.0), at(0.0, 0.0));
-    let way_out = Course::line(at(0.0, 0.0), at(0.0, 30.0));
+    let way_in = Curve::line(at(-100.0, 0.0), at(0.0, 0.0));
+    let way_out = Curve::line(at(0.0, 0.0), at(0.0, 30.0));
     let corner = Corner::of(&way_in, &way_out, 10.0);
     assert!((corner.cut_mm() - 10.0 * 2.0_f64.sqrt() / 4.0).abs() < 1e-12);
     assert!((corner.at(0.5).translation.vector - Vector3::new(-2.5, 2.5, 0.0)).norm() < 1e-12);
@@ -379,7 +379,7 @@ fn on_an_arc_the_tool_keeps_its_orientation_or_turns_with_the_path() {
     };
     for sweep in [100.0, 170.0, 190.0, 300.0] {
         for (name, turn) in [("kept", 0.0), ("with the path", 1.0)] {
-            let course = Course::round(
+            let course = Curve::round(
                 at(0.0, 0.0),
                 &at(0.5 * sweep, 0.5 * sweep * turn),
                 at(sweep, sweep * turn),
@@ -399,7 +399,7 @@ fn on_an_arc_the_tool_keeps_its_orientation_or_turns_with_the_path() {
     }
     // With the circle point's own orientation the tool passes it.
     let course =
-        Course::round(at(0.0, 0.0), &at(45.0, 20.0), at(90.0, 0.0), &motion_with(None, Switch::On)).unwrap();
+        Curve::round(at(0.0, 0.0), &at(45.0, 20.0), at(90.0, 0.0), &motion_with(None, Switch::On)).unwrap();
     assert!(course.at(0.5).rotation.angle_to(&at(45.0, 20.0).rotation) < 1e-9);
 }
 

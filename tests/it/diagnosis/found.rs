@@ -142,7 +142,7 @@ fn what_a_shop_floor_log_hides_is_found() {
         ("backlash/order", Sensor::Position, 300, 21),
         ("thermal-drift/temperature", Sensor::Position, 250, 22),
         ("thermal-drift/base", Sensor::Cable, 300, 23),
-        ("cable-sag", Sensor::Cable, 300, 24),
+        ("cable-sag", Sensor::Cable, 600, 27),
         ("gear-eccentricity/rounded", Sensor::Position, 250, 25),
         ("sensor-zero-shift/twice", Sensor::Cable, 350, 26),
     ] {

@@ -138,7 +138,7 @@ pub fn draw(kind: &str, rows: usize, rng: &mut ChaCha8Rng) -> Hidden {
             Hidden::Thermal { growth: size * 2.5e-4, time_constant_h: rng.random_range(0.4..2.0) }
         }
         "sensor-scale" => Hidden::Scale { factor: sign * size * 5e-4 },
-        "cable-sag" => Hidden::Sag { square_per_m2: rng.random_range(1e-3..1e-2) },
+        "cable-sag" => Hidden::Sag { square_per_m2: rng.random_range(2e-3..1e-2) },
         "payload-change" => Hidden::Payload { from, to, kg: rng.random_range(1.0..5.0) },
         "sensor-zero-shift" => Hidden::Zero { from, to, mm: sign * size },
         "sensor-frame-shift" => Hidden::Frame { from, to, mm: direction() },

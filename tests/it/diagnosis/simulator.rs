@@ -382,7 +382,7 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 up: arm.up,
             };
             let mut at = (grown.frames(&turned)[6] * grown.flange * (touched + slipped)).xyz();
-            at.z += warp * (at.x / 110.0).sin() * (at.y / 130.0).cos();
+            at.z += warp * (at.x / 180.0).sin() * (at.y / 220.0).cos();
             match setup.sensor {
                 Sensor::Cable => {
                     let chord = at - outlet - moved;

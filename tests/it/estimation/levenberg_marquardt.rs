@@ -218,3 +218,117 @@ fn same_bits_for_any_number_of_threads() {
         assert_eq!(run(1, factorisation), run(2, factorisation));
     }
 }
+
+/// Distances from points on a plate to a station, where the plate may stand turned: plate and station turning together
+/// leave every distance as it is, so that only the priors hold them, along a circle.
+struct Turntable {
+    points: Vec<[f64; 2]>,
+    distances: Vec<f64>,
+    priors: Vec<Prior>,
+}
+
+impl Turntable {
+    const SIGMA: f64 = 0.03;
+
+    fn of(rows: usize) -> Self {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let points: Vec<[f64; 2]> = (0..rows)
+            .map(|_| [random.random_range(-400.0..400.0), random.random_range(-400.0..400.0)])
+            .collect();
+        let distances = points
+            .iter()
+            .map(|p| (p[0] - 742.0).hypot(p[1] - 183.0) + Self::SIGMA * random.random_range(-1.7..1.7))
+            .collect();
+        let prior = |sigma: f64| Prior { mean: 0.0, sigma };
+        Self { points, distances, priors: vec![prior(0.005), prior(2000.0), prior(2000.0)] }
+    }
+}
+
+impl Problem for Turntable {
+    fn parameters(&self) -> usize {
+        3
+    }
+
+    fn rows(&self) -> usize {
+        self.points.len()
+    }
+
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn residuals(&self, x: &[f64], rows: std::ops::Range<usize>, out: &mut [f64]) {
+        self.jacobian(x, rows.clone(), out, &mut vec![0.0; 3 * rows.len()]);
+    }
+
+    fn jacobian(&self, x: &[f64], rows: std::ops::Range<usize>, r: &mut [f64], j: &mut [f64]) {
+        let (sin, cos) = x[0].sin_cos();
+        let n = rows.len();
+        for (i, row) in rows.enumerate() {
+            let [u, v] = self.points[row];
+            let (px, py) = (cos * u - sin * v, sin * u + cos * v);
+            let (dx, dy) = (px - 700.0 - x[1], py - 300.0 - x[2]);
+            let d = dx.hypot(dy);
+            r[i] = (d - self.distances[row]) / Self::SIGMA;
+            j[i] = (dx * -py + dy * px) / d / Self::SIGMA;
+            j[n + i] = -dx / d / Self::SIGMA;
+            j[2 * n + i] = -dy / d / Self::SIGMA;
+        }
+    }
+
+    fn thinned(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+        Some(Box::new(Self {
+            points: observations.iter().map(|&i| self.points[i]).collect(),
+            distances: observations.iter().map(|&i| self.distances[i]).collect(),
+            priors: self.priors.clone(),
+        }))
+    }
+}
+
+/// The same without a thinned form.
+struct Plain(Turntable);
+
+impl Problem for Plain {
+    fn parameters(&self) -> usize {
+        3
+    }
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+    fn priors(&self) -> &[Prior] {
+        self.0.priors()
+    }
+    fn residuals(&self, x: &[f64], rows: std::ops::Range<usize>, out: &mut [f64]) {
+        self.0.residuals(x, rows, out);
+    }
+    fn jacobian(&self, x: &[f64], rows: std::ops::Range<usize>, r: &mut [f64], j: &mut [f64]) {
+        self.0.jacobian(x, rows, r, j);
+    }
+}
+
+#[test]
+fn very_many_rows_begin_on_few_and_reach_the_same_optimum_in_few_passes() {
+    let rows = 60_000;
+    let start = [0.0; 3];
+    let found = solve(&Turntable::of(rows), &start, &Options::default());
+    // The optimum, by a search over all rows that is not content with less than 1e-15 of the cost. From the start it would
+    // take thousands of passes.
+    let plain = solve(&Plain(Turntable::of(rows)), &found.x, &Options { initial_damping: 0.0, ..precise() });
+    let passes = |e: &Estimate| e.evaluations.jacobians as f64 / rows as f64;
+    println!(
+        "{} after {:.1} passes; the optimum {} after {:.1} more",
+        found.termination,
+        passes(&found),
+        plain.termination,
+        passes(&plain)
+    );
+    assert!(found.termination.is_converged() && plain.termination.is_converged());
+    assert!(passes(&found) < 8.0, "{} passes", passes(&found));
+    assert!((found.cost - plain.cost).abs() <= 1e-8 * plain.cost, "{} {}", found.cost, plain.cost);
+    assert!(monotone(&found));
+    // From the optimum itself there is no detour.
+    let again = solve(&Turntable::of(rows), &found.x, &Options::default());
+    assert!(passes(&again) <= 2.0, "{} passes", passes(&again));
+    assert!(again.cost <= found.cost * (1.0 + 1e-12));
+}

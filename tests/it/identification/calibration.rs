@@ -253,6 +253,26 @@ fn normal_equations_equal_the_stacked_jacobian_and_padding_is_silent() {
 }
 
 #[test]
+fn a_thinned_task_has_the_rows_that_were_chosen() {
+    for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
+        let task = task(sensor, 40);
+        let chosen = [3, 4, 9, 17, 18, 19, 31, 32, 38];
+        let thinned = task.thinned(&chosen).unwrap();
+        let per = task.rows_per_observation();
+        assert_eq!((thinned.rows(), thinned.parameters()), (chosen.len() * per, task.parameters()));
+        let x = vec![1e-5; task.parameters()];
+        let (mut all, mut some) = (vec![0.0; task.rows()], vec![0.0; thinned.rows()]);
+        task.residuals(&x, 0..task.rows(), &mut all);
+        thinned.residuals(&x, 0..thinned.rows(), &mut some);
+        let wanted: Vec<f64> = chosen.iter().flat_map(|i| all[i * per..(i + 1) * per].to_vec()).collect();
+        assert_eq!(some, wanted);
+        let cost = 0.5 * some.iter().map(|r| r * r).sum::<f64>();
+        assert!((thinned.normal_equations(&x).cost - cost).abs() < 1e-11 * cost);
+        assert_eq!(task.thinned(&[]).unwrap().rows(), 0);
+    }
+}
+
+#[test]
 fn residuals_equal_the_plain_forward_map() {
     let data = dataset(Sensor::Position, 11, 7);
     let list = parameters(Sensor::Position);

@@ -153,6 +153,35 @@ fn targets_are_found_from_their_configuration_alone() {
     }
 }
 
+/// A heavy sweep: `it-… --ignored every_random_pose_is_found_from_its_configuration_alone`, poses of each arm from the
+/// variable TRUEGRIND_SWEEP (20,000).
+#[test]
+#[ignore = "minutes; the sample of it above runs always"]
+fn every_random_pose_is_found_from_its_configuration_alone() {
+    let poses = std::env::var("TRUEGRIND_SWEEP").ok().and_then(|n| n.parse().ok()).unwrap_or(20_000);
+    let mut missed = Vec::new();
+    for sheet in SHEETS {
+        let nominal = sheet.model();
+        let mut random = generator(11);
+        let arm = with_effects(&perturbed(&nominal, &mut random, 0.5, 0.1), &mut random);
+        let inverse = Inverse::new(&arm, &loaded(), &nominal);
+        for k in 0..poses {
+            let joints = joints_within(&arm, &mut random);
+            let target = arm.forward(&joints, &loaded());
+            let wanted = inverse.configuration(&joints);
+            match inverse.solve_configured(&target, &wanted, None) {
+                Ok(solution) => assert_reaches(&arm, &loaded(), &target, &solution),
+                Err(error) => {
+                    let near = inverse.singularity_distances(&joints).map(|d| d.nearest());
+                    missed.push(format!("{} pose {k} ({near:?}): {error}", sheet.name));
+                }
+            }
+        }
+        println!("{}: {poses} poses, {} missed so far", sheet.name, missed.len());
+    }
+    assert!(missed.is_empty(), "{} of {}:\n{}", missed.len(), poses * SHEETS.len(), missed.join("\n"));
+}
+
 #[test]
 fn configuration_is_rapids_confdata() {
     let model = Sheet::named("abb-irb-120");

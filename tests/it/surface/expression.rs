@@ -145,6 +145,14 @@ fn what_cannot_be_read_says_where_and_why() {
 }
 
 #[test]
+fn many_terms_are_differentiated_not_overflown() {
+    let many = Expression::parse(&format!("{}x", "x+".repeat(149)), &["x", "y"]).unwrap();
+    assert_eq!((many.value(&[2.0, 0.0]), many.gradient(&[2.0, 0.0])[0]), (300.0, 150.0));
+    let product = Expression::parse(&vec!["x"; 60].join("*"), &["x", "y"]).unwrap();
+    assert!((product.gradient(&[1.0, 0.0])[0] - 60.0).abs() < 1e-9);
+}
+
+#[test]
 fn long_and_deep_texts_are_refused_not_overflown() {
     for text in ["(".repeat(1500), "-".repeat(1500), "sin(".repeat(400), "2^".repeat(900)] {
         let error = Expression::parse(&text, &["x"]).unwrap_err();

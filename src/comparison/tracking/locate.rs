@@ -1,0 +1,123 @@
+//! Which parameter moved, since when, and whether it jumped or drifts.
+//!
+//! **Method.** For every parameter k and every pose s of the history, the generalised likelihood ratio (Willsky and Jones
+//! 1976) of a change of k from s on, against what was known before the history began: a *jump* adds the same to every
+//! later pose, a *drift* as much more with each. With Jᵢ and rᵢ of pose i at the state before the history, P its covariance
+//! and weights wᵢ (jump 1, drift i − s + 1): B = Σ wᵢ JᵢᵀJᵢ, D = Σ wᵢ² JᵢᵀJᵢ, h = Σ wᵢ Jᵢᵀrᵢ over i ≥ s, A and g the sums
+//! over all poses with weight 1, and M = (P⁻¹ + A)⁻¹:
+//! ratio = (h(k) − B(:,k)ᵀ M g)² / (D(k,k) − B(:,k)ᵀ M B(:,k)), exact for rows of unit noise.
+//!
+//! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w.
+//!
+//! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n p³ operations.
+//!
+//! **Source and departures.** Willsky and Jones, "A generalized likelihood ratio approach to the detection and estimation
+//! of jumps in linear systems", IEEE TAC 21, 1976, with the drift beside the jump.
+//!
+//! **Checked against** least squares that has the change as one parameter more.
+
+use nalgebra::{DMatrix, DVector, DVectorView};
+
+/// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
+pub const ALTERNATIVE: f64 = 4.0;
+
+/// How a parameter changes from a pose on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// At once.
+    Jump,
+    /// As much more with each pose.
+    Drift,
+}
+
+/// A change of one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// First changed pose.
+    pub since: usize,
+    /// How it changes.
+    pub form: Form,
+    /// By how much so far; a drift by the last pose.
+    pub shift: f64,
+    /// Standard deviation of that.
+    pub sigma: f64,
+    /// Likelihood ratio: χ² with one degree of freedom if nothing had moved.
+    pub ratio: f64,
+}
+
+/// The change that explains the history best, and what else would.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The best.
+    pub best: Change,
+    /// The other form of the same parameter, where it explains the history nearly as well.
+    pub other_form: Option<Change>,
+    /// Other parameters that explain the history nearly as well, each at its best.
+    pub alternatives: Vec<Change>,
+}
+
+/// Looks through all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose,
+/// at the state of which `covariance` is the covariance. `None` where that is not positive definite, or nothing is seen.
+pub fn locate(residuals: &[f64], jacobian: &[f64], per: usize, covariance: &DMatrix<f64>) -> Option<Found> {
+    let (p, n) = (covariance.nrows(), residuals.len() / per.max(1));
+    let j = DMatrix::from_column_slice(n * per, p, jacobian);
+    let r = DVector::from_column_slice(residuals);
+    let whole = j.tr_mul(&j);
+    let m = (covariance.clone().cholesky()?.inverse() + whole).cholesky()?.inverse();
+    let mg = &m * j.tr_mul(&r);
+    let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
+    // Sums from the end: of a jump (weights 1), of a drift (weights 1, 2, …), and Σ w(w + 1)/2 on the diagonal.
+    let (mut jump, mut drift) = (DMatrix::zeros(p, p), DMatrix::zeros(p, p));
+    let (mut jump_gradient, mut drift_gradient) = (DVector::zeros(p), DVector::zeros(p));
+    let mut triangle = DVector::zeros(p);
+    for since in (0..n).rev() {
+        let rows = j.rows(since * per, per);
+        jump += rows.tr_mul(&rows);
+        jump_gradient += rows.tr_mul(&r.rows(since * per, per));
+        drift += &jump;
+        drift_gradient += &jump_gradient;
+        triangle += drift.diagonal();
+        let (of_jump, of_drift) = (&m * &jump, &m * &drift);
+        for k in 0..p {
+            let mut weigh = |form: Form, cross: DVectorView<'_, f64>, h: f64, square: f64, own: f64| {
+                let left = h - cross.dot(&mg);
+                let seen = square - own;
+                // A change that the history hardly sees says nothing.
+                if !(seen > 1e-9 * square) {
+                    return;
+                }
+                let ratio = left * left / seen;
+                let place = &mut best[k][form as usize];
+                if place.is_none_or(|b| ratio > b.ratio) {
+                    let far = if form == Form::Drift { (n - since) as f64 } else { 1.0 };
+                    let (shift, sigma) = (-left / seen * far, far / seen.sqrt());
+                    *place = Some(Change { parameter: k, since, form, shift, sigma, ratio });
+                }
+            };
+            let column = jump.column(k);
+            weigh(Form::Jump, column, jump_gradient[k], jump[(k, k)], column.dot(&of_jump.column(k)));
+            // With one pose left both forms are the same.
+            if since + 1 < n {
+                let column = drift.column(k);
+                let square = 2.0 * triangle[k] - drift[(k, k)];
+                weigh(Form::Drift, column, drift_gradient[k], square, column.dot(&of_drift.column(k)));
+            }
+        }
+    }
+    let better = |[a, b]: &[Option<Change>; 2]| match (a, b) {
+        (Some(a), Some(b)) => Some(if b.ratio > a.ratio { *b } else { *a }),
+        (a, b) => a.or(*b),
+    };
+    let mut all: Vec<Change> = best.iter().filter_map(better).collect();
+    all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio).then(a.parameter.cmp(&b.parameter)));
+    let first = *all.first()?;
+    let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE;
+    let other = best[first.parameter].iter().flatten().find(|c| c.form != first.form).copied();
+    Some(Found {
+        best: first,
+        other_form: other.filter(near),
+        alternatives: all[1..].iter().take_while(|c| near(c)).copied().collect(),
+    })
+}
