@@ -24,6 +24,7 @@ fn run(folder: &Path, arguments: &[&str]) {
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// All targets in front of the arm, axis 1 in the quarter that the configurations state.
 fn program(number: usize) -> String {
     let mut text = format!("MODULE Path{number}\n  PROC main()\n");
     for k in 0..TARGETS {
@@ -34,7 +35,7 @@ fn program(number: usize) -> String {
             "    MoveL [[{:.4},{:.4},{:.4}],[0.0000000,0.0000000,1.0000000,0.0000000],[0,0,0,0],\
              [9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]],v100,z1,tool0;",
             330.0 + x,
-            y - 40.0,
+            y + 4.0,
             420.0 + z
         );
     }

@@ -2,20 +2,22 @@
 
 use truegrind::measurement::import::{self, Options};
 use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, TargetValue};
+use truegrind::program::motion::{Mark, MotionKind, Role, TargetValue};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::Program;
-use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};
+use truegrind::program::rewrite::{Change, Extra, NewTarget, RewriteOptions};
 use truegrind::program::{nc, rapid};
 use truegrind::surface::SurfaceFile;
 
-/// Every target that is known, moved and turned a little; every third stays.
+/// Every target that is known, moved and turned a little; every third stays. Every other circle becomes straight pieces.
 fn changes(program: &Program<'_>) -> Vec<Change> {
     (0_u32..)
         .zip(&program.listing().motions)
         .filter(|(index, motion)| index % 3 != 2 && motion.reason().is_none())
         .map(|(motion, listed)| {
+            let straightens = listed.straightens && motion % 2 == 0;
             let targets = listed.targets.iter().map(|target| match target.value {
+                _ if straightens && target.role == Role::Via => NewTarget::Drop,
                 Ok(TargetValue::Cartesian(t)) => NewTarget::Cartesian {
                     position_mm: t.position_mm.map(|x| x + 0.125),
                     quaternion: [t.quaternion[0] + 1e-3, t.quaternion[1], t.quaternion[2], t.quaternion[3]],
@@ -24,7 +26,18 @@ fn changes(program: &Program<'_>) -> Vec<Change> {
                 Ok(TargetValue::Joint(t)) => NewTarget::Joint { robot_deg: t.robot_deg.map(|q| q + 0.01) },
                 Err(_) => NewTarget::Keep,
             });
-            Change { motion, targets: targets.collect(), before: Vec::new() }
+            let piece = NewTarget::Cartesian {
+                position_mm: [1.0, 2.0, 3.0],
+                quaternion: [1.0, 0.0, 0.0, 0.0],
+                conf: None,
+            };
+            let piece = Extra { kind: MotionKind::Linear, target: piece, external: None };
+            let before = if straightens && motion % 4 == 0 || listed.insertable && motion % 5 == 0 {
+                vec![piece.clone(), piece]
+            } else {
+                Vec::new()
+            };
+            Change { motion, targets: targets.collect(), before }
         })
         .collect()
 }

@@ -10,7 +10,7 @@ use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::{After, PathReport, Status};
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::precision::single_precision;
-use truegrind::compensation::rewrite::{Emit, Options, Plan, plan};
+use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan, plan};
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::diff::unified;
@@ -36,6 +36,15 @@ pub(super) enum EmitArgument {
     Targets,
     /// Joint targets.
     Joints,
+}
+
+/// What becomes of circular motions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum CirclesArgument {
+    /// Circles through their corrected points, the path checked by sampling.
+    Keep,
+    /// Straight pieces within the tolerance.
+    Segments,
 }
 
 /// What is known of the cell, for rewriting and judging.
@@ -116,6 +125,9 @@ pub(super) struct Arguments {
     /// Moved robtargets or joint targets.
     #[arg(long, value_enum, default_value_t = EmitArgument::Targets)]
     emit: EmitArgument,
+    /// Circular motions (MoveC, G2, G3) as circles or as straight pieces.
+    #[arg(long, value_enum, default_value_t = CirclesArgument::Keep)]
+    circles: CirclesArgument,
     /// How far the path between two targets may leave the intended line (mm).
     #[arg(long, value_name = "MM", default_value_t = 0.05, allow_negative_numbers = true)]
     tolerance: f64,
@@ -202,6 +214,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         emit: match arguments.emit {
             EmitArgument::Targets => Emit::Targets,
             EmitArgument::Joints => Emit::Joints,
+        },
+        circles: match arguments.circles {
+            CirclesArgument::Keep => Circles::Keep,
+            CirclesArgument::Segments => Circles::Segments,
         },
         tolerance_mm: arguments.tolerance,
         max_correction_mm: arguments.max_correction,

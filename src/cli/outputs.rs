@@ -1,4 +1,4 @@
-//! The outputs that every verb offers: --json, --csv, --md, --html, --rrd.
+//! The outputs that every verb offers: --json, --csv, --parquet, --md, --html, --rrd.
 
 use std::path::{Path, PathBuf};
 
@@ -18,6 +18,9 @@ pub(super) struct Outputs {
     /// CSV table.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) csv: Option<PathBuf>,
+    /// The table as an Apache Parquet file.
+    #[arg(long, value_name = "FILE")]
+    pub(super) parquet: Option<PathBuf>,
     /// Markdown page.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) md: Option<PathBuf>,
@@ -32,7 +35,7 @@ pub(super) struct Outputs {
 impl Outputs {
     /// All files named.
     pub(super) fn files(&self) -> Vec<&Path> {
-        [&self.json, &self.csv, &self.md, &self.html, &self.rrd]
+        [&self.json, &self.csv, &self.parquet, &self.md, &self.html, &self.rrd]
             .into_iter()
             .filter_map(|p| p.as_deref())
             .collect()
@@ -40,7 +43,7 @@ impl Outputs {
 
     /// Whether any output shows the points of a path.
     pub(super) fn of_points(&self) -> bool {
-        [&self.csv, &self.md, &self.html, &self.rrd].into_iter().any(Option::is_some)
+        [&self.csv, &self.parquet, &self.md, &self.html, &self.rrd].into_iter().any(Option::is_some)
     }
 
     /// Whether stdout is taken by one of the outputs, so that the summary goes to stderr.
@@ -59,8 +62,14 @@ impl Outputs {
         if let Some(path) = &self.json {
             batch.add(path, format::json::text(&json())?);
         }
-        if let Some(path) = &self.csv {
-            batch.add(path, format::csv::table(&table()));
+        if self.csv.is_some() || self.parquet.is_some() {
+            let table = table();
+            if let Some(path) = &self.csv {
+                batch.add(path, format::csv::table(&table));
+            }
+            if let Some(path) = &self.parquet {
+                batch.add(path, format::parquet::table(&table));
+            }
         }
         if self.md.is_none() && self.html.is_none() {
             return Ok(());

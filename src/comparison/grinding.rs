@@ -277,5 +277,6 @@ pub fn taught_cell(
             position_mm: None,
             quaternion_wxyz: None,
         }],
+        external: Vec::new(),
     })
 }

@@ -55,7 +55,34 @@ impl CellFrame {
     }
 }
 
-/// The cell file: what is known of the origin of tools and work objects.
+/// What an external axis carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Carries {
+    /// The robot's base: a track or gantry.
+    Base,
+    /// A part, a tool, or nothing that a target depends on.
+    Other,
+}
+
+/// One external axis of a cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellAxis {
+    /// Its letter in a target, `a` to `f`.
+    pub axis: char,
+    /// What it carries.
+    pub carries: Carries,
+}
+
+impl CellAxis {
+    /// Its place among the external axes of a target.
+    pub fn index(&self) -> Option<usize> {
+        ('a'..='f').position(|letter| letter == self.axis.to_ascii_lowercase())
+    }
+}
+
+/// The cell file: what is known of the origin of tools and work objects, and of external axes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
@@ -65,6 +92,9 @@ pub struct Cell {
     /// Work objects.
     #[serde(default)]
     pub wobj: Vec<CellFrame>,
+    /// External axes.
+    #[serde(default)]
+    pub external: Vec<CellAxis>,
 }
 
 impl Cell {
@@ -90,7 +120,15 @@ impl Cell {
                 ));
             }
         }
+        if let Some(wrong) = cell.external.iter().find(|axis| axis.index().is_none()) {
+            return Err(format!("external axis '{}': expected one of a, b, c, d, e, f", wrong.axis));
+        }
         Ok(cell)
+    }
+
+    /// What an external axis carries, by its place in a target.
+    pub fn carries(&self, index: usize) -> Option<Carries> {
+        self.external.iter().find(|axis| axis.index() == Some(index)).map(|axis| axis.carries)
     }
 
     /// What is known of a tool.

@@ -9,8 +9,8 @@
 //! Lines and arcs are sampled between their ends, and a parabola through neighbouring samples tells where between them
 //! a joint turned.
 
+use super::curve::{Arc, between};
 use super::mounting::Mounting;
-use super::segment::{Arc, between};
 use crate::kinematics::inverse::Inverse;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
@@ -246,8 +246,10 @@ impl Samples {
     fn arc(&mut self, from: &Reached, to: &Reached, mounting: &Mounting) {
         let point = |pose: &Pose| nalgebra::Point3::from(pose.translation.vector);
         let Some(via) = to.via else { return };
-        let Some(arc) = Arc::through(&point(&from.told), &point(&via), &point(&to.told)) else { return };
-        let pieces = pieces(arc.length(), arc.sweep.max(from.told.rotation.angle_to(&to.told.rotation)));
+        let Some(arc) = Arc::through(&point(&from.told), &point(&via), &point(&to.told), None) else {
+            return;
+        };
+        let pieces = pieces(arc.length_mm(), arc.sweep.max(from.told.rotation.angle_to(&to.told.rotation)));
         for k in 1..pieces {
             let s = k as f64 / pieces as f64;
             let rotation = between(&from.told, &to.told, s).rotation;

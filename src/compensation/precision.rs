@@ -23,7 +23,7 @@ pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
     let mut most: Option<SinglePrecision> = None;
     for target in targets {
         let found = match *target {
-            NewTarget::Keep => continue,
+            NewTarget::Keep | NewTarget::Drop => continue,
             NewTarget::Cartesian { position_mm, quaternion, .. } => {
                 let off = position_mm.map(|value| short(value) - value);
                 let written = Frame { position_mm, quaternion };

@@ -8,18 +8,19 @@
 //! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
 //! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
 
-use std::collections::HashMap;
-
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::cell::Cell;
 use super::circumstance::Circumstances;
+use super::corner::{CUT_MM, cut_of_lines};
 use super::deviation::{PathPoint, Status};
-use super::mounting::{Mounted, Mounting, mount};
+use super::mounting::Mounting;
+use super::mountings::Mountings;
+use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
-use super::segment::{Ends, Path, circle_bend, fastest, insertions, middles_off, straight_bend};
+use super::segment::{Ends, Path, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all};
+use super::speed::fastest;
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::effect::Effect;
@@ -32,7 +33,7 @@ use crate::math::se3::Pose;
 use crate::program::motion::{
     Listing, Motion, MotionKind, MotionTarget, Reason, RobTarget, Role, Switch, TargetValue,
 };
-use crate::program::rewrite::{Change, Extra, NewTarget};
+use crate::program::rewrite::{Change, NewTarget};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,11 +45,23 @@ pub enum Emit {
     Joints,
 }
 
+/// What becomes of circular motions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Circles {
+    /// Three corrected points make a circle again; the path is checked by sampling it.
+    #[default]
+    Keep,
+    /// Straight pieces within the tolerance, where the language and the arm allow it.
+    Segments,
+}
+
 /// Bounds of a rewrite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// What is written.
     pub emit: Emit,
+    /// What becomes of circular motions.
+    pub circles: Circles,
     /// How far the path between two targets may leave the intended line (mm).
     pub tolerance_mm: f64,
     /// Largest correction of a position that is written (mm).
@@ -73,6 +86,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             emit: Emit::Targets,
+            circles: Circles::Keep,
             tolerance_mm: 0.05,
             max_correction_mm: 10.0,
             max_turn_rad: 2.0_f64.to_radians(),
@@ -267,85 +281,6 @@ struct Portion {
     points: Vec<PathPoint>,
 }
 
-/// Mountings by (tool, work object) as motions use them.
-pub(super) struct Mountings {
-    places: HashMap<(u32, u32), usize>,
-    pub(super) list: Vec<Mounted>,
-}
-
-impl Mountings {
-    pub(super) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
-        let mut out = Self { places: HashMap::new(), list: Vec::new() };
-        for motion in &listing.motions {
-            let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
-            if out.places.contains_key(&(tool, object)) {
-                continue;
-            }
-            let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
-            let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else { continue };
-            let nominal = arms.nominal.arm();
-            let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
-            out.list.push(mount(
-                (t, tv),
-                (o, ov),
-                cell,
-                nominal,
-                arms.estimated.arm(),
-                arms.knowledge,
-                &usual,
-            ));
-            out.places.insert((tool, object), out.list.len() - 1);
-        }
-        out
-    }
-
-    pub(super) fn of_motion(&self, motion: &Motion) -> Option<usize> {
-        self.places.get(&(motion.tool?, motion.work_object?)).copied()
-    }
-
-    fn notes(&self) -> Vec<String> {
-        let mut out: Vec<String> = Vec::new();
-        for note in self.list.iter().flat_map(|m| &m.notes) {
-            if !out.contains(note) {
-                out.push(note.clone());
-            }
-        }
-        out
-    }
-}
-
-/// Joints of the first target of a motion with this mounting, at which the effect of unknown origins is estimated.
-fn usual_joints(
-    listing: &Listing,
-    motion: &Motion,
-    tool: Pose,
-    object: &crate::program::motion::WorkObjectValue,
-    arms: &Arms<'_>,
-) -> Joints {
-    let mounting = Mounting {
-        tool,
-        object: object.user_frame.pose() * object.object_frame.pose(),
-        holds_part: object.robhold,
-    };
-    let same = |m: &&Motion| m.tool == motion.tool && m.work_object == motion.work_object;
-    let middle = Joints::from_fn(|i, _| {
-        let limits = &arms.nominal.arm().model.limits;
-        0.5 * (limits.min_rad[i] + limits.max_rad[i])
-    });
-    listing
-        .motions
-        .iter()
-        .filter(same)
-        .take(50)
-        .filter_map(|m| m.to())
-        .filter_map(|t| t.value.ok().and_then(|v| v.cartesian().copied()))
-        .find_map(|t| {
-            let flange = mounting.flange_for(&t.pose());
-            configured(&arms.nominal, &flange, &t, Switch::Off, None).ok()
-        })
-        .unwrap_or(middle)
-}
-
 /// The joints that the controller takes for a flange pose with a target's configuration.
 pub(super) fn configured(
     nominal: &Inverse<'_>,
@@ -393,8 +328,14 @@ pub(super) fn monitored(motion: &Motion) -> Switch {
 }
 
 /// The corrected end of a motion, where its last target was worked out.
-fn ends_of<'a>(targets: &[Result<Solved, Why>], mountings: &'a Mountings) -> Option<Ends<'a>> {
+fn ends_of<'a>(
+    motion: &Motion,
+    targets: &[Result<Solved, Why>],
+    mountings: &'a Mountings,
+) -> Option<Ends<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
+    let stated =
+        motion.to().and_then(|target| target.value.ok()).and_then(|value| value.cartesian().copied());
     Some(Ends {
         mounted: &mountings.list[to.mounted],
         index: to.mounted,
@@ -402,6 +343,8 @@ fn ends_of<'a>(targets: &[Result<Solved, Why>], mountings: &'a Mountings) -> Opt
         told: to.told,
         joints: to.after,
         place: to.place,
+        before: to.before,
+        conf: stated.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
     })
 }
 
@@ -442,17 +385,45 @@ impl<'a> Job<'a> {
     /// The path to the end of a motion; `None` where it is not one between two corrected ends in one work object.
     fn path(&self, index: usize) -> Option<Path<'a>> {
         let motion = &self.listing.motions[index];
-        if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular) {
+        if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
             return None;
         }
         let previous = motion.previous? as usize;
-        if !may_change(&self.listing.motions[previous], self.options) {
+        let before = &self.listing.motions[previous];
+        let targets = self.solved.of(previous);
+        let changes = |target: &Result<Solved, Why>| {
+            target.as_ref().is_ok_and(|solved| forbidden(solved, self.arms, self.options).is_none())
+        };
+        if !may_change(before, self.options) || !targets.iter().all(changes) {
             return None;
         }
-        let from = ends_of(self.solved.of(previous), self.mountings)?;
-        let to = ends_of(self.solved.of(index), self.mountings)?;
+        let from = ends_of(before, targets, self.mountings)?;
+        let to = ends_of(motion, self.solved.of(index), self.mountings)?;
         let way = self.solved.way(index, to.place);
         (from.index == to.index).then_some(Path { from, to, way })
+    }
+
+    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it.
+    fn corner(&self, motion: &Motion, path: Option<&Path<'a>>, passage: &Passage) -> Option<f64> {
+        let Path { from: point, to, way } = path?;
+        passage.courses.as_ref()?;
+        let previous = motion.previous? as usize;
+        let before = &self.listing.motions[previous];
+        let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
+        if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
+            // Nearly all lines go on nearly straight: that is told by three points.
+            let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
+            let points = [&first.meant, &point.meant, &to.meant].map(|pose| pose.translation.vector);
+            if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
+                return None;
+            }
+        }
+        let path = self.path(previous)?;
+        let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
+        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
+        let way_in = Passage::of(before, Some(&path), &good, middle, self.arms, self.options);
+        let places = [point.place, way.at(0.0)];
+        corner(point, &way_in, passage, zone_mm, places, self.arms, self.options.emit)
     }
 
     /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
@@ -516,42 +487,24 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
         return finish(outcome, Status::Refused, Some(why), None, point);
     }
     // Then the path from the motion before.
-    let (mut before, mut flag) = (Vec::new(), None);
-    if let Some(path) = path {
-        match motion.kind {
-            MotionKind::Linear => {
-                let bend = straight_bend(path, arms, options.emit, middle_mm);
-                outcome.bend_mm = Some(bend);
-                if bend > options.tolerance_mm {
-                    if !motion.insertable {
-                        flag = Some(Why::Bend { mm: bend });
-                    } else {
-                        let (extra, left) = insertions(path, arms, options);
-                        outcome.inserted = extra.len();
-                        outcome.bend_mm = Some(left);
-                        before = extra;
-                        if left > options.tolerance_mm {
-                            flag = Some(Why::Bend { mm: left });
-                        }
-                    }
-                }
-            }
-            MotionKind::Circular if good.len() == 2 => {
-                outcome.bend_mm = circle_bend(path, &good[0].meant, &good[0].told, arms);
-                flag = match outcome.bend_mm {
-                    None => Some(Why::WholeCircle),
-                    Some(bend) => (bend > options.tolerance_mm).then_some(Why::Bend { mm: bend }),
-                };
-            }
-            _ => {}
+    let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
+    (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
+    let mut flag = passage.flag;
+    if let Some(corner) = job.corner(motion, path, &passage) {
+        outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
+        if !(corner <= options.tolerance_mm) {
+            flag = flag.or(Some(Why::Corner { mm: corner }));
         }
     }
-    let flag = flag.or_else(|| path.and_then(|path| too_fast(motion, listing, path, &good, arms)));
+    let flag = flag.or_else(|| path.and_then(|path| too_fast(motion, listing, path, &passage, arms)));
     let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
-    let new_targets: Vec<NewTarget> =
-        motion.targets.iter().zip(&good).map(|(t, s)| new_target(t, s, motion, options)).collect();
+    let new = |(target, solved): (&MotionTarget, &&Solved)| match target.role {
+        Role::Via if passage.straight => NewTarget::Drop,
+        _ => new_target(target, solved, motion, options),
+    };
+    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
     outcome.after_mm = good.last().map(|s| s.deviation_after.norm_mm());
-    let change = Change { motion: index as u32, targets: new_targets, before };
+    let change = Change { motion: index as u32, targets: new_targets, before: passage.before };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     finish(outcome, status, flag, Some(change), point)
 }
@@ -588,17 +541,12 @@ fn too_fast(
     motion: &Motion,
     listing: &Listing,
     Path { from, to, .. }: &Path<'_>,
-    good: &[&Solved],
+    passage: &Passage,
     arms: &Arms<'_>,
 ) -> Option<Why> {
     let speed = listing.speed(motion).filter(|_| !motion.timed)?.value.as_ref().ok()?;
-    let [start, end] = [&from.meant, &to.meant].map(|pose| pose.translation.vector);
-    // An arc is a little longer than its two chords; the joints on it go with them.
-    let length = match good {
-        [via, _] => gap(&start, &via.meant.translation.vector) + gap(&via.meant.translation.vector, &end),
-        _ => gap(&start, &end),
-    };
-    let (joint, ratio) = fastest(from, to, length, speed, arms)?;
+    let [_, told] = passage.courses.as_ref()?;
+    let (joint, ratio) = fastest(from, to, told, speed, arms)?;
     (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
 }
 
@@ -660,30 +608,4 @@ fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
         status: Status::Changed,
         reason: None,
     }
-}
-
-/// A target that the told path needs between two ends.
-pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit) -> Extra {
-    let q = told.rotation.quaternion();
-    match emit {
-        Emit::Targets => Extra {
-            kind: MotionKind::Linear,
-            target: NewTarget::Cartesian {
-                position_mm: told.translation.vector.into(),
-                quaternion: [q.w, q.i, q.j, q.k],
-                conf: None,
-            },
-            external: None,
-        },
-        Emit::Joints => Extra {
-            kind: MotionKind::AbsoluteJoint,
-            target: NewTarget::Joint { robot_deg: std::array::from_fn(|i| joints[i].to_degrees()) },
-            external: None,
-        },
-    }
-}
-
-/// Distance between two positions (mm).
-pub(super) fn gap(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    (a - b).norm()
 }

@@ -1,17 +1,18 @@
 //! The path between two targets: how far the told line bends under the estimated arm, and which targets straighten it.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::circumstance::picked;
+use super::curve::{beside, between};
 use super::mounting::Mounted;
-use super::rewrite::{Arms, Emit, Options, extra_of, gap};
+use super::rewrite::{Arms, Emit, Options};
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
-use crate::program::motion::SpeedValue;
-use crate::program::rewrite::Extra;
+use crate::program::motion::MotionKind;
+use crate::program::rewrite::{Extra, NewTarget};
 
 /// A corrected end of a motion.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 pub(super) struct Ends<'a> {
     pub(super) mounted: &'a Mounted,
     pub(super) index: usize,
@@ -23,6 +24,10 @@ pub(super) struct Ends<'a> {
     pub(super) joints: Joints,
     /// The condition under which the arm comes there.
     pub(super) place: usize,
+    /// Joints there with the program as it is.
+    pub(super) before: Joints,
+    /// The configuration that its target states, where the controller checks it.
+    pub(super) conf: Option<[i32; 4]>,
 }
 
 /// Under which condition the arm goes along a path: from a share of the way on, a place in the list of conditions.
@@ -35,7 +40,7 @@ pub(super) struct Way {
 }
 
 impl Way {
-    fn at(&self, s: f64) -> usize {
+    pub(super) fn at(&self, s: f64) -> usize {
         self.later.iter().rev().find(|(from, _)| *from <= s).map_or(self.first, |later| later.1)
     }
 
@@ -67,13 +72,6 @@ pub(super) struct Path<'a> {
     pub(super) way: Way,
 }
 
-/// Position straight, orientation by the shortest turn: as controllers interpolate a linear motion.
-pub(super) fn between(from: &Pose, to: &Pose, s: f64) -> Pose {
-    let position = from.translation.vector.lerp(&to.translation.vector, s);
-    let rotation = from.rotation.try_slerp(&to.rotation, s, 1e-9).unwrap_or(from.rotation);
-    Pose::from_parts(position.into(), rotation)
-}
-
 /// How far the tool is from the intended line at share `s` of the way; infinite where the nominal arm cannot go.
 fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, place: usize, arms: &Arms<'_>, emit: Emit) -> f64 {
     let joints = from.joints.lerp(&to.joints, s);
@@ -97,11 +95,7 @@ fn off_line(from: &Ends<'_>, to: &Ends<'_>, s: f64, flange: &Pose) -> f64 {
     let reached = to.mounted.real.target_of(flange);
     let meant = from.meant.translation.vector.lerp(&to.meant.translation.vector, s);
     let off = reached.translation.vector - meant;
-    let along = to.meant.translation.vector - from.meant.translation.vector;
-    match along.try_normalize(1e-6) {
-        Some(direction) => (off - direction * direction.dot(&off)).norm(),
-        None => off.norm(),
-    }
+    beside(&off, &(to.meant.translation.vector - from.meant.translation.vector))
 }
 
 /// [`off_at`] the middle of many lines, in lanes.
@@ -139,7 +133,7 @@ pub(super) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
 }
 
 /// Longest piece of a line that is judged by three samples (mm).
-const PIECE_MM: f64 = 100.0;
+pub(super) const PIECE_MM: f64 = 100.0;
 
 /// Largest distance from the intended line along a path (mm): that of the `middle`, which is given, and where that is not
 /// clearly straight of samples that get denser until they tell the distance to [`CHORD_MM`]. Where a joint turns and the
@@ -176,16 +170,25 @@ fn pieces_of(from: &Ends<'_>, to: &Ends<'_>) -> usize {
 
 /// Between two samples the distance from the intended path is known to this (mm): their chord leaves the distance half
 /// way by no more.
-const CHORD_MM: f64 = 0.002;
+pub(super) const CHORD_MM: f64 = 0.002;
 
 /// How often a piece is halved at most.
 const HALVINGS: u32 = 5;
 
 /// The largest value of a function over a path, which is 0 at both ends: equal pieces, each halved until its chord tells
 /// its middle to [`CHORD_MM`].
-fn largest(pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
-    let at = |k: usize| if k == 0 || k == pieces { 0.0 } else { off(k as f64 / pieces as f64) };
-    let mut most = 0.0_f64;
+pub(super) fn largest(pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
+    largest_from([0.0; 2], pieces, off)
+}
+
+/// The same with other values at the ends.
+pub(super) fn largest_from(ends: [f64; 2], pieces: usize, off: &dyn Fn(f64) -> f64) -> f64 {
+    let at = |k: usize| match k {
+        0 => ends[0],
+        k if k == pieces => ends[1],
+        k => off(k as f64 / pieces as f64),
+    };
+    let mut most = ends[0];
     let mut before = at(0);
     for k in 0..pieces {
         let after = at(k + 1);
@@ -219,17 +222,17 @@ pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) ->
     let Path { from, to, way } = path;
     let mut extra = Vec::new();
     let mut left = 0.0_f64;
-    let mut begin = from.clone();
+    let mut begin = *from;
     for jump in way.jumps(from) {
         let at = |place: usize| end_between(from, to, jump.share, place, arms);
         if jump.share > 0.0
             && let Some(arrived) = at(jump.before)
         {
             left = left.max(split(&begin, &arrived, arms, options, MAX_DEPTH, &mut extra));
-            extra.push(extra_of(&arrived.told, &arrived.joints, options.emit));
+            extra.push(extra_of(&arrived.told, &arrived.joints, options.emit, to, arms));
         }
         let Some(taken_up) = at(jump.after) else { continue };
-        extra.push(extra_of(&taken_up.told, &taken_up.joints, options.emit));
+        extra.push(extra_of(&taken_up.told, &taken_up.joints, options.emit, to, arms));
         begin = taken_up;
     }
     left = left.max(split(&begin, to, arms, options, MAX_DEPTH, &mut extra));
@@ -249,7 +252,7 @@ fn end_between<'a>(
     let joints =
         arms.acting.inverse(place).solve_near(&to.mounted.real.flange_for(&meant), &near).ok()?.joints;
     let told = to.mounted.told.target_of(&arms.nominal.arm().forward(&joints));
-    Some(Ends { mounted: to.mounted, index: to.index, meant, told, joints, place })
+    Some(Ends { meant, told, joints, place, before: near, ..*to })
 }
 
 /// 63 targets at most on one line: more means that the line cannot be followed.
@@ -270,131 +273,50 @@ fn split(
     }
     let Some(middle) = end_between(from, to, 0.5, to.place, arms) else { return bend };
     let first = split(from, &middle, arms, options, depth - 1, extra);
-    extra.push(extra_of(&middle.told, &middle.joints, options.emit));
+    extra.push(extra_of(&middle.told, &middle.joints, options.emit, to, arms));
     let second = split(&middle, to, arms, options, depth - 1, extra);
     first.max(second)
 }
 
-/// Largest distance of the tool from the intended circle, both circles through their three points, sampled along the
-/// arc until the samples tell it to [`CHORD_MM`]; infinite where three points make no circle, `None` for a whole one.
-pub(super) fn circle_bend(
-    path: &Path<'_>,
-    via_meant: &Pose,
-    via_told: &Pose,
-    arms: &Arms<'_>,
-) -> Option<f64> {
+/// How far the tool is, half way of a joint motion, from where the data-sheet arm goes with the program as it is (mm),
+/// the largest over the way: a joint motion has no line to keep, so nothing is put in for it.
+pub(super) fn joint_bend(path: &Path<'_>, arms: &Arms<'_>) -> f64 {
     let Path { from, to, way } = path;
-    let point = |p: &Pose| Point3::from(p.translation.vector);
-    let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < 1e-6;
-    if closed {
-        return None;
-    }
-    let meant = Arc::through(&point(&from.meant), &point(via_meant), &point(&to.meant));
-    let told = Arc::through(&point(&from.told), &point(via_told), &point(&to.told));
-    let (Some(meant), Some(told)) = (meant, told) else { return Some(f64::INFINITY) };
     let off = |s: f64| {
-        let rotation = between(&from.told, &to.told, s).rotation;
-        let pose = Pose::from_parts(told.at(s).coords.into(), rotation);
-        let near = from.joints.lerp(&to.joints, s);
-        match arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near) {
-            Ok(solution) => {
-                let flange = arms.acting.arm(way.at(s)).forward(&solution.joints);
-                let reached = to.mounted.real.target_of(&flange);
-                meant.distance(&point(&reached))
-            }
-            Err(_) => f64::INFINITY,
-        }
+        let meant = arms.nominal.arm().forward(&from.before.lerp(&to.before, s));
+        let reached = arms.acting.arm(way.at(s)).forward(&from.joints.lerp(&to.joints, s));
+        let meant = to.mounted.told.target_of(&meant).translation.vector;
+        gap(&to.mounted.real.target_of(&reached).translation.vector, &meant)
     };
-    // At least every eighth of a turn, and every piece of a long arc.
-    let pieces = ((meant.sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
-        .max((meant.sweep * meant.radius / PIECE_MM).ceil() as usize)
-        .clamp(4, 64);
-    Some(largest(pieces, &off))
+    largest_from([off(0.0), off(1.0)], 2, &off)
 }
 
-/// The joint that turns fastest for what it can, with its speed over its limit, at a speed along a path of this length
-/// and turn; `None` where the path or the limits say nothing.
-pub(super) fn fastest(
-    from: &Ends<'_>,
-    to: &Ends<'_>,
-    length_mm: f64,
-    speed: &SpeedValue,
-    arms: &Arms<'_>,
-) -> Option<(usize, f64)> {
-    let limits = arms.nominal.arm().model.limits.speed_rad_s?;
-    let turn_deg = from.meant.rotation.angle_to(&to.meant.rotation).to_degrees();
-    let duration_s = (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s);
-    if !(duration_s > 1e-6 && duration_s.is_finite()) {
-        return None;
+/// A target that the told path needs before the end `to`.
+pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit, to: &Ends<'_>, arms: &Arms<'_>) -> Extra {
+    let q = told.rotation.quaternion();
+    match emit {
+        Emit::Targets => Extra {
+            kind: MotionKind::Linear,
+            target: NewTarget::Cartesian {
+                position_mm: told.translation.vector.into(),
+                quaternion: [q.w, q.i, q.j, q.k],
+                // cfx stays where only the quarters are used.
+                conf: to.conf.map(|[_, _, _, cfx]| {
+                    let here = arms.nominal.configuration(joints);
+                    [here.cf1, here.cf4, here.cf6, cfx]
+                }),
+            },
+            external: None,
+        },
+        Emit::Joints => Extra {
+            kind: MotionKind::AbsoluteJoint,
+            target: NewTarget::Joint { robot_deg: std::array::from_fn(|i| joints[i].to_degrees()) },
+            external: None,
+        },
     }
-    // Speeds along a line follow its parts; joints at the parts of a long or turning one are worked out.
-    let parts = ((length_mm / 50.0).ceil() as usize).max((turn_deg / 10.0).ceil() as usize).clamp(1, 40);
-    let mut worst: Option<(usize, f64)> = None;
-    let mut before = from.joints;
-    for part in 1..=parts {
-        let s = part as f64 / parts as f64;
-        let joints = if part == parts {
-            to.joints
-        } else {
-            let told = between(&from.told, &to.told, s);
-            let near = from.joints.lerp(&to.joints, s);
-            arms.nominal.solve_near(&to.mounted.told.flange_for(&told), &near).ok()?.joints
-        };
-        for joint in 0..6 {
-            let ratio = (joints[joint] - before[joint]).abs() * parts as f64 / duration_s / limits[joint];
-            if worst.is_none_or(|(_, most)| ratio > most) {
-                worst = Some((joint, ratio));
-            }
-        }
-        before = joints;
-    }
-    worst
 }
 
-/// An arc from its start over a point to its end.
-pub(super) struct Arc {
-    centre: Point3<f64>,
-    x: Vector3<f64>,
-    y: Vector3<f64>,
-    radius: f64,
-    /// Angle from start to end (rad).
-    pub(super) sweep: f64,
-}
-
-impl Arc {
-    /// From start to end (mm).
-    pub(super) fn length(&self) -> f64 {
-        self.radius * self.sweep
-    }
-
-    /// The arc through three points; `None` where they are in line or coincide.
-    pub(super) fn through(start: &Point3<f64>, via: &Point3<f64>, end: &Point3<f64>) -> Option<Self> {
-        let (a, b) = (via - start, end - start);
-        let normal = a.cross(&b);
-        let square = normal.norm_squared();
-        if square < 1e-9 {
-            return None;
-        }
-        let to_centre =
-            (normal.cross(&a) * b.norm_squared() + b.cross(&normal) * a.norm_squared()) / (2.0 * square);
-        let centre = start + to_centre;
-        let radius = to_centre.norm();
-        let x = -to_centre / radius;
-        let y = normal.normalize().cross(&x);
-        let to_end = end - centre;
-        let sweep = to_end.dot(&y).atan2(to_end.dot(&x)).rem_euclid(std::f64::consts::TAU);
-        Some(Self { centre, x, y, radius, sweep })
-    }
-
-    pub(super) fn at(&self, s: f64) -> Point3<f64> {
-        let (sin, cos) = (self.sweep * s).sin_cos();
-        self.centre + (self.x * cos + self.y * sin) * self.radius
-    }
-
-    fn distance(&self, point: &Point3<f64>) -> f64 {
-        let off = point - self.centre;
-        let height = off.dot(&self.x.cross(&self.y));
-        let (u, v) = (off.dot(&self.x), off.dot(&self.y));
-        (u.hypot(v) - self.radius).hypot(height)
-    }
+/// Distance between two positions (mm).
+pub(super) fn gap(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    (a - b).norm()
 }

@@ -15,8 +15,9 @@ use rayon::prelude::*;
 use super::circumstance::picked;
 use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
+use super::mountings::Mountings;
 use super::payload::Load;
-use super::rewrite::{Arms, Emit, Mountings, Options, configured, may_change, monitored};
+use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
 use super::segment::Way;
 use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
@@ -394,6 +395,9 @@ impl<'a> Told<'a> {
     fn of(asked: &Asked<'a>, mountings: &Mountings) -> Option<Self> {
         let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
         let mounted = mountings.of_motion(asked.motion)?;
+        if mountings.moving_base(target).is_some() {
+            return None;
+        }
         let meant = target.pose();
         let flange = mountings.list[mounted].told.flange_for(&meant);
         Some(Self { target, monitored: monitored(asked.motion), mounted, meant, flange })
@@ -440,6 +444,9 @@ fn start(
     let told = &mountings.list[mounted].told;
     match value {
         TargetValue::Cartesian(t) => {
+            if let Some(why) = mountings.moving_base(&t) {
+                return Err(why);
+            }
             let meant = t.pose();
             let flange = told.flange_for(&meant);
             let joints = configured(&arms.nominal, &flange, &t, monitored(asked.motion), near)?;

@@ -8,8 +8,9 @@ use nalgebra::{Point3, Vector3};
 use super::cell::Cell;
 use super::course::{Reached, Stop, courses};
 use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use super::mountings::Mountings;
 use super::payload::Loads;
-use super::rewrite::{Arms, Mountings, configured, monitored};
+use super::rewrite::{Arms, configured, monitored};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{Carried, Estimated};
@@ -221,6 +222,9 @@ fn send(
     let mounting = &mountings.list[mounted].told;
     let (told, joints) = match value {
         TargetValue::Cartesian(t) => {
+            if let Some(why) = mountings.moving_base(&t) {
+                return Err(why);
+            }
             let told = t.pose();
             let flange = mounting.flange_for(&told);
             (told, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)

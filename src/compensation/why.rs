@@ -10,6 +10,11 @@ use crate::program::motion::Reason;
 pub enum Why {
     /// The program does not say enough, or says what must not be touched.
     Program(Reason),
+    /// An external axis carries the robot's base, which is not followed.
+    MovingBase {
+        /// Its place among the external axes, 0-based.
+        axis: usize,
+    },
     /// A joint target states joints, not a pose; rewritten only when asked.
     JointTarget,
     /// No joints reach the target.
@@ -38,6 +43,13 @@ pub enum Why {
         /// By how much (mm).
         mm: f64,
     },
+    /// The robot rounds the point before, and the corner leaves the intended one by more than the tolerance.
+    Corner {
+        /// By how much (mm).
+        mm: f64,
+    },
+    /// Straight pieces were asked for, but the circle stays.
+    CircleKept,
     /// At the programmed speed a joint turns faster than it can.
     TooFast {
         /// Joint, 0-based.
@@ -84,6 +96,11 @@ impl fmt::Display for Why {
             Why::JointTarget => {
                 f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
             }
+            Why::MovingBase { axis } => write!(
+                f,
+                "external axis {} carries the robot's base: where that stands is not followed",
+                char::from(b'a' + *axis as u8)
+            ),
             Why::Inverse(error) => error.fmt(f),
             Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
             Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
@@ -91,6 +108,13 @@ impl fmt::Display for Why {
             Why::NearSingularity => f.write_str("too close to a singularity"),
             Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
+            Why::Corner { mm } => {
+                write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: make the zone smaller")
+            }
+            Why::CircleKept => f.write_str(
+                "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
+                 straight pieces keep to it",
+            ),
             Why::TooFast { joint, ratio } => {
                 write!(
                     f,

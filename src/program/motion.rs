@@ -386,6 +386,11 @@ pub struct Motion {
     pub timed: bool,
     /// Whether the language lets targets be put in before it.
     pub insertable: bool,
+    /// Whether the language lets a circular motion be replaced by straight ones.
+    pub straightens: bool,
+    /// The axis about which a circular motion turns, positively, in the axes of its targets; `None` where its three
+    /// points alone say it (RAPID).
+    pub axis: Option<[f64; 3]>,
     /// The modal state in which it runs.
     pub modal: Modal,
     /// Whether it stands in a loop.

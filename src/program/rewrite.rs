@@ -12,6 +12,8 @@ use crate::program::motion::{Mark, MotionKind, Reason};
 pub enum NewTarget {
     /// Leave it as it is.
     Keep,
+    /// Take it out: a circular motion without its circle point becomes a straight one.
+    Drop,
     /// A new pose; external axes stay.
     Cartesian {
         /// Position in the object frame (mm).
@@ -49,6 +51,13 @@ pub struct Change {
     pub targets: Vec<NewTarget>,
     /// Motions to put before it, in the order in which the robot shall reach them.
     pub before: Vec<Extra>,
+}
+
+impl Change {
+    /// Whether a circular motion becomes straight.
+    pub fn straightens(&self) -> bool {
+        self.targets.contains(&NewTarget::Drop)
+    }
 }
 
 /// How numbers are written. The decimals are the larger of these and those of the source.

@@ -1,10 +1,11 @@
-//! Formats: each turns a table, and where it makes sense a whole document, into text.
+//! Formats: each turns a table, and where it makes sense a whole document, into text or bytes.
 //!
-//! For people: [`terminal`], [`markdown`], [`html`], with the digits each column asks for. For programs: [`csv`] and
-//! [`json`], with every digit.
+//! For people: [`terminal`], [`markdown`], [`html`], with the digits each column asks for. For programs: [`csv`],
+//! [`json`] and [`parquet`], with every digit.
 
 pub mod terminal;
 pub mod markdown;
 pub mod csv;
 pub mod json;
 pub mod html;
+pub mod parquet;

@@ -1,7 +1,9 @@
 //! Rewriting programs: the estimated arm follows what was meant, and nothing dangerous is ever written.
 
+mod path;
 mod payload;
 mod play;
+mod reasons;
 
 use nalgebra::{DMatrix, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -252,6 +254,7 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
     let cell = Cell {
         tool: vec![frame("tSpindle", FrameOrigin::Metrology, Vec::new())],
         wobj: vec![frame("wobjBlade", FrameOrigin::Taught, teaching_deg)],
+        ..Cell::default()
     };
     // The arm is known but for its base: a rigid shift that no sensor in the base can see.
     let mut known_model = actual.clone();

@@ -7,6 +7,7 @@ mod formats;
 mod identification;
 mod numbers;
 mod page;
+mod parquet;
 mod plots;
 mod robots;
 mod study;

@@ -22,7 +22,7 @@ const TARGETS: [Target; 4] = [
     (
         "rapid",
         truegrind_fuzz::rapid,
-        &["mod", "prg"],
+        &["mod", "modx", "prg", "sys"],
         &[
             "MODULE M\n",
             "ENDMODULE\n",
@@ -42,6 +42,7 @@ const TARGETS: [Target; 4] = [
             "ERROR\n",
             "MoveL p,v100,z1,tool0;\n",
             "MoveC p,p,v100,z1,tool0;\n",
+            "MoveC CirPoint:=p, ! c\n ToPoint:=p,v100,z1,tool0;\n",
             "MoveAbsJ j,v100,fine,tool0;\n",
             "Offs(p,1,2,3)",
             "RelTool(p,1,2,3\\Rz:=4)",

@@ -22,6 +22,13 @@ impl Plane {
     pub const ZX: Plane = Plane { a: 2, b: 0, across: 1 };
     /// G19.
     pub const YZ: Plane = Plane { a: 1, b: 2, across: 0 };
+
+    /// The axis about which G3 (`positive`) or G2 turns positively.
+    pub fn axis(&self, positive: bool) -> [f64; 3] {
+        let mut axis = [0.0; 3];
+        axis[self.across] = if positive { 1.0 } else { -1.0 };
+        axis
+    }
 }
 
 /// An arc, perhaps rising across its plane.

@@ -5,27 +5,25 @@
 //! that what is left as it is goes where it always went. Arcs get the centre (or radius) of the circle through their new
 //! start, middle and end.
 
+mod pen;
+mod slots;
+
 use std::collections::HashMap;
 
 use nalgebra::UnitQuaternion;
 
+use self::pen::{Pen, differs};
+use self::slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, Slots, VECTOR, said, slots, spaced};
 use super::arc::{Arc, Plane};
 use super::dialect::Dialect;
-use super::expression::literal;
 use super::machine::Turn;
 use super::mark;
 use super::orientation::{Angles, vector_and_spin};
-use super::parser::word;
-use super::syntax::{Belongs, NcTree, Syntax, Word};
+use super::syntax::{Belongs, NcTree, Word};
 use super::task::{Event, Task, Written};
-use super::token::Token;
 use crate::program::edit::{EditError, Edits};
 use crate::program::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
-use crate::program::rapid::number;
 use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
-
-/// Changes smaller than this are numerical noise, whatever the decimals of the source.
-const NOISE: f64 = 1e-9;
 
 /// Ends of a whole circle that are farther apart than this are none (mm).
 const CLOSED_MM: f64 = 1e-3;
@@ -56,7 +54,10 @@ impl Task<'_> {
             let mut follower = Follower { task: self, options, edits: &mut edits, now: Now::default() };
             for event in &self.events {
                 match *event {
-                    Event::Unknown => follower.now = Now::default(),
+                    Event::Unknown => {
+                        let straightened = follower.now.straightened;
+                        follower.now = Now { straightened, ..Now::default() };
+                    }
                     Event::Lost(axes) => follower.now.lose(axes),
                     Event::Shift(stated) => follower.now.shift_at(stated),
                     Event::NoShift => follower.now.moved = [0.0; 3],
@@ -98,10 +99,13 @@ impl Task<'_> {
                 return Some(Reason::NoJointForm);
             }
         }
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
+        }
         if change.before.is_empty() {
             return None;
         }
-        if !self.written[change.motion as usize].insertable {
+        if !change.straightens() && !self.written[change.motion as usize].insertable {
             return Some(Reason::NoInsertion);
         }
         change.before.iter().find_map(|extra| match (extra.kind, &extra.target) {
@@ -123,6 +127,8 @@ struct Now {
     vector: Option<([f64; 3], f64)>,
     /// By how much a shift of G92 has moved, because it was set where the tool now stands elsewhere.
     moved: [f64; 3],
+    /// Whether G1 holds where the original has G2 or G3, because an arc before has become straight.
+    straightened: bool,
 }
 
 impl Now {
@@ -143,46 +149,6 @@ impl Now {
                 self.moved[axis] = now - meant;
             }
         }
-    }
-}
-
-/// The words of a block that say where to go.
-#[derive(Default)]
-struct Slots<'s> {
-    axes: [Option<Word<'s>>; 3],
-    angles: [Option<Word<'s>>; 3],
-    vector: [Option<Word<'s>>; 3],
-    centre: [Option<Word<'s>>; 3],
-    spin: Option<Word<'s>>,
-    radius: Option<Word<'s>>,
-    feed: Option<Word<'s>>,
-    /// G90 or G91, as written.
-    distance: Option<Word<'s>>,
-    /// After which token new words go.
-    end: u32,
-    /// The last word before that.
-    last: u32,
-}
-
-/// Places in the order of words.
-const AXES: usize = 0;
-const ANGLES: usize = 3;
-const VECTOR: usize = 6;
-const SPIN: usize = 9;
-const CENTRE: usize = 10;
-const RADIUS: usize = 13;
-const ORDER: usize = 14;
-
-impl<'s> Slots<'s> {
-    fn order(&self) -> [Option<Word<'s>>; ORDER] {
-        let mut order = [None; ORDER];
-        order[AXES..ANGLES].copy_from_slice(&self.axes);
-        order[ANGLES..VECTOR].copy_from_slice(&self.angles);
-        order[VECTOR..SPIN].copy_from_slice(&self.vector);
-        order[SPIN] = self.spin;
-        order[CENTRE..RADIUS].copy_from_slice(&self.centre);
-        order[RADIUS] = self.radius;
-        order
     }
 }
 
@@ -210,6 +176,8 @@ impl<'s> Follower<'_, 's> {
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
         let stays = motion.left.is_some_and(|reason| !stays_in_place(reason));
+        let straightens = change.is_some_and(Change::straightens);
+        self.mode_again(motion, written, straightens);
         let Some(to) = to.filter(|_| !stays) else {
             let file = motion.place.file as usize;
             self.pass(&task.trees[file], task.dialects[file], written);
@@ -227,7 +195,9 @@ impl<'s> Follower<'_, 's> {
         let mut aim = new.unwrap_or(original);
         let mut arc = None;
         let mut outcome = Outcome::Unchanged;
-        if let Some((old, positive, _)) = written.arc {
+        if let Some((old, positive, _)) = written.arc
+            && !straightens
+        {
             arc = self.arc(&aim, start, &old, positive);
             if arc.is_none() {
                 // No circle goes there: the motion stays.
@@ -239,7 +209,11 @@ impl<'s> Follower<'_, 's> {
             }
         }
         let tree = &task.trees[motion.place.file as usize];
-        let slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        let mut slots = slots(tree, task.dialects[motion.place.file as usize], written);
+        if straightens {
+            self.straighten(motion, &mut slots, change.is_some_and(|change| change.before.is_empty()));
+            outcome = Outcome::InPlace;
+        }
         if let Some(change) = change
             && !matches!(outcome, Outcome::Refused(_))
             && !change.before.is_empty()
@@ -249,6 +223,58 @@ impl<'s> Follower<'_, 's> {
         }
         let done = self.write(motion, written, &slots, &aim, arc);
         if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
+    }
+
+    /// Says G2 or G3 again in a block that leaves it out, where an arc before has become straight.
+    fn mode_again(&mut self, motion: &Motion, written: &Written, straightens: bool) {
+        if !self.now.straightened || straightens {
+            return;
+        }
+        let task = self.task;
+        let file = motion.place.file as usize;
+        let slots = slots(&task.trees[file], task.dialects[file], written);
+        if slots.mode.is_none() && motion.kind == MotionKind::Circular {
+            let at = slots
+                .first
+                .map_or(motion.statement.start as usize, |word| task.trees[file].start(word.first));
+            let text = format!("{} ", motion.instruction);
+            self.edits[file].insert(at, text.as_bytes());
+        }
+        // A motion of another kind that stands here has been told by a word of its own. A block that may be skipped
+        // may not have said it.
+        let told = slots.mode.is_some() || motion.kind != MotionKind::Unknown;
+        self.now.straightened &= !told || motion.conditional;
+    }
+
+    /// An arc's block becomes a straight one: G1 for G2 or G3, and no centre or radius.
+    fn straighten(&mut self, motion: &Motion, slots: &mut Slots<'s>, alone: bool) {
+        let file = motion.place.file as usize;
+        let tree = &self.task.trees[file];
+        let edits = &mut self.edits[file];
+        match slots.mode {
+            Some(Word { belongs: Belongs::Literal { number, .. }, .. }) => {
+                let range = tree.range(number, number + 1);
+                let digits = tree.text(number).iter().rposition(u8::is_ascii_digit).unwrap_or(0);
+                // G02 to G01: the last digit before a point.
+                let whole =
+                    tree.text(number).iter().position(|&byte| byte == b'.').map_or(digits, |point| point - 1);
+                edits.replace(range.start + whole..range.start + whole + 1, b"1");
+            }
+            _ if alone && !self.now.straightened => {
+                let at = slots.first.map_or(motion.statement.start as usize, |word| tree.start(word.first));
+                edits.insert(at, b"G1 ");
+            }
+            _ => {}
+        }
+        for word in slots.centre.iter_mut().chain([&mut slots.radius]).filter_map(Option::take) {
+            let range = tree.range(word.first, word.end);
+            let blanks =
+                tree.source()[..range.start].iter().rev().take_while(|byte| matches!(byte, b' ' | b'\t'));
+            let begin = range.start - blanks.count();
+            let end = tree.start(word.end - 1) + tree.text(word.end - 1).len();
+            edits.replace(begin..end, b"");
+        }
+        self.now.straightened = true;
     }
 
     /// Whether the control stands where the original has it, so that a motion that stays needs nothing.
@@ -540,128 +566,6 @@ enum Told {
     Vector([f64; 3], f64),
 }
 
-/// Writes words of one block.
-struct Pen<'p, 's> {
-    tree: &'p NcTree<'s>,
-    dialect: Dialect,
-    edits: &'p mut Edits,
-    /// The words of the block in the order in which controls list them.
-    order: [Option<Word<'p>>; ORDER],
-    /// After which token new words go where the block has none of these.
-    end: u32,
-    /// The words of a block that does not exist yet.
-    added: Vec<u8>,
-    replaced: Outcome,
-    /// Whether white space stands between words here.
-    spaced: bool,
-}
-
-impl Pen<'_, '_> {
-    /// Puts a word in at its place among the others: before the next of them, else after the last.
-    fn insert(&mut self, place: usize, mut text: Vec<u8>) {
-        if self.end == 0 {
-            self.added.push(b' ');
-            self.added.extend_from_slice(&text);
-            return;
-        }
-        if self.replaced == Outcome::Unchanged {
-            self.replaced = Outcome::InPlace;
-        }
-        match self.order[place + 1..].iter().flatten().next() {
-            Some(next) => {
-                if self.spaced {
-                    text.push(b' ');
-                }
-                self.edits.insert(self.tree.start(next.first), &text);
-            }
-            None => {
-                let last = self.order[..place].iter().flatten().next_back().map_or(self.end, |word| word.end);
-                if self.spaced {
-                    text.insert(0, b' ');
-                }
-                // After the last byte of the word: white space belongs to what follows.
-                let at = self.tree.start(last - 1) + self.tree.text(last - 1).len();
-                self.edits.insert(at, &text);
-            }
-        }
-    }
-
-    /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
-    /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
-    fn put(&mut self, place: usize, name: &[u8], value: f64, keep: f64, was: f64, least: u8) -> f64 {
-        let Some(word) = self.order[place] else {
-            if !differs(keep, value, least) {
-                return keep;
-            }
-            let mut text = name.to_vec();
-            if name.len() > 1 && self.dialect == Dialect::Siemens {
-                text.push(b'=');
-            }
-            if self.dialect == Dialect::Heidenhain && number::rounded(value, least) >= 0.0 {
-                text.push(b'+');
-            }
-            number::write(&mut text, value, least);
-            self.insert(place, text);
-            return number::rounded(value, least);
-        };
-        match word.belongs {
-            Belongs::Literal { sign, number: token } => {
-                let text = self.tree.text(token);
-                let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
-                let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
-                let decimals = decimals(text).max(least);
-                if !differs(old, value, decimals) {
-                    return old;
-                }
-                let first = sign.unwrap_or(token);
-                let plus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Plus))
-                    || self.dialect == Dialect::Heidenhain;
-                let rounded = number::rounded(value, decimals);
-                self.edits.replace_with(self.tree.range(first, token + 1), |out| {
-                    if plus && rounded >= 0.0 {
-                        out.push(b'+');
-                    }
-                    number::write(out, value, decimals);
-                });
-                if self.replaced == Outcome::Unchanged {
-                    self.replaced = Outcome::InPlace;
-                }
-                rounded
-            }
-            Belongs::Expression { .. } if !differs(was, value, least) => was,
-            Belongs::Expression { first, end } => {
-                // AC( … ) and IC( … ) keep their name.
-                let called =
-                    self.dialect == Dialect::Siemens && self.tree.kind(first) == Some(Token::Name) && {
-                        let name = self.tree.text(first).to_ascii_uppercase();
-                        matches!(&*name, b"AC" | b"IC" | b"DC" | b"ACP" | b"ACN")
-                    };
-                let open = (first..end).find(|&token| self.tree.kind(token) == Some(Token::ParenOpen));
-                let range = match open {
-                    Some(open) if called => self.tree.start(open + 1)..self.tree.start(end - 1),
-                    _ => self.tree.range(first, end),
-                };
-                let rounded = number::rounded(value, least);
-                self.edits.replace_with(range, |out| number::write(out, value, least));
-                self.replaced = Outcome::Inlined;
-                rounded
-            }
-            Belongs::Nothing | Belongs::Arguments { .. } => keep,
-        }
-    }
-}
-
-/// Half a unit of the last decimal, and never less than noise. What is not known differs from everything.
-fn differs(old: f64, new: f64, decimals: u8) -> bool {
-    let half = 0.5 * 10_f64.powi(-i32::from(decimals));
-    !((new - old).abs() <= half.max(NOISE))
-}
-
-fn decimals(text: &[u8]) -> u8 {
-    let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
-    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
-}
-
 fn all(values: [Option<f64>; 3]) -> Option<[f64; 3]> {
     Some([values[0]?, values[1]?, values[2]?])
 }
@@ -703,95 +607,6 @@ fn aim_of(motion: &Motion, change: &Change) -> Option<Aim> {
     let mut aim = aim?;
     aim.via = via;
     Some(aim)
-}
-
-/// The words of a block by what they are.
-fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) -> Slots<'s> {
-    let mut slots = Slots::default();
-    let node = tree.nodes[written.node as usize];
-    if !matches!(node.kind, Syntax::Block | Syntax::Skippable) {
-        return slots;
-    }
-    let (mut place, mut fallback) = (None, (node.end, node.first));
-    for child in tree.child_nodes(written.node) {
-        let word = word(tree, child);
-        let name = word.name.to_ascii_uppercase();
-        let at = |letter: u8, first: u8| usize::from(letter - first);
-        let mut says_where = true;
-        match &*name {
-            [letter @ b'X'..=b'Z'] => slots.axes[at(*letter, b'X')] = Some(word),
-            [b'I', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
-                slots.axes[at(*letter, b'X')] = Some(word);
-            }
-            [b'C'] if dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {
-                says_where = false
-            }
-            [letter @ b'A'..=b'C'] if written.turn == Turn::Angles => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [b'I', letter @ b'A'..=b'C'] if dialect == Dialect::Heidenhain => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [letter @ b'A'..=b'C', b'2'] if written.turn == Turn::Rpy => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [letter @ b'A'..=b'C', b'3'] => slots.vector[at(*letter, b'A')] = Some(word),
-            [b'T', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
-                slots.vector[at(*letter, b'X')] = Some(word);
-            }
-            [letter @ b'I'..=b'K'] if written.vector_words && written.arc.is_none() => {
-                slots.vector[at(*letter, b'I')] = Some(word);
-            }
-            [letter @ b'I'..=b'K'] => slots.centre[at(*letter, b'I')] = Some(word),
-            b"THETA" => slots.spin = Some(word),
-            b"R" if dialect != Dialect::Heidenhain => slots.radius = Some(word),
-            b"R" => match word.belongs {
-                Belongs::Literal { sign: None, .. } => says_where = false,
-                _ => slots.radius = Some(word),
-            },
-            b"CR" if dialect == Dialect::Siemens => slots.radius = Some(word),
-            b"F" => {
-                slots.feed = Some(word);
-                says_where = false;
-            }
-            b"G" | b"N" | b"L" | b"LN" => {
-                fallback = (word.end, word.first);
-                if let Belongs::Literal { sign: None, number } = word.belongs
-                    && matches!(literal(tree.text(number)), Some(90.0 | 91.0))
-                {
-                    slots.distance = Some(word);
-                }
-                says_where = false;
-            }
-            _ => says_where = false,
-        }
-        if says_where {
-            place = Some((word.end, word.first));
-        }
-    }
-    (slots.end, slots.last) = place.unwrap_or(fallback);
-    slots
-}
-
-/// Whether a word says by itself that it is an increment (IC, IX) or not (AC).
-fn said(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
-    if dialect == Dialect::Heidenhain {
-        return Some(word.name.len() == 2 && word.name[0] | 32 == b'i');
-    }
-    let Belongs::Expression { first, .. } = word.belongs else { return None };
-    if dialect != Dialect::Siemens || tree.kind(first) != Some(Token::Name) {
-        return None;
-    }
-    match &*tree.text(first).to_ascii_uppercase() {
-        b"IC" => Some(true),
-        b"AC" | b"DC" | b"ACP" | b"ACN" => Some(false),
-        _ => None,
-    }
-}
-
-/// Whether white space stands before the word that begins with this token (or it begins its line).
-fn spaced(tree: &NcTree<'_>, token: u32) -> bool {
-    token == 0 || tree.kind(token - 1).is_some_and(Token::is_trivia)
 }
 
 /// The line end that a file uses.

@@ -4,9 +4,13 @@
 //! subprogram), what went before holds no more, but for groups that the whole file sets to one thing only. A block that
 //! may be skipped leaves known only what it does not change.
 
+mod codes;
+mod flow;
 mod frames;
 mod heidenhain;
 mod motion;
+mod names;
+mod survey;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc as Shared;
@@ -14,7 +18,7 @@ use std::sync::Arc as Shared;
 use super::arc::Arc;
 use super::dialect::Dialect;
 use super::expression::{Reader, Variable, Worth, literal, numbered};
-use super::machine::{GROUPS, Group, State, Turn};
+use super::machine::{Group, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::{parse, word};
@@ -247,75 +251,6 @@ impl<'t, 's> Lister<'t, 's> {
         }
     }
 
-    /// What the whole file sets, and where its jumps go.
-    fn survey(&mut self) {
-        let mut found: [BTreeSet<u32>; GROUPS as usize] = Default::default();
-        let mut jump = false;
-        for node in 0..self.tree.nodes.len() as u32 {
-            if self.tree.nodes[node as usize].kind != Syntax::Word {
-                continue;
-            }
-            let said = word(self.tree, node);
-            let number = match said.belongs {
-                Belongs::Literal { sign: None, number } => literal(self.tree.text(number)),
-                _ => None,
-            };
-            let address = said.address();
-            if jump {
-                // GOTO N100: the block number stands in a word of its own.
-                jump = false;
-                match (address, number) {
-                    (Some(b'N'), Some(number)) => {
-                        self.targets.insert(number as u64);
-                        continue;
-                    }
-                    (None, _) => {}
-                    _ => self.anywhere = true,
-                }
-            }
-            match (address, number) {
-                (Some(b'G'), Some(number)) => {
-                    let code = code(number);
-                    if matches!(code, 920 | 520) {
-                        found[Group::Shift as usize].extend([0, 1]);
-                    }
-                    if let Some((group, value)) = group_of(code, self.dialect) {
-                        found[group as usize].insert(value);
-                    }
-                }
-                (Some(b'G'), None) => found.iter_mut().for_each(|found| found.extend([0, 1])),
-                (Some(b'M'), Some(number)) => self.changes_tools |= number == 6.0,
-                (Some(b'T'), Some(number)) => {
-                    found[Group::Tool as usize].insert(number as u32);
-                }
-                (Some(b'T'), None) => found[Group::Tool as usize].extend([0, 1]),
-                (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
-                    match number {
-                        Some(number) => {
-                            self.targets.insert(number as u64);
-                        }
-                        None if said.belongs == Belongs::Nothing && said.index.is_none() => jump = true,
-                        None => self.anywhere = true,
-                    }
-                }
-                (None, _) if said.is("TRAORI") => {
-                    found[Group::Tip as usize].insert(1);
-                }
-                (None, _) if said.is("TRAFOOF") => {
-                    found[Group::Tip as usize].insert(0);
-                }
-                _ => {}
-            }
-        }
-        for (group, found) in found.iter().enumerate() {
-            match found.len() {
-                0 => {}
-                1 => self.once |= 1 << group,
-                _ => self.several |= 1 << group,
-            }
-        }
-    }
-
     // ---- blocks ----
 
     fn block(&mut self, node: u32, said: &mut Said<'s>) {
@@ -529,147 +464,6 @@ impl<'t, 's> Lister<'t, 's> {
         }
     }
 
-    fn is_reached_by_jumps(&self, said: &Said<'s>) -> bool {
-        let Some(first) = said.words.first() else { return false };
-        if first.name.len() > 1
-            && self.dialect == Dialect::Siemens
-            && self.tree.kind(first.end.saturating_sub(1)) == Some(Token::Colon)
-        {
-            return true;
-        }
-        let number = said.words.iter().take(2).find(|word| word.address() == Some(b'N'));
-        let labelled = said
-            .words
-            .get(1)
-            .is_some_and(|word| self.tree.kind(word.end - 1) == Some(Token::Colon) && word.name.len() > 1);
-        labelled
-            || number
-                .and_then(|word| self.literal(word))
-                .is_some_and(|number| self.anywhere || self.targets.contains(&(number as u64)))
-    }
-
-    /// Values of variables.
-    fn assignments(&mut self, said: &Said<'s>) {
-        for word in &said.words {
-            if !word.assigned {
-                continue;
-            }
-            let name: Option<Variable> = match word.name {
-                b"#" => match word.index {
-                    Some((first, _)) if self.tree.kind(first) == Some(Token::Name) => {
-                        Some(self.tree.text(first).to_ascii_uppercase())
-                    }
-                    Some(range) => self.evaluated(range).ok().map(|number| numbered(b'#', number)),
-                    None => None,
-                },
-                [b'R' | b'r'] => word
-                    .index
-                    .and_then(|range| self.evaluated(range).ok())
-                    .map(|number| numbered(b'R', number)),
-                [b'R' | b'r', digits @ ..] if !digits.is_empty() && digits.iter().all(u8::is_ascii_digit) => {
-                    Some(word.name.to_ascii_uppercase())
-                }
-                name if name.len() > 1 && word.index.is_none() && self.is_variable(name) => {
-                    Some(name.to_ascii_uppercase())
-                }
-                _ => continue,
-            };
-            let value = match word.belongs {
-                Belongs::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
-                Belongs::Expression { first, end } => self.evaluated((first, end)),
-                _ => Err(Reason::WrongShape),
-            };
-            match name {
-                Some(name) => {
-                    self.state.variables.insert(name, value);
-                }
-                // Any of them.
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
-            }
-        }
-    }
-
-    /// Whether a name with a value is a variable, not an address of two letters or more.
-    fn is_variable(&self, name: &[u8]) -> bool {
-        const ADDRESSES: [&[u8]; 26] = [
-            b"A2", b"B2", b"C2", b"A3", b"B3", b"C3", b"A4", b"B4", b"C4", b"A5", b"B5", b"C5", b"THETA",
-            b"CR", b"TURN", b"AR", b"AP", b"RP", b"I1", b"J1", b"K1", b"ADIS", b"LEAD", b"TILT", b"RPL",
-            b"SPOS",
-        ];
-        self.dialect == Dialect::Siemens
-            && !ADDRESSES.iter().any(|address| name.eq_ignore_ascii_case(address))
-            && !name.starts_with(b"$")
-    }
-
-    /// Jumps, loops and subprograms. True where the block does nothing else.
-    fn control_flow(&mut self, said: &Said<'s>) -> bool {
-        let Some(first) = said.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
-        let name = first.name.to_ascii_uppercase();
-        if self.dialect == Dialect::LinuxCnc && first.address() == Some(b'O') {
-            let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
-            match &*keyword {
-                b"CALL" => self.subprogram(said, "O call"),
-                b"IF" => {}
-                _ => self.forget(),
-            }
-            return true;
-        }
-        match (&*name, first.address()) {
-            (_, Some(b'O')) if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) => {
-                // The number of a program: the first one is where the machine starts.
-                if !self.written.is_empty() {
-                    self.forget();
-                }
-                true
-            }
-            // A program number stands alone; with words it is a block number.
-            (b":", _) if said.words.len() == 1 => {
-                if !self.written.is_empty() {
-                    self.forget();
-                }
-                true
-            }
-            (b"PROC", _) => {
-                self.forget();
-                true
-            }
-            (b"IF", _) => {
-                // A jump may go away; what stands here holds where it does not.
-                true
-            }
-            (
-                b"WHILE" | b"DO" | b"END" | b"ELSE" | b"ENDIF" | b"ENDWHILE" | b"FOR" | b"ENDFOR" | b"LOOP"
-                | b"ENDLOOP" | b"REPEAT" | b"UNTIL" | b"CASE",
-                _,
-            ) => {
-                self.forget();
-                true
-            }
-            _ if name.starts_with(b"GOTO") => true,
-            _ if name.starts_with(b"REPEAT") => {
-                self.subprogram(said, "REPEAT");
-                true
-            }
-            (b"CALL" | b"PCALL" | b"EXTCALL" | b"MCALL" | b"EXECSTRING", _) => {
-                let text = String::from_utf8_lossy(&name).into_owned();
-                self.subprogram(said, &text);
-                true
-            }
-            (_, Some(b'L')) if self.dialect == Dialect::Siemens && first.belongs != Belongs::Nothing => {
-                self.subprogram(said, "L");
-                true
-            }
-            (b"DEF" | b"EXTERN" | b"DEFINE", _) => true,
-            _ => false,
-        }
-    }
-
-    /// A call: listed, and what it leaves behind is not known.
-    fn subprogram(&mut self, said: &Said<'_>, name: &str) {
-        self.left(said, name, Reason::Subprogram);
-        self.forget();
-    }
-
     /// Tools: T, with M6 where the file changes them so.
     fn tools_of(&mut self, said: &Said<'s>) {
         for word in &said.words {
@@ -701,21 +495,4 @@ const POSITION: u8 = 7;
 /// A G number in tenths: 540 for G54, 434 for G43.4.
 fn code(number: f64) -> u32 {
     (number * 10.0).round().clamp(0.0, 1e6) as u32
-}
-
-/// The group that a code sets, and to what, for the survey.
-fn group_of(code: u32, dialect: Dialect) -> Option<(Group, u32)> {
-    Some(match code {
-        900 | 910 => (Group::Distance, code),
-        200 | 700 | 7000 => (Group::Unit, 20),
-        210 | 710 | 7100 => (Group::Unit, 21),
-        170 | 180 | 190 => (Group::Plane, code),
-        540..=599 => (Group::Frame, code),
-        5000..=5999 if dialect == Dialect::Siemens => (Group::Frame, code),
-        400..=429 => (Group::Radius, code),
-        434 | 435 | 2340 => (Group::Tip, code),
-        490 => (Group::Tip, 0),
-        680 | 682 | 683 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
-        _ => return None,
-    })
 }

@@ -8,11 +8,14 @@
 //!
 //! Departure: a controller computes `num` in single precision.
 
+mod functions;
+
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 
-use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
+use self::functions::{Options, call};
 use super::literal;
 use super::number;
 use super::symbol::{Symbols, What};
@@ -21,8 +24,7 @@ use super::syntax::{
 };
 use super::token::{Token, fold, folded, same_name};
 use super::value::{Value, built_in, cartesian_target, components, joint_target};
-use crate::math::se3::{Pose, rotation_from_matrix};
-use crate::program::motion::{Frame, Reason, Span, TargetValue};
+use crate::program::motion::{Reason, Span, TargetValue};
 use crate::program::tree::Child;
 
 /// What the statements so far gave to data that the program assigns.
@@ -569,172 +571,4 @@ fn combined(left: &Value, operator: Token, right: &Value) -> Value {
         }
         _ => Value::Unknown(Reason::WrongShape),
     }
-}
-
-/// A rotation from Euler angles z, y, x (degrees) as `OrientZYX`: about z, the new y, the new x.
-fn orient_zyx(z_deg: f64, y_deg: f64, x_deg: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), z_deg.to_radians())
-        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), y_deg.to_radians())
-        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), x_deg.to_radians())
-}
-
-/// Optional arguments of the functions that are known here.
-#[derive(Default)]
-struct Options {
-    /// `\Rx`, `\Ry`, `\Rz`.
-    turns: [Option<Value>; 3],
-    /// `\WObj` of MirPos.
-    work_object: Option<Value>,
-    /// `\MirY`.
-    mirrors_y: bool,
-}
-
-/// A predefined function of values.
-fn call(name: &[u8], required: &[Value], options: &Options) -> Result<Value, Reason> {
-    let number = |index: usize| required.get(index).ok_or(Reason::MissingArgument)?.number();
-    // An unknown offset is another reason than an unknown base.
-    let offset = |value: &Value| value.number().map_err(|_| Reason::RunTimeOffset);
-    let one = |function: fn(f64) -> f64| Ok(Value::Number(function(number(0)?)));
-    match name {
-        b"offs" => {
-            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
-            let shift = [offset(x)?, offset(y)?, offset(z)?];
-            edited(target, |frame| {
-                for (position, shift) in frame.position_mm.iter_mut().zip(shift) {
-                    *position += shift;
-                }
-            })
-        }
-        b"reltool" => {
-            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
-            let shift = Vector3::new(offset(x)?, offset(y)?, offset(z)?);
-            let mut angles = [0.0; 3];
-            for (angle, option) in angles.iter_mut().zip(&options.turns) {
-                if let Some(value) = option {
-                    *angle = offset(value)?;
-                }
-            }
-            let [rx, ry, rz] = angles.map(f64::to_radians);
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), rx)
-                * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), ry)
-                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rz);
-            edited(target, |frame| {
-                let moved = frame.pose() * Pose::from_parts(Translation3::from(shift), turn);
-                let quaternion = frame.quaternion;
-                *frame = Frame::from_pose(&moved);
-                if angles == [0.0; 3] {
-                    frame.quaternion = quaternion;
-                }
-            })
-        }
-        b"mirpos" => {
-            let [target, plane] = required else { return Err(Reason::MissingArgument) };
-            let plane = plane.work_object()?;
-            let object = match &options.work_object {
-                Some(value) => value.work_object()?,
-                None => built_in(b"wobj0").ok_or(Reason::WrongShape)?.work_object()?,
-            };
-            if !plane.fixed || !object.fixed {
-                return Err(Reason::MovingWorkObject);
-            }
-            let plane = plane.user_frame.pose() * plane.object_frame.pose();
-            let object = object.user_frame.pose() * object.object_frame.pose();
-            edited(target, |frame| {
-                *frame = Frame::from_pose(&mirrored(&frame.pose(), &plane, &object, options.mirrors_y));
-            })
-        }
-        b"posemult" => {
-            let [a, b] = required else { return Err(Reason::MissingArgument) };
-            Ok(Value::from_frame(&Frame::from_pose(&(a.frame()?.pose() * b.frame()?.pose()))))
-        }
-        b"poseinv" => {
-            let [pose] = required else { return Err(Reason::MissingArgument) };
-            Ok(Value::from_frame(&Frame::from_pose(&pose.frame()?.pose().inverse())))
-        }
-        b"posevect" => {
-            let [pose, vector] = required else { return Err(Reason::MissingArgument) };
-            let vector = pose.frame()?.pose() * nalgebra::Point3::from(vector.numbers::<3>()?);
-            Ok(Value::from_numbers(&[vector.x, vector.y, vector.z]))
-        }
-        b"orientzyx" => {
-            let turn = orient_zyx(number(0)?, number(1)?, number(2)?);
-            Ok(Value::from_numbers(&[turn.w, turn.i, turn.j, turn.k]))
-        }
-        b"norient" => {
-            let q = required.first().ok_or(Reason::MissingArgument)?.numbers::<4>()?;
-            let length = q.iter().map(|q| q * q).sum::<f64>().sqrt();
-            if length == 0.0 {
-                return Err(Reason::BadQuaternion);
-            }
-            Ok(Value::from_numbers(&q.map(|q| q / length)))
-        }
-        b"defframe" => {
-            let [origin, x, xy] = required else { return Err(Reason::MissingArgument) };
-            let point = |value: &Value| -> Result<Vector3<f64>, Reason> {
-                match value.target(false)? {
-                    TargetValue::Cartesian(target) => Ok(Vector3::from(target.position_mm)),
-                    TargetValue::Joint(_) => Err(Reason::WrongShape),
-                }
-            };
-            let (origin, x, xy) = (point(origin)?, point(x)?, point(xy)?);
-            let normal = (x - origin).cross(&(xy - origin));
-            if normal.norm() < 1e-9 {
-                return Err(Reason::WrongShape);
-            }
-            let (e1, e3) = ((x - origin).normalize(), normal.normalize());
-            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[e1, e3.cross(&e1), e3]));
-            let pose = Pose::from_parts(origin.into(), rotation_from_matrix(rotation.matrix()));
-            Ok(Value::from_frame(&Frame::from_pose(&pose)))
-        }
-        b"abs" => one(f64::abs),
-        b"sqrt" => one(f64::sqrt),
-        b"exp" => one(f64::exp),
-        b"sin" => one(|x| x.to_radians().sin()),
-        b"cos" => one(|x| x.to_radians().cos()),
-        b"tan" => one(|x| x.to_radians().tan()),
-        b"asin" => one(|x| x.asin().to_degrees()),
-        b"acos" => one(|x| x.acos().to_degrees()),
-        b"atan" => one(|x| x.atan().to_degrees()),
-        b"round" => one(f64::round),
-        b"trunc" => one(f64::trunc),
-        b"atan2" => Ok(Value::Number(number(0)?.atan2(number(1)?).to_degrees())),
-        b"pow" => Ok(Value::Number(number(0)?.powf(number(1)?))),
-        _ => Err(Reason::RunTimeFunction),
-    }
-}
-
-/// A pose in a work object, mirrored in the xy plane of a frame (RAPID reference, MirPos): the position, the z axis of the
-/// tool, and its x axis (with `\MirY` its y axis); the third axis makes it right-handed again.
-fn mirrored(pose: &Pose, plane: &Pose, object: &Pose, mirrors_y: bool) -> Pose {
-    let world = object * pose;
-    let normal = plane.rotation * Vector3::z();
-    let origin = plane.translation.vector;
-    let reflected = |v: Vector3<f64>| v - normal * (2.0 * normal.dot(&v));
-    let position = origin + reflected(world.translation.vector - origin);
-    let axis = |v: Vector3<f64>| reflected(world.rotation * v);
-    let z = axis(Vector3::z());
-    let columns = if mirrors_y {
-        let y = axis(Vector3::y());
-        [y.cross(&z), y, z]
-    } else {
-        let x = axis(Vector3::x());
-        [x, z.cross(&x), z]
-    };
-    let turn = rotation_from_matrix(&Matrix3::from_columns(&columns));
-    object.inverse() * Pose::from_parts(position.into(), turn)
-}
-
-/// A robtarget with another pose; conf and external axes stay.
-fn edited(target: &Value, edit: impl FnOnce(&mut Frame)) -> Result<Value, Reason> {
-    let parts = match target {
-        Value::List(parts) if parts.len() == 4 => parts,
-        Value::Unknown(reason) => return Err(*reason),
-        _ => return Err(Reason::WrongShape),
-    };
-    let mut frame = Frame { position_mm: parts[0].numbers()?, quaternion: parts[1].numbers()? };
-    super::value::usable(&frame.quaternion)?;
-    edit(&mut frame);
-    let position = Value::from_numbers(&frame.position_mm);
-    let rotation = Value::from_numbers(&frame.quaternion);
-    Ok(Value::List(vec![position, rotation, parts[2].clone(), parts[3].clone()]))
 }

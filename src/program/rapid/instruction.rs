@@ -91,6 +91,20 @@ impl Instruction {
         })
     }
 
+    /// For a motion on a circle, the one that does the same on a line: the last C of its name is an L, the circle point
+    /// goes, the other arguments stay.
+    pub fn line_form(&self) -> Option<&'static Instruction> {
+        let rest = self.pattern.strip_prefix('C')?;
+        let at = self.name.rfind('C')?;
+        let line = |name: &str| {
+            name.len() == self.name.len()
+                && name[..at] == self.name[..at]
+                && name[at..].starts_with('L')
+                && name[at + 1..] == self.name[at + 1..]
+        };
+        INSTRUCTIONS.iter().find(|other| other.pattern == rest && line(other.name))
+    }
+
     /// Whether it ends where a signal comes.
     pub fn searches(&self) -> bool {
         self.pattern.contains('O')

@@ -4,20 +4,20 @@
 //! place where every use agrees on the new value and nothing else reads it, else a clone beside it under a new name;
 //! an array element in place or as a literal in the instruction; a computed target as a literal in the instruction.
 
+mod extra;
+
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
+use super::instruction::{self, Between, INSTRUCTIONS, Instruction};
 use super::mark;
 use super::print::{self, Fresh};
-use super::syntax::{RapidTree, arguments, tokens_of};
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::program::edit::{EditError, Edits};
 use crate::program::motion::{Motion, MotionKind, Origin, Reason, Role, Span, TargetValue};
-use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
-use crate::program::tree::Child;
+use crate::program::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 /// Changes that one thread takes at a time.
 const PORTION: usize = 1024;
@@ -190,11 +190,15 @@ impl<'r, 's> Rewriter<'r, 's> {
                 _ => {}
             }
         }
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
+        }
         if change.before.is_empty() {
             return None;
         }
         let guarded = self.task.statements[change.motion as usize].guarded;
-        let between = instruction.map_or(Between::Nothing, |instruction| instruction.between);
+        let written = instruction.and_then(|instruction| written_as(instruction, change));
+        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
         if guarded || motion.timed || between == Between::Nothing {
             return Some(Reason::NoInsertion);
         }
@@ -209,6 +213,7 @@ impl<'r, 's> Rewriter<'r, 's> {
         None
     }
 
+    /// The instruction of a motion as the source has it.
     fn instruction(&self, motion: &Motion) -> Option<&'static Instruction> {
         instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
     }
@@ -223,6 +228,10 @@ impl<'r, 's> Rewriter<'r, 's> {
         computed: &mut Vec<Wish>,
     ) -> Outcome {
         let mut outcome = Outcome::Unchanged;
+        if change.straightens() {
+            self.straighten(motion);
+            outcome = Outcome::InPlace;
+        }
         for (position, (target, new)) in motion.targets.iter().zip(&change.targets).enumerate() {
             let Some(fresh) = fresh(new) else { continue };
             let Ok(old) = target.value else { continue };
@@ -271,6 +280,19 @@ impl<'r, 's> Rewriter<'r, 's> {
         let value = print::merged(old, fresh);
         let edits = &mut self.edits[motion.place.file as usize];
         edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+    }
+
+    /// The instruction becomes the one on a line, and its circle point goes with the comma behind it; a comment between
+    /// them stays.
+    fn straighten(&mut self, motion: &Motion) {
+        let Some(line) = self.instruction(motion).and_then(Instruction::line_form) else { return };
+        let start = motion.statement.start as usize;
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace(start..start + motion.instruction.len(), line.name.as_bytes());
+        let source = self.task.trees[motion.place.file as usize].source();
+        for range in circle_point(source, motion).into_iter().flatten() {
+            edits.replace(range, b"");
+        }
     }
 
     /// The instruction becomes the one that takes joints.
@@ -454,166 +476,41 @@ impl<'r, 's> Rewriter<'r, 's> {
             outcomes[wish.change] = worse(was, Outcome::Inlined);
         }
     }
-
-    // ---- extra motions ----
-
-    fn extras(&mut self, change: &Change) {
-        let motion = &self.task.listing.motions[change.motion as usize];
-        let Some(instruction) = self.instruction(motion) else { return };
-        let tree = &self.task.trees[motion.place.file as usize];
-        let source = tree.source();
-        let start = motion.statement.start as usize;
-        let parts = Parts::of(tree, self.task.statements[change.motion as usize].node, instruction);
-        let mut text = Vec::new();
-        for extra in &change.before {
-            self.extra(&mut text, motion, instruction, tree, &parts, extra);
-            text.extend_from_slice(mark::line_end(source));
-            text.extend_from_slice(indent(source, start));
-        }
-        self.edits[motion.place.file as usize].insert(start, &text);
-    }
-
-    fn extra(
-        &self,
-        out: &mut Vec<u8>,
-        motion: &Motion,
-        instruction: &Instruction,
-        tree: &RapidTree<'_>,
-        parts: &Parts,
-        extra: &Extra,
-    ) {
-        let (Some(fresh), Some(Ok(old))) = (fresh(&extra.target), motion.to().map(|target| target.value))
-        else {
-            return;
-        };
-        let mut value = print::merged(&old, &fresh);
-        if let Some(external) = extra.external {
-            match &mut value {
-                TargetValue::Cartesian(target) => target.external = external,
-                TargetValue::Joint(target) => target.external = external,
-            }
-        }
-        let source = tree.source();
-        let mut target = Vec::new();
-        print::literal(&mut target, &value, self.options);
-        let same = match instruction.between {
-            Between::Same => Some(instruction.name),
-            Between::Other(name) => Some(name),
-            Between::Plain | Between::Nothing => None,
-        };
-        let Some(name) = same else {
-            let name: &[u8] = match extra.kind {
-                MotionKind::Joint => b"MoveJ",
-                MotionKind::AbsoluteJoint => b"MoveAbsJ",
-                _ => b"MoveL",
-            };
-            out.extend_from_slice(name);
-            out.push(b' ');
-            out.extend_from_slice(&target);
-            out.push(b',');
-            for (index, part) in [&parts.speed, &parts.zone, &parts.tool].into_iter().enumerate() {
-                if index == 1 {
-                    out.extend_from_slice(self.options.extra_zone.as_bytes());
-                    out.push(b',');
-                } else if let Some(span) = part {
-                    out.extend_from_slice(&source[span.range()]);
-                    if index == 0 {
-                        for option in &parts.speed_options {
-                            out.extend_from_slice(&source[option.range()]);
-                        }
-                        out.push(b',');
-                    }
-                }
-            }
-            for option in &parts.tool_options {
-                out.extend_from_slice(&source[option.range()]);
-            }
-            out.push(b';');
-            return;
-        };
-        // The same instruction, with another target and a fly-by zone.
-        let statement = &source[motion.statement.range()];
-        let base = motion.statement.start as usize;
-        let mut edits = Edits::new();
-        edits.replace(0..motion.instruction.len(), name.as_bytes());
-        if let Some(to) = motion.targets.iter().find(|target| target.role == Role::To) {
-            let range = to.argument.range();
-            edits.replace(range.start - base..range.end - base, &target);
-        }
-        if let Some(zone) = parts.zone {
-            let range = zone.range();
-            edits.replace(range.start - base..range.end - base, self.options.extra_zone.as_bytes());
-        }
-        for option in &parts.stop_options {
-            let range = option.range();
-            edits.replace(range.start - base..range.end - base, b"");
-        }
-        if let Ok(copy) = edits.apply(statement) {
-            out.extend_from_slice(&copy);
-        }
-    }
 }
 
-/// The arguments of an instruction that extra motions take over.
-#[derive(Default)]
-struct Parts {
-    speed: Option<Span>,
-    zone: Option<Span>,
-    tool: Option<Span>,
-    /// `\V`.
-    speed_options: Vec<Span>,
-    /// `\WObj`, `\TLoad`.
-    tool_options: Vec<Span>,
-    /// `\Inpos`, `\Z`: belong to the stop at the end.
-    stop_options: Vec<Span>,
+/// The instruction that a change leaves.
+fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'static Instruction> {
+    if change.straightens() { instruction.line_form() } else { Some(instruction) }
 }
 
-impl Parts {
-    fn of(tree: &RapidTree<'_>, node: u32, instruction: &Instruction) -> Parts {
-        let mut parts = Parts::default();
-        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
-        let span = |child: Child| {
-            let (first, end) = tokens_of(tree, child);
-            tree.span(first, end)
-        };
-        let mut index = 0;
-        for argument in arguments(tree, node) {
-            if argument.optional {
-                let Some(name) = argument.name else { continue };
-                let end = argument.value.map_or(name + 1, |value| tokens_of(tree, value).1);
-                // From the backslash before the name.
-                let mut first = name;
-                while first > 0 && tree.kind(first) != Some(Token::Backslash) {
-                    first -= 1;
-                }
-                let option = tree.span(first, end);
-                let is = |wanted: &[u8]| same_name(tree.text(name), wanted);
-                if is(b"V") {
-                    parts.speed_options.push(option);
-                } else if is(b"WObj") || is(b"TLoad") {
-                    parts.tool_options.push(option);
-                } else if is(b"Inpos") || is(b"Z") {
-                    parts.stop_options.push(option);
-                }
-                continue;
-            }
-            let slot = instruction.slot(index, count);
-            index += 1;
-            let Some(value) = argument.value else { continue };
-            match slot {
-                Some(Slot::Speed) => parts.speed = Some(span(value)),
-                Some(Slot::Zone) => parts.zone = Some(span(value)),
-                Some(Slot::Tool) => parts.tool = Some(span(value)),
-                _ => {}
-            }
-        }
-        parts
+/// The bytes of a circle point, and those of the comma behind it with the blanks before the next argument.
+fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
+    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    let mut argument = via.argument.range();
+    // `CirPoint := p20` goes with its name.
+    if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
+        let name = before.trim_ascii_end();
+        let long =
+            name.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
+        argument.start = name.len() - long;
     }
+    let mut at = argument.end;
+    while let Some(&byte) = source.get(at).filter(|_| at < motion.statement.end as usize) {
+        match byte {
+            b',' => {
+                let blanks = source[at + 1..].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+                return Some([argument, at..at + 1 + blanks]);
+            }
+            b'!' => at += source[at..].iter().take_while(|&&byte| byte != b'\n').count(),
+            _ => at += 1,
+        }
+    }
+    None
 }
 
 fn fresh(new: &NewTarget) -> Option<Fresh> {
     match *new {
-        NewTarget::Keep => None,
+        NewTarget::Keep | NewTarget::Drop => None,
         NewTarget::Cartesian { position_mm, quaternion, conf } => {
             Some(Fresh::Cartesian { position_mm, quaternion, conf })
         }

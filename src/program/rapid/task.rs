@@ -280,6 +280,8 @@ impl<'a, 's> Lister<'a, 's> {
             work_object: None,
             timed: false,
             insertable: false,
+            straightens: false,
+            axis: None,
             modal: crate::program::motion::Modal::START,
             in_loop: around.in_loop,
             conditional: around.conditional,
@@ -387,7 +389,11 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         motion.timed = options.timed;
-        motion.insertable = !options.timed && !around.guarded && instruction.between != Between::Nothing;
+        let free = !options.timed && !around.guarded;
+        motion.insertable = free && instruction.between != Between::Nothing;
+        motion.straightens = free
+            && instruction.kind == MotionKind::Circular
+            && instruction.line_form().is_some_and(|line| line.between != Between::Nothing);
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }

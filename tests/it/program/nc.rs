@@ -58,6 +58,7 @@ fn each_sample_is_known_by_its_signs() {
     let found: Vec<(String, Dialect)> =
         samples().iter().map(|(name, bytes)| (name.clone(), Dialect::of(bytes))).collect();
     let expected = [
+        ("circles.nc", Dialect::Iso),
         ("fanuc.nc", Dialect::Fanuc),
         ("heidenhain.h", Dialect::Heidenhain),
         ("linuxcnc.ngc", Dialect::LinuxCnc),
@@ -286,6 +287,9 @@ fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
     // With both G90 and G91 in the file what the numbers mean is not known.
     let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
     assert_eq!(found[2], Err(Reason::UnknownFlow));
+    // Nor what a variable is worth that only a condition sets.
+    let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2 Y2 Z3\n", Dialect::Iso);
+    assert_eq!(found, [Err(Reason::UnknownFlow), Ok([4.0, 2.0, 3.0])]);
     // A skipped block makes unsure what it changes, no more.
     let found = ends("G1 X1 Y2 Z3 A0 B0 C0\n/X9\nY5\nX4\n", Dialect::LinuxCnc);
     assert_eq!(found[1..], [Err(Reason::Skippable), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);

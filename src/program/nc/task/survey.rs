@@ -1,0 +1,98 @@
+//! What the whole file sets, and where its jumps go: read once before the blocks are followed.
+
+use std::collections::BTreeSet;
+
+use super::super::dialect::Dialect;
+use super::super::expression::literal;
+use super::super::machine::{GROUPS, Group};
+use super::super::parser::word;
+use super::super::syntax::{Belongs, Syntax};
+use super::{Lister, code};
+
+impl Lister<'_, '_> {
+    /// What the whole file sets, and where its jumps go.
+    pub(super) fn survey(&mut self) {
+        let mut found: [BTreeSet<u32>; GROUPS as usize] = Default::default();
+        let mut jump = false;
+        for node in 0..self.tree.nodes.len() as u32 {
+            if self.tree.nodes[node as usize].kind != Syntax::Word {
+                continue;
+            }
+            let said = word(self.tree, node);
+            let number = match said.belongs {
+                Belongs::Literal { sign: None, number } => literal(self.tree.text(number)),
+                _ => None,
+            };
+            let address = said.address();
+            if jump {
+                // GOTO N100: the block number stands in a word of its own.
+                jump = false;
+                match (address, number) {
+                    (Some(b'N'), Some(number)) => {
+                        self.targets.insert(number as u64);
+                        continue;
+                    }
+                    (None, _) => {}
+                    _ => self.anywhere = true,
+                }
+            }
+            match (address, number) {
+                (Some(b'G'), Some(number)) => {
+                    let code = code(number);
+                    if matches!(code, 920 | 520) {
+                        found[Group::Shift as usize].extend([0, 1]);
+                    }
+                    if let Some((group, value)) = group_of(code, self.dialect) {
+                        found[group as usize].insert(value);
+                    }
+                }
+                (Some(b'G'), None) => found.iter_mut().for_each(|found| found.extend([0, 1])),
+                (Some(b'M'), Some(number)) => self.changes_tools |= number == 6.0,
+                (Some(b'T'), Some(number)) => {
+                    found[Group::Tool as usize].insert(number as u32);
+                }
+                (Some(b'T'), None) => found[Group::Tool as usize].extend([0, 1]),
+                (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
+                    match number {
+                        Some(number) => {
+                            self.targets.insert(number as u64);
+                        }
+                        None if said.belongs == Belongs::Nothing && said.index.is_none() => jump = true,
+                        None => self.anywhere = true,
+                    }
+                }
+                (None, _) if said.is("TRAORI") => {
+                    found[Group::Tip as usize].insert(1);
+                }
+                (None, _) if said.is("TRAFOOF") => {
+                    found[Group::Tip as usize].insert(0);
+                }
+                _ => {}
+            }
+        }
+        for (group, found) in found.iter().enumerate() {
+            match found.len() {
+                0 => {}
+                1 => self.once |= 1 << group,
+                _ => self.several |= 1 << group,
+            }
+        }
+    }
+}
+
+/// The group that a code sets, and to what, for the survey.
+fn group_of(code: u32, dialect: Dialect) -> Option<(Group, u32)> {
+    Some(match code {
+        900 | 910 => (Group::Distance, code),
+        200 | 700 | 7000 => (Group::Unit, 20),
+        210 | 710 | 7100 => (Group::Unit, 21),
+        170 | 180 | 190 => (Group::Plane, code),
+        540..=599 => (Group::Frame, code),
+        5000..=5999 if dialect == Dialect::Siemens => (Group::Frame, code),
+        400..=429 => (Group::Radius, code),
+        434 | 435 | 2340 => (Group::Tip, code),
+        490 => (Group::Tip, 0),
+        680 | 682 | 683 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
+        _ => return None,
+    })
+}

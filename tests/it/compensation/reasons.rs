@@ -1,0 +1,189 @@
+//! Every reason why a motion is left, refused or flagged shows in a program.
+
+use std::collections::BTreeSet;
+
+use truegrind::compensation::cell::Cell;
+use truegrind::compensation::deviation::Status;
+use truegrind::compensation::rewrite::{Circles, Options, Plan, plan};
+use truegrind::compensation::why::Why;
+use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::Joints;
+use truegrind::program::rapid::Task;
+
+use super::{estimated, perturbed};
+
+/// Every variant by name: a new one does not compile until it stands here.
+fn name(why: &Why) -> &'static str {
+    match why {
+        Why::Program(_) => "program",
+        Why::MovingBase { .. } => "moving base",
+        Why::JointTarget => "joint target",
+        Why::Inverse(_) => "inverse",
+        Why::OutsideLimits { .. } => "outside limits",
+        Why::TooFar { .. } => "too far",
+        Why::TooMuchTurn { .. } => "too much turn",
+        Why::NearSingularity => "near singularity",
+        Why::OtherBranch => "other branch",
+        Why::Bend { .. } => "bend",
+        Why::Corner { .. } => "corner",
+        Why::CircleKept => "circle kept",
+        Why::TooFast { .. } => "too fast",
+        Why::WholeCircle => "whole circle",
+        Why::JointNotMeasured { .. } => "joint not measured",
+        Why::NotCovered { .. } => "not covered",
+        Why::Uncertain { .. } => "uncertain",
+    }
+}
+
+const NAMES: [&str; 17] = [
+    "program",
+    "moving base",
+    "joint target",
+    "inverse",
+    "outside limits",
+    "too far",
+    "too much turn",
+    "near singularity",
+    "other branch",
+    "bend",
+    "corner",
+    "circle kept",
+    "too fast",
+    "whole circle",
+    "joint not measured",
+    "not covered",
+    "uncertain",
+];
+
+fn known() -> Estimated {
+    let mut known = estimated(perturbed(5, 3.0), &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    known
+}
+
+fn planned(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    let task = Task::read(&[("p.mod", source)]);
+    assert!(task.listing.opaque.is_empty(), "{:?}", task.listing.opaque);
+    plan(&task.listing, known, cell, options)
+}
+
+fn sample(name: &str) -> Vec<u8> {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("programs");
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+fn fine() -> Options {
+    Options { tolerance_mm: 0.005, circles: Circles::Segments, ..Options::default() }
+}
+
+#[test]
+fn each_motion_of_the_sample_states_the_reason_beside_it() {
+    let source = sample("refusals.mod");
+    let task = Task::read(&[("p.mod", &source)]);
+    let plan = planned(&source, &known(), &Cell::default(), &fine());
+    let text = String::from_utf8(source.clone()).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let mut wrong = Vec::new();
+    for (motion, outcome) in task.listing.motions.iter().zip(&plan.outcomes) {
+        let line = lines[motion.place.line as usize - 1];
+        let expected = line.split("! expect: ").nth(1).unwrap();
+        let found = outcome.reason.map_or("nothing".to_owned(), |why| why.to_string());
+        if !found.contains(expected) {
+            wrong.push(format!("{}: {expected}: {found} ({outcome:?})", motion.place.line));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_reason_there_is_shows_in_a_program() {
+    let mut seen: BTreeSet<&str> = BTreeSet::new();
+    let mut look = |plan: &Plan| {
+        for outcome in &plan.outcomes {
+            if let Some(why) = &outcome.reason {
+                assert_ne!(outcome.status, Status::Changed);
+                assert!(!why.to_string().is_empty());
+                seen.insert(name(why));
+            }
+        }
+    };
+    let refusals = sample("refusals.mod");
+    let cell = Cell::default();
+    look(&planned(&refusals, &known(), &cell, &fine()));
+    look(&planned(&sample("switches.mod"), &known(), &cell, &fine()));
+    look(&planned(&sample("track.mod"), &known(), &cell, &fine()));
+    let bounds = [
+        Options { max_correction_mm: 1e-4, ..fine() },
+        Options { max_turn_rad: 1e-7, ..fine() },
+        Options { joint_targets: true, ..fine() },
+        Options { min_singularity: 1.0, ..fine() },
+        Options { tolerance_mm: 0.5, ..fine() },
+    ];
+    for options in &bounds {
+        look(&planned(&refusals, &known(), &cell, options));
+    }
+    let mut unsure = known();
+    unsure.region.sigma_mm = 1e-12;
+    look(&planned(&refusals, &unsure, &cell, &fine()));
+    let mut elsewhere = known();
+    elsewhere.region.spacing_deg = 1.0;
+    elsewhere.region.samples_deg = vec![[150.0; 6]];
+    look(&planned(&refusals, &elsewhere, &cell, &fine()));
+    let mut narrow = known();
+    narrow.region.max_deg[1] = 5.0;
+    look(&planned(&refusals, &narrow, &cell, &fine()));
+    // Axis 5 almost straight, so that a correction turns it to the other side; no bound on singularity.
+    let mut near = String::from("MODULE M\n PROC main()\n");
+    for angle in [-0.006, -0.003, 0.003, 0.006_f64] {
+        let q = nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Vector3::y_axis(),
+            std::f64::consts::FRAC_PI_2 + angle,
+        );
+        let cfx = if angle > 0.0 { 0 } else { 1 };
+        near += &format!(
+            "  MoveJ [[374,0,{:.6}],[{:.9},0,{:.9},0],[0,0,0,{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n",
+            630.0 - 72.0 * angle,
+            q.w,
+            q.j
+        );
+    }
+    near += " ENDPROC\nENDMODULE\n";
+    let options = Options { min_singularity: 0.0, max_turn_rad: 1.0, max_correction_mm: 50.0, ..fine() };
+    for seed in 0..12 {
+        look(&planned(
+            near.as_bytes(),
+            &estimated(perturbed(seed, 1.0), &[Joints::zeros()]),
+            &cell,
+            &options,
+        ));
+    }
+    let missing: Vec<&&str> = NAMES.iter().filter(|name| !seen.contains(*name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
+fn an_axis_that_carries_the_base_refuses_its_motions() {
+    let source = sample("track.mod");
+    let reasons = |cell: &Cell| -> Vec<Option<Why>> {
+        planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason).collect()
+    };
+    let base = Some(Why::MovingBase { axis: 0 });
+    // Farther away than the arm is long: the axis must carry the base, there and where it stands at 0.
+    let found = reasons(&Cell::default());
+    assert_eq!(found, [base, base, base, None]);
+    let stated = |text: &str| Cell::from_toml(&format!("[[external]]\naxis = \"{text}")).unwrap();
+    assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base, base, base, None]);
+    let both = stated("b\"\ncarries = \"base\"\n");
+    assert_eq!(reasons(&both)[3], Some(Why::MovingBase { axis: 1 }));
+    // Stated not to: then the far target is out of reach, and says so.
+    let other = reasons(&stated("a\"\ncarries = \"other\"\n"));
+    assert_eq!(other[0], None);
+    assert!(matches!(other[1], Some(Why::Inverse(_))), "{other:?}");
+    assert!(Cell::from_toml("[[external]]\naxis = \"g\"\ncarries = \"base\"\n").is_err());
+    let notes = planned(&source, &known(), &Cell::default(), &Options::default()).notes;
+    assert!(
+        notes.iter().any(|note| note.contains("external axis a") && note.contains("[[external]]")),
+        "{notes:?}"
+    );
+}
