@@ -82,11 +82,9 @@ impl CellArguments {
             bail!("--payload {kg}: expected a mass in kg, from 0 to {LARGEST_PAYLOAD_KG}");
         }
         let cell = match &self.cell {
-            Some(path) => {
-                Cell::from_toml(&files::read_text(path)?).map_err(|e| {
+            Some(path) => Cell::from_toml(&files::read_text(path)?).map_err(|e| {
                 anyhow!("{}: {}; a cell file lists [[tool]] and [[wobj]]", path.display(), e.trim_end())
-            })?
-            }
+            })?,
             None => Cell::default(),
         };
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;

@@ -100,7 +100,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
             program: "blade.mod",
             name: &one.estimated.provenance.method,
             after: After::Achieved,
-        loads: [None, None],
+            loads: [None, None],
         };
         let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
         let mut report = judge(&judged, &acting);

@@ -195,7 +195,11 @@ const MOST_NAMES: usize = 40;
 /// A first line of numbers alone is no header.
 fn headless(found: &[String]) -> &'static str {
     let numbers = !found.is_empty() && found.iter().all(|name| name.trim().parse::<f64>().is_ok());
-    if numbers { "; these are numbers: put a header line with the names of the columns above them" } else { "" }
+    if numbers {
+        "; these are numbers: put a header line with the names of the columns above them"
+    } else {
+        ""
+    }
 }
 
 fn suggestion(near: &[(String, String)]) -> String {
