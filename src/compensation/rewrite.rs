@@ -217,7 +217,8 @@ fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
         ),
     };
     Some(format!(
-        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
+        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}; where a joint \
+         turns between two targets the path can be off by a part of its play beyond what is stated here",
         plays.join(", ")
     ))
 }
