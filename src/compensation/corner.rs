@@ -6,7 +6,7 @@
 //! most half of each way. The told corner, gone by the estimated arm, is compared with the intended one, so it shows
 //! when targets that were put in shorten a zone and so change the shape of the corner.
 //! Shapes: poses of the tool in the work object (mm).
-//! Stops: sampled to [`CHORD_MM`]; corners that cut off less than [`CUT_MM`] are as the lines that they join.
+//! Stops: sampled to the chord error of lines (0.002 mm); corners that cut off less than `CUT_MM` are as the lines they join.
 //! Source: ABB, RAPID reference manual, zonedata and motion principles (corner path a parabola, zones cut to half the
 //! distance). Departure: the larger zones of reorientation and external axes are taken as that of the position.
 //! Checked against: a right angle in closed form, dense samples of the corner in the tests.
