@@ -118,7 +118,7 @@ pub fn diagnose(
     let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
     let most = if needed.is_some() { 0 } else { options.selection.most };
     let selection = selection::select(&searched, &selection::Options { most, ..options.selection }, tell);
-    let Selection { geometric, extended: mut found, mut accepted, left, .. } = selection;
+    let Selection { geometric, extended: mut found, mut accepted, left } = selection;
     let (geometric, mut extended) = match &thinned {
         None => (geometric, found.clone()),
         Some(thin) => {

@@ -5,12 +5,10 @@
 //! be found, while single wild rows pull no more than a bad normal one. Scale by the median, refined at the end so that
 //! the weighted sum of squares has its degrees of freedom. Source: Huber, Robust Statistics, 1981, chapter 7.
 
-use nalgebra::DVector;
-
 use super::cause::Cause;
 use crate::estimation::estimate::Estimate;
 use crate::estimation::least_squares::lm;
-use crate::estimation::problem::{Prior, Problem};
+use crate::estimation::problem::Prior;
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
 use crate::identification::rounding;
@@ -309,20 +307,6 @@ impl Extended {
             })
             .map(|(k, _)| k)
             .collect()
-    }
-
-    /// Cost with priors at the estimate, twice: χ² of rows and priors under the weights of the fit.
-    pub fn chi_square(&self) -> f64 {
-        let prior: f64 = self.priors.iter().zip(&self.x).map(|(p, x)| ((x - p.mean) / p.sigma).powi(2)).sum();
-        2.0 * self.task.row_cost(&self.x) + prior
-    }
-
-    /// Deviations over the priors' variances: the pull of the priors at the estimate.
-    pub fn prior_pull(&self) -> DVector<f64> {
-        DVector::from_iterator(
-            self.x.len(),
-            self.priors.iter().zip(&self.x).map(|(p, x)| (x - p.mean) / p.sigma.powi(2)),
-        )
     }
 }
 

@@ -70,8 +70,6 @@ pub struct Selection {
     pub accepted: Vec<Accepted>,
     /// Every candidate against the extended model, best first: what is left to find, and what could not be seen.
     pub left: Vec<Scored>,
-    /// Kinds of candidates (name and joints) that were tried.
-    pub families: f64,
 }
 
 /// Candidates that do not depend on a fit, built once.
@@ -296,8 +294,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                             continue;
                         }
                     }
-                    let families = catalogue.families;
-                    return Selection { geometric, extended: current, accepted, left, families };
+                    return Selection { geometric, extended: current, accepted, left };
                 }
             }
         };
@@ -345,7 +342,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let board = Board::of(&catalogue, subject, &current);
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    Selection { geometric, extended: current, accepted, left, families: catalogue.families }
+    Selection { geometric, extended: current, accepted, left }
 }
 
 /// A cause is in doubt beside rivals that have less merit by no more than this.

@@ -154,9 +154,9 @@ fn targets_are_found_from_their_configuration_alone() {
 }
 
 /// A heavy sweep: `it-… --ignored every_random_pose_is_found_from_its_configuration_alone`, poses of each arm from the
-/// variable TRUEGRIND_SWEEP (20,000).
+/// variable TRUEGRIND_SWEEP (20,000). It does not pass yet: of the first 60,000 poses, on three arms, 11 were missed.
 #[test]
-#[ignore = "minutes; the sample of it above runs always"]
+#[ignore = "takes minutes and misses 11 of 60,000 poses; targets_are_found_from_their_configuration_alone runs always"]
 fn every_random_pose_is_found_from_its_configuration_alone() {
     let poses = std::env::var("TRUEGRIND_SWEEP").ok().and_then(|n| n.parse().ok()).unwrap_or(20_000);
     let mut missed = Vec::new();
