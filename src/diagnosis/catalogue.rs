@@ -219,12 +219,12 @@ const COUPLINGS: [(usize, usize); 10] =
 
 /// Knots of an error map over a turn: a smooth curve.
 pub const MAP_KNOTS: usize = 24;
-/// Knots of one that follows the periods of a reducer's stages, tried where lines of the joint stand out.
-const FINE_KNOTS: usize = 72;
+/// Knots of those that follow the periods of a reducer's stages, tried where lines of the joint stand out that they reach.
+pub const FINE_KNOTS: [usize; 2] = [72, 144];
 
 /// The finely resolved error map of a joint.
-pub fn fine_map(subject: &Subject<'_>, joint: usize) -> Candidate {
-    let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; FINE_KNOTS] });
+pub fn fine_map(subject: &Subject<'_>, joint: usize, knots: usize) -> Candidate {
+    let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
     Candidate::arm(effect, &subject.observed.dataset, subject.nominal)
 }
 

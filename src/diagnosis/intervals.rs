@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::design::{Design, gram};
+use super::algebra::gram;
+use super::design::Design;
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
