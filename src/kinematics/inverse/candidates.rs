@@ -2,10 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use nalgebra::UnitQuaternion;
+
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::model::{Joints, Limits};
+use crate::math::se3::Pose;
 
 /// Solutions nearer than this are one (rad).
 const SAME_RAD: f64 = 1e-6;
@@ -15,6 +18,12 @@ const NEARLY_SINGULAR: f64 = 0.15;
 const SPREAD: usize = 64;
 /// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
 const SPREAD_RESCUE: usize = 24;
+/// A solution with a smaller margin to a singularity may have a neighbour across it.
+const FOLDED: f64 = 0.1;
+/// Targets beside one whose wanted solution is not found.
+const BESIDE: usize = 60;
+/// How far beside, in turn (rad, and shares of the characteristic length).
+const BESIDE_WIDTH: [f64; 3] = [0.01, 0.04, 0.15];
 
 impl Inverse<'_> {
     /// [`Inverse::solve_near`] where the kernel's answer does not count.
@@ -73,6 +82,9 @@ impl Inverse<'_> {
         };
         if !found.iter().any(fits) {
             found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
+        }
+        if !found.iter().any(fits) {
+            found = self.beside(goal, near, found, &fits);
         }
         for found in found {
             let outcome = self.turned(goal, found, &wanted);
@@ -187,6 +199,38 @@ impl Inverse<'_> {
         })
     }
 
+    /// Solutions with more that lie near a fold, until one of them `fits`. There the closed form of the target itself leads
+    /// to few places, but those of targets a little beside it stand all about the fold: they are the seeds.
+    fn beside(
+        &self,
+        goal: &Goal,
+        near: Option<&Joints>,
+        found: Vec<Outcome>,
+        fits: &dyn Fn(&Outcome) -> bool,
+    ) -> Vec<Outcome> {
+        let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < FOLDED);
+        let Some(map_inverse) = self.map_inverse.filter(|_| found.iter().any(folded)) else { return found };
+        let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
+        let mapped = (self.arm.model.joint_map * around).into();
+        let mut search = Search { inverse: self, goal, around, found, stuck: Vec::new() };
+        for k in 0..BESIDE {
+            let width = BESIDE_WIDTH[k % BESIDE_WIDTH.len()];
+            let off = Joints::from_fn(|axis, _| width * (2.0 * halton(axis, k) - 1.0));
+            let shift = off.fixed_rows::<3>(0) * self.kernel.length_mm;
+            let turn = UnitQuaternion::from_scaled_axis(off.fixed_rows::<3>(3).into_owned());
+            let target =
+                Pose::from_parts((goal.last.translation.vector + shift).into(), turn * goal.last.rotation);
+            for seed in self.structure.seeds(&target, &mapped) {
+                let known = search.found.len();
+                search.attempt(&(map_inverse * Joints::from(seed.rotations)));
+                if search.found[known..].iter().any(fits) {
+                    return search.found;
+                }
+            }
+        }
+        search.found
+    }
+
     /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again.
     fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
         let joints = on_turn_near(&outcome.joints, wanted);
@@ -204,17 +248,22 @@ impl Inverse<'_> {
     /// Point `k` of a Halton sequence over the joint ranges.
     fn spread_seed(&self, k: usize) -> Joints {
         Joints::from_fn(|axis, _| {
-            let base = [2, 3, 5, 7, 11, 13][axis];
-            let (mut fraction, mut scale, mut rest) = (0.0, 1.0, k + 1);
-            while rest > 0 {
-                scale /= base as f64;
-                fraction += scale * (rest % base) as f64;
-                rest /= base;
-            }
             let (low, high) = range(&self.arm.model.limits, axis);
-            low + fraction * (high - low)
+            low + halton(axis, k) * (high - low)
         })
     }
+}
+
+/// Point `k` of a Halton sequence, from 0 to 1, along an axis.
+fn halton(axis: usize, k: usize) -> f64 {
+    let base = [2, 3, 5, 7, 11, 13][axis];
+    let (mut fraction, mut scale, mut rest) = (0.0, 1.0, k + 1);
+    while rest > 0 {
+        scale /= base as f64;
+        fraction += scale * (rest % base) as f64;
+        rest /= base;
+    }
+    fraction
 }
 
 /// Solutions gathered from seed after seed.
