@@ -262,12 +262,13 @@ pub(super) fn approached(
                 .collect();
             let robust = trusted(&weights, &trust);
             let task = plain_task.reweighted(&robust);
+            // The last weights get a matrix of their own, under which few steps are enough.
             let mut near_enough = false;
-            for _ in 0..LAST_STEPS {
-                metric =
-                    metric.and_then(|m| Metric::step(Some(m), &task, &robust, angles > 0, &priors, &mut x));
-                near_enough = metric.as_ref().is_some_and(|m| m.promise < NEAR * (n * per) as f64);
-                if near_enough || metric.is_none() {
+            let mut last = None;
+            for _ in 0..if nearby { LAST_STEPS } else { 0 } {
+                last = Metric::step(last, &task, &robust, angles > 0, &priors, &mut x);
+                near_enough = last.as_ref().is_some_and(|m| m.promise < NEAR * (n * per) as f64);
+                if near_enough || last.is_none() {
                     break;
                 }
             }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::board::Board;
-use super::catalogue::{Candidate, FINE_KNOTS, arm_candidates, fine_map, measurement_candidates};
+use super::catalogue::{Candidate, arm_candidates, fine_maps, measurement_candidates};
 use super::cause::Cause;
 use super::design::Design;
 use super::extension::{Extended, Freedom, Subject, approached, fit};
@@ -78,7 +78,7 @@ pub struct Catalogue {
     /// Those whose rows and orders are listed.
     pub listed: Vec<Arc<Candidate>>,
     /// Fine error maps of each joint, by how fine they are.
-    pub fine: Vec<[Arc<Candidate>; 2]>,
+    pub fine: Vec<Vec<Arc<Candidate>>>,
     /// Kinds of shifts with their regressors over all rows.
     pub shifts: Vec<Candidate>,
     /// Kinds of candidates (name and joints).
@@ -112,7 +112,7 @@ impl Catalogue {
         stories.dedup();
         let families = stories.len() as f64;
         let fine =
-            (0..6).map(|joint| FINE_KNOTS.map(|knots| Arc::new(fine_map(subject, joint, knots)))).collect();
+            (0..6).map(|joint| fine_maps(subject, joint).into_iter().map(Arc::new).collect()).collect();
         Self { listed: listed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 
@@ -145,7 +145,9 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let geometric = fit(subject, &[], Freedom::All, Some(&registered));
     let random = split::folds(dataset, 5, options.seed);
     let blocks = split::blocks(dataset, BLOCKS);
-    let mut current = geometric.clone();
+    let mut current = Arc::new(geometric.clone());
+    // The board of the current fit, where one was made already.
+    let mut known: Option<Board<'_>> = None;
     let mut refused: Vec<Cause> = Vec::new();
     // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
     // comes in too.
@@ -154,9 +156,8 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let mut failed: Vec<(Cause, f64)> = Vec::new();
     let (mut told_again, mut ahead, mut turned_out) = (false, EXCHANGE, Vec::new());
     for _ in 0..4 * options.most.max(1) {
-        let board = Board::of(&catalogue, subject, &current);
-        let design = &board.whole.design;
-        let left = board.scored(design, true);
+        let board = known.take().unwrap_or_else(|| Board::of(&catalogue, subject, Arc::clone(&current)));
+        let left = board.scored(&board.whole.design, true);
         let taken = (current.causes.len() < options.most)
             .then(|| next(&board, &left, &refused, &mut failed, options, [&random, &blocks]))
             .flatten();
@@ -175,7 +176,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                         list.push(gone.clone());
                     }
                     ahead *= HARDER;
-                    current = *settled;
+                    current = Arc::new(*settled);
                     continue;
                 }
                 Review::Settled(accepted) => {
@@ -183,11 +184,16 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                         told_again = true;
                         let told = approached(subject, &causes, Freedom::All, Some(&current));
                         if levels::as_good(&told, &current) {
-                            current = told;
+                            current = Arc::new(told);
                             continue;
                         }
                     }
-                    return Selection { geometric, extended: current.polished(), accepted, left };
+                    return Selection {
+                        geometric,
+                        extended: Arc::unwrap_or_clone(current).polished(),
+                        accepted,
+                        left,
+                    };
                 }
             }
         };
@@ -201,7 +207,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
-        current = approached(subject, &causes, Freedom::All, Some(&current));
+        current = Arc::new(approached(subject, &causes, Freedom::All, Some(&current)));
         let asked: Vec<Cause> = doubtful
             .iter()
             .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(&cause)))
@@ -216,14 +222,13 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             if unsure.is_empty() {
                 break;
             }
-            match review(
-                &Board::of(&catalogue, subject, &current),
-                options,
-                &unsure,
-                &How { quick: true, ahead: EXCHANGE },
-            ) {
-                Review::Changed(settled) => current = *settled,
-                Review::Settled(_) => break,
+            let board = Board::of(&catalogue, subject, Arc::clone(&current));
+            match review(&board, options, &unsure, &How { quick: true, ahead: EXCHANGE }) {
+                Review::Changed(settled) => current = Arc::new(*settled),
+                Review::Settled(_) => {
+                    known = Some(board);
+                    break;
+                }
             }
         }
         if current.causes.len() <= count && !already(&current.causes, &cause) {
@@ -232,10 +237,10 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         }
     }
     // Causes that take turns without end: the last state is judged as it stands.
-    let board = Board::of(&catalogue, subject, &current);
+    let board = Board::of(&catalogue, subject, Arc::clone(&current));
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    Selection { geometric, extended: current.polished(), accepted, left }
+    Selection { geometric, extended: Arc::unwrap_or_clone(current).polished(), accepted, left }
 }
 
 /// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.
@@ -340,7 +345,7 @@ enum Review {
 /// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
 /// explains better.
 fn review(board: &Board<'_>, options: &Options, which: &[usize], how: &How) -> Review {
-    let (subject, catalogue, current) = (board.subject, board.catalogue, board.fit);
+    let (subject, catalogue, current) = (board.subject, board.catalogue, &*board.fit);
     let mut accepted = Vec::new();
     for some in which.chunks(BESIDE) {
         let looked: Vec<_> = some
@@ -398,7 +403,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
 
 /// A cause against the model without it: the judgement, the design there, and every candidate's score in it.
 fn looked_at(board: &Board<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
-    let current = board.fit;
+    let current = &*board.fit;
     let cause = &current.causes[index];
     let design = board.whole.without(&current.places(index));
     let scored = board.scored(&design, open);
