@@ -52,12 +52,14 @@ pub struct Board<'a> {
     /// What is diagnosed.
     pub subject: &'a Subject<'a>,
     /// The fit.
-    pub fit: &'a Extended,
+    pub fit: Arc<Extended>,
     /// The fit linearised.
+    pub linear: Linear,
+    /// Everything free in it.
     pub whole: Whole,
     listed: Vec<Entry>,
     shifts: Vec<Shift>,
-    fine: Vec<OnceLock<Entry>>,
+    fine: Vec<Vec<OnceLock<Entry>>>,
 }
 
 /// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
@@ -65,11 +67,12 @@ const CLOSER: f64 = 10.0;
 
 impl<'a> Board<'a> {
     /// All candidates of `catalogue` against `fit`.
-    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: &'a Extended) -> Self {
-        let whole = Linear::of(subject, fit).whole();
+    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
+        let linear = Linear::of(subject, &fit);
+        let whole = linear.whole();
         let design = &whole.design;
         let listed = catalogue.listed.par_iter().map(|c| Entry::of(c, design)).collect();
-        let known = known_load(fit).map(|kind| {
+        let known = known_load(&fit).map(|kind| {
             let always = Disturbance::new(kind, Course::Always);
             Candidate::measurement(always, &subject.observed.dataset, subject.nominal)
         });
@@ -82,8 +85,8 @@ impl<'a> Board<'a> {
                 Some(Shift { kind: disturbance.kind.clone(), strip })
             })
             .collect();
-        let fine = catalogue.fine.iter().map(|_| OnceLock::new()).collect();
-        Self { catalogue, subject, fit, whole, listed, shifts, fine }
+        let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
+        Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
     }
 
     /// All candidates against `design`, which is the whole one or a part of it, best first. Without `open` only the listed
@@ -123,9 +126,10 @@ impl<'a> Board<'a> {
         let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
         let fine: Vec<&Entry> = mapped
             .into_iter()
-            .map(|joint| {
-                let candidate = &self.catalogue.fine[joint];
-                self.fine[joint].get_or_init(|| Entry::of(candidate, &self.whole.design))
+            .filter_map(|(joint, level)| {
+                let candidate = self.catalogue.fine[joint].get(level)?;
+                let entry = &self.fine[joint][level];
+                Some(entry.get_or_init(|| Entry::of(candidate, &self.whole.design)))
             })
             .collect();
         out.par_extend(open.par_iter().map(|candidate| {

@@ -201,6 +201,9 @@ pub struct Diagnosis {
     pub noise_model: Option<RangeNoise>,
     /// Rows to measure again, by data row from 0.
     pub measure_again: Vec<usize>,
+    /// Different poses that causes need to be told from geometry; absent where there are as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses_needed: Option<usize>,
     /// The models on other series of the same arm.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transfers: Vec<Transfer>,

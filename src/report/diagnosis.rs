@@ -96,13 +96,26 @@ pub fn summary(found: &Diagnosed) -> Document {
             Confidence::Ambiguous => format!("{} (ambiguous: {})", sentence(&f.cause), others(f)),
         })
         .collect();
-    let headline = match diagnosis.findings.len() {
+    let found_there = match diagnosis.findings.len() {
         0 => "Nothing but geometry was found".to_owned(),
         1 => "One cause beyond geometry was found".to_owned(),
         n => format!("{n} causes beyond geometry were found"),
     };
+    // A fit of so few rows follows them whatever is wrong: that it found nothing is no good news.
+    let (status, headline) = match diagnosis.poses_needed {
+        Some(needed) => (
+            Status::NotEvaluated,
+            format!(
+                "{} rows are too few to look for causes, at least {needed} different poses are needed; geometry, held by its \
+                 priors",
+                diagnosis.dataset.rows
+            ),
+        ),
+        None if diagnosis.findings.is_empty() => (Status::Good, found_there),
+        None => (Status::Warning, found_there),
+    };
     page.push(Verdict::new(
-        if diagnosis.findings.is_empty() { Status::Good } else { Status::Warning },
+        status,
         format!(
             "{headline}: held-out error {:.3} mm, geometry alone {:.3}, data sheet {:.3}",
             fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm

@@ -194,4 +194,12 @@ fn too_few_rows_say_how_many_are_needed() {
     let d = &out.diagnosed.diagnosis;
     assert!(d.findings.is_empty());
     assert!(d.notes[0].contains("too few") && d.notes[0].contains("at least"), "{:?}", d.notes);
+    let needed = d.poses_needed.unwrap();
+    assert!(needed > 30);
+    let page = truegrind::report::format::terminal::document(
+        &truegrind::report::diagnosis::summary(&out.diagnosed),
+        100,
+    );
+    assert!(page.contains("[not evaluated]") && page.contains(&needed.to_string()), "{page}");
+    assert!(!page.contains("[ok]"), "a fit that follows its few rows is no good news: {page}");
 }
