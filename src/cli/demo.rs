@@ -88,6 +88,8 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let work = Work::start("asking what geometry does not explain");
     let mut asked = diagnosis::diagnose::Options::default();
     asked.selection.seed = seed;
+    // The priors of the methods beside it.
+    asked.tolerance = Tolerance::default();
     let causes = diagnose::diagnosed(&dataset, &robot.sheet.name, nominal, &asked, &|step| work.tell(step))?;
     let mut arms: Vec<(&str, &Estimated)> = vec![(DIAGNOSED, &causes.estimated)];
     arms.extend(found.iter().map(|one| (one.estimated.provenance.method.as_str(), &one.estimated)));

@@ -206,6 +206,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         held_out: &[],
         set_aside: &[],
         identification: None,
+        diagnosis: None,
     })?)
 }
 

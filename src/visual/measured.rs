@@ -24,6 +24,7 @@ use super::legend;
 use super::page::{Eye, Pane, View, page};
 use super::recording::{Recording, Store, VisualError};
 use crate::diagnosis::diagnose::Diagnosed;
+use crate::diagnosis::finding::Diagnosis;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observed, errors_on};
 use crate::identification::identify::{Identification, observe};
@@ -73,6 +74,8 @@ pub struct MeasuredScene<'a> {
     pub set_aside: &'a [usize],
     /// What was identified, for the text.
     pub identification: Option<&'a Identification>,
+    /// What a diagnosis found in it.
+    pub diagnosis: Option<&'a Diagnosis>,
 }
 
 /// Draws a measurement file with what was identified from it.
@@ -104,6 +107,7 @@ pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Re
         held_out: &held_out,
         set_aside: &estimated.provenance.set_aside,
         identification: Some(found),
+        diagnosis: None,
     })
 }
 
@@ -130,6 +134,7 @@ pub fn diagnosis_recording(dataset: &Dataset, found: &Diagnosed) -> Result<Recor
         held_out: &[],
         set_aside: &found.estimated.provenance.set_aside,
         identification: None,
+        diagnosis: Some(&found.diagnosis),
     })
 }
 

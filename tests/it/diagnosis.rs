@@ -5,7 +5,7 @@
 mod simulator;
 #[path = "diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
-mod scenarios;
+pub(crate) mod scenarios;
 mod found;
 mod parts;
 mod real;

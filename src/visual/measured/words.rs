@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::MeasuredScene;
+use crate::diagnosis::finding::{Confidence, Diagnosis};
 use crate::identification::identify::{Identification, sensor_name};
 use crate::kinematics::estimated::{EstimatedParameter, Judgement};
 use crate::math::statistics::ErrorSummary;
@@ -21,6 +22,9 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
     if let Some(found) = scene.identification {
         verdict(&mut text, found);
         errors(&mut text, found);
+    }
+    if let Some(found) = scene.diagnosis {
+        causes(&mut text, found);
     }
     for note in &dataset.notes {
         let _ = writeln!(text, "- {}", line(note));
@@ -44,6 +48,31 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
     }
     text.push_str("\nLengths are mm, in the base of the arm with z up. Time counts data rows from 0.\n");
     text
+}
+
+/// What was found beyond geometry, and what it brought on held-out rows.
+fn causes(text: &mut String, found: &Diagnosis) {
+    text.push_str("## What geometry does not explain\n\n");
+    if found.findings.is_empty() {
+        text.push_str("Nothing was found.\n");
+    }
+    for finding in &found.findings {
+        let sure = match finding.confidence {
+            Confidence::Identified => "identified",
+            Confidence::Ambiguous => "ambiguous",
+        };
+        let _ = writeln!(text, "- {} ({sure})", line(&finding.cause));
+    }
+    text.push_str("\n## Errors, held out [mm]\n\n| | random | blocks |\n|---|---:|---:|\n");
+    let stages = &found.fits;
+    for (name, stage) in
+        [("data sheet", &stages.nominal), ("geometry", &stages.geometric), ("with causes", &stages.extended)]
+    {
+        let [random, blocks] = [stage.cv_rmse_mm, stage.cv_blocks_rmse_mm].map(|v| number(Some(v)));
+        let _ = writeln!(text, "| {name} | {random} | {blocks} |");
+    }
+    let floor = number(found.noise_floor_mm);
+    let _ = writeln!(text, "\nNoise floor {floor} mm; {} rows set aside.\n", found.dataset.set_aside);
 }
 
 fn verdict(text: &mut String, found: &Identification) {

@@ -4,15 +4,18 @@ use nalgebra::{Point3, Vector3};
 use rerun::components::Scalar;
 use rerun::components::{Color, LineStrip3D};
 use rerun::{LineStrips3D, Points3D, Scalars};
+use truegrind::diagnosis::diagnose;
 use truegrind::identification::calibration::Frames;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::model::{Joints, Model};
 use truegrind::math::se3::Pose;
 use truegrind::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind::measurement::import;
 use truegrind::visual::measured::{AXIS, Residuals};
-use truegrind::visual::{MeasuredScene, VisualError, measured_recording};
+use truegrind::visual::{MeasuredScene, VisualError, diagnosis_recording, measured_recording};
 
 use super::read::Read;
+use crate::diagnosis::scenarios::frames as frames_of;
 
 const OUTLET: [f64; 3] = [900.0, -200.0, 30.0];
 const HOOK: [f64; 3] = [10.0, 0.0, 40.0];
@@ -77,6 +80,7 @@ fn rows_sensor_and_residuals_are_drawn() {
         held_out: &[(3, 0.2), (8, -0.1)],
         set_aside: &[29],
         identification: None,
+        diagnosis: None,
     };
     let read = Read::of(&measured_recording(&scene).unwrap().rrd().unwrap());
     assert_eq!(read.axes().keys().collect::<Vec<_>>(), [AXIS]);
@@ -129,6 +133,7 @@ fn a_file_alone_is_a_picture_too() {
         held_out: &[],
         set_aside: &[],
         identification: None,
+        diagnosis: None,
     };
     let read = Read::of(&measured_recording(&scene).unwrap().rrd().unwrap());
     let entities = read.entities();
@@ -152,6 +157,22 @@ fn no_rows_no_picture() {
         held_out: &[],
         set_aside: &[],
         identification: None,
+        diagnosis: None,
     };
     assert!(matches!(measured_recording(&scene), Err(VisualError::Empty(why)) if why.contains("no rows")));
+}
+
+#[test]
+fn a_diagnosis_says_in_its_picture_what_it_found() {
+    let bytes = include_bytes!("../../data/irb120-cable.csv");
+    let dataset = import::read("irb120-cable.csv", bytes, &import::Options::default()).unwrap();
+    let options = diagnose::Options::default();
+    let start = frames_of(&dataset, &arm());
+    let found = diagnose::diagnose(&dataset, "abb-irb-120", &arm(), &start, &options, &|_| {}).unwrap();
+    assert!(!found.diagnosis.findings.is_empty());
+    let text = Read::of(&diagnosis_recording(&dataset, &found).unwrap().rrd().unwrap()).summary();
+    for finding in &found.diagnosis.findings {
+        assert!(text.contains(&finding.cause), "{}: {text}", finding.cause);
+    }
+    assert!(text.contains("| with causes |") && text.contains("Noise floor"), "{text}");
 }
