@@ -39,11 +39,13 @@ pub(super) fn page(page: &mut Document, study: &Study) {
         "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The mean of |e| is \
          what the papers call STD. A method that diverged in any case has no bar.",
     );
-    page.figure(
-        rows(study),
-        "Errors of the held-out rows of the first case, by method. Rows are in the order of the file. Methods that \
-         diverged in any case are left out.",
-    );
+    for picture in rows(study) {
+        page.figure(
+            picture,
+            "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
+             Methods that diverged in any case are left out.",
+        );
+    }
     page.heading(2, "Which differences are real");
     page.push(verdict_table(study));
     page.push(convergence(study));
@@ -51,7 +53,8 @@ pub(super) fn page(page: &mut Document, study: &Study) {
     page.figure(
         curves(study, false),
         "Root mean square of the fit over the iterations, first case, methods as printed. An iteration of one method \
-         costs something else than one of another. A curve ends where it is ten times above its start.",
+         costs something else than one of another. A curve ends where it is ten times above its start; who is there after \
+         one step has none.",
     );
     page.figure(
         curves(study, true),
@@ -61,7 +64,7 @@ pub(super) fn page(page: &mut Document, study: &Study) {
     page.push(times(study));
     page.figure(
         time_bars(study),
-        "Seconds for one case, while other cases ran on other cores: not the same in every run.",
+        "Time of one case, while other cases ran on other cores: not the same in every run.",
     );
     if !study.parameters.is_empty() {
         page.heading(2, "What was identified");
@@ -89,9 +92,11 @@ fn head(page: &mut Document, study: &Study) {
     }
     if study.simulated {
         notes.push(
-            "Simulated rows: the paper's figures were measured on another arm and stand beside ours for the order of the \
-             methods, not for their size."
-                .to_owned(),
+            format!(
+                "Simulated rows of {}: the paper's figures were measured on another arm and stand beside ours for the order \
+                 of the methods, not for their size.",
+                study.robot
+            ),
         );
     }
     notes.extend(caveats(&study.experiment));
@@ -197,7 +202,7 @@ fn treatment(result: &MethodResult) -> &'static str {
 }
 
 /// Passes over the rows of the fit: residuals alone, and with derivatives.
-fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
+pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
     let per = match study.sensor {
         Sensor::Cable => 1,
         Sensor::Position => 3,

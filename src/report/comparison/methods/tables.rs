@@ -1,8 +1,8 @@
 //! The tables of methods over cases: errors beside the paper's, which differences are real, budgets, parameters.
 
-use super::{ended, figure, iterations, name_of, over, over_cases, passes, rmse, seconds, title, treatment};
+use super::{ended, figure, iterations, over_cases, passes, rmse, seconds, title, treatment};
 use crate::comparison::parameters::ParameterTable;
-use crate::comparison::protocol::Study;
+use crate::comparison::protocol::{Outcome, Study};
 use crate::comparison::verdict::Conclusion;
 use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
@@ -115,22 +115,7 @@ pub(super) fn verdict_table(study: &Study) -> Table {
 }
 
 pub(super) fn verdict(study: &Study) -> Verdict {
-    let comparisons = &study.judgement.comparisons;
-    let real = comparisons
-        .iter()
-        .filter(|c| matches!(c.conclusion, Conclusion::ReferenceBetter | Conclusion::MethodBetter));
-    let same = comparisons
-        .iter()
-        .filter(|c| matches!(&c.conclusion, Conclusion::SameOptimum { stopped, .. } if !stopped.is_empty()));
-    let headline = format!(
-        "Of {} methods compared with {}, {} differ significantly; {} share its optimum and differ only by where they were \
-         stopped",
-        comparisons.len(),
-        name_of(study, &study.judgement.reference),
-        real.count(),
-        same.count()
-    );
-    Verdict::new(Status::Good, headline, words::sentences(study))
+    Verdict::new(Status::Good, words::headline(study), words::sentences(study))
 }
 
 /// What each least-squares method finds when nothing stops it.
@@ -149,12 +134,11 @@ pub(super) fn convergence(study: &Study) -> Table {
     );
     for result in &study.results {
         let Some(converged) = &result.converged else { continue };
-        let all: Vec<ErrorSummary> = converged.iter().map(|o| o.held_out).collect();
         table.push([
             result.method.id.as_str().into(),
-            over(result, |s| s.rmse).0.into(),
+            mean_rmse(&result.outcomes),
             iterations(&result.outcomes).into(),
-            over_cases(&all, |s| s.rmse).0.into(),
+            mean_rmse(converged),
             iterations(converged).into(),
             (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into(),
             ended(converged).into(),
@@ -171,6 +155,15 @@ pub(super) fn convergence(study: &Study) -> Table {
             .to_owned(),
     ];
     table
+}
+
+/// Mean held-out RMSE; nothing where a case diverged, since a mean over that is no figure.
+fn mean_rmse(outcomes: &[Outcome]) -> Cell {
+    if outcomes.iter().any(|o| o.diverged) {
+        return Cell::Text("diverged".to_owned());
+    }
+    let all: Vec<ErrorSummary> = outcomes.iter().map(|o| o.held_out).collect();
+    over_cases(&all, |s| s.rmse).0.into()
 }
 
 /// Budgets: rows evaluated, in all and for one iteration.
@@ -220,8 +213,8 @@ pub(in crate::report::comparison) fn times(study: &Study) -> Table {
         vec![
             Column::text("id", ""),
             Column::text("method", "Method"),
-            Column::significant("time_s", "time", "s", 2),
-            Column::significant("time_per_iteration_s", "per iteration", "s", 2),
+            Column::significant("time_ms", "time", "ms", 2),
+            Column::significant("time_per_iteration_ms", "per iteration", "ms", 2),
             Column::number("paper_time_s", "paper", "s", 2),
             Column::number("paper_iterations", "paper, iterations", "", 0),
         ],
@@ -232,8 +225,8 @@ pub(in crate::report::comparison) fn times(study: &Study) -> Table {
         table.push([
             result.method.id.as_str().into(),
             result.method.name.as_str().into(),
-            seconds.into(),
-            (seconds / iterations(&result.outcomes)).into(),
+            (1e3 * seconds).into(),
+            (1e3 * seconds / iterations(&result.outcomes)).into(),
             paper.time_s.into(),
             paper.iterations.into(),
         ]);
@@ -252,6 +245,7 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
             Column::text("parameter", "Parameter"),
             Column::text("unit", "Unit"),
             Column::number("nominal", "nominal", "", 3),
+            Column::number("compensated", "compensated", "", 3),
             Column::significant("deviation", "deviation", "", 2),
             Column::number("paper_deviation", "paper", "", 3),
             Column::number("determined", "seen by the data", "", 2),
@@ -265,18 +259,22 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
             row.parameter.to_string().into(),
             unit.into(),
             (row.nominal * scale).into(),
+            ((row.nominal + row.deviation) * scale).into(),
             Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale)),
             row.paper.map(|v| v * scale).into(),
             row.determined.into(),
             if row.is_observable() { "yes" } else { "no" }.into(),
         ]);
     }
+    table.notes = vec![
+        "compensated: nominal and deviation together, as a controller would take it; ± is 1σ of the deviation.".to_owned(),
+    ];
     if parameters.rows.iter().any(|row| row.paper.is_some()) {
-        table.notes = vec![
-            "paper: what it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
+        table.notes.push(
+            "paper: the deviation that it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
              rows do not see. Its link 2 has an offset d2, ours a turn beta in its place."
                 .to_owned(),
-        ];
+        );
     }
     table
 }
