@@ -102,31 +102,41 @@ fn ids(comparisons: &[&Comparison]) -> String {
     comparisons.iter().map(|c| c.id.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Methods that end where the reference ends, by who was stopped before.
+/// Methods that end where the reference ends: whether they differ as limited, who of method and reference was stopped, and
+/// which they are.
+struct Alike<'a> {
+    was_significant: bool,
+    stopped: [bool; 2],
+    methods: Vec<&'a Comparison>,
+}
+
+/// What is to be said of them.
 fn same_optimum(study: &Study) -> Vec<String> {
     let reference = &study.judgement.reference;
-    let mut groups: Vec<((bool, [bool; 2]), Vec<&Comparison>)> = Vec::new();
+    let mut groups: Vec<Alike<'_>> = Vec::new();
     for comparison in &study.judgement.comparisons {
         let Conclusion::SameOptimum { stopped, was_significant } = &comparison.conclusion else { continue };
-        let key = (*was_significant, [stopped.contains(&comparison.id), stopped.contains(reference)]);
-        match groups.iter_mut().find(|g| g.0 == key) {
-            Some(group) => group.1.push(comparison),
-            None => groups.push((key, vec![comparison])),
+        let was_significant = *was_significant;
+        let stopped = [stopped.contains(&comparison.id), stopped.contains(reference)];
+        match groups.iter_mut().find(|g| g.was_significant == was_significant && g.stopped == stopped) {
+            Some(group) => group.methods.push(comparison),
+            None => groups.push(Alike { was_significant, stopped, methods: vec![comparison] }),
         }
     }
-    let sentence = |((significant, stopped), of): &((bool, [bool; 2]), Vec<&Comparison>)| {
+    let sentence = |group: &Alike<'_>| {
+        let (significant, of) = (group.was_significant, &group.methods);
         let before = match (significant, of.as_slice()) {
             (true, [one]) => format!("differ significantly as limited ({})", tests(&one.limited)),
             (true, _) => "differ significantly as limited".to_owned(),
             (false, _) => "do not differ significantly as limited".to_owned(),
         };
-        let why = match stopped {
+        let why = match group.stopped {
             [false, false] => "all had converged".to_owned(),
             [true, false] => format!("{} stopped before they converged, {reference} was not", were(of)),
             [false, true] => format!("only {reference} was stopped before it converged"),
             [true, true] => "all were stopped before they converged".to_owned(),
         };
-        let and = if *significant { "but" } else { "and" };
+        let and = if significant { "but" } else { "and" };
         format!("{} and {reference} {before}, {and} end at the same errors: {why}.", ids(of))
     };
     groups.iter().map(sentence).collect()
