@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyFigure, Provenance, Verdict};
+use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -76,8 +77,7 @@ pub fn table(tracker: &Tracker) -> Table {
     );
     let sigmas = tracker.sigmas();
     for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
-        let (scale, unit) =
-            if parameter.unit() == "rad" { (1f64.to_degrees(), "°") } else { (1.0, parameter.unit()) };
+        let (scale, unit) = handy(parameter.unit());
         table.push([
             parameter.to_string().into(),
             unit.into(),

@@ -236,7 +236,12 @@ impl Tracker {
             sigma: best.sigma,
             poses: history.len() - since,
             ratio,
-            alternatives: found.alternatives.iter().map(|c| name(c.parameter)).collect(),
+            alternatives: found
+                .alternatives
+                .iter()
+                .map(|c| name(c.parameter))
+                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].name)))
+                .collect(),
             window_nis: [sum, bound],
             parts: Vec::new(),
         };

@@ -9,7 +9,8 @@
 //!
 //! Parameters that move together, such as the six of a sensor that was knocked, are one change of several: with l and S the
 //! vector and matrix of the same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ how far such a thing may move. It is preferred to
-//! the best single parameter where it is the more surprising if nothing had moved ([`surprise`]), by [`ALTERNATIVE`].
+//! the best single parameter where it is the more surprising if nothing had moved ([`surprise`]), and that by far
+//! ([`CLEARLY`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
 //!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w.
 //!
@@ -24,6 +25,10 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
 pub const ALTERNATIVE: f64 = 4.0;
+
+/// A group is preferred to a single parameter where its surprise is larger by this, and by this share of the parameter's
+/// ratio.
+pub const CLEARLY: (f64, f64) = (30.0, 0.25);
 
 /// How a parameter changes from a pose on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +85,7 @@ pub struct Together {
 pub fn surprise(freedom: usize, ratio: f64) -> f64 {
     // ln Γ(k/2) for k = 0 to 6.
     const LN_GAMMA: [f64; 7] =
-        [0.0, 0.572_364_942_9, 0.0, -0.120_782_237_6, 0.0, 0.284_682_870_5, 0.693_147_180_6];
+        [0.0, 0.572_364_942_9, 0.0, -0.120_782_237_6, 0.0, 0.284_682_870_5, std::f64::consts::LN_2];
     let half = (ratio / 2.0).max(1.0).ln();
     ratio - (freedom as f64 - 2.0) * half + 2.0 * LN_GAMMA[freedom.min(6)]
 }
@@ -94,8 +99,10 @@ pub struct Found {
     pub other_form: Option<Change>,
     /// Other parameters that explain the history nearly as well, each at its best.
     pub alternatives: Vec<Change>,
-    /// A group that explains it better than any single parameter.
+    /// A group that explains it far better than any single parameter.
     pub together: Option<Together>,
+    /// A group that explains it about as well as the best single parameter, or better, but not clearly.
+    pub nearly: Option<usize>,
 }
 
 /// Looks through all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose,
@@ -179,14 +186,18 @@ pub fn locate(
     all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio).then(a.parameter.cmp(&b.parameter)));
     let first = *all.first()?;
     let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE;
-    let together = together.filter(|t| {
-        surprise(groups[t.group].members.len(), t.ratio) > surprise(1, first.ratio) + ALTERNATIVE
-    });
+    let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio) - surprise(1, first.ratio);
+    let (clear, nearly): (Option<Together>, Option<usize>) = match together {
+        Some(t) if gain(&t) > CLEARLY.0.max(CLEARLY.1 * first.ratio) => (Some(t), None),
+        Some(t) if gain(&t) > -ALTERNATIVE => (None, Some(t.group)),
+        _ => (None, None),
+    };
     let other = best[first.parameter].iter().flatten().find(|c| c.form != first.form).copied();
     Some(Found {
         best: first,
         other_form: other.filter(near),
         alternatives: all[1..].iter().take_while(|c| near(c)).copied().collect(),
-        together,
+        together: clear,
+        nearly,
     })
 }

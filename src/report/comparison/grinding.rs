@@ -12,6 +12,7 @@ use crate::math::statistics::mean_and_deviation;
 use crate::report::document::{Block, Document, Verdict};
 use crate::report::number::Precision;
 use crate::report::plot::{Axis, ColorMap, PlanPath, PlanView};
+use crate::report::repeated;
 use crate::report::status::Status;
 use crate::report::table::{Cell, Column, Table};
 
@@ -63,15 +64,14 @@ fn stands_in(result: &GrindingResult, row: &GrindingRow) -> bool {
     !result.simulated && result.all_rows && row.solver.name == SOLVERS[0].name
 }
 
-/// Mean and, of several cases, standard deviation; nothing where a case has no result.
+/// Mean ± standard deviation over the cases; nothing where a case has no result.
 fn over(row: &GrindingRow, figure: fn(&Deviations) -> f64) -> Cell {
-    match row.over_cases(figure) {
-        Some(values) => {
-            let (mean, deviation) = mean_and_deviation(&values);
-            Cell::with_sigma(mean, (values.len() > 1).then_some(deviation))
-        }
-        None => Cell::Missing,
-    }
+    row.over_cases(figure).map_or(Cell::Missing, |values| repeated::cell(&values))
+}
+
+/// RMSE of held-out measurements in every case.
+fn held_out(row: &GrindingRow) -> Vec<f64> {
+    row.cases.iter().map(|c| c.held_out.rmse).collect()
 }
 
 /// What one part and so many draws of measurements can say.
@@ -128,9 +128,7 @@ fn verdict(result: &GrindingResult) -> Verdict {
         ));
     }
     reasons.extend(against(result));
-    let held_out =
-        |r: &GrindingRow| mean_and_deviation(&r.cases.iter().map(|c| c.held_out.rmse).collect::<Vec<_>>()).0;
-    let fits = || order.iter().map(|(r, _)| held_out(r));
+    let fits = || order.iter().map(|(r, _)| mean_and_deviation(&held_out(r)).0);
     if let (Some(most), Some(least)) = (fits().reduce(f64::max), fits().reduce(f64::min)) {
         reasons.push(format!(
             "On held-out measurements the methods leave between {} and {} mm: a good fit there is no promise for the part.",
@@ -276,8 +274,6 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             (None, 0) => String::new(),
             (None, n) => format!("{n} targets refused"),
         };
-        let held_out: Vec<f64> = row.cases.iter().map(|c| c.held_out.rmse).collect();
-        let (mean, deviation) = mean_and_deviation(&held_out);
         table.push([
             row.id.as_str().into(),
             row.solver.name.into(),
@@ -285,7 +281,7 @@ pub(super) fn table(result: &GrindingResult) -> Table {
             over(row, |b| b.all.mean_absolute),
             over(row, |b| b.all.standard_deviation),
             over(row, |b| b.all.max),
-            Cell::with_sigma(mean, (held_out.len() > 1).then_some(deviation)),
+            repeated::cell(&held_out(row)),
             note.into(),
         ]);
     }

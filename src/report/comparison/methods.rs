@@ -10,9 +10,10 @@ use super::caveats;
 use crate::comparison::experiment::{Treatment, Units};
 use crate::comparison::protocol::{MethodResult, Outcome, Study};
 use crate::estimation::estimate::Termination;
-use crate::math::statistics::{ErrorSummary, mean_and_deviation, median};
+use crate::math::statistics::{ErrorSummary, median};
 use crate::measurement::dataset::Sensor;
 use crate::report::document::{Block, Document, KeyFigure};
+use crate::report::repeated::spread;
 use crate::report::table::Cell;
 
 pub(super) use self::data::{json, table};
@@ -101,22 +102,21 @@ fn head(page: &mut Document, study: &Study) {
     }
     notes.extend(caveats(&study.experiment));
     page.push(Block::List(notes));
+    let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
     let best = study
         .results
         .iter()
-        .filter(|r| !r.outcomes.iter().any(|o| o.diverged))
-        .min_by(|a, b| over(a, |s| s.rmse).0.total_cmp(&over(b, |s| s.rmse).0));
-    let registered = over_cases(&study.cases.iter().map(|c| c.registered).collect::<Vec<_>>(), |s| s.rmse);
+        .filter_map(|r| Some((r, rmse(&held_out(r)?)?)))
+        .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
     let mut figures = vec![];
-    if let Some(best) = best {
-        let (mean, deviation) = over(best, |s| s.rmse);
+    if let Some((best, (mean, deviation))) = best {
         figures.push(
             KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm")
                 .note(format!("{} {}", best.method.id, best.method.name)),
         );
     }
     figures.push(
-        KeyFigure::new("Frames registered alone", registered.0, 3, "mm")
+        KeyFigure::new("Frames registered alone", rmse(&registered(study)).map(|r| r.0), 3, "mm")
             .note("nominal links, the fair before"),
     );
     figures.push(KeyFigure::new("Noise floor", study.noise_floor_mm, 3, "mm").note(if study.simulated {
@@ -127,15 +127,15 @@ fn head(page: &mut Document, study: &Study) {
     page.push(figures);
 }
 
-/// Mean and, for several cases, standard deviation of a figure over the cases.
-fn over(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> (f64, Option<f64>) {
-    over_cases(&result.outcomes.iter().map(|o| o.held_out).collect::<Vec<_>>(), figure)
+/// Held-out errors of all cases; nothing of a method that diverged in any, since a mean over such cases is no figure.
+fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
+    let all = result.outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out));
+    all.collect()
 }
 
-fn over_cases(errors: &[ErrorSummary], figure: fn(&ErrorSummary) -> f64) -> (f64, Option<f64>) {
-    let values: Vec<f64> = errors.iter().map(figure).collect();
-    let (mean, deviation) = mean_and_deviation(&values);
-    (mean, (values.len() > 1).then_some(deviation))
+/// The same of the start, with frames registered.
+fn registered(study: &Study) -> Vec<ErrorSummary> {
+    study.cases.iter().map(|c| c.registered).collect()
 }
 
 pub(super) fn name_of(study: &Study, id: &str) -> String {
@@ -170,23 +170,6 @@ fn ended(outcomes: &[Outcome]) -> String {
         [one] => one.to_string(),
         _ => format!("converged in {converged} of {n}"),
     }
-}
-
-/// RMSE over the cases, or in how many of them the method diverged: a mean over such cases is no figure.
-fn rmse(result: &MethodResult) -> Cell {
-    match result.outcomes.iter().filter(|o| o.diverged).count() {
-        0 => figure(result, |s| s.rmse),
-        n => Cell::Text(format!("diverged {n}/{}", result.outcomes.len())),
-    }
-}
-
-/// Mean ± deviation over the cases; nothing of a method that diverged.
-fn figure(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> Cell {
-    if result.outcomes.iter().any(|o| o.diverged) {
-        return Cell::Missing;
-    }
-    let (mean, deviation) = over(result, figure);
-    Cell::with_sigma(mean, deviation)
 }
 
 fn iterations(outcomes: &[Outcome]) -> f64 {

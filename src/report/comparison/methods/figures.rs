@@ -1,34 +1,16 @@
 //! The pictures of methods over cases: the papers' bars of errors and times, errors row by row, convergence.
 
-use super::{over, seconds};
+use super::{held_out, seconds};
 use crate::comparison::experiment::Treatment;
 use crate::comparison::protocol::{MethodResult, Study};
-use crate::math::statistics::ErrorSummary;
 use crate::report::number::Precision;
 use crate::report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series};
+use crate::report::repeated;
 
+/// A method that diverged has no bar: it would be the only one to be seen.
 pub(super) fn error_bars(study: &Study) -> String {
-    let group = |label: &str, figure: fn(&ErrorSummary) -> f64| {
-        // A method that diverged has no bar: it would be the only one to be seen.
-        let of = |r: &MethodResult| (!diverged(r)).then(|| over(r, figure));
-        let all: Vec<Option<(f64, Option<f64>)>> = study.results.iter().map(of).collect();
-        BarGroup {
-            deviations: all.iter().map(|f| f.and_then(|f| f.1)).collect(),
-            ..BarGroup::new(label, all.iter().map(|f| f.map(|f| f.0).filter(|v| v.is_finite())))
-        }
-    };
-    Bars {
-        title: "Held-out errors".to_owned(),
-        y: Axis::new("error", "mm"),
-        names: names(study),
-        groups: vec![
-            group("RMSE", |s| s.rmse),
-            group("mean |e|", |s| s.mean_absolute),
-            group("max", |s| s.max),
-        ],
-        labels: None,
-    }
-    .svg()
+    let errors: Vec<_> = study.results.iter().map(held_out).collect();
+    repeated::bars(names(study), &errors, None)
 }
 
 pub(super) fn time_bars(study: &Study) -> String {
