@@ -15,7 +15,8 @@ use nalgebra::Vector3;
 
 use super::curve::{Curve, beside, between};
 use super::rewrite::Arms;
-use super::segment::{Ends, largest_from};
+use super::segment::{Ends, STEPS, largest_from};
+use super::slack::Slack;
 use crate::math::se3::Pose;
 
 /// A corner that cuts off less than this has the shape of the lines that it joins (mm): over so short a way an arm's
@@ -100,13 +101,19 @@ pub(super) fn corner_bend(
         return None;
     }
     let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
-    let off =
-        |t: f64| match arms.nominal.solve_near(&point.mounted.told.flange_for(&told.at(t)), &point.joints) {
-            Ok(solution) => {
-                let reached = arms.acting.arm(places[usize::from(t > 0.5)]).forward(&solution.joints);
-                meant.distance(&point.mounted.real.target_of(&reached), t)
-            }
-            Err(_) => f64::INFINITY,
-        };
-    Some(largest_from([off(0.0), off(1.0)], 4, &off))
+    let motor = |t: f64| {
+        let solution = arms.nominal.solve_near(&point.mounted.told.flange_for(&told.at(t)), &point.joints);
+        solution.ok().map(|solution| solution.joints)
+    };
+    let off = |t: f64, flange: &Pose| meant.distance(&point.mounted.real.target_of(flange), t);
+    if places[0] != places[1] {
+        let Some(start) = motor(0.0) else { return Some(f64::INFINITY) };
+        let links = Slack::at(&start, places[0], places[1], &arms.acting);
+        return Some(links.most_off(2 * STEPS, &motor, &off));
+    }
+    let even = |t: f64| match motor(t) {
+        Some(joints) => off(t, &arms.acting.arm(places[0]).forward(&joints)),
+        None => f64::INFINITY,
+    };
+    Some(largest_from([even(0.0), even(1.0)], 4, &even))
 }
