@@ -503,6 +503,11 @@ impl Tracker {
         }
     }
 
+    /// Name of the robot.
+    pub fn robot(&self) -> &str {
+        &self.begun.robot
+    }
+
     /// What must be saved.
     pub fn state(&self) -> &State {
         &self.state

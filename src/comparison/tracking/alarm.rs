@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::Tracker;
@@ -90,7 +91,7 @@ pub struct Alarm {
     pub alternatives: Vec<String>,
     /// Sum of the window's NIS, and what it should not exceed.
     pub window_nis: [f64; 2],
-    /// Of something that moved as a whole its parameters; the shift is then the length of its way.
+    /// Of something that moved as a whole its parameters; the shift is then what the readings moved by on average.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
 }
@@ -111,7 +112,8 @@ impl fmt::Display for Alarm {
             return write!(
                 f,
                 "innovations left their bounds at row {} of {} (sum of the window {:.0}, bound {:.0}), and no single parameter \
-                 explains it: look at the sensor, the target, and at effects that the model does not hold",
+                 explains it so far: look at the sensor, the target, and at effects that the model does not hold; more poses may \
+                 tell",
                 self.noticed_row, self.noticed_file, self.window_nis[0], self.window_nis[1]
             );
         }
@@ -120,9 +122,10 @@ impl fmt::Display for Alarm {
             Course::Jump => "jumped",
             Course::Drift => "has drifted",
         };
+        let whole = if self.parts.is_empty() { "" } else { ", which moved the readings" };
         write!(
             f,
-            "{} {verb} by {:.4} ± {:.4} {unit} since row {} of {}",
+            "{} {verb}{whole} by {:.4} ± {:.4} {unit} since row {} of {}",
             self.parameter,
             self.shift * scale,
             self.sigma * scale,
@@ -261,17 +264,31 @@ impl Tracker {
             sigma: together.covariance[(a, a)].max(0.0).sqrt(),
         };
         alarm.parts = group.members.iter().enumerate().map(part).collect();
-        let lengths = || (0..alarm.parts.len()).filter(|a| alarm.parts[*a].unit == "mm");
-        let way = lengths().map(|a| together.shifts[a].powi(2)).sum::<f64>().sqrt();
-        // σ along the way.
-        let along = |a: usize| together.shifts[a] / way.max(f64::MIN_POSITIVE);
-        let variance: f64 = lengths()
-            .flat_map(|a| lengths().map(move |b| (a, b)))
-            .map(|(a, b)| along(a) * together.covariance[(a, b)] * along(b))
-            .sum();
-        (alarm.shift, alarm.sigma) = (way, variance.max(0.0).sqrt());
+        (alarm.shift, alarm.sigma) = self.displaced(group, together);
         (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
         alarm.alternatives.clear();
+    }
+
+    /// By how much the readings of the changed poses moved on average (mm), and its standard deviation: a frame that turned
+    /// far from where it is measured has no place of its own where a distance would mean anything.
+    fn displaced(&self, group: &Group, together: &Together) -> (f64, f64) {
+        let poses = &self.state.history;
+        let (per, p) = (self.rows_per_pose(), self.parameters.len());
+        let rows = poses.len() * per;
+        let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
+        self.task(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
+        // The rows of position; a pose has three more.
+        let axes = per.min(3);
+        let changed = (poses.len() - together.since).max(1) as f64;
+        let mean = DMatrix::from_fn(axes, group.members.len(), |axis, a| {
+            let column = &j[group.members[a].0 * rows..][..rows];
+            let of = |pose: usize| column[pose * per + axis] / poses[pose].per_mm;
+            (together.since..poses.len()).map(of).sum::<f64>() / changed
+        });
+        let way = &mean * DVector::from_column_slice(&together.shifts);
+        let length = way.norm();
+        let along = mean.tr_mul(&(way / length.max(f64::MIN_POSITIVE)));
+        (length, (&together.covariance * &along).dot(&along).max(0.0).sqrt())
     }
 
     /// What may move as a whole: the sensor against the arm's base, the point that it touches, the outlet of a cable.
