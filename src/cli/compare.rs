@@ -15,7 +15,7 @@ use truegrind::report::format;
 
 use super::files::{self, Batch};
 use super::identify::{Angles, DataArguments};
-use super::outputs::{Outputs, width};
+use super::outputs::{Outputs, say, width};
 use super::progress::Work;
 use super::{Common, Ending, identify, inputs, on_threads};
 
@@ -66,7 +66,7 @@ struct Measured {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.list {
-        print!("{}", format::terminal::document(&view::list(&Experiment::shipped()?), width()));
+        say(&format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
         return Ok(Ending::Done);
     }
     let name = arguments.experiment.as_deref().unwrap_or_default();
@@ -136,7 +136,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })
     })??;
     drop(work);
-    arguments.outputs.print(&view::summary(&experiment, &results));
+    arguments.outputs.print(&view::summary(&experiment, &results))?;
     let times = view::times(&results);
     if let Some(times) = &times {
         eprint!("{}", format::terminal::table(times, width()));

@@ -156,7 +156,7 @@ impl Track<'_> {
                 Ok(begun) => tracker = Some(begun),
                 // Files that are still growing: nothing is wrong, nothing can be done.
                 Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
-                    say(said, format!("note: {error}"));
+                    say_once(said, format!("note: {error}"));
                     return Ok(false);
                 }
                 Err(error) => return Err(error.into()),
@@ -220,7 +220,7 @@ impl Track<'_> {
         let model_path = self.folder.join(format!("{}-{date}-{:06}.toml", self.stem, tracker.state().poses));
         let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
         let path = model_path.display().to_string();
-        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path));
+        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))?;
         if arguments.output.is_some() {
             files::make_folder(self.folder)?;
         }
@@ -249,7 +249,7 @@ impl Track<'_> {
             let is_new = !known.iter().any(|k| k.file == files::name(&path));
             match read(self.arguments, self.arm, &path, is_new) {
                 Ok(dataset) => out.extend(dataset),
-                Err(error) if waits => say(said, format!("note: {error:#}; left for the next look")),
+                Err(error) if waits => say_once(said, format!("note: {error:#}; left for the next look")),
                 Err(error) => return Err(error),
             }
         }
@@ -258,7 +258,7 @@ impl Track<'_> {
 }
 
 /// Says a thing once.
-fn say(said: &mut BTreeSet<String>, what: String) {
+fn say_once(said: &mut BTreeSet<String>, what: String) {
     if !said.contains(&what) {
         eprintln!("{what}");
         said.insert(what);
