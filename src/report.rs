@@ -14,6 +14,7 @@ pub mod status;
 pub mod table;
 pub mod plot;
 pub mod document;
+mod repeated;
 pub mod format;
 pub mod identification;
 pub mod diagnosis;

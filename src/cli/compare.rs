@@ -66,8 +66,7 @@ struct Measured {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.list {
-        let table = view::list(&Experiment::shipped()?);
-        say(&format::terminal::table(&table, width()))?;
+        say(&format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
         return Ok(Ending::Done);
     }
     let name = arguments.experiment.as_deref().unwrap_or_default();
@@ -100,31 +99,31 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     } else if let Some(data) = &arguments.data {
         bail!("{}: experiment {name} takes no measurements; leave DATA out", data.display());
     }
-    if arguments.rows.is_some() && !matches!(kind, Kind::Methods(_)) {
+    if arguments.rows.is_some() && !experiment.takes_rows() {
         bail!("--rows: experiment {name} draws no rows");
     }
     let work = Work::start(format!("experiment {}", experiment.name));
     let results = on_threads(arguments.common.threads, || -> anyhow::Result<Results> {
         let rows = || measured.as_ref().ok_or_else(|| anyhow!("no measurements"));
+        let options = |from: &Measured| Options {
+            rows: arguments.rows,
+            seed,
+            simulated: arguments.data.is_none(),
+            sensor_sigma_mm: from.sensor_sigma_mm,
+        };
         Ok(match kind {
             Kind::Methods(methods) => {
                 let from = rows()?;
-                let options = Options {
-                    rows: arguments.rows,
-                    seed,
-                    simulated: arguments.data.is_none(),
-                    sensor_sigma_mm: from.sensor_sigma_mm,
-                };
-                let study =
-                    protocol::run(&experiment, methods, &from.dataset, &from.robot, &from.nominal, &options)?;
+                let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
+                let study = protocol::run(&experiment, methods, data, robot, nominal, &options(from))?;
                 Results::Methods(Box::new(study))
             }
             Kind::Grinding(settings) => {
                 let from = rows()?;
                 let actual = from.actual.as_ref().map_or(Actual::Estimated, Actual::Simulated);
+                let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
                 let name = &experiment.name;
-                let result =
-                    grinding::run(settings, name, &from.dataset, &from.robot, &from.nominal, actual, seed)?;
+                let result = grinding::run(settings, name, data, robot, nominal, actual, &options(from))?;
                 Results::Grinding(Box::new(result))
             }
             Kind::Uniformity(settings) => Results::Uniformity(uniformity::run(settings, seed)),

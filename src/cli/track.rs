@@ -1,15 +1,18 @@
 //! `truegrind track DATA --model MODEL.toml`: keeps an arm accurate over its life.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
+use truegrind::comparison::tracking::state::Consumed;
 use truegrind::comparison::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::convention::AngleConvention;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::measurement::import;
+use truegrind::measurement::plausibility::{Evidence, plausibility};
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
 
@@ -55,6 +58,9 @@ pub(super) struct Arguments {
     /// Whether the angles are the controller's or DH angles; the robot file says otherwise.
     #[arg(long, value_enum)]
     angles: Option<Angles>,
+    /// Take the units as they are, however odd they look.
+    #[arg(long)]
+    allow_odd_units: bool,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -78,16 +84,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     let stem = arguments.model.file_stem().map_or("model".into(), |s| s.to_string_lossy().into_owned());
     let folder = match &arguments.output {
-        Some(folder) => {
-            files::make_folder(folder)?;
-            folder.clone()
-        }
+        // Made when there is something to put into it.
+        Some(folder) => folder.clone(),
         None => arguments.model.parent().map(Path::to_path_buf).unwrap_or_default(),
     };
     let state_path = arguments.state.clone().unwrap_or_else(|| folder.join(format!("{stem}.track.toml")));
     let inputs_of_run = [arguments.data.as_path(), arguments.model.as_path()];
     let mut targets = arguments.outputs.files();
-    targets.push(&state_path);
+    if arguments.state.is_some() || folder.is_dir() {
+        targets.push(&state_path);
+    }
     Batch::check(&inputs_of_run, &targets)?;
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: a track has no recording; --html FILE writes a page");
@@ -105,124 +111,158 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             state_path.display()
         );
     }
+    let track = Track {
+        arguments,
+        arm: &arm,
+        hash: &hash,
+        options,
+        folder: &folder,
+        stem: &stem,
+        state_path: &state_path,
+    };
     let mut flagged = false;
+    let mut said = BTreeSet::new();
     loop {
-        let seen = on_threads(arguments.common.threads, || {
-            pass(arguments, &arm, &hash, &options, &folder, &stem, &state_path)
-        })??;
-        flagged |= seen;
+        flagged |= on_threads(arguments.common.threads, || track.look(&mut said))??;
         let Some(seconds) = arguments.follow else { break };
         std::thread::sleep(Duration::from_secs_f64(seconds));
     }
     Ok(if flagged { Ending::Flagged } else { Ending::Done })
 }
 
-/// One look at the data: everything new is taken in, and model and state are written together. Whether an alarm was
-/// raised.
-fn pass(
-    arguments: &Arguments,
-    arm: &Estimated,
-    hash: &str,
-    options: &Options,
-    folder: &Path,
-    stem: &str,
-    state_path: &Path,
-) -> anyhow::Result<bool> {
-    let datasets = datasets(arguments, arm)?;
-    let mut tracker = match state_path.is_file() {
-        true => {
-            let text = files::read_text(state_path)?;
-            let name = state_path.display().to_string();
-            let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
-            if state.model_hash != hash {
-                bail!(
-                    "{name} is the track of another model than {}: give the model that it began with, or another --state",
-                    arguments.model.display()
-                );
-            }
-            Some(Tracker::resume(arm, state, &name)?)
-        }
-        false => None,
-    };
-    if tracker.is_none()
-        && let Some(first) = first_poses(&datasets, options.first_poses)
-    {
-        match Tracker::begin(arm, hash, &first, options) {
-            Ok(begun) => tracker = Some(begun),
-            // Files that are still growing: nothing is wrong, nothing can be done.
-            Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
-                eprintln!("note: {error}");
-                return Ok(false);
-            }
-            Err(error) => return Err(error.into()),
-        }
-    }
-    let before = tracker.as_ref().map_or(0, |t| t.state().poses);
-    let mut alarms: Vec<Alarm> = Vec::new();
-    let mut taking = Duration::ZERO;
-    if let Some(tracker) = &mut tracker {
-        for dataset in &datasets {
-            let begun = Instant::now();
-            alarms.extend(tracker.take(dataset)?);
-            taking += begun.elapsed();
-        }
-    }
-    let Some(tracker) = tracker else {
-        if arguments.follow.is_some() {
-            return Ok(false);
-        }
-        bail!("{}: no measurements to begin with", arguments.data.display());
-    };
-    let fresh = tracker.state().poses - before;
-    if fresh == 0 {
-        if arguments.follow.is_none() {
-            eprintln!("note: no new measurements since {} poses; nothing written", before);
-        }
-        return Ok(false);
-    }
-    eprintln!(
-        "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
-        taking.as_secs_f64() * 1e3,
-        taking.as_secs_f64() * 1e6 / fresh as f64
-    );
-    let date = match &arguments.date {
-        Some(date) => stamp(date)?,
-        None => now()?,
-    };
-    let model_path = folder.join(format!("{stem}-{date}-{:06}.toml", tracker.state().poses));
-    let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
-    let path = model_path.display().to_string();
-    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &path))?;
-    let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
-    // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
-    if !model_path.exists() {
-        batch.add(&model_path, text);
-    } else if files::read(&model_path)? != text.as_bytes() {
-        bail!("{path} is there already: it is never overwritten; give another --date or -o");
-    }
-    arguments.outputs.add_made(
-        &mut batch,
-        || view::document(&tracker, fresh, &alarms, &path),
-        || view::table(&tracker),
-        || view::json(&tracker, fresh, &alarms),
-    )?;
-    batch.add(state_path, tracker.state().to_toml().map_err(anyhow::Error::msg)?);
-    batch.write()?;
-    Ok(!alarms.is_empty())
+/// What stays the same from look to look.
+struct Track<'a> {
+    arguments: &'a Arguments,
+    arm: &'a Estimated,
+    hash: &'a str,
+    options: Options,
+    folder: &'a Path,
+    stem: &'a str,
+    state_path: &'a Path,
 }
 
-/// What there is to take in. Who follows waits for what cannot be read yet.
-fn datasets(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Vec<Dataset>> {
-    let waits = arguments.follow.is_some();
-    let mut out = Vec::new();
-    for path in measurement_files(arguments)? {
-        match read(arguments, arm, &path) {
-            Ok(dataset) => out.extend(dataset),
-            Err(error) if waits => eprintln!("note: {error:#}; left for the next look"),
-            Err(error) => return Err(error),
+impl Track<'_> {
+    /// One look at the data: everything new is taken in, and model and state are written together. Whether an alarm was
+    /// raised. What `said` holds is not said again.
+    fn look(&self, said: &mut BTreeSet<String>) -> anyhow::Result<bool> {
+        let (arguments, arm) = (self.arguments, self.arm);
+        let mut tracker = self.state()?;
+        let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
+        let datasets = self.datasets(&known, said)?;
+        if tracker.is_none()
+            && let Some(first) = first_poses(&datasets, self.options.first_poses)
+        {
+            match Tracker::begin(arm, self.hash, &first, &self.options) {
+                Ok(begun) => tracker = Some(begun),
+                // Files that are still growing: nothing is wrong, nothing can be done.
+                Err(error @ TrackError::TooFew { .. }) if arguments.follow.is_some() => {
+                    say_once(said, format!("note: {error}"));
+                    return Ok(false);
+                }
+                Err(error) => return Err(error.into()),
+            }
         }
+        let before = tracker.as_ref().map_or(0, |t| t.state().poses);
+        let mut alarms: Vec<Alarm> = Vec::new();
+        let mut taking = Duration::ZERO;
+        if let Some(tracker) = &mut tracker {
+            for dataset in &datasets {
+                let begun = Instant::now();
+                alarms.extend(tracker.take(dataset)?);
+                taking += begun.elapsed();
+            }
+        }
+        let Some(tracker) = tracker else {
+            if arguments.follow.is_some() {
+                return Ok(false);
+            }
+            bail!("{}: no measurements to begin with", arguments.data.display());
+        };
+        let fresh = tracker.state().poses - before;
+        if fresh == 0 {
+            if arguments.follow.is_none() {
+                eprintln!("note: no new measurements since {before} poses; nothing written");
+            }
+            return Ok(false);
+        }
+        eprintln!(
+            "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
+            taking.as_secs_f64() * 1e3,
+            taking.as_secs_f64() * 1e6 / fresh as f64
+        );
+        self.write(&tracker, fresh, &alarms)?;
+        Ok(!alarms.is_empty())
     }
-    Ok(out)
+
+    /// Where the last run left off.
+    fn state(&self) -> anyhow::Result<Option<Tracker>> {
+        if !self.state_path.is_file() {
+            return Ok(None);
+        }
+        let text = files::read_text(self.state_path)?;
+        let name = self.state_path.display().to_string();
+        let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
+        if state.model_hash != self.hash {
+            bail!(
+                "{name} is the track of another model than {}: give the model that it began with, or another --state",
+                self.arguments.model.display()
+            );
+        }
+        Ok(Some(Tracker::resume(self.arm, state, &name)?))
+    }
+
+    fn write(&self, tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> anyhow::Result<()> {
+        let arguments = self.arguments;
+        let date = match &arguments.date {
+            Some(date) => stamp(date)?,
+            None => now()?,
+        };
+        let model_path = self.folder.join(format!("{}-{date}-{:06}.toml", self.stem, tracker.state().poses));
+        let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
+        let path = model_path.display().to_string();
+        arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))?;
+        if arguments.output.is_some() {
+            files::make_folder(self.folder)?;
+        }
+        let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
+        // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
+        if !model_path.exists() {
+            batch.add(&model_path, text);
+        } else if files::read(&model_path)? != text.as_bytes() {
+            bail!("{path} is there already: it is never overwritten; give another --date or -o");
+        }
+        arguments.outputs.add_made(
+            &mut batch,
+            || view::document(tracker, fresh, alarms, &path),
+            || view::table(tracker),
+            || view::json(tracker, fresh, alarms),
+        )?;
+        batch.add(self.state_path, tracker.state().to_toml().map_err(anyhow::Error::msg)?);
+        batch.write()
+    }
+
+    /// What there is to take in. Who follows waits for what cannot be read yet.
+    fn datasets(&self, known: &[Consumed], said: &mut BTreeSet<String>) -> anyhow::Result<Vec<Dataset>> {
+        let waits = self.arguments.follow.is_some();
+        let mut out = Vec::new();
+        for path in measurement_files(self.arguments)? {
+            let is_new = !known.iter().any(|k| k.file == files::name(&path));
+            match read(self.arguments, self.arm, &path, is_new) {
+                Ok(dataset) => out.extend(dataset),
+                Err(error) if waits => say_once(said, format!("note: {error:#}; left for the next look")),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Says a thing once.
+fn say_once(said: &mut BTreeSet<String>, what: String) {
+    if !said.contains(&what) {
+        eprintln!("{what}");
+        said.insert(what);
+    }
 }
 
 /// The file, or the files of a folder by name. What the track itself writes is no measurement.
@@ -249,8 +289,14 @@ fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
     Ok(out)
 }
 
-/// The rows of a file that are whole; `None` while it has no row.
-fn read(arguments: &Arguments, arm: &Estimated, path: &Path) -> anyhow::Result<Option<Dataset>> {
+/// The rows of a file that are whole; `None` while it has no row. Whether their units fit the arm is looked at in a file
+/// that is new, once it has rows enough to tell.
+fn read(
+    arguments: &Arguments,
+    arm: &Estimated,
+    path: &Path,
+    is_new: bool,
+) -> anyhow::Result<Option<Dataset>> {
     let mut bytes = files::read(path)?;
     let is_text = !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xlsx"));
     if is_text {
@@ -263,7 +309,8 @@ fn read(arguments: &Arguments, arm: &Estimated, path: &Path) -> anyhow::Result<O
             return Ok(None);
         }
     }
-    let options = import::Options { allow_odd_units: true, ..import::Options::default() };
+    let allow_odd_units = arguments.allow_odd_units;
+    let options = import::Options { allow_odd_units, ..import::Options::default() };
     let dataset = import::read(&files::name(path), &bytes, &options)?;
     let dh = match arguments.angles {
         Some(angles) => angles == Angles::Dh,
@@ -271,6 +318,12 @@ fn read(arguments: &Arguments, arm: &Estimated, path: &Path) -> anyhow::Result<O
             .is_ok_and(|r| r.sheet.joints.angles == sheet::Angles::Dh),
     };
     let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
+    if is_new && !allow_odd_units && dataset.rows.len() >= ROWS_TO_TELL_UNITS {
+        let suspicions = plausibility(&dataset, &arm.nominal, convention);
+        if let Some(suspicion) = suspicions.iter().find(|s| s.evidence == Evidence::Sensor) {
+            bail!("{suspicion} (--allow-odd-units takes the file at its word)");
+        }
+    }
     let applied = convention.apply(&dataset, &arm.nominal);
     applied.map(Some).ok_or_else(|| anyhow!("{}: its joint map cannot be inverted", arm.robot))
 }
@@ -298,6 +351,9 @@ fn options(arguments: &Arguments, arm: &Estimated) -> anyhow::Result<Options> {
     }
     Ok(options)
 }
+
+/// Rows from which a wrong unit is told from a few odd poses.
+const ROWS_TO_TELL_UNITS: usize = 15;
 
 /// A date as it stands in a file name, 20260504T123000Z.
 fn stamp(date: &str) -> anyhow::Result<String> {

@@ -232,12 +232,24 @@ pub struct PaperFigures {
 pub struct Grinding {
     /// A surface that ships.
     pub surface: String,
-    /// Share of rows held out to state each method's error.
+    /// Rows of one case, drawn at random from the file; all of them where not stated.
+    #[serde(default)]
+    pub rows: Option<usize>,
+    /// Share of these held out to state each method's error.
     pub held_out: f64,
+    /// Cases, each with rows of its own.
+    #[serde(default = "one")]
+    pub cases: usize,
+    /// Id of the method that all others are compared with.
+    pub reference: String,
     /// What the paper prints before compensation.
     pub before: Option<PaperPoints>,
     /// The methods.
     pub method: Vec<GrindingMethod>,
+}
+
+fn one() -> usize {
+    1
 }
 
 /// A method of a grinding experiment.
@@ -355,7 +367,7 @@ pub enum ExperimentError {
     },
     /// Fewer rows than the protocol asks for.
     #[error(
-        "{file} has {found} rows, experiment {experiment} asks for {asked}: run it with --rows {found}, the same shares of \
+        "{file} has {found} rows, experiment {experiment} asks for {asked}: run it with --rows {possible}, the same shares of \
          fewer rows; its tables are then headed \"reduced protocol\""
     )]
     TooFewRows {
@@ -367,6 +379,8 @@ pub enum ExperimentError {
         found: usize,
         /// Rows asked for.
         asked: usize,
+        /// Rows that can be asked for.
+        possible: usize,
     },
     /// Too few rows for the parameters.
     #[error(
@@ -514,6 +528,12 @@ impl Experiment {
             Kind::Methods(methods) => methods.check(&wrong),
             Kind::Grinding(grinding) => {
                 share("grinding.held_out", grinding.held_out, &wrong)?;
+                if grinding.cases == 0 {
+                    return wrong("grinding.cases", "0".to_owned(), "1 at least");
+                }
+                if !grinding.method.iter().any(|m| m.id == grinding.reference) {
+                    return wrong("grinding.reference", grinding.reference.clone(), "the id of a method");
+                }
                 for (k, method) in grinding.method.iter().enumerate() {
                     solver_named(&format!("grinding.method {}", k + 1), &method.solver, &wrong)?;
                 }

@@ -164,7 +164,8 @@ pub struct CurvePoint {
     pub iteration: usize,
     /// Passes over the rows so far, those with derivatives counted too.
     pub passes: f64,
-    /// Root of the mean square of the weighted residuals of the fit: mm where every row weighs 1/mm.
+    /// Root of the mean square of the fit's errors (mm), by the fit's weights: of a length, or of the distance between two
+    /// positions.
     pub rmse: f64,
 }
 
@@ -206,6 +207,7 @@ pub fn run(
             experiment: experiment.name.clone(),
             found: dataset.rows.len(),
             asked: rows,
+            possible: dataset.rows.len(),
         });
     }
     enough(experiment, methods, &dataset, rows, nominal)?;
@@ -436,12 +438,8 @@ pub(super) fn register(train: &Observed, nominal: &Model) -> Result<(Frames, Fit
     })
 }
 
-/// The problem that a method is given, and the arm and frames that it starts from.
-pub(super) fn task_of(
-    case: &Prepared,
-    solver: &Solver,
-    treatment: Treatment,
-) -> (Calibration, Vec<Parameter>) {
+/// The problem that a method is given, what moves in it, and the root mean square of its rows' weights (1/mm).
+fn task_of(case: &Prepared, solver: &Solver, treatment: Treatment) -> (Calibration, Vec<Parameter>, f64) {
     let train = &case.train.dataset;
     let model = solver.prepared(&case.nominal, train);
     let frames = &case.registered.frames;
@@ -471,7 +469,9 @@ pub(super) fn task_of(
         }
     };
     let priors = tolerance.priors(&parameters, &model);
-    (Calibration::new(train, &model, frames, &parameters, &priors, &weights), parameters)
+    let squares = weights.iter().map(|w| w.per_mm * w.per_mm).sum::<f64>() / weights.len().max(1) as f64;
+    let task = Calibration::new(train, &model, frames, &parameters, &priors, &weights);
+    (task, parameters, squares.sqrt().max(f64::MIN_POSITIVE))
 }
 
 fn outcome(
@@ -482,7 +482,7 @@ fn outcome(
     run: &Run,
     seed: u64,
 ) -> (Outcome, Option<Outcome>) {
-    let (task, parameters) = task_of(case, solver, treatment);
+    let (task, parameters, per_mm) = task_of(case, solver, treatment);
     let start = vec![0.0; parameters.len()];
     let begun = Instant::now();
     let estimate = match method.units {
@@ -497,12 +497,13 @@ fn outcome(
     let seconds = begun.elapsed().as_secs_f64();
     let converged = (solver.family == Family::LeastSquares).then(|| {
         let from = if estimate.x.iter().all(|x| x.is_finite()) { &estimate.x } else { &start };
-        judged(case, &task, continued(&task, solver, from), 0.0)
+        judged(case, &task, per_mm, continued(&task, solver, from), 0.0)
     });
-    (judged(case, &task, estimate, seconds), converged)
+    (judged(case, &task, per_mm, estimate, seconds), converged)
 }
 
-fn judged(case: &Prepared, task: &Calibration, estimate: Estimate, seconds: f64) -> Outcome {
+/// `per_mm` is the root mean square of the rows' weights.
+fn judged(case: &Prepared, task: &Calibration, per_mm: f64, estimate: Estimate, seconds: f64) -> Outcome {
     let (model, frames) = task.apply(&estimate.x);
     let errors_mm = errors_on(&case.test, &model, &frames);
     let held_out = ErrorSummary::of(errors_mm.iter().copied());
@@ -511,6 +512,10 @@ fn judged(case: &Prepared, task: &Calibration, estimate: Estimate, seconds: f64)
     let finite = held_out.rmse.is_finite() && estimate.x.iter().all(|x| x.is_finite());
     let diverged = !finite || estimate.termination.is_failure() || held_out.rmse > DIVERGED * before;
     let rows = task.rows().max(1) as f64;
+    // The three coordinates of a position make one distance. The orientation of a pose has no mm: there rows are taken
+    // alike.
+    let per = task.rows_per_observation();
+    let lengths = if per == 3 { 3.0 } else { 1.0 };
     let curve = estimate
         .trace
         .iter()
@@ -518,7 +523,7 @@ fn judged(case: &Prepared, task: &Calibration, estimate: Estimate, seconds: f64)
         .map(|(iteration, i)| CurvePoint {
             iteration,
             passes: (i.evaluations.residuals + i.evaluations.jacobians) as f64 / rows,
-            rmse: (2.0 * i.row_cost.unwrap_or(i.cost).max(0.0) / rows).sqrt(),
+            rmse: (lengths * 2.0 * i.row_cost.unwrap_or(i.cost).max(0.0) / rows).sqrt() / per_mm,
         })
         .collect();
     let tolerances = Tolerance::default().priors(task.parameters_list(), task.start());
@@ -550,7 +555,7 @@ fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTabl
         return None;
     }
     let outcome = result.outcomes.first()?;
-    let (task, parameters) = task_of(case, result.solver, result.treatment);
+    let (task, parameters, _) = task_of(case, result.solver, result.treatment);
     let readings = task.rows().saturating_sub(parameters.len()).max(1) as f64;
     let variance = match result.treatment {
         // Rows as printed are not weighed: their spread is what the fit left.

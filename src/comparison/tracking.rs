@@ -12,13 +12,17 @@
 //! accidents; a lone one counts as expected, since what a model does not hold has longer tails than χ². An alarm that
 //! no single parameter explains says so and changes nothing.
 //!
-//! **Which parameter, since when.** A jump or a drift of one parameter from one pose of the history on, whichever explains
-//! the history best ([`locate`]). Parameters that explain it nearly as well are named as alternatives: a sensor that was
+//! **Which parameter, since when.** A few poses after the bound was left: a jump or a drift of one parameter from one pose of
+//! the history on, or the sensor, its target or an outlet moved as a whole, whichever explains the history best
+//! ([`locate`]). Parameters that explain it nearly as well are named as alternatives: a sensor that was
 //! knocked and a joint that lost its zero can look the same. Lone accidents have no say.
 //!
 //! **After an alarm.** The filter goes back to where the history began, what moved gets room (three times a jump; the
 //! process noise of a drift), and the history is taken in again: nothing is lost, and the model follows within a few
 //! poses ([`alarm`]).
+//!
+//! **Another arm.** First poses that leave far more than the model had on held-out rows are refused: a filter that takes all
+//! of it for noise would never notice anything.
 //!
 //! **A stop.** [`state`] holds every bit that matters, so that a track that was stopped anywhere and goes on ends in the same
 //! bits as one that was not.
@@ -125,6 +129,22 @@ pub enum TrackError {
     /// The rows do not place the sensor.
     #[error(transparent)]
     Placing(#[from] ExperimentError),
+    /// The first poses do not fit the model.
+    #[error(
+        "{file}: the first {poses} poses leave {left_mm:.3} mm under this model, which left {held_out_mm:.3} mm on rows \
+         that it had not seen: the arm has changed since, or these are not its measurements; identify it anew, or begin all \
+         the same with --sigma {left_mm:.3}"
+    )]
+    Foreign {
+        /// File.
+        file: String,
+        /// Poses that placed the sensor.
+        poses: usize,
+        /// What they leave, of one coordinate or length (mm).
+        left_mm: f64,
+        /// What the model left on held-out rows, likewise (mm).
+        held_out_mm: f64,
+    },
     /// Another sensor than before.
     #[error(
         "{file}: has {found} readings, and the track so far has {expected}: start a new track with another --state"
@@ -212,7 +232,20 @@ impl Tracker {
         // have just placed the sensor seem to.
         let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
         let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
-        let sigma_mm = options.sigma_mm.unwrap_or(fitted.sigma_mm.max(unexplained_mm));
+        let left_mm = fitted.sigma_mm;
+        if options.sigma_mm.is_none()
+            && unexplained_mm > 0.0
+            && left_mm > FOREIGN * unexplained_mm
+            && left_mm > FOREIGN_MM
+        {
+            return Err(TrackError::Foreign {
+                file: dataset.file.clone(),
+                poses: options.first_poses,
+                left_mm,
+                held_out_mm: unexplained_mm,
+            });
+        }
+        let sigma_mm = options.sigma_mm.unwrap_or(left_mm.max(unexplained_mm));
         let frames = fitted.frames;
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
@@ -258,6 +291,7 @@ impl Tracker {
             middle: snapshot,
             region: model.region.clone(),
             quiet_until: 0,
+            pending_since: 0,
             consumed: Vec::new(),
             alarms: Vec::new(),
             history: Vec::new(),
@@ -469,6 +503,11 @@ impl Tracker {
         }
     }
 
+    /// Name of the robot.
+    pub fn robot(&self) -> &str {
+        &self.begun.robot
+    }
+
     /// What must be saved.
     pub fn state(&self) -> &State {
         &self.state
@@ -495,6 +534,10 @@ impl Tracker {
         self.task(&self.seen(&observed))
     }
 }
+
+/// First poses that leave so many times what the model left on held-out rows, and more than so many mm, are no noise.
+const FOREIGN: f64 = 5.0;
+const FOREIGN_MM: f64 = 0.05;
 
 /// A covariance of an identification may be singular to rounding; this is nothing beside any tolerance (mm², rad²).
 const SMALLEST_VARIANCE: f64 = 1e-14;

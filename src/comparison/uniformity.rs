@@ -5,9 +5,11 @@
 //! some 4.4 counts there, as much as the differences between the r. With 100,000 points the density of the map itself
 //! shows. See [`chaos::uniformity`](crate::estimation::chaos::uniformity).
 
+use serde::Serialize;
+
 use crate::comparison::experiment::Uniformity;
 use crate::estimation::chaos::map::Map;
-use crate::estimation::chaos::uniformity::{self, Options, Study};
+use crate::estimation::chaos::uniformity::{self, Options, Study, Uniformity as Evenness};
 
 /// The result.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,8 +20,19 @@ pub struct UniformityResult {
     pub study: Study,
     /// Figure 3a: the first points of one sequence with the claimed r.
     pub points: Vec<f64>,
-    /// Figure 3b: their counts.
-    pub counts: Vec<usize>,
+    /// The maps of Table 2 with their usual parameters.
+    pub maps: Vec<MapEvenness>,
+}
+
+/// How evenly one map fills its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MapEvenness {
+    /// The map.
+    pub map: Map,
+    /// With the points of the short sequence.
+    pub short: Evenness,
+    /// With the points of the long sequence.
+    pub long: Evenness,
 }
 
 /// Start of the sequence of Fig. 3; the paper does not state its own.
@@ -36,6 +49,13 @@ pub fn run(settings: &Uniformity, seed: u64) -> UniformityResult {
         settings: settings.clone(),
         study: uniformity::study(&rs, settings.claimed, settings.long_points, &options),
         points: map.sequence(START).take(settings.points).collect(),
-        counts: uniformity::counts(map, START, settings.points, settings.bins),
+        maps: Map::ALL
+            .into_iter()
+            .map(|map| MapEvenness {
+                map,
+                short: uniformity::uniformity(map, &options),
+                long: uniformity::uniformity(map, &Options { points: settings.long_points, ..options }),
+            })
+            .collect(),
     }
 }

@@ -46,7 +46,7 @@ pub struct Comparison {
     pub conclusion: Conclusion,
 }
 
-/// Differences of held-out RMSE, method minus reference: positive where the reference is better.
+/// Differences of errors (of held-out RMSE, where methods are compared), method minus reference: positive where the reference is better.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Test {
     /// Mean difference (mm).
@@ -117,20 +117,31 @@ pub fn judge(results: &[MethodResult], reference: &str, held_out: f64) -> Judgem
     };
     let cases = of.outcomes.len();
     let others: Vec<&MethodResult> = results.iter().filter(|r| r.method.id != reference).collect();
-    let mut limited: Vec<Test> = others.iter().map(|r| test(&r.outcomes, &of.outcomes, held_out)).collect();
-    correct(limited.iter_mut().collect());
-    let mut converged: Vec<Option<Test>> =
-        others.iter().map(|r| Some(test(r.converged.as_ref()?, of.converged.as_ref()?, held_out))).collect();
-    correct(converged.iter_mut().flatten().collect());
+    let rmse = |outcomes: &[Outcome]| -> Vec<f64> { outcomes.iter().map(|o| o.held_out.rmse).collect() };
+    let reference_rmse = rmse(&of.outcomes);
+    let limited = paired(
+        &reference_rmse,
+        &others.iter().map(|r| Some(rmse(&r.outcomes))).collect::<Vec<_>>(),
+        held_out,
+    );
+    let converged = paired(
+        &of.converged.as_deref().map(rmse).unwrap_or_default(),
+        &others
+            .iter()
+            .map(|r| of.converged.as_ref().and(r.converged.as_deref()).map(rmse))
+            .collect::<Vec<_>>(),
+        held_out,
+    );
     // Two-sided, all cases of one sign, and corrected for as many comparisons.
     let smallest = 2.0_f64 * 0.5_f64.powi(cases as i32) * others.len().max(1) as f64;
     let comparisons = others
         .iter()
         .zip(limited)
         .zip(converged)
-        .map(|((result, limited), converged)| {
+        .filter_map(|((result, limited), converged)| {
+            let limited = limited?;
             let conclusion = conclude(result, of, &limited, converged.as_ref());
-            Comparison { id: result.method.id.clone(), limited, converged, conclusion }
+            Some(Comparison { id: result.method.id.clone(), limited, converged, conclusion })
         })
         .collect();
     Judgement { reference: reference.to_owned(), cases, can_be_significant: smallest < LEVEL, comparisons }
@@ -173,8 +184,25 @@ fn share(a: f64, b: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / a.min(b) }
 }
 
-fn test(method: &[Outcome], reference: &[Outcome], held_out: f64) -> Test {
-    let pairs = || method.iter().zip(reference).map(|(m, r)| (m.held_out.rmse, r.held_out.rmse));
+/// Every one of `others` against `reference`, case by case, corrected by Holm over all of them. `held_out` is held-out rows
+/// over rows of training. Nothing where there is nothing to compare.
+pub fn paired(reference: &[f64], others: &[Option<Vec<f64>>], held_out: f64) -> Vec<Option<Test>> {
+    let mut tests: Vec<Option<Test>> =
+        others.iter().map(|other| Some(test(other.as_ref()?, reference, held_out))).collect();
+    let ranks = holm(
+        &tests.iter().map(|t| t.as_ref().map_or(f64::NAN, |t| t.signed_rank.two_sided)).collect::<Vec<_>>(),
+    );
+    let ts = holm(&tests.iter().map(|t| t.as_ref().map_or(f64::NAN, |t| t.resampled)).collect::<Vec<_>>());
+    for ((test, rank), t) in tests.iter_mut().zip(ranks).zip(ts) {
+        if let Some(test) = test {
+            (test.signed_rank_holm, test.resampled_holm) = (rank, t);
+        }
+    }
+    tests
+}
+
+fn test(method: &[f64], reference: &[f64], held_out: f64) -> Test {
+    let pairs = || method.iter().zip(reference).map(|(m, r)| (*m, *r));
     let differences: Vec<f64> = pairs().map(|(m, r)| m - r).collect();
     let shares = pairs().map(|(m, r)| share(m, r));
     Test {
@@ -187,13 +215,5 @@ fn test(method: &[Outcome], reference: &[Outcome], held_out: f64) -> Test {
         signed_rank_holm: f64::NAN,
         resampled: resampled_t(&differences, held_out),
         resampled_holm: f64::NAN,
-    }
-}
-
-fn correct(mut tests: Vec<&mut Test>) {
-    let ranks = holm(&tests.iter().map(|t| t.signed_rank.two_sided).collect::<Vec<_>>());
-    let ts = holm(&tests.iter().map(|t| t.resampled).collect::<Vec<_>>());
-    for ((test, rank), t) in tests.iter_mut().zip(ranks).zip(ts) {
-        (test.signed_rank_holm, test.resampled_holm) = (rank, t);
     }
 }

@@ -82,7 +82,7 @@ impl std::fmt::Display for Termination {
             Self::Step => "converged: step",
             Self::Cost => "converged: cost",
             Self::SmallResidual => "converged: residuals vanish",
-            Self::DataProcessed => "all observations processed",
+            Self::DataProcessed => "all rows taken in",
             Self::IterationLimit => "iteration limit",
             Self::Stalled => "stalled",
             Self::NotFinite => "not finite",

@@ -122,22 +122,16 @@ pub fn json(experiment: &Experiment, results: &Results, origin: &Origin) -> Valu
     })
 }
 
-/// All experiments that ship, one line each.
-pub fn list(experiments: &[Experiment]) -> Table {
-    use super::table::Column;
-    let mut table = Table::new(
-        "Experiments",
-        vec![
-            Column::text("name", "Name"),
-            Column::text("stands_for", "Stands for"),
-            Column::text("title", "What"),
-        ],
-    );
-    for experiment in experiments {
-        let stands_for = format!("{}: {}", experiment.paper, experiment.figures.join(", "));
-        table.push([experiment.name.as_str().into(), stands_for.into(), experiment.title.as_str().into()]);
-    }
-    table
+/// All experiments that ship: name, what is done, and what of which paper it stands for.
+pub fn list(experiments: &[Experiment]) -> Document {
+    let mut page = Document::new("Experiments");
+    page.push(Block::List(
+        experiments
+            .iter()
+            .map(|e| format!("{}: {}. Stands for {}, {}.", e.name, e.title, e.paper, e.figures.join(", ")))
+            .collect(),
+    ));
+    page
 }
 
 fn opening(experiment: &Experiment, results: &Results) -> Document {

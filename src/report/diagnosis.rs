@@ -312,10 +312,7 @@ fn parameters(finding: &Finding) -> Table {
     // A map is a picture, not a table.
     let shown: Vec<&FoundParameter> = finding.parameters.iter().filter(|p| p.name != "knot").collect();
     for parameter in shown {
-        let (scale, unit) = match parameter.unit.as_str() {
-            "rad" => (1f64.to_degrees(), "°"),
-            unit => (1.0, unit),
-        };
+        let (scale, unit) = super::number::handy(&parameter.unit);
         table.push([
             Cell::from(parameter.name.as_str()),
             Cell::with_sigma(parameter.value * scale, parameter.sigma.map(|s| s * scale)),

@@ -205,11 +205,10 @@ fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> Estimated
 /// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
 fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
     let (factor, unit) = match parameter.unit.as_str() {
-        "rad" => (1f64.to_degrees(), "°"),
         "1" => (1e6, "ppm"),
         "1/K" => (1e6, "ppm/K"),
         "rad/(N m)" => (1e6, "µrad/(N m)"),
-        unit => (1.0, unit),
+        unit => super::number::handy(unit),
     };
     in_unit(parameter, factor, unit)
 }

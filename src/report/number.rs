@@ -66,6 +66,14 @@ impl Precision {
     }
 }
 
+/// Factor and unit in which people read a number that is held in `unit`: degrees for radians.
+pub(super) fn handy(unit: &str) -> (f64, &str) {
+    match unit {
+        "rad" => (1f64.to_degrees(), "°"),
+        unit => (1.0, unit),
+    }
+}
+
 /// The shortest text that reads back as the same number; plain where that is short, with an exponent elsewhere.
 pub(super) fn exact(value: f64) -> String {
     let size = value.abs();

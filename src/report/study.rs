@@ -4,7 +4,8 @@ use serde_json::{Value, json};
 
 use super::document::{Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
-use super::plot::{Axis, BarGroup, Bars, Graph, Series};
+use super::plot::{Axis, Graph, Series};
+use super::repeated;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use crate::identification::study::MethodRow;
@@ -22,25 +23,18 @@ pub fn table(rows: &[MethodRow]) -> Table {
     let splits = rows.first().map_or(0, |row| row.held_out.len());
     let mut table = Table::new(
         format!("Held-out errors over {splits} splits"),
-        vec![
-            Column::text("method", "Method"),
-            Column::number("rmse_mm", "RMSE", "mm", 3),
-            Column::number("mean_absolute_mm", "mean |e|", "mm", 3),
-            Column::number("max_mm", "max", "mm", 3),
-            Column::number("jacobian_passes", "Jacobian passes", "", 1),
-            Column::text("converged", "Converged"),
-        ],
+        std::iter::once(Column::text("method", "Method"))
+            .chain(repeated::columns([3; 3]))
+            .chain([
+                Column::number("jacobian_passes", "Jacobian passes", "", 1),
+                Column::text("converged", "Converged"),
+            ])
+            .collect(),
     );
     for row in rows {
-        let cell = |figure: fn(&ErrorSummary) -> f64| over_splits(row, figure);
-        table.push([
-            name(row).into(),
-            cell(|s| s.rmse),
-            cell(|s| s.mean_absolute),
-            cell(|s| s.max),
-            passes(row).into(),
-            converged(row).map(|(yes, of)| format!("{yes} of {of}")).into(),
-        ]);
+        let ended = converged(row).map(|(yes, of)| format!("{yes} of {of}"));
+        let cells = std::iter::once(Cell::from(name(row))).chain(repeated::cells(&row.held_out));
+        table.push(cells.chain([passes(row).into(), ended.into()]));
     }
     table.notes = notes(rows);
     table
@@ -142,15 +136,6 @@ fn name(row: &MethodRow) -> &'static str {
     row.solver.map_or(REGISTERED, |solver| solver.name)
 }
 
-/// Mean ± deviation; the mean alone for one split, nothing for none.
-fn over_splits(row: &MethodRow, figure: fn(&ErrorSummary) -> f64) -> Cell {
-    let (mean, deviation) = row.over_splits(figure);
-    match row.held_out.len() {
-        0 => Cell::Missing,
-        n => Cell::with_sigma(mean, (n > 1).then_some(deviation)),
-    }
-}
-
 fn passes(row: &MethodRow) -> Option<f64> {
     (!row.jacobian_passes.is_empty()).then(|| mean_and_deviation(&row.jacobian_passes).0)
 }
@@ -248,25 +233,9 @@ fn same_optimum(rows: &[MethodRow]) -> Vec<String> {
 }
 
 fn bars(rows: &[MethodRow]) -> String {
-    let group = |label: &str, figure: fn(&ErrorSummary) -> f64| {
-        let figures: Vec<(f64, f64)> = rows.iter().map(|row| row.over_splits(figure)).collect();
-        BarGroup {
-            deviations: figures.iter().map(|f| Some(f.1)).collect(),
-            ..BarGroup::new(label, figures.iter().map(|f| Some(f.0)))
-        }
-    };
-    Bars {
-        title: "Held-out errors".to_owned(),
-        y: Axis::new("error", "mm"),
-        names: rows.iter().map(|row| name(row).to_owned()).collect(),
-        groups: vec![
-            group("RMSE", |s| s.rmse),
-            group("mean |e|", |s| s.mean_absolute),
-            group("max", |s| s.max),
-        ],
-        labels: Some(Precision::Decimals(2)),
-    }
-    .svg()
+    let names = rows.iter().map(|row| name(row).to_owned()).collect();
+    let errors: Vec<_> = rows.iter().map(|row| Some(row.held_out.clone())).collect();
+    repeated::bars(names, &errors, Some(Precision::Decimals(2)))
 }
 
 fn by_split(rows: &[MethodRow]) -> String {

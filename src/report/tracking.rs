@@ -2,15 +2,18 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Document, KeyFigure, Provenance, Verdict};
+use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::number::handy;
 use super::plot::{Axis, Graph, Reference, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use crate::comparison::tracking::state::Consumed;
 use crate::comparison::tracking::{Alarm, Tracker};
 
 /// What the terminal shows.
 pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = Document::new("Track");
+    page.subtitle = format!("{}, {} readings", tracker.robot(), tracker.state().sensor);
     head(&mut page, tracker, fresh, alarms, model);
     page
 }
@@ -18,6 +21,12 @@ pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -
 /// The page.
 pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = summary(tracker, fresh, alarms, model);
+    let earlier = tracker.state().alarms.len() - alarms.len().min(tracker.state().alarms.len());
+    if earlier > 0 {
+        page.heading(2, "Changes noticed before");
+        page.push(Block::List(tracker.state().alarms[..earlier].iter().map(ToString::to_string).collect()));
+    }
+    page.heading(2, "How surprising the poses are");
     let history = &tracker.state().history;
     let points: Vec<[f64; 2]> = history.iter().enumerate().map(|(i, s)| [i as f64 + 1.0, s.nis]).collect();
     page.figure(
@@ -32,9 +41,21 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
         .svg(),
         "How surprising each pose was: near the line on average while arm, sensor and noise are what they are taken for.",
     );
+    page.heading(2, "Where the arm stands");
     page.push(table(tracker));
-    page.push(Provenance::here());
+    page.push(Provenance { sources: sources(tracker), ..Provenance::here() });
     page
+}
+
+/// The files that were taken in.
+fn sources(tracker: &Tracker) -> Vec<Source> {
+    let of = |consumed: &Consumed| Source {
+        name: consumed.file.clone(),
+        role: "Measurements".to_owned(),
+        sha256: None,
+        rows: Some(consumed.rows),
+    };
+    tracker.state().consumed.iter().map(of).collect()
 }
 
 fn rows_per_pose(tracker: &Tracker) -> f64 {
@@ -76,8 +97,7 @@ pub fn table(tracker: &Tracker) -> Table {
     );
     let sigmas = tracker.sigmas();
     for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
-        let (scale, unit) =
-            if parameter.unit() == "rad" { (1f64.to_degrees(), "°") } else { (1.0, parameter.unit()) };
+        let (scale, unit) = handy(parameter.unit());
         table.push([
             parameter.to_string().into(),
             unit.into(),

@@ -7,6 +7,11 @@
 //! over all poses with weight 1, and M = (P⁻¹ + A)⁻¹:
 //! ratio = (h(k) − B(:,k)ᵀ M g)² / (D(k,k) − B(:,k)ᵀ M B(:,k)), exact for rows of unit noise.
 //!
+//! Parameters that move together, such as the six of a sensor that was knocked, are one change of several: with l and S the
+//! vector and matrix of the same expressions, ratio = lᵀ (S + Λ⁻¹)⁻¹ l, Λ how far such a thing may move. It is preferred to
+//! the best single parameter where it is the more surprising if nothing had moved ([`surprise`]), and that by far
+//! ([`CLEARLY`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
+//!
 //! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w.
 //!
 //! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n p³ operations.
@@ -20,6 +25,10 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
 pub const ALTERNATIVE: f64 = 4.0;
+
+/// A group is preferred to a single parameter where its surprise is larger by this, and by this share of the parameter's
+/// ratio.
+pub const CLEARLY: (f64, f64) = (30.0, 0.25);
 
 /// How a parameter changes from a pose on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +56,40 @@ pub struct Change {
     pub ratio: f64,
 }
 
+/// Parameters that may move together, each with how far (one standard deviation).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Parameter and reach.
+    pub members: Vec<(usize, f64)>,
+}
+
+/// Several parameters that jumped at once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Together {
+    /// Index of the group.
+    pub group: usize,
+    /// First changed pose.
+    pub since: usize,
+    /// By how much each member, in the order of the group.
+    pub shifts: Vec<f64>,
+    /// Covariance of these.
+    pub covariance: DMatrix<f64>,
+    /// Likelihood ratio: χ² with as many degrees of freedom as there are members if nothing had moved.
+    pub ratio: f64,
+}
+
+/// −2 ln of the probability that χ² with so many degrees of freedom is beyond `ratio`, far out: what makes changes of one
+/// parameter and of several comparable.
+pub fn surprise(freedom: usize, ratio: f64) -> f64 {
+    // ln Γ(k/2) for k = 0 to 6.
+    const LN_GAMMA: [f64; 7] =
+        [0.0, 0.572_364_942_9, 0.0, -0.120_782_237_6, 0.0, 0.284_682_870_5, std::f64::consts::LN_2];
+    let half = (ratio / 2.0).max(1.0).ln();
+    ratio - (freedom as f64 - 2.0) * half + 2.0 * LN_GAMMA[freedom.min(6)]
+}
+
 /// The change that explains the history best, and what else would.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -56,11 +99,21 @@ pub struct Found {
     pub other_form: Option<Change>,
     /// Other parameters that explain the history nearly as well, each at its best.
     pub alternatives: Vec<Change>,
+    /// A group that explains it far better than any single parameter.
+    pub together: Option<Together>,
+    /// A group that explains it about as well as the best single parameter, or better, but not clearly.
+    pub nearly: Option<usize>,
 }
 
 /// Looks through all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose,
-/// at the state of which `covariance` is the covariance. `None` where that is not positive definite, or nothing is seen.
-pub fn locate(residuals: &[f64], jacobian: &[f64], per: usize, covariance: &DMatrix<f64>) -> Option<Found> {
+/// at the state of which `covariance` is the covariance; `groups` may move as one. `None` where that is not positive definite, or nothing is seen.
+pub fn locate(
+    residuals: &[f64],
+    jacobian: &[f64],
+    per: usize,
+    covariance: &DMatrix<f64>,
+    groups: &[Group],
+) -> Option<Found> {
     let (p, n) = (covariance.nrows(), residuals.len() / per.max(1));
     let j = DMatrix::from_column_slice(n * per, p, jacobian);
     let r = DVector::from_column_slice(residuals);
@@ -72,6 +125,7 @@ pub fn locate(residuals: &[f64], jacobian: &[f64], per: usize, covariance: &DMat
     let (mut jump, mut drift) = (DMatrix::zeros(p, p), DMatrix::zeros(p, p));
     let (mut jump_gradient, mut drift_gradient) = (DVector::zeros(p), DVector::zeros(p));
     let mut triangle = DVector::zeros(p);
+    let mut together: Option<Together> = None;
     for since in (0..n).rev() {
         let rows = j.rows(since * per, per);
         jump += rows.tr_mul(&rows);
@@ -80,6 +134,24 @@ pub fn locate(residuals: &[f64], jacobian: &[f64], per: usize, covariance: &DMat
         drift_gradient += &jump_gradient;
         triangle += drift.diagonal();
         let (of_jump, of_drift) = (&m * &jump, &m * &drift);
+        for (index, group) in groups.iter().enumerate() {
+            let at = |a: usize| group.members[a].0;
+            let d = group.members.len();
+            let left = DVector::from_fn(d, |a, _| jump_gradient[at(a)] - jump.column(at(a)).dot(&mg));
+            let information = DMatrix::from_fn(d, d, |a, b| {
+                let own = if a == b { 1.0 / (group.members[a].1 * group.members[a].1) } else { 0.0 };
+                jump[(at(a), at(b))] - jump.column(at(a)).dot(&of_jump.column(at(b))) + own
+            });
+            let Some(factor) = information.cholesky() else { continue };
+            let shifts = factor.solve(&left);
+            let ratio = left.dot(&shifts);
+            let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio);
+            if together.as_ref().is_none_or(|t| surprise(d, ratio) > gain(t)) {
+                let shifts = shifts.iter().map(|s| -s).collect();
+                together =
+                    Some(Together { group: index, since, shifts, covariance: factor.inverse(), ratio });
+            }
+        }
         for k in 0..p {
             let mut weigh = |form: Form, cross: DVectorView<'_, f64>, h: f64, square: f64, own: f64| {
                 let left = h - cross.dot(&mg);
@@ -114,10 +186,18 @@ pub fn locate(residuals: &[f64], jacobian: &[f64], per: usize, covariance: &DMat
     all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio).then(a.parameter.cmp(&b.parameter)));
     let first = *all.first()?;
     let near = |c: &Change| c.ratio > first.ratio - ALTERNATIVE;
+    let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio) - surprise(1, first.ratio);
+    let (clear, nearly): (Option<Together>, Option<usize>) = match together {
+        Some(t) if gain(&t) > CLEARLY.0.max(CLEARLY.1 * first.ratio) => (Some(t), None),
+        Some(t) if gain(&t) > -ALTERNATIVE => (None, Some(t.group)),
+        _ => (None, None),
+    };
     let other = best[first.parameter].iter().flatten().find(|c| c.form != first.form).copied();
     Some(Found {
         best: first,
         other_form: other.filter(near),
         alternatives: all[1..].iter().take_while(|c| near(c)).copied().collect(),
+        together: clear,
+        nearly,
     })
 }

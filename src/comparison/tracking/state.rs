@@ -133,6 +133,9 @@ pub struct State {
     pub region: Region,
     /// Number of poses before which no further alarm is raised, after one that no parameter explained.
     pub quiet_until: usize,
+    /// Number of poses when the window left its bounds, while what moved is waited for; 0 otherwise.
+    #[serde(default)]
+    pub pending_since: usize,
     /// Files and rows taken in.
     pub consumed: Vec<Consumed>,
     /// Changes noticed so far.

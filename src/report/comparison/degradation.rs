@@ -171,17 +171,21 @@ fn groups(result: &DegradationResult) -> Table {
     }
     table.notes = vec![
         format!(
-            "Mean over {} simulated arms. Each link grows by {:e} per kelvin towards a further rise of {:?} K with a time \
-             constant of {} h; joint zeros wander by {:?} °/h.",
+            "Mean over {} simulated arms. Links grow by {:e} per kelvin towards a further rise of {} K (links 1 to 6) with a \
+             time constant of {} h; zeros of joints 1 to 6 wander by {} °/h.",
             result.settings.arms,
             result.settings.heat.growth_per_k,
-            result.settings.heat.rise_k,
+            listed(&result.settings.heat.rise_k),
             result.settings.heat.time_constant_h,
-            result.settings.wear.zero_deg_per_h
+            listed(&result.settings.wear.zero_deg_per_h)
         ),
         format!("The sensor alone: {:.4} mm.", result.noise_floor_mm),
     ];
     table
+}
+
+fn listed(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn counts(result: &DegradationResult) -> Table {

@@ -2,14 +2,17 @@
 
 use serde_json::{Value, json};
 
+use super::words;
 use crate::comparison::experiment::PaperPoints;
-use crate::comparison::grinding::{GrindingResult, GrindingRow};
+use crate::comparison::grinding::{GrindingCase, GrindingResult, GrindingRow};
+use crate::comparison::verdict::LEVEL;
 use crate::compensation::deviation::{Block as Deviations, PathReport};
 use crate::identification::solver::SOLVERS;
 use crate::math::statistics::mean_and_deviation;
 use crate::report::document::{Block, Document, Verdict};
 use crate::report::number::Precision;
 use crate::report::plot::{Axis, ColorMap, PlanPath, PlanView};
+use crate::report::repeated;
 use crate::report::status::Status;
 use crate::report::table::{Cell, Column, Table};
 
@@ -25,7 +28,7 @@ pub(super) fn page(page: &mut Document, result: &GrindingResult) {
     page.push(verdict(result));
     page.push(five(result));
     page.push(Block::Details {
-        summary: "The paper's Table 8".to_owned(),
+        summary: "The five points of the paper's Table 8".to_owned(),
         blocks: vec![papers(result).into()],
     });
     page.push(table(result));
@@ -34,7 +37,7 @@ pub(super) fn page(page: &mut Document, result: &GrindingResult) {
         plan(result),
         format!(
             "The path of {} from above, coloured by the deviation along the normal, one panel before and one for each method, \
-             on a common scale.",
+             on a common scale; first case.",
             result.program
         ),
     );
@@ -44,28 +47,55 @@ fn label(result: &GrindingResult) -> &'static str {
     if result.simulated { "simulated actual arm" } else { "predicted on the sound estimate" }
 }
 
-/// Whether a row's model is the one that the program was judged by.
-fn stands_in(result: &GrindingResult, row: &GrindingRow) -> bool {
-    !result.simulated && row.solver.name == SOLVERS[0].name
+/// What is shown, on which part, with how many measured rows.
+fn title(result: &GrindingResult, what: &str) -> String {
+    let protocol = if result.reduced { "Reduced protocol: " } else { "" };
+    let cases = result.rows.first().map_or(0, |r| r.cases.len());
+    format!(
+        "{protocol}{what}, {}, {}, {cases} cases of {} rows",
+        result.surface,
+        label(result),
+        result.measured
+    )
 }
 
-/// What one part and one draw of measurements can say.
+/// Whether a row's model is the one that the program was judged by.
+fn stands_in(result: &GrindingResult, row: &GrindingRow) -> bool {
+    !result.simulated && result.all_rows && row.solver.name == SOLVERS[0].name
+}
+
+/// Mean ± standard deviation over the cases; nothing where a case has no result.
+fn over(row: &GrindingRow, figure: fn(&Deviations) -> f64) -> Cell {
+    row.over_cases(figure).map_or(Cell::Missing, |values| repeated::cell(&values))
+}
+
+/// RMSE of held-out measurements in every case.
+fn held_out(row: &GrindingRow) -> Vec<f64> {
+    row.cases.iter().map(|c| c.held_out.rmse).collect()
+}
+
+/// What one part and so many draws of measurements can say.
 fn verdict(result: &GrindingResult) -> Verdict {
     let mm = |v: f64| Precision::Significant(2).format(v);
-    let size = |row: &GrindingRow| row.after.as_ref().map(|b| b.all.mean_absolute);
     // A program that was only partly rewritten is no result, and what stands in for the arm is right by definition.
-    let counts = |r: &&GrindingRow| r.refused == 0 && !stands_in(result, r);
     let mut order: Vec<(&GrindingRow, f64)> = result
         .rows
         .iter()
-        .filter(counts)
-        .filter_map(|r| size(r).filter(|v| v.is_finite()).map(|v| (r, v)))
+        .filter(|r| !stands_in(result, r))
+        .filter_map(|r| Some((r, mean_and_deviation(&r.sizes_mm()?).0)))
         .collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let before = result.before.as_ref().map_or(f64::NAN, |b| b.all.mean_absolute);
     let headline = match order.first() {
-        Some((best, left)) => format!(
+        Some((best, left)) if *left < before => format!(
             "{} leaves least: {} mm of {} mm mean size along the normal ({})",
+            best.id,
+            mm(*left),
+            mm(before),
+            label(result)
+        ),
+        Some((best, left)) => format!(
+            "No method leaves less than no compensation: {} {} mm, before {} mm mean size along the normal ({})",
             best.id,
             mm(*left),
             mm(before),
@@ -77,97 +107,130 @@ fn verdict(result: &GrindingResult) -> Verdict {
     let refused: Vec<String> = result
         .rows
         .iter()
-        .filter(|r| r.refused > 0)
-        .map(|r| format!("{} ({} targets)", r.id, r.refused))
+        .filter(|r| r.refused() > 0)
+        .map(|r| {
+            let cases = r.cases.iter().filter(|c| c.refused > 0).count();
+            format!("{} ({} targets in {cases} of {} cases)", r.id, r.refused(), r.cases.len())
+        })
         .collect();
     if !refused.is_empty() {
         reasons.push(format!(
-            "Not compared, since targets could not be rewritten: {}. Their figures are of a program left as it was there.",
+            "Not compared, since targets could not be rewritten: {}. There their figures are of a program left as it was.",
             refused.join(", ")
         ));
     }
     let worse: Vec<&str> = order.iter().filter(|(_, v)| *v > before).map(|(r, _)| r.id.as_str()).collect();
     if !worse.is_empty() {
         reasons.push(format!(
-            "Worse than no compensation: {}. What the measurements do not see, a method without priors moves at will, and a \
-             program in another place or turn shows it.",
+            "Worse than no compensation, on the mean of the cases: {}. What the measurements do not see, a method without \
+             priors moves at will, and a program in another place or turn shows it.",
             worse.join(", ")
         ));
     }
-    if let (Some(printed), Some(lowest)) = (
-        order.iter().map(|(r, _)| r.held_out.rmse).reduce(f64::max),
-        order.iter().map(|(r, _)| r.held_out.rmse).reduce(f64::min),
-    ) {
+    reasons.extend(against(result));
+    let fits = || order.iter().map(|(r, _)| mean_and_deviation(&held_out(r)).0);
+    if let (Some(most), Some(least)) = (fits().reduce(f64::max), fits().reduce(f64::min)) {
         reasons.push(format!(
             "On held-out measurements the methods leave between {} and {} mm: a good fit there is no promise for the part.",
-            mm(lowest),
-            mm(printed)
+            mm(least),
+            mm(most)
         ));
     }
     reasons.push(
-        "One part and one draw of measurements: without a spread the order of methods that lie close to each other says \
-         nothing. The same holds for the paper's Table 8."
+        "One part, in one place: the cases vary the measurements only, and another program asks for another order. The \
+         paper's Table 8 has one part and one case."
             .to_owned(),
     );
     Verdict::new(Status::Good, headline, reasons)
 }
 
-/// Table 8 as the paper has it.
-fn five(result: &GrindingResult) -> Table {
-    let mut columns = vec![Column::text("id", ""), Column::text("solver", "Method")];
-    columns.extend((1..=5).map(|k| Column::number(format!("p{k}_mm"), format!("P{k}"), "mm", 2)));
-    columns.extend([
-        Column::number("mean_mm", "mean", "mm", 2),
-        Column::number("paper_mean_mm", "paper", "mm", 2),
-        Column::number("sd_mm", "SD", "mm", 2),
-        Column::number("paper_sd_mm", "paper", "mm", 2),
-    ]);
-    let mut table = Table::new(
-        format!("Five points, deviation along the normal, {}, {}", result.surface, label(result)),
-        columns,
-    );
-    let mut add = |id: &str, name: &str, ours: Option<&Deviations>, paper: Option<PaperPoints>| {
-        let mut cells: Vec<Cell> = vec![id.into(), name.into()];
-        match ours {
-            Some(block) => {
-                let (mean, deviation) = mean_and_deviation(&block.five_mm);
-                cells.extend(block.five_mm.iter().map(|v| Cell::Number(*v)));
-                cells.extend([
-                    mean.into(),
-                    paper.map(|p| p.mean_mm).into(),
-                    deviation.into(),
-                    paper.map(|p| p.sd_mm).into(),
-                ]);
-            }
-            None => {
-                cells.extend([const { Cell::Missing }; 6]);
-                cells.extend([paper.map(|p| p.mean_mm).into(), Cell::Missing, paper.map(|p| p.sd_mm).into()]);
-            }
+/// Which methods differ from the reference in what they leave on the part.
+fn against(result: &GrindingResult) -> Vec<String> {
+    let reference = &result.settings.reference;
+    let mut better = Vec::new();
+    let mut worse = Vec::new();
+    let mut alike = Vec::new();
+    for (row, test) in result.rows.iter().zip(&result.against) {
+        let Some(test) = test.as_ref().filter(|_| !stands_in(result, row)) else { continue };
+        let difference = format!(
+            "{} ({}{} mm, p = {})",
+            row.id,
+            if test.mean_mm > 0.0 { "+" } else { "" },
+            Precision::Significant(2).format(test.mean_mm),
+            words::p(test.signed_rank_holm)
+        );
+        match (test.signed_rank_holm < LEVEL, test.mean_mm < 0.0) {
+            (true, true) => better.push(difference),
+            (true, false) => worse.push(difference),
+            (false, _) => alike.push(row.id.clone()),
         }
+    }
+    let mut out = Vec::new();
+    let mut say = |of: &[String], what: &str| {
+        if !of.is_empty() {
+            out.push(format!("{what}: {}.", of.join(", ")));
+        }
+    };
+    say(&better, &format!("Leaves significantly less on the part than {reference}"));
+    say(&worse, &format!("Leaves significantly more than {reference}"));
+    say(&alike, &format!("Not told apart from {reference} by the signed-rank test"));
+    if !out.is_empty() {
+        out.push(
+            "Signed-rank test over the cases, two-sided, after Holm's correction; it takes the cases as independent, and \
+             they share rows."
+                .to_owned(),
+        );
+    }
+    out
+}
+
+/// Table 8 as the paper has it, of the first case.
+fn five(result: &GrindingResult) -> Table {
+    let mut columns = vec![Column::text("id", "")];
+    columns.extend((1..=5).map(|k| Column::number(format!("p{k}_mm"), format!("P{k}"), "", 2)));
+    columns.extend([
+        Column::number("mean_mm", "mean", "", 2),
+        Column::number("paper_mean_mm", "paper", "", 2),
+        Column::number("mean_absolute_mm", "mean |d|", "", 2),
+        Column::number("paper_mean_absolute_mm", "paper", "", 2),
+        Column::number("sd_mm", "SD", "", 2),
+        Column::number("paper_sd_mm", "paper", "", 2),
+    ]);
+    let mut table =
+        Table::new(title(result, "Five points, deviation along the normal in mm, first case"), columns);
+    let size = |points: &[f64; 5]| points.iter().map(|v| v.abs()).sum::<f64>() / 5.0;
+    let mut add = |id: &str, ours: Option<&Deviations>, paper: Option<PaperPoints>| {
+        let mut cells: Vec<Cell> = vec![id.into()];
+        let points = ours.map(|block| block.five_mm);
+        cells.extend((0..5).map(|k| Cell::from(points.map(|p| p[k]))));
+        let both = points.map(|p| mean_and_deviation(&p));
+        cells.extend([
+            both.map(|b| b.0).into(),
+            paper.map(|p| p.mean_mm).into(),
+            points.map(|p| size(&p)).into(),
+            paper.map(|p| size(&p.points_mm)).into(),
+            both.map(|b| b.1).into(),
+            paper.map(|p| p.sd_mm).into(),
+        ]);
         table.push(cells);
     };
-    add("BC", "before compensation", result.before.as_ref(), result.settings.before);
+    add("BC", result.before.as_ref(), result.settings.before);
     for row in &result.rows {
-        add(&row.id, row.solver.name, row.after.as_ref(), row.paper);
+        add(&row.id, row.cases.first().and_then(|c| c.after.as_ref()), row.paper);
     }
     table.notes = vec![
         "P1 to P5 at the middles of five equal sections of the cut. mean is signed, SD is n - 1 of signed values, as in the \
-         paper's Table 8: with signs of both kinds a mean near zero says little."
+         paper's Table 8: with signs of both kinds a mean near zero says little. Its mean |d| is worked out from its points."
             .to_owned(),
         "The paper's part, path and errors are not given: its figures stand beside for their kind, not for their size.".to_owned(),
     ];
     table
 }
 
-/// What the paper prints.
+/// The points that the paper prints.
 fn papers(result: &GrindingResult) -> Table {
     let mut columns = vec![Column::text("id", "")];
     columns.extend((1..=5).map(|k| Column::number(format!("p{k}_mm"), format!("P{k}"), "mm", 2)));
-    columns.extend([
-        Column::number("mean_mm", "mean", "mm", 2),
-        Column::number("mean_absolute_mm", "mean |d|, from its points", "mm", 2),
-        Column::number("sd_mm", "SD", "mm", 2),
-    ]);
     let mut table = Table::new("The paper's Table 8, its own part and arm", columns);
     let all = std::iter::once(("BC", result.settings.before))
         .chain(result.rows.iter().map(|r| (r.id.as_str(), r.paper)));
@@ -175,8 +238,6 @@ fn papers(result: &GrindingResult) -> Table {
         let Some(paper) = paper else { continue };
         let mut cells: Vec<Cell> = vec![id.into()];
         cells.extend(paper.points_mm.iter().map(|v| Cell::Number(*v)));
-        let size = paper.points_mm.iter().map(|v| v.abs()).sum::<f64>() / 5.0;
-        cells.extend([paper.mean_mm.into(), size.into(), paper.sd_mm.into()]);
         table.push(cells);
     }
     table
@@ -185,42 +246,51 @@ fn papers(result: &GrindingResult) -> Table {
 /// All of the cut.
 pub(super) fn table(result: &GrindingResult) -> Table {
     let mut table = Table::new(
-        format!("All of the cut, deviation along the normal, {}, {}", result.surface, label(result)),
+        title(result, "All of the cut, deviation along the normal in mm"),
         vec![
             Column::text("id", ""),
             Column::text("solver", "Method"),
-            Column::number("mean_mm", "mean, signed", "mm", 3),
-            Column::number("mean_absolute_mm", "mean |d|", "mm", 3),
-            Column::number("sd_mm", "SD", "mm", 3),
-            Column::number("max_mm", "max", "mm", 3),
-            Column::number("held_out_rmse_mm", "held-out RMSE", "mm", 3),
+            Column::number("mean_mm", "mean, signed", "", 3),
+            Column::number("mean_absolute_mm", "mean |d|", "", 3),
+            Column::number("sd_mm", "SD", "", 3),
+            Column::number("max_mm", "max", "", 3),
+            Column::number("held_out_rmse_mm", "held-out", "", 3),
             Column::text("note", ""),
         ],
     );
-    let block = |block: Option<&Deviations>| match block {
-        Some(b) => {
-            [b.all.mean.into(), b.all.mean_absolute.into(), b.all.standard_deviation.into(), b.all.max.into()]
-        }
-        None => [const { Cell::Missing }; 4],
-    };
     let mut before: Vec<Cell> = vec!["BC".into(), "before compensation".into()];
-    before.extend(block(result.before.as_ref()));
-    before.extend([Cell::Missing, Cell::Missing]);
+    match &result.before {
+        Some(b) => before
+            .extend([b.all.mean, b.all.mean_absolute, b.all.standard_deviation, b.all.max].map(Cell::Number)),
+        None => before.extend([const { Cell::Missing }; 4]),
+    }
+    before.extend([Cell::Missing, "".into()]);
     table.push(before);
     for row in &result.rows {
-        let mut cells: Vec<Cell> = vec![row.id.as_str().into(), row.solver.name.into()];
-        cells.extend(block(row.after.as_ref()));
-        let note = match (&row.failure, row.refused) {
+        let failed = row.cases.iter().find_map(|c| c.failure.as_ref());
+        let note = match (failed, row.refused()) {
             (Some(why), _) => format!("failed: {why}"),
             (None, 0) if stands_in(result, row) => "stands in for the arm".to_owned(),
             (None, 0) => String::new(),
             (None, n) => format!("{n} targets refused"),
         };
-        cells.extend([row.held_out.rmse.into(), note.into()]);
-        table.push(cells);
+        table.push([
+            row.id.as_str().into(),
+            row.solver.name.into(),
+            over(row, |b| b.all.mean),
+            over(row, |b| b.all.mean_absolute),
+            over(row, |b| b.all.standard_deviation),
+            over(row, |b| b.all.max),
+            repeated::cell(&held_out(row)),
+            note.into(),
+        ]);
     }
     table.notes = vec![
-        format!("{} points of the cut; SD is n - 1 of signed values.", result.points),
+        format!(
+            "{} points of the cut; SD is n - 1 of signed values. ± is the standard deviation over the cases. held-out: RMSE of \
+             measurements that the fit did not see.",
+            result.points
+        ),
         "Corrections up to 100 mm and 20° are let through here, so that the consequence of each method is seen; compensate \
          refuses what exceeds 10 mm or 2°."
             .to_owned(),
@@ -262,19 +332,26 @@ fn plan(result: &GrindingResult) -> String {
 
 /// Everything.
 pub(super) fn json(result: &GrindingResult) -> Value {
+    let case = |case: &GrindingCase| {
+        json!({
+            "after": case.after,
+            "refused": case.refused,
+            "held_out": case.held_out,
+            "termination": case.termination,
+            "failure": case.failure,
+        })
+    };
     let rows: Vec<Value> = result
         .rows
         .iter()
-        .map(|row| {
+        .zip(&result.against)
+        .map(|(row, test)| {
             json!({
                 "id": row.id,
                 "solver": row.solver.name,
-                "after": row.after,
-                "refused": row.refused,
-                "held_out": row.held_out,
-                "termination": row.termination,
                 "paper": row.paper,
-                "failure": row.failure,
+                "cases": row.cases.iter().map(case).collect::<Vec<_>>(),
+                "against_reference": test,
             })
         })
         .collect();
@@ -282,6 +359,9 @@ pub(super) fn json(result: &GrindingResult) -> Value {
         "surface": result.surface,
         "program": result.program,
         "actual": if result.simulated { "simulated" } else { "sound estimate" },
+        "rows": result.measured,
+        "reduced_protocol": result.reduced,
+        "reference": result.settings.reference,
         "points": result.points,
         "before": { "block": result.before, "paper": result.settings.before },
         "methods": rows,

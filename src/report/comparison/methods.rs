@@ -10,9 +10,10 @@ use super::caveats;
 use crate::comparison::experiment::{Treatment, Units};
 use crate::comparison::protocol::{MethodResult, Outcome, Study};
 use crate::estimation::estimate::Termination;
-use crate::math::statistics::{ErrorSummary, mean_and_deviation, median};
+use crate::math::statistics::{ErrorSummary, median};
 use crate::measurement::dataset::Sensor;
 use crate::report::document::{Block, Document, KeyFigure};
+use crate::report::repeated::spread;
 use crate::report::table::Cell;
 
 pub(super) use self::data::{json, table};
@@ -39,11 +40,13 @@ pub(super) fn page(page: &mut Document, study: &Study) {
         "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The mean of |e| is \
          what the papers call STD. A method that diverged in any case has no bar.",
     );
-    page.figure(
-        rows(study),
-        "Errors of the held-out rows of the first case, by method. Rows are in the order of the file. Methods that \
-         diverged in any case are left out.",
-    );
+    for picture in rows(study) {
+        page.figure(
+            picture,
+            "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
+             Methods that diverged in any case are left out.",
+        );
+    }
     page.heading(2, "Which differences are real");
     page.push(verdict_table(study));
     page.push(convergence(study));
@@ -51,7 +54,8 @@ pub(super) fn page(page: &mut Document, study: &Study) {
     page.figure(
         curves(study, false),
         "Root mean square of the fit over the iterations, first case, methods as printed. An iteration of one method \
-         costs something else than one of another. A curve ends where it is ten times above its start.",
+         costs something else than one of another. A curve ends where it is ten times above its start; who is there after \
+         one step has none.",
     );
     page.figure(
         curves(study, true),
@@ -61,7 +65,7 @@ pub(super) fn page(page: &mut Document, study: &Study) {
     page.push(times(study));
     page.figure(
         time_bars(study),
-        "Seconds for one case, while other cases ran on other cores: not the same in every run.",
+        "Time of one case, while other cases ran on other cores: not the same in every run.",
     );
     if !study.parameters.is_empty() {
         page.heading(2, "What was identified");
@@ -89,29 +93,30 @@ fn head(page: &mut Document, study: &Study) {
     }
     if study.simulated {
         notes.push(
-            "Simulated rows: the paper's figures were measured on another arm and stand beside ours for the order of the \
-             methods, not for their size."
-                .to_owned(),
+            format!(
+                "Simulated rows of {}: the paper's figures were measured on another arm and stand beside ours for the order \
+                 of the methods, not for their size.",
+                study.robot
+            ),
         );
     }
     notes.extend(caveats(&study.experiment));
     page.push(Block::List(notes));
+    let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
     let best = study
         .results
         .iter()
-        .filter(|r| !r.outcomes.iter().any(|o| o.diverged))
-        .min_by(|a, b| over(a, |s| s.rmse).0.total_cmp(&over(b, |s| s.rmse).0));
-    let registered = over_cases(&study.cases.iter().map(|c| c.registered).collect::<Vec<_>>(), |s| s.rmse);
+        .filter_map(|r| Some((r, rmse(&held_out(r)?)?)))
+        .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
     let mut figures = vec![];
-    if let Some(best) = best {
-        let (mean, deviation) = over(best, |s| s.rmse);
+    if let Some((best, (mean, deviation))) = best {
         figures.push(
             KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm")
                 .note(format!("{} {}", best.method.id, best.method.name)),
         );
     }
     figures.push(
-        KeyFigure::new("Frames registered alone", registered.0, 3, "mm")
+        KeyFigure::new("Frames registered alone", rmse(&registered(study)).map(|r| r.0), 3, "mm")
             .note("nominal links, the fair before"),
     );
     figures.push(KeyFigure::new("Noise floor", study.noise_floor_mm, 3, "mm").note(if study.simulated {
@@ -122,15 +127,15 @@ fn head(page: &mut Document, study: &Study) {
     page.push(figures);
 }
 
-/// Mean and, for several cases, standard deviation of a figure over the cases.
-fn over(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> (f64, Option<f64>) {
-    over_cases(&result.outcomes.iter().map(|o| o.held_out).collect::<Vec<_>>(), figure)
+/// Held-out errors of all cases; nothing of a method that diverged in any, since a mean over such cases is no figure.
+fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
+    let all = result.outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out));
+    all.collect()
 }
 
-fn over_cases(errors: &[ErrorSummary], figure: fn(&ErrorSummary) -> f64) -> (f64, Option<f64>) {
-    let values: Vec<f64> = errors.iter().map(figure).collect();
-    let (mean, deviation) = mean_and_deviation(&values);
-    (mean, (values.len() > 1).then_some(deviation))
+/// The same of the start, with frames registered.
+fn registered(study: &Study) -> Vec<ErrorSummary> {
+    study.cases.iter().map(|c| c.registered).collect()
 }
 
 pub(super) fn name_of(study: &Study, id: &str) -> String {
@@ -167,23 +172,6 @@ fn ended(outcomes: &[Outcome]) -> String {
     }
 }
 
-/// RMSE over the cases, or in how many of them the method diverged: a mean over such cases is no figure.
-fn rmse(result: &MethodResult) -> Cell {
-    match result.outcomes.iter().filter(|o| o.diverged).count() {
-        0 => figure(result, |s| s.rmse),
-        n => Cell::Text(format!("diverged {n}/{}", result.outcomes.len())),
-    }
-}
-
-/// Mean ± deviation over the cases; nothing of a method that diverged.
-fn figure(result: &MethodResult, figure: fn(&ErrorSummary) -> f64) -> Cell {
-    if result.outcomes.iter().any(|o| o.diverged) {
-        return Cell::Missing;
-    }
-    let (mean, deviation) = over(result, figure);
-    Cell::with_sigma(mean, deviation)
-}
-
 fn iterations(outcomes: &[Outcome]) -> f64 {
     outcomes.iter().map(|o| o.iterations as f64).sum::<f64>() / outcomes.len().max(1) as f64
 }
@@ -197,7 +185,7 @@ fn treatment(result: &MethodResult) -> &'static str {
 }
 
 /// Passes over the rows of the fit: residuals alone, and with derivatives.
-fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
+pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
     let per = match study.sensor {
         Sensor::Cable => 1,
         Sensor::Position => 3,

@@ -3,15 +3,61 @@
 use serde_json::{Value, json};
 
 use super::words;
-use crate::comparison::signed_rank::TableResult;
-use crate::report::document::Document;
+use crate::comparison::signed_rank::{PairTest, TableResult};
+use crate::comparison::statistics::holm;
+use crate::comparison::verdict::LEVEL;
+use crate::report::document::{Document, Verdict};
+use crate::report::status::Status;
 use crate::report::table::{Cell, Column, Table};
 
 /// Terminal and page.
 pub(super) fn summary(page: &mut Document, tables: &[TableResult]) {
+    page.push(verdict(tables));
     for table in tables {
         page.push(one(table));
     }
+}
+
+/// Half a unit of the paper's last place, for p values of 0.002 and of four digits alike.
+const REPRODUCED: f64 = 6e-4;
+
+fn is_reproduced(test: &PairTest) -> bool {
+    test.paper_p.is_some_and(|p| (p - test.test.one_sided_positive).abs() < REPRODUCED)
+}
+
+/// Whether the numbers hold, and what they say.
+fn verdict(tables: &[TableResult]) -> Verdict {
+    let all = || tables.iter().flat_map(|t| &t.tests).filter(|t| t.paper_p.is_some());
+    let reproduced = all().filter(|t| is_reproduced(t)).count();
+    let mut reasons: Vec<String> = Vec::new();
+    for table in tables {
+        let below = |p: fn(&PairTest) -> f64| table.tests.iter().filter(|t| p(t) < LEVEL).count();
+        reasons.push(format!(
+            "{}: {} of {} comparisons are below 5 % one-sided as printed, {} two-sided, {} two-sided after Holm's correction. {}",
+            short(table),
+            below(|t| t.test.one_sided_positive),
+            table.tests.len(),
+            below(|t| t.test.two_sided),
+            holm(&table.tests.iter().map(|t| t.test.two_sided).collect::<Vec<_>>())
+                .iter()
+                .filter(|p| **p < LEVEL)
+                .count(),
+            table.table.dependence
+        ));
+    }
+    let status = if reproduced == all().count() { Status::Good } else { Status::Warning };
+    Verdict::new(
+        status,
+        format!(
+            "{reproduced} of {} printed p values are reproduced; they show less than they seem to",
+            all().count()
+        ),
+        reasons,
+    )
+}
+
+fn short(table: &TableResult) -> String {
+    table.table.title.split(':').next().unwrap_or_default().to_owned()
 }
 
 fn columns() -> Vec<Column> {
@@ -28,7 +74,7 @@ fn columns() -> Vec<Column> {
 }
 
 fn push(table: &mut Table, of: &TableResult) {
-    let short = of.table.title.split(':').next().unwrap_or_default().to_owned();
+    let short = short(of);
     for test in &of.tests {
         table.push([
             Cell::Text(short.clone()),
@@ -46,17 +92,14 @@ fn push(table: &mut Table, of: &TableResult) {
 fn one(of: &TableResult) -> Table {
     let mut table = Table::new(of.table.title.clone(), columns());
     push(&mut table, of);
-    table.notes = vec![of.table.dependence.clone()];
-    let agree =
-        of.tests.iter().filter(|t| t.paper_p.is_some_and(|p| (p - t.test.one_sided_positive).abs() < 6e-4));
-    table.notes.push(format!(
-        "The paper's p is reproduced for {} of {} comparisons, as a one-sided exact test; the smallest one-sided p that \
-         {} pairs can give is {}.",
-        agree.count(),
-        of.tests.len(),
+    // All rows are of this table.
+    table.columns.remove(0);
+    table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
+    table.notes = vec![format!(
+        "The smallest one-sided p that {} pairs can give is {}.",
         of.table.rows.len(),
         words::p(0.5f64.powi(of.table.rows.len() as i32))
-    ));
+    )];
     table
 }
 

@@ -3,14 +3,16 @@
 use serde_json::{Value, json};
 
 use crate::comparison::uniformity::UniformityResult;
-use crate::report::document::{Document, Verdict};
-use crate::report::plot::{Axis, Graph, Reference, Series};
+use crate::report::document::{Block, Document, Verdict};
+use crate::report::number::Precision;
+use crate::report::plot::{Axis, Graph, Histogram, Reference, Sample, Series};
 use crate::report::status::Status;
 use crate::report::table::{Cell, Column, Table};
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, result: &UniformityResult) {
     page.push(verdict(result));
+    page.push(maps(result));
     page.push(table(result).excerpt(24));
 }
 
@@ -22,8 +24,9 @@ pub(super) fn page(page: &mut Document, result: &UniformityResult) {
         page.figure(
             over_r(result, long),
             format!(
-                "{points} points in {} bins, mean of {} starts; the band is one standard deviation over the starts. The \
+                "{} points in {} bins, mean of {} starts; the band is one standard deviation over the starts. The \
                  line across is what random points give.",
+                thousands(points),
                 result.settings.bins, result.settings.starts
             ),
         );
@@ -43,28 +46,66 @@ pub(super) fn page(page: &mut Document, result: &UniformityResult) {
         .svg(),
         "The paper's Fig. 3a, from one start.",
     );
-    let bins = result.settings.bins as f64;
     page.figure(
-        Graph {
-            title: "Counts".to_owned(),
+        Histogram {
+            title: format!("Counts of the same {} points", thousands(result.settings.points)),
             x: Axis::new("value", ""),
-            y: Axis::new("count", ""),
-            series: vec![Series::line(
-                "counts",
-                result
-                    .counts
-                    .iter()
-                    .enumerate()
-                    .map(|(i, c)| [(i as f64 + 0.5) / bins, *c as f64])
-                    .collect::<Vec<_>>(),
-            )],
-            references: vec![Reference::Horizontal(result.settings.points as f64 / bins, "even".to_owned())],
-            ..Graph::default()
+            samples: vec![Sample::new("logistic-tent", result.points.clone())],
+            bins: Some(result.settings.bins),
         }
         .svg(),
-        "The paper's Fig. 3b. Random counts would scatter by as much.",
+        format!(
+            "The paper's Fig. 3b. {} in each bin would be even; random counts would scatter by as much as these.",
+            Precision::Significant(3).format(result.settings.points as f64 / result.settings.bins as f64)
+        ),
     );
-    page.push(table(result));
+    page.heading(2, "The maps beside each other");
+    page.push(maps(result));
+    page.push(Block::Details {
+        summary: format!("All {} values of r", result.settings.steps),
+        blocks: vec![table(result).into()],
+    });
+}
+
+/// 100,000.
+fn thousands(count: usize) -> String {
+    let digits = count.to_string();
+    let cut = digits.len() % 3;
+    let (head, rest) = digits.split_at(cut);
+    let groups = rest.as_bytes().chunks(3).map(|g| String::from_utf8_lossy(g).into_owned());
+    let head = Some(head.to_owned()).filter(|h| !h.is_empty());
+    head.into_iter().chain(groups).collect::<Vec<_>>().join(",")
+}
+
+/// The maps of Table 2.
+fn maps(result: &UniformityResult) -> Table {
+    let settings = &result.settings;
+    let mut table = Table::new(
+        "Standard deviation of the counts, the maps of the paper's Table 2",
+        vec![
+            Column::text("map", "Map"),
+            Column::number("short", format!("{} points", thousands(settings.points)), "", 1),
+            Column::number("short_random", "random", "", 1),
+            Column::number("long", format!("{} points", thousands(settings.long_points)), "", 0),
+            Column::number("long_random", "random", "", 0),
+        ],
+    );
+    for of in &result.maps {
+        table.push([
+            of.map.name().into(),
+            Cell::with_sigma(of.short.deviation, Some(of.short.spread)),
+            of.short.random.into(),
+            Cell::with_sigma(of.long.deviation, Some(of.long.spread)),
+            of.long.random.into(),
+        ]);
+    }
+    table.notes = vec![format!(
+        "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point; \
+             fresh digits are fed in at the far end. Logistic, sine, Chebyshev and Hénon have densities that are not \
+             uniform, and are not meant to be.",
+        settings.starts
+    )];
+    table
 }
 
 fn verdict(result: &UniformityResult) -> Verdict {
@@ -80,11 +121,15 @@ fn verdict(result: &UniformityResult) -> Verdict {
     let mut reasons = vec![
         format!(
             "With {} points {} of {all} values of r lie within one sampling spread of r = {claimed}, or below; the smallest is r = {:.2}.",
-            result.settings.points, verdict.indistinguishable_short, verdict.best_short
+            thousands(result.settings.points),
+            verdict.indistinguishable_short,
+            verdict.best_short
         ),
         format!(
             "With {} points {} values of r are more uniform by more than one sampling spread; the smallest is r = {:.2}.",
-            result.settings.long_points, verdict.better_long, verdict.best_long
+            thousands(result.settings.long_points),
+            verdict.better_long,
+            verdict.best_long
         ),
     ];
     if let Some(point) = random {
@@ -105,7 +150,10 @@ fn over_r(result: &UniformityResult, long: bool) -> String {
     let spreads: Vec<f64> = result.study.points.iter().map(|p| of(p).spread).collect();
     let random = result.study.points.first().map_or(f64::NAN, |p| of(p).random);
     Graph {
-        title: format!("{} points", if long { result.settings.long_points } else { result.settings.points }),
+        title: format!(
+            "{} points",
+            thousands(if long { result.settings.long_points } else { result.settings.points })
+        ),
         x: Axis::new("r", ""),
         y: Axis::log("standard deviation of the counts", ""),
         series: vec![Series::line("logistic-tent", points).plus_minus(&spreads)],
@@ -124,9 +172,9 @@ pub(super) fn table(result: &UniformityResult) -> Table {
         "Standard deviation of the counts",
         vec![
             Column::number("r", "r", "", 2),
-            Column::number("short", format!("{} points", result.settings.points), "", 2),
+            Column::number("short", format!("{} points", thousands(result.settings.points)), "", 2),
             Column::number("short_random", "random", "", 2),
-            Column::number("long", format!("{} points", result.settings.long_points), "", 1),
+            Column::number("long", format!("{} points", thousands(result.settings.long_points)), "", 1),
             Column::number("long_random", "random", "", 1),
         ],
     );
@@ -145,5 +193,10 @@ pub(super) fn table(result: &UniformityResult) -> Table {
 
 /// Everything.
 pub(super) fn json(result: &UniformityResult) -> Value {
-    json!({ "settings": result.settings, "points": result.study.points, "verdict": result.study.verdict })
+    json!({
+        "settings": result.settings,
+        "points": result.study.points,
+        "maps": result.maps,
+        "verdict": result.study.verdict,
+    })
 }

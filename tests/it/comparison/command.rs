@@ -23,6 +23,16 @@ fn names(folder: &Path) -> Vec<String> {
     out
 }
 
+/// A folder with measurements and the model that was made of them.
+fn identified() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("first.csv"), TRACKER).unwrap();
+    let arguments = ["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"];
+    let (code, _, err) = truegrind(dir.path(), &arguments);
+    assert!(code == 0, "{err}");
+    dir
+}
+
 #[test]
 fn compare_lists_what_there_is_and_refuses_what_is_not() {
     let dir = tempfile::tempdir().unwrap();
@@ -98,12 +108,8 @@ fn compare_runs_an_experiment_of_ones_own_and_writes_the_same_bytes_again() {
 
 #[test]
 fn track_takes_in_a_growing_file_writes_dated_models_and_goes_on_where_it_was_stopped() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = identified();
     let at = dir.path();
-    fs::write(at.join("first.csv"), TRACKER).unwrap();
-    let (code, _, err) =
-        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
-    assert!(code == 0, "{err}");
     let lines: Vec<&str> = TRACKER.lines().collect();
     let day = |rows: usize, tail: &str| {
         fs::write(at.join("day.csv"), lines[..=rows].join("\n") + "\n" + tail).unwrap();
@@ -169,12 +175,8 @@ fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
     use std::io::Write;
     use std::process::{Command as Process, Stdio};
     use std::time::Duration;
-    let dir = tempfile::tempdir().unwrap();
+    let dir = identified();
     let at = dir.path();
-    fs::write(at.join("first.csv"), TRACKER).unwrap();
-    let (code, _, err) =
-        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
-    assert!(code == 0, "{err}");
     let lines: Vec<&str> = TRACKER.lines().collect();
     // Rows come in while the follower is killed at whatever it is doing, from before it began to after it wrote.
     fs::write(at.join("day.csv"), format!("{}\n", lines[0])).unwrap();
@@ -224,13 +226,40 @@ fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
 }
 
 #[test]
-fn track_takes_a_folder_of_small_files_and_none_twice() {
-    let dir = tempfile::tempdir().unwrap();
+fn track_refuses_wrong_units_and_leaves_nothing_behind() {
+    let dir = identified();
     let at = dir.path();
-    fs::write(at.join("first.csv"), TRACKER).unwrap();
-    let (code, _, err) =
-        truegrind(at, &["identify", "first.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
-    assert!(code == 0, "{err}");
+    let mut lines = TRACKER.lines();
+    let mut metres = format!("{}\n", lines.next().unwrap());
+    for line in lines {
+        let cells: Vec<String> = line
+            .split(',')
+            .enumerate()
+            .map(|(k, cell)| match k {
+                6..9 => (cell.parse::<f64>().unwrap() / 1000.0).to_string(),
+                _ => cell.to_owned(),
+            })
+            .collect();
+        metres += &(cells.join(",") + "\n");
+    }
+    fs::write(at.join("metres.csv"), metres).unwrap();
+    let track = |arguments: &[&str]| {
+        let mut all = vec!["track", "metres.csv", "--model", "model.toml", "-o", "out"];
+        all.extend(arguments);
+        truegrind(at, &all)
+    };
+    let (code, _, err) = track(&[]);
+    assert!(code == 2 && err.contains("these look like metres"), "{err}");
+    // Whoever insists is told that the readings are not of this arm.
+    let (code, _, err) = track(&["--allow-odd-units"]);
+    assert!(code == 2 && err.contains("these are not its measurements"), "{err}");
+    assert_eq!(names(at), ["first.csv", "metres.csv", "model.toml"], "nothing is written, no folder made");
+}
+
+#[test]
+fn track_takes_a_folder_of_small_files_and_none_twice() {
+    let dir = identified();
+    let at = dir.path();
     let lines: Vec<&str> = TRACKER.lines().collect();
     fs::create_dir(at.join("days")).unwrap();
     let day = |k: usize| {

@@ -100,6 +100,50 @@ fn two_methods_with_one_optimum_differ_only_by_where_they_were_stopped() {
 }
 
 #[test]
+fn the_verdict_says_what_the_paper_has_and_which_method_costs_least() {
+    let (experiment, study, _) =
+        study(&METHODS.replace("name = \"LM\"\n", "name = \"LM\"\npaper = { rmse_mm = 0.3 }\n"), None)
+            .unwrap();
+    let results = Results::Methods(Box::new(study));
+    let text = format::terminal::document(&view::summary(&experiment, &results), 400);
+    for word in [
+        "Of 3 methods compared with B (LM): 1 of the same optimum, 1 not told apart, 1 diverged",
+        "Diverged and not compared, with the cases: C (3 of 3)",
+        "The paper has B before all others. Here no difference is found to A.",
+        "fewest passes over the rows: A (3), D (",
+    ] {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+}
+
+#[test]
+fn curves_are_in_millimetres_of_what_the_method_is_judged_by() {
+    // A length; the network's rows are weighed by the sensor, and begin where the frames alone are all the same.
+    let text =
+        METHODS.to_owned() + "[[methods.method]]\nid = \"N\"\nname = \"RBF\"\nsolver = \"rbf-alone\"\n";
+    let (_, cable, _) = study(&text, None).unwrap();
+    let first = |study: &Study, k: usize| study.results[k].outcomes[0].curve[0].rmse;
+    let last = |study: &Study, k: usize| study.results[k].outcomes[0].curve.last().unwrap().rmse;
+    let fitted = |study: &Study, k: usize| study.results[k].outcomes[0].fitted.rmse;
+    assert!(
+        (last(&cable, 1) / fitted(&cable, 1) - 1.0).abs() < 1e-6,
+        "{} {}",
+        last(&cable, 1),
+        fitted(&cable, 1)
+    );
+    assert!(
+        (first(&cable, 4) / first(&cable, 1) - 1.0).abs() < 0.3,
+        "{} {}",
+        first(&cable, 4),
+        first(&cable, 1)
+    );
+    // Three coordinates make one distance.
+    let position = METHODS.replace("irb120-1024", "irb120-1024-position").replace("cases = 3", "cases = 1");
+    let (_, position, _) = study(&position, None).unwrap();
+    assert!((last(&position, 1) / fitted(&position, 1) - 1.0).abs() < 1e-6);
+}
+
+#[test]
 fn same_seed_same_bits_for_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -1,75 +1,67 @@
 //! The pictures of methods over cases: the papers' bars of errors and times, errors row by row, convergence.
 
-use super::{over, seconds};
+use super::{held_out, seconds};
 use crate::comparison::experiment::Treatment;
 use crate::comparison::protocol::{MethodResult, Study};
-use crate::math::statistics::ErrorSummary;
 use crate::report::number::Precision;
-use crate::report::plot::{Axis, BarGroup, Bars, Graph, Mark, Reference, Series};
+use crate::report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series};
+use crate::report::repeated;
 
+/// A method that diverged has no bar: it would be the only one to be seen.
 pub(super) fn error_bars(study: &Study) -> String {
-    let group = |label: &str, figure: fn(&ErrorSummary) -> f64| {
-        // A method that diverged has no bar: it would be the only one to be seen.
-        let of = |r: &MethodResult| (!diverged(r)).then(|| over(r, figure));
-        let all: Vec<Option<(f64, Option<f64>)>> = study.results.iter().map(of).collect();
-        BarGroup {
-            deviations: all.iter().map(|f| f.and_then(|f| f.1)).collect(),
-            ..BarGroup::new(label, all.iter().map(|f| f.map(|f| f.0).filter(|v| v.is_finite())))
-        }
-    };
-    Bars {
-        title: "Held-out errors".to_owned(),
-        y: Axis::new("error", "mm"),
-        names: names(study),
-        groups: vec![
-            group("RMSE", |s| s.rmse),
-            group("mean |e|", |s| s.mean_absolute),
-            group("max", |s| s.max),
-        ],
-        labels: None,
-    }
-    .svg()
+    let errors: Vec<_> = study.results.iter().map(held_out).collect();
+    repeated::bars(names(study), &errors, None)
 }
 
 pub(super) fn time_bars(study: &Study) -> String {
     Bars {
         title: "Time of one case".to_owned(),
-        y: Axis::log("time", "s"),
+        y: Axis::log("time", "ms"),
         names: names(study),
-        groups: vec![BarGroup::new("", study.results.iter().map(|r| Some(seconds(r))))],
+        groups: vec![BarGroup::new("", study.results.iter().map(|r| Some(1e3 * seconds(r))))],
         labels: Some(Precision::Significant(2)),
     }
     .svg()
 }
 
-/// Figure 7 of the papers: the held-out rows of the first case.
-pub(super) fn rows(study: &Study) -> String {
+/// Most methods of one picture of rows: more lines cannot be told apart.
+const PANEL: usize = 4;
+
+/// Figure 7 of the papers: the held-out rows of the first case, each picture with the start beside a few methods.
+pub(super) fn rows(study: &Study) -> Vec<String> {
     let registered = study.cases.first().map_or(&[][..], |c| c.registered_errors_mm.as_slice());
-    let mut series = vec![points("BC", registered)];
-    for result in &study.results {
-        // One that diverges in any case would be the only one to be seen.
-        if let Some(outcome) = result.outcomes.first().filter(|_| !diverged(result)) {
-            series.push(points(&result.method.id, &outcome.errors_mm));
-        }
-    }
-    Graph {
-        title: "Errors of the held-out rows, first case".to_owned(),
-        x: Axis::new("held-out row", ""),
-        y: Axis::new("error", "mm"),
-        series,
-        references: vec![Reference::Horizontal(0.0, String::new())],
-        ..Graph::default()
-    }
-    .svg()
+    let (printed, sound): (Vec<_>, Vec<_>) = study
+        .results
+        .iter()
+        .filter(|r| !diverged(r))
+        .filter_map(|r| Some((r, r.outcomes.first()?)))
+        .partition(|(r, _)| r.treatment == Treatment::Printed);
+    let panels = printed.chunks(PANEL).chain(sound.chunks(PANEL));
+    panels
+        .map(|panel| {
+            let start = Series::line("BC", numbered(registered)).ink(Ink::Text);
+            let each = panel.iter().zip([Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple]);
+            let each = each.map(|((r, o), ink)| Series::line(&r.method.id, numbered(&o.errors_mm)).ink(ink));
+            let ids: Vec<&str> = panel.iter().map(|(r, _)| r.method.id.as_str()).collect();
+            Graph {
+                title: format!("Errors of the held-out rows, first case: {}", ids.join(", ")),
+                x: Axis::new("held-out row", ""),
+                y: Axis::new("error", "mm"),
+                series: std::iter::once(start).chain(each).collect(),
+                references: vec![Reference::Horizontal(0.0, String::new())],
+                ..Graph::default()
+            }
+            .svg()
+        })
+        .collect()
 }
 
 fn diverged(result: &MethodResult) -> bool {
     result.outcomes.iter().any(|o| o.diverged)
 }
 
-fn points(name: &str, errors: &[f64]) -> Series {
-    let points: Vec<[f64; 2]> = errors.iter().enumerate().map(|(i, e)| [i as f64 + 1.0, *e]).collect();
-    Series { mark: Mark::Line, ..Series::line(name, points) }
+fn numbered(errors: &[f64]) -> Vec<[f64; 2]> {
+    errors.iter().enumerate().map(|(i, e)| [i as f64 + 1.0, *e]).collect()
 }
 
 /// Figures 8 (ltlm-2024) and 6 (ukf-vslm-2023).
@@ -84,11 +76,12 @@ pub(super) fn curves(study: &Study, by_passes: bool) -> String {
             .take_while(|c| c.rmse <= highest)
             .map(|c| if by_passes { [c.passes.max(1.0), c.rmse] } else { [c.iteration as f64 + 1.0, c.rmse] })
             .collect();
-        Some(Series::line(result.method.id.clone(), points))
+        // One that leaves at once has no line, and no place in the legend.
+        (points.len() > 1).then(|| Series::line(result.method.id.clone(), points))
     });
     let x = if by_passes { "passes over the rows" } else { "iteration (1 is the start)" };
     Graph {
-        title: "Convergence, first case".to_owned(),
+        title: format!("Convergence over {}, first case", if by_passes { "passes" } else { "iterations" }),
         x: Axis::log(x, ""),
         y: Axis::log("RMSE of the fit", "mm"),
         series: series.collect(),

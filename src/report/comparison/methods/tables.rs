@@ -1,57 +1,43 @@
 //! The tables of methods over cases: errors beside the paper's, which differences are real, budgets, parameters.
 
-use super::{ended, figure, iterations, name_of, over, over_cases, passes, rmse, seconds, title, treatment};
+use super::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
+use crate::comparison::experiment::PaperFigures;
 use crate::comparison::parameters::ParameterTable;
-use crate::comparison::protocol::Study;
+use crate::comparison::protocol::{Outcome, Study};
 use crate::comparison::verdict::Conclusion;
-use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
 use crate::report::comparison::words;
 use crate::report::document::Verdict;
-use crate::report::number::Precision;
+use crate::report::number::{Precision, handy};
+use crate::report::repeated::{self, spread};
 use crate::report::status::Status;
 use crate::report::table::{Cell, Column, Table};
 
 /// The papers' table, ours and theirs side by side.
 pub(super) fn errors(study: &Study) -> Table {
-    let mut table = Table::new(
-        title(study, "Held-out errors"),
-        vec![
-            Column::text("id", ""),
-            Column::text("method", "Method"),
-            Column::number("rmse_mm", "RMSE", "mm", 3),
-            Column::number("paper_rmse_mm", "paper", "mm", 2),
-            Column::number("mean_absolute_mm", "mean |e|", "mm", 3),
-            Column::number("paper_mean_absolute_mm", "paper", "mm", 2),
-            Column::number("max_mm", "max", "mm", 2),
-            Column::number("paper_max_mm", "paper", "mm", 2),
-        ],
-    );
-    let cell = |(mean, deviation): (f64, Option<f64>)| Cell::with_sigma(mean, deviation);
-    let registered: Vec<ErrorSummary> = study.cases.iter().map(|c| c.registered).collect();
-    let before = study.methods.before.unwrap_or_default();
-    table.push([
-        "BC".into(),
-        "frames alone".into(),
-        cell(over_cases(&registered, |s| s.rmse)),
-        before.rmse_mm.into(),
-        cell(over_cases(&registered, |s| s.mean_absolute)),
-        before.mean_absolute_mm.into(),
-        cell(over_cases(&registered, |s| s.max)),
-        before.max_mm.into(),
-    ]);
+    let paper = |key: &str| Column::number(format!("paper_{key}"), "paper", "mm", 2);
+    let mut columns = vec![Column::text("id", ""), Column::text("method", "Method")];
+    for column in repeated::columns([3, 3, 2]) {
+        let beside = paper(&column.key);
+        columns.extend([column, beside]);
+    }
+    let mut table = Table::new(title(study, "Held-out errors"), columns);
+    let mut add = |id: &str, name: &str, ours: [Cell; 3], paper: Option<PaperFigures>| {
+        let paper = paper.unwrap_or_default();
+        let printed = [paper.rmse_mm, paper.mean_absolute_mm, paper.max_mm];
+        let pairs = ours.into_iter().zip(printed).flat_map(|(ours, printed)| [ours, printed.into()]);
+        table.push([Cell::from(id), name.into()].into_iter().chain(pairs));
+    };
+    add("BC", "frames alone", repeated::cells(&registered(study)), study.methods.before);
     for result in &study.results {
-        let paper = result.method.paper.unwrap_or_default();
-        table.push([
-            result.method.id.as_str().into(),
-            result.method.name.as_str().into(),
-            rmse(result),
-            paper.rmse_mm.into(),
-            figure(result, |s| s.mean_absolute),
-            paper.mean_absolute_mm.into(),
-            figure(result, |s| s.max),
-            paper.max_mm.into(),
-        ]);
+        let ours = match held_out(result) {
+            Some(errors) => repeated::cells(&errors),
+            None => {
+                let n = result.outcomes.iter().filter(|o| o.diverged).count();
+                [format!("diverged {n}/{}", result.outcomes.len()).into(), Cell::Missing, Cell::Missing]
+            }
+        };
+        add(&result.method.id, &result.method.name, ours, result.method.paper);
     }
     table.notes = vec![
         "± is the standard deviation over the cases. mean |e| is what the papers print as STD, SD or Mean (ltlm-2024 eq. \
@@ -115,22 +101,7 @@ pub(super) fn verdict_table(study: &Study) -> Table {
 }
 
 pub(super) fn verdict(study: &Study) -> Verdict {
-    let comparisons = &study.judgement.comparisons;
-    let real = comparisons
-        .iter()
-        .filter(|c| matches!(c.conclusion, Conclusion::ReferenceBetter | Conclusion::MethodBetter));
-    let same = comparisons
-        .iter()
-        .filter(|c| matches!(&c.conclusion, Conclusion::SameOptimum { stopped, .. } if !stopped.is_empty()));
-    let headline = format!(
-        "Of {} methods compared with {}, {} differ significantly; {} share its optimum and differ only by where they were \
-         stopped",
-        comparisons.len(),
-        name_of(study, &study.judgement.reference),
-        real.count(),
-        same.count()
-    );
-    Verdict::new(Status::Good, headline, words::sentences(study))
+    Verdict::new(Status::Good, words::headline(study), words::sentences(study))
 }
 
 /// What each least-squares method finds when nothing stops it.
@@ -149,12 +120,11 @@ pub(super) fn convergence(study: &Study) -> Table {
     );
     for result in &study.results {
         let Some(converged) = &result.converged else { continue };
-        let all: Vec<ErrorSummary> = converged.iter().map(|o| o.held_out).collect();
         table.push([
             result.method.id.as_str().into(),
-            over(result, |s| s.rmse).0.into(),
+            mean_rmse(&result.outcomes),
             iterations(&result.outcomes).into(),
-            over_cases(&all, |s| s.rmse).0.into(),
+            mean_rmse(converged),
             iterations(converged).into(),
             (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into(),
             ended(converged).into(),
@@ -171,6 +141,12 @@ pub(super) fn convergence(study: &Study) -> Table {
             .to_owned(),
     ];
     table
+}
+
+/// Mean held-out RMSE; nothing where a case diverged, since a mean over that is no figure.
+fn mean_rmse(outcomes: &[Outcome]) -> Cell {
+    let all: Option<Vec<f64>> = outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out.rmse)).collect();
+    all.map_or_else(|| "diverged".into(), |all| spread(&all).map(|(mean, _)| mean).into())
 }
 
 /// Budgets: rows evaluated, in all and for one iteration.
@@ -220,8 +196,8 @@ pub(in crate::report::comparison) fn times(study: &Study) -> Table {
         vec![
             Column::text("id", ""),
             Column::text("method", "Method"),
-            Column::significant("time_s", "time", "s", 2),
-            Column::significant("time_per_iteration_s", "per iteration", "s", 2),
+            Column::significant("time_ms", "time", "ms", 2),
+            Column::significant("time_per_iteration_ms", "per iteration", "ms", 2),
             Column::number("paper_time_s", "paper", "s", 2),
             Column::number("paper_iterations", "paper, iterations", "", 0),
         ],
@@ -232,8 +208,8 @@ pub(in crate::report::comparison) fn times(study: &Study) -> Table {
         table.push([
             result.method.id.as_str().into(),
             result.method.name.as_str().into(),
-            seconds.into(),
-            (seconds / iterations(&result.outcomes)).into(),
+            (1e3 * seconds).into(),
+            (1e3 * seconds / iterations(&result.outcomes)).into(),
             paper.time_s.into(),
             paper.iterations.into(),
         ]);
@@ -252,6 +228,7 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
             Column::text("parameter", "Parameter"),
             Column::text("unit", "Unit"),
             Column::number("nominal", "nominal", "", 3),
+            Column::number("compensated", "compensated", "", 3),
             Column::significant("deviation", "deviation", "", 2),
             Column::number("paper_deviation", "paper", "", 3),
             Column::number("determined", "seen by the data", "", 2),
@@ -259,24 +236,27 @@ pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
         ],
     );
     for row in &parameters.rows {
-        let (scale, unit) =
-            if row.parameter.unit() == "mm" { (1.0, "mm") } else { (1f64.to_degrees(), "°") };
+        let (scale, unit) = handy(row.parameter.unit());
         table.push([
             row.parameter.to_string().into(),
             unit.into(),
             (row.nominal * scale).into(),
+            ((row.nominal + row.deviation) * scale).into(),
             Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale)),
             row.paper.map(|v| v * scale).into(),
             row.determined.into(),
             if row.is_observable() { "yes" } else { "no" }.into(),
         ]);
     }
+    table.notes = vec![
+        "compensated: nominal and deviation together, as a controller would take it; ± is 1σ of the deviation.".to_owned(),
+    ];
     if parameters.rows.iter().any(|row| row.paper.is_some()) {
-        table.notes = vec![
-            "paper: what it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
+        table.notes.push(
+            "paper: the deviation that it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
              rows do not see. Its link 2 has an offset d2, ours a turn beta in its place."
                 .to_owned(),
-        ];
+        );
     }
     table
 }
