@@ -100,13 +100,28 @@ pub(super) fn corner_bend(
         return None;
     }
     let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
-    let off =
-        |t: f64| match arms.nominal.solve_near(&point.mounted.told.flange_for(&told.at(t)), &point.joints) {
-            Ok(solution) => {
-                let reached = arms.acting.arm(places[usize::from(t > 0.5)]).forward(&solution.joints);
-                meant.distance(&point.mounted.real.target_of(&reached), t)
-            }
+    let flange = |t: f64| point.mounted.told.flange_for(&told.at(t));
+    let place = |t: f64| places[usize::from(t > 0.5)];
+    let distance = |t: f64, reached: &Pose| meant.distance(&point.mounted.real.target_of(reached), t);
+    // The samples that every corner needs, in lanes.
+    let flanges = FIRST.map(flange);
+    let solved = arms.nominal.solve_seeded(&flanges, &[point.joints; FIRST.len()]);
+    let first: [f64; FIRST.len()] = std::array::from_fn(|k| match &solved[k] {
+        Ok(solution) => distance(FIRST[k], &arms.acting.arm(place(FIRST[k])).forward(&solution.joints)),
+        Err(_) => f64::INFINITY,
+    });
+    let off = |t: f64| match FIRST.iter().position(|first| *first == t) {
+        Some(k) => first[k],
+        None => match arms.nominal.solve_near(&flange(t), &point.joints) {
+            Ok(solution) => distance(t, &arms.acting.arm(place(t)).forward(&solution.joints)),
             Err(_) => f64::INFINITY,
-        };
-    Some(largest_from([off(0.0), off(1.0)], 4, &off))
+        },
+    };
+    Some(largest_from([off(0.0), off(1.0)], PIECES, &off))
 }
+
+/// Equal pieces of a corner that are halved until their chords tell enough.
+const PIECES: usize = 4;
+
+/// The ends, the pieces' ends and their middles: what [`largest_from`] asks for first.
+const FIRST: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];

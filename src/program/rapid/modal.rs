@@ -22,7 +22,7 @@ pub enum Which {
     ConfLinear,
     /// ConfJ.
     ConfJoint,
-    /// PDispOn, PDispSet, PDispOff.
+    /// PDispOn, PDispSet, PDispAdd, PDispOff.
     Displacement,
     /// EOffsOn, EOffsSet, EOffsOff.
     ExternalOffset,
@@ -144,7 +144,7 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
         (Which::ConfLinear, !option(&["Off"]))
     } else if is("ConfJ") {
         (Which::ConfJoint, !option(&["Off"]))
-    } else if is("PDispOn") || is("PDispSet") {
+    } else if is("PDispOn") || is("PDispSet") || is("PDispAdd") {
         (Which::Displacement, true)
     } else if is("PDispOff") {
         (Which::Displacement, false)
