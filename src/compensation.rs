@@ -21,6 +21,7 @@ pub mod verify;
 pub mod precision;
 pub mod curve;
 pub mod corner;
+mod slack;
 mod segment;
 mod circle;
 mod passage;

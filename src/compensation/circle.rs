@@ -8,7 +8,9 @@
 
 use super::curve::{Curve, between};
 use super::rewrite::{Arms, Emit, Options};
-use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, extra_of, largest};
+use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, STEPS, extra_of, largest};
+use crate::kinematics::model::Joints;
+use crate::math::se3::Pose;
 use crate::program::motion::Motion;
 use crate::program::rewrite::Extra;
 
@@ -22,8 +24,8 @@ impl Circle {
     /// From its three corrected points; `None` where they make no circle.
     pub(super) fn of(
         from: &Ends<'_>,
-        via_meant: &crate::math::se3::Pose,
-        via_told: &crate::math::se3::Pose,
+        via_meant: &Pose,
+        via_told: &Pose,
         to: &Ends<'_>,
         motion: &Motion,
     ) -> Option<Self> {
@@ -36,23 +38,25 @@ impl Circle {
     /// Largest distance of the tool from the intended circle, sampled along the arc until the samples tell it to
     /// [`CHORD_MM`]; infinite where the arm cannot go.
     pub(super) fn bend(&self, path: &Path<'_>, arms: &Arms<'_>) -> f64 {
-        let Path { from, to, way } = path;
-        let off = |s: f64| {
+        let Path { from, to, .. } = path;
+        let motor = |s: f64| {
             let near = from.joints.lerp(&to.joints, s);
-            match arms.nominal.solve_near(&to.mounted.told.flange_for(&self.told.at(s)), &near) {
-                Ok(solution) => {
-                    let reached = arms.acting.arm(way.at(s)).forward(&solution.joints);
-                    self.meant.distance(&to.mounted.real.target_of(&reached), s)
-                }
-                Err(_) => f64::INFINITY,
-            }
+            let solution = arms.nominal.solve_near(&to.mounted.told.flange_for(&self.told.at(s)), &near);
+            solution.ok().map(|solution| solution.joints)
         };
+        let off = |s: f64, flange: &Pose| self.meant.distance(&to.mounted.real.target_of(flange), s);
         // At least every eighth of a turn, and every piece of a long arc.
         let sweep = self.meant.arc().map_or(0.0, |arc| arc.sweep);
         let pieces = ((sweep / std::f64::consts::FRAC_PI_4).ceil() as usize)
             .max((self.meant.length_mm() / PIECE_MM).ceil() as usize)
             .clamp(4, 64);
-        largest(pieces, &off)
+        match path.slack(arms) {
+            Some(slack) => slack.most_off(STEPS * pieces, &motor, &off),
+            None => largest(pieces, &|s| match motor(s) {
+                Some(joints) => off(s, &arms.acting.arm(to.place).forward(&joints)),
+                None => f64::INFINITY,
+            }),
+        }
     }
 
     /// Targets between the ends such that straight pieces keep to the intended arc within the tolerance, and the
@@ -85,31 +89,44 @@ impl Circle {
     /// So many pieces, and how far they leave the intended arc; `None` where the arm cannot go.
     fn cut(&self, count: usize, path: &Path<'_>, arms: &Arms<'_>) -> Option<(Vec<Extra>, f64)> {
         let Path { from, to, way } = path;
-        let mut extra = Vec::with_capacity(count - 1);
-        let (mut told, mut joints, mut most) = (from.told, from.joints, 0.0_f64);
-        for k in 1..=count {
-            let (next, after) = if k == count {
-                (to.told, to.joints)
-            } else {
-                let flange = to.mounted.real.flange_for(&self.meant.at(k as f64 / count as f64));
-                let solution =
-                    arms.acting.inverse(way.at(k as f64 / count as f64)).solve_near(&flange, &joints).ok()?;
-                let told = to.mounted.told.target_of(&arms.nominal.arm().forward(&solution.joints));
-                extra.push(extra_of(&told, &solution.joints, Emit::Targets, to, arms));
-                (told, solution.joints)
-            };
-            for part in SAMPLES {
-                let pose = between(&told, &next, part);
-                let near = joints.lerp(&after, part);
-                let reached = arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near).ok()?;
-                let share = (k as f64 - 1.0 + part) / count as f64;
-                let reached = arms.acting.arm(way.at(share)).forward(&reached.joints);
-                let reached = to.mounted.real.target_of(&reached);
-                most = most.max(self.meant.distance(&reached, share));
-            }
-            (told, joints) = (next, after);
+        let mut corners = Vec::with_capacity(count + 1);
+        corners.push((from.told, from.joints));
+        for k in 1..count {
+            let share = k as f64 / count as f64;
+            let flange = to.mounted.real.flange_for(&self.meant.at(share));
+            let near = corners[k - 1].1;
+            let joints = arms.acting.inverse(way.at(share)).solve_near(&flange, &near).ok()?.joints;
+            corners.push((to.mounted.told.target_of(&arms.nominal.arm().forward(&joints)), joints));
         }
-        Some((extra, most + CHORD_MM))
+        corners.push((to.told, to.joints));
+        // Share of the way to the joints there, along the pieces.
+        let motor = |s: f64| {
+            let u = s * count as f64;
+            let k = (u as usize).min(count - 1);
+            let ((told, joints), (next, after)) = (&corners[k], &corners[k + 1]);
+            let part = u - k as f64;
+            let pose = between(told, next, part);
+            let near = joints.lerp(after, part);
+            let solution = arms.nominal.solve_near(&to.mounted.told.flange_for(&pose), &near);
+            solution.ok().map(|solution| solution.joints)
+        };
+        let off = |s: f64, flange: &Pose| self.meant.distance(&to.mounted.real.target_of(flange), s);
+        let most = match path.slack(arms) {
+            Some(slack) => slack.most_off(STEPS * count, &motor, &off),
+            None => {
+                let mut most = 0.0_f64;
+                for k in 0..count {
+                    for part in SAMPLES {
+                        let share = (k as f64 + part) / count as f64;
+                        most = most.max(off(share, &arms.acting.arm(to.place).forward(&motor(share)?)));
+                    }
+                }
+                most
+            }
+        };
+        let corner = |(told, joints): &(Pose, Joints)| extra_of(told, joints, Emit::Targets, to, arms);
+        let extra = corners[1..count].iter().map(corner).collect();
+        most.is_finite().then_some((extra, most + CHORD_MM))
     }
 }
 

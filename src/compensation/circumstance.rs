@@ -27,6 +27,8 @@ pub(super) struct Circumstances<'a> {
     pub(super) play_rad: [f64; 6],
     places: HashMap<(Sides, LoadKey), usize>,
     list: Vec<Inverse<'a>>,
+    /// For each place the one with the same load and every joint in the middle of its play.
+    middles: Vec<usize>,
 }
 
 impl<'a> Circumstances<'a> {
@@ -37,7 +39,8 @@ impl<'a> Circumstances<'a> {
                 play_rad[backlash.joint] += backlash.play_rad;
             }
         }
-        Self { model, nominal, base: *base, play_rad, places: HashMap::new(), list: Vec::new() }
+        let (places, list, middles) = (HashMap::new(), Vec::new(), Vec::new());
+        Self { model, nominal, base: *base, play_rad, places, list, middles }
     }
 
     /// Whether it matters from which side a joint comes.
@@ -51,15 +54,24 @@ impl<'a> Circumstances<'a> {
         let sides: Sides = std::array::from_fn(|j| if self.play_rad[j] == 0.0 { 0 } else { sides[j] });
         let [x, y, z] = load.map_or([0.0; 3], |load| load.centre_mm);
         let key = (sides, load.map(|load| [load.mass_kg, x, y, z].map(f64::to_bits)));
-        let (model, nominal, list) = (self.model, self.nominal, &mut self.list);
+        if let Some(place) = self.places.get(&key) {
+            return *place;
+        }
+        let middle = if sides == [0; 6] { self.list.len() } else { self.place([0; 6], load) };
         let mut condition = Condition { approach: sides, ..self.base };
         if let Some(load) = load {
             (condition.payload_kg, condition.payload_centre_mm) = (Some(load.mass_kg), load.centre_mm);
         }
-        *self.places.entry(key).or_insert_with(|| {
-            list.push(Inverse::new(model, &condition, nominal));
-            list.len() - 1
-        })
+        let place = self.list.len();
+        self.list.push(Inverse::new(self.model, &condition, self.nominal));
+        self.middles.push(middle);
+        self.places.insert(key, place);
+        place
+    }
+
+    /// The place with the same load as `place` and every joint in the middle of its play.
+    pub(super) fn middle(&self, place: usize) -> usize {
+        self.middles[place]
     }
 
     /// The inverse of the arm under a condition.

@@ -15,7 +15,9 @@ use nalgebra::Vector3;
 
 use super::curve::{Curve, beside, between};
 use super::rewrite::Arms;
-use super::segment::{Ends, largest_from};
+use super::segment::{Ends, STEPS, largest_from};
+use super::slack::Slack;
+use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
 
 /// A corner that cuts off less than this has the shape of the lines that it joins (mm): over so short a way an arm's
@@ -101,23 +103,29 @@ pub(super) fn corner_bend(
     }
     let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
     let flange = |t: f64| point.mounted.told.flange_for(&told.at(t));
-    let place = |t: f64| places[usize::from(t > 0.5)];
-    let distance = |t: f64, reached: &Pose| meant.distance(&point.mounted.real.target_of(reached), t);
-    // The samples that every corner needs, in lanes.
-    let flanges = FIRST.map(flange);
-    let solved = arms.nominal.solve_seeded(&flanges, &[point.joints; FIRST.len()]);
-    let first: [f64; FIRST.len()] = std::array::from_fn(|k| match &solved[k] {
-        Ok(solution) => distance(FIRST[k], &arms.acting.arm(place(FIRST[k])).forward(&solution.joints)),
-        Err(_) => f64::INFINITY,
-    });
-    let off = |t: f64| match FIRST.iter().position(|first| *first == t) {
-        Some(k) => first[k],
-        None => match arms.nominal.solve_near(&flange(t), &point.joints) {
-            Ok(solution) => distance(t, &arms.acting.arm(place(t)).forward(&solution.joints)),
-            Err(_) => f64::INFINITY,
-        },
+    let motor = |t: f64| {
+        let solution = arms.nominal.solve_near(&flange(t), &point.joints);
+        solution.ok().map(|solution| solution.joints)
     };
-    Some(largest_from([off(0.0), off(1.0)], PIECES, &off))
+    let off = |t: f64, flange: &Pose| meant.distance(&point.mounted.real.target_of(flange), t);
+    if places[0] != places[1] {
+        let Some(start) = motor(0.0) else { return Some(f64::INFINITY) };
+        let links = Slack::at(&start, places[0], places[1], &arms.acting);
+        return Some(links.most_off(2 * STEPS, &motor, &off));
+    }
+    let reached = |t: f64, joints: Option<Joints>| match joints {
+        Some(joints) => off(t, &arms.acting.arm(places[0]).forward(&joints)),
+        None => f64::INFINITY,
+    };
+    // The samples that every corner needs, in lanes.
+    let solved = arms.nominal.solve_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let first: [f64; FIRST.len()] =
+        std::array::from_fn(|k| reached(FIRST[k], solved[k].as_ref().ok().map(|solution| solution.joints)));
+    let even = |t: f64| match FIRST.iter().position(|first| *first == t) {
+        Some(k) => first[k],
+        None => reached(t, motor(t)),
+    };
+    Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
 }
 
 /// Equal pieces of a corner that are halved until their chords tell enough.

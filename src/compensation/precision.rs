@@ -64,12 +64,14 @@ impl SinglePrecision {
 
     /// One sentence for a report.
     pub fn text(&self) -> String {
+        // A bound is rounded up.
+        let up = |value: f64, decimals: i32| (value * 10f64.powi(decimals)).ceil() / 10f64.powi(decimals);
         let mut parts = Vec::new();
         if self.position_mm > 0.0 || self.orientation_deg > 0.0 {
-            parts.push(format!("{:.5} mm and {:.5}°", self.position_mm, self.orientation_deg));
+            parts.push(format!("{:.5} mm and {:.5}°", up(self.position_mm, 5), up(self.orientation_deg, 5)));
         }
         if self.joint_deg > 0.0 {
-            parts.push(format!("{:.6}° per joint", self.joint_deg));
+            parts.push(format!("{:.6}° per joint", up(self.joint_deg, 6)));
         }
         if parts.is_empty() {
             parts.push("nothing".to_owned());

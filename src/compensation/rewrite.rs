@@ -217,8 +217,7 @@ fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
         ),
     };
     Some(format!(
-        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}; where a joint \
-         turns between two targets the path can be off by a part of its play beyond what is stated here",
+        "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
         plays.join(", ")
     ))
 }

@@ -6,6 +6,7 @@ use super::circumstance::picked;
 use super::curve::{beside, between};
 use super::mounting::Mounted;
 use super::rewrite::{Arms, Emit, Options};
+use super::slack::Slack;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
 use crate::program::motion::MotionKind;
@@ -44,13 +45,14 @@ impl Way {
         self.later.iter().rev().find(|(from, _)| *from <= s).map_or(self.first, |later| later.1)
     }
 
-    /// At which shares of the way from `start` the arm jumps by a play: before, and after.
-    fn jumps(&self, start: &Ends<'_>) -> Vec<Jump> {
+    /// At which shares of the way from `start` a joint has a play to take up, or the load is another: under which
+    /// condition the arm comes there, and under which it goes on.
+    fn changes(&self, start: &Ends<'_>) -> Vec<Turn> {
         let mut out = Vec::new();
         let mut last = start.place;
         for (share, place) in std::iter::once((0.0, self.first)).chain(self.later.iter().copied()) {
             if place != last {
-                out.push(Jump { share, before: last, after: place });
+                out.push(Turn { share, before: last, after: place });
             }
             last = place;
         }
@@ -58,8 +60,8 @@ impl Way {
     }
 }
 
-/// A joint turns on the way, and the arm takes up its play.
-struct Jump {
+/// A joint turns on the way, and has its play to take up.
+struct Turn {
     share: f64,
     before: usize,
     after: usize,
@@ -72,20 +74,33 @@ pub(super) struct Path<'a> {
     pub(super) way: Way,
 }
 
+impl Path<'_> {
+    /// The links at its start, where a joint turns on it or the load is another than before.
+    pub(super) fn slack<'s>(&self, arms: &'s Arms<'_>) -> Option<Slack<'s>> {
+        let changes = self.way.first != self.from.place || !self.way.later.is_empty();
+        changes.then(|| Slack::at(&self.from.joints, self.from.place, self.to.place, &arms.acting))
+    }
+}
+
 /// How far the tool is from the intended line at share `s` of the way; infinite where the nominal arm cannot go.
 fn off_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, place: usize, arms: &Arms<'_>, emit: Emit) -> f64 {
+    match motor_at(from, to, s, arms, emit) {
+        Some(joints) => off_line(from, to, s, &arms.acting.arm(place).forward(&joints)),
+        None => f64::INFINITY,
+    }
+}
+
+/// Joints to which the controller goes at share `s` of the told line; `None` where the nominal arm cannot go.
+fn motor_at(from: &Ends<'_>, to: &Ends<'_>, s: f64, arms: &Arms<'_>, emit: Emit) -> Option<Joints> {
     let joints = from.joints.lerp(&to.joints, s);
-    let joints = match emit {
-        Emit::Joints => joints,
+    match emit {
+        Emit::Joints => Some(joints),
         Emit::Targets => {
             let told = between(&from.told, &to.told, s);
-            match arms.nominal.solve_near(&to.mounted.told.flange_for(&told), &joints) {
-                Ok(solution) => solution.joints,
-                Err(_) => return f64::INFINITY,
-            }
+            let solution = arms.nominal.solve_near(&to.mounted.told.flange_for(&told), &joints);
+            solution.ok().map(|solution| solution.joints)
         }
-    };
-    off_line(from, to, s, &arms.acting.arm(place).forward(&joints))
+    }
 }
 
 /// How far the tool is from the intended line at share `s` of the way, with the flange where it is then.
@@ -136,22 +151,22 @@ pub(super) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
 pub(super) const PIECE_MM: f64 = 100.0;
 
 /// Largest distance from the intended line along a path (mm): that of the `middle`, which is given, and where that is not
-/// clearly straight of samples that get denser until they tell the distance to [`CHORD_MM`]. Where a joint turns and the
-/// arm takes up its play, both sides of the jump count.
+/// clearly straight of samples that get denser until they tell the distance to [`CHORD_MM`]. Where a joint turns, its link
+/// waits until the play is taken up.
 pub(super) fn straight_bend(path: &Path<'_>, arms: &Arms<'_>, emit: Emit, middle: f64) -> f64 {
-    let Path { from, to, way } = path;
-    let jumps = way.jumps(from);
-    if jumps.is_empty() {
-        return even_bend(from, to, to.place, arms, emit, middle);
+    let Path { from, to, .. } = path;
+    match path.slack(arms) {
+        None => even_bend(from, to, to.place, arms, emit, middle),
+        Some(slack) => slack.most_off(
+            STEPS * pieces_of(from, to),
+            &|s| motor_at(from, to, s, arms, emit),
+            &|s, flange| off_line(from, to, s, flange),
+        ),
     }
-    let pieces = pieces_of(from, to);
-    let even = largest(pieces, &|s| off_at(from, to, s, way.at(s), arms, emit));
-    let at_jumps = jumps.iter().flat_map(|jump| {
-        let off = |place: usize| off_at(from, to, jump.share, place, arms, emit);
-        [if jump.share > 0.0 { off(jump.before) } else { 0.0 }, off(jump.after)]
-    });
-    at_jumps.fold(even.max(middle), f64::max)
 }
+
+/// Steps of links with play on each piece of a way, to begin with.
+pub(super) const STEPS: usize = 8;
 
 /// The same where no joint turns on the way.
 fn even_bend(from: &Ends<'_>, to: &Ends<'_>, place: usize, arms: &Arms<'_>, emit: Emit, middle: f64) -> f64 {
@@ -218,25 +233,96 @@ const CLEARLY_STRAIGHT_MM: f64 = 0.01;
 
 /// Targets that keep the path within tolerance, and the bend that is left: one where a joint turns, at which the arm takes
 /// up its play, and between those by bisection.
+///
+/// A told line between two of them bends a joint's course a little. Close to where the joint turns it then turns once more,
+/// and the link waits: where this leaves more than the tolerance, the lines are cut finer.
 pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) -> (Vec<Extra>, f64) {
-    let Path { from, to, way } = path;
-    let mut extra = Vec::new();
-    let mut left = 0.0_f64;
-    let mut begin = *from;
-    for jump in way.jumps(from) {
-        let at = |place: usize| end_between(from, to, jump.share, place, arms);
-        if jump.share > 0.0
-            && let Some(arrived) = at(jump.before)
-        {
-            left = left.max(split(&begin, &arrived, arms, options, MAX_DEPTH, &mut extra));
-            extra.push(extra_of(&arrived.told, &arrived.joints, options.emit, to, arms));
+    let mut best = cut(path, arms, options.emit, options.tolerance_mm);
+    if let Some(slack) = path.slack(arms) {
+        let mut aim_mm = options.tolerance_mm;
+        best.left_mm = walked(path, &best, &slack, arms, options.emit);
+        for _ in 0..FINER {
+            if best.left_mm <= options.tolerance_mm {
+                break;
+            }
+            aim_mm *= 0.5;
+            let mut finer = cut(path, arms, options.emit, aim_mm);
+            finer.left_mm = walked(path, &finer, &slack, arms, options.emit);
+            if finer.left_mm < best.left_mm {
+                best = finer;
+            }
         }
-        let Some(taken_up) = at(jump.after) else { continue };
-        extra.push(extra_of(&taken_up.told, &taken_up.joints, options.emit, to, arms));
-        begin = taken_up;
     }
-    left = left.max(split(&begin, to, arms, options, MAX_DEPTH, &mut extra));
-    (extra, left)
+    let extra = |stop: &Stopover<'_>| extra_of(&stop.at.told, &stop.at.joints, options.emit, &path.to, arms);
+    (best.stops.iter().map(extra).collect(), best.left_mm)
+}
+
+/// How often the lines between targets that are put in are cut finer.
+const FINER: usize = 4;
+
+/// A target that is put in.
+#[derive(Clone, Copy)]
+struct Stopover<'a> {
+    share: f64,
+    at: Ends<'a>,
+}
+
+/// A line that is cut.
+struct Cut<'a> {
+    stops: Vec<Stopover<'a>>,
+    /// Largest distance from the intended line (mm).
+    left_mm: f64,
+}
+
+/// Cuts a line so that its pieces, gone with the links on the flanks where they come to lie, keep within `aim_mm`.
+fn cut<'a>(path: &Path<'a>, arms: &Arms<'_>, emit: Emit, aim_mm: f64) -> Cut<'a> {
+    let Path { from, to, way } = path;
+    let mut out = Cut { stops: Vec::new(), left_mm: 0.0 };
+    let mut begin = Stopover { share: 0.0, at: *from };
+    let splitting = Splitting { arms, emit, aim_mm };
+    for turn in way.changes(from) {
+        let at = |place: usize| {
+            end_between(from, to, turn.share, place, arms).map(|at| Stopover { share: turn.share, at })
+        };
+        if turn.share > 0.0
+            && let Some(arrived) = at(turn.before)
+        {
+            splitting.split(&begin, &arrived, MAX_DEPTH, &mut out);
+            out.stops.push(arrived);
+        }
+        let Some(taken_up) = at(turn.after) else { continue };
+        begin = taken_up;
+        out.stops.push(taken_up);
+    }
+    splitting.split(&begin, &Stopover { share: 1.0, at: *to }, MAX_DEPTH, &mut out);
+    out
+}
+
+/// Largest distance from the intended line where it is cut, gone by links with play (mm). While a play is taken up on the
+/// spot nothing is judged: the arm may stand off there because it was just loaded.
+fn walked(path: &Path<'_>, cut: &Cut<'_>, slack: &Slack<'_>, arms: &Arms<'_>, emit: Emit) -> f64 {
+    let Path { from, to, .. } = path;
+    let pieces = cut.stops.len() + 1;
+    let node = |k: usize| match k {
+        0 => (0.0, from),
+        k if k == pieces => (1.0, to),
+        k => (cut.stops[k - 1].share, &cut.stops[k - 1].at),
+    };
+    // Which piece, and which share of it.
+    let piece = |u: f64| {
+        let u = u * pieces as f64;
+        let k = (u as usize).min(pieces - 1);
+        (node(k), node(k + 1), u - k as f64)
+    };
+    let motor = |u: f64| {
+        let (a, b, t) = piece(u);
+        motor_at(a.1, b.1, t, arms, emit)
+    };
+    let off = |u: f64, flange: &Pose| match piece(u) {
+        (a, b, _) if a.0 == b.0 => 0.0,
+        (a, b, t) => off_line(from, to, a.0 + t * (b.0 - a.0), flange),
+    };
+    slack.most_off(STEPS * pieces, &motor, &off)
 }
 
 /// A point of the intended line as a corrected end, under a condition.
@@ -258,37 +344,52 @@ fn end_between<'a>(
 /// 63 targets at most on one line: more means that the line cannot be followed.
 const MAX_DEPTH: usize = 6;
 
-fn split(
-    from: &Ends<'_>,
-    to: &Ends<'_>,
-    arms: &Arms<'_>,
-    options: &Options,
-    depth: usize,
-    extra: &mut Vec<Extra>,
-) -> f64 {
-    let middle = off_at(from, to, 0.5, to.place, arms, options.emit);
-    let bend = even_bend(from, to, to.place, arms, options.emit, middle);
-    if bend <= options.tolerance_mm || depth == 0 {
-        return bend;
+/// How a line is cut in halves until they are straight.
+struct Splitting<'s> {
+    arms: &'s Arms<'s>,
+    emit: Emit,
+    aim_mm: f64,
+}
+
+impl Splitting<'_> {
+    fn split<'a>(&self, begin: &Stopover<'a>, end: &Stopover<'a>, depth: usize, out: &mut Cut<'a>) {
+        let (from, to, place) = (&begin.at, &end.at, end.at.place);
+        let middle = off_at(from, to, 0.5, place, self.arms, self.emit);
+        let bend = even_bend(from, to, place, self.arms, self.emit, middle);
+        let halves = if bend <= self.aim_mm || depth == 0 {
+            None
+        } else {
+            end_between(from, to, 0.5, place, self.arms)
+        };
+        match halves {
+            None => out.left_mm = out.left_mm.max(bend),
+            Some(at) => {
+                let middle = Stopover { share: 0.5 * (begin.share + end.share), at };
+                self.split(begin, &middle, depth - 1, out);
+                out.stops.push(middle);
+                self.split(&middle, end, depth - 1, out);
+            }
+        }
     }
-    let Some(middle) = end_between(from, to, 0.5, to.place, arms) else { return bend };
-    let first = split(from, &middle, arms, options, depth - 1, extra);
-    extra.push(extra_of(&middle.told, &middle.joints, options.emit, to, arms));
-    let second = split(&middle, to, arms, options, depth - 1, extra);
-    first.max(second)
 }
 
 /// How far the tool is, half way of a joint motion, from where the data-sheet arm goes with the program as it is (mm),
 /// the largest over the way: a joint motion has no line to keep, so nothing is put in for it.
 pub(super) fn joint_bend(path: &Path<'_>, arms: &Arms<'_>) -> f64 {
-    let Path { from, to, way } = path;
-    let off = |s: f64| {
+    let Path { from, to, .. } = path;
+    let motor = |s: f64| from.joints.lerp(&to.joints, s);
+    let off = |s: f64, flange: &Pose| {
         let meant = arms.nominal.arm().forward(&from.before.lerp(&to.before, s));
-        let reached = arms.acting.arm(way.at(s)).forward(&from.joints.lerp(&to.joints, s));
         let meant = to.mounted.told.target_of(&meant).translation.vector;
-        gap(&to.mounted.real.target_of(&reached).translation.vector, &meant)
+        gap(&to.mounted.real.target_of(flange).translation.vector, &meant)
     };
-    largest_from([off(0.0), off(1.0)], 2, &off)
+    match path.slack(arms) {
+        Some(slack) => slack.most_off(STEPS, &|s| Some(motor(s)), &off),
+        None => {
+            let even = |s: f64| off(s, &arms.acting.arm(to.place).forward(&motor(s)));
+            largest_from([even(0.0), even(1.0)], 2, &even)
+        }
+    }
 }
 
 /// A target that the told path needs before the end `to`.

@@ -2,7 +2,8 @@
 //!
 //! Every branch that reaches the first point is followed along the path on the nominal arm, which is what the
 //! controller computes with; of those that get to the end inside the joint limits the one that keeps farthest from
-//! singularities is taken.
+//! singularities is taken, and of its full turns of joints 4 and 6, which pass singularities at the same distance, the
+//! one that keeps farthest from the ends of the joints' ranges.
 
 use thiserror::Error;
 
@@ -81,7 +82,7 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     let flange =
         |p: &PathPoint| file.work_object.base_from_work_object * p.work_object_from_tool() * tool.inverse();
     let flanges: Vec<Pose> = points.iter().map(flange).collect();
-    let mut best: Option<(f64, Vec<Joints>)> = None;
+    let mut best: Option<Followed> = None;
     let mut farthest: (usize, InverseError) = (0, InverseError::Unreachable { beyond_mm: f64::NAN });
     let starts = inverse.all(&flanges[0]);
     if starts.is_empty()
@@ -91,16 +92,16 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     }
     for start in starts {
         match follow(&inverse, &flanges, start.joints) {
-            Ok((singularity, joints)) => {
-                if best.as_ref().is_none_or(|(s, _)| singularity > *s) {
-                    best = Some((singularity, joints));
+            Ok(found) => {
+                if best.as_ref().is_none_or(|best| found.better_than(best, nominal)) {
+                    best = Some(found);
                 }
             }
             Err((reached, error)) if reached >= farthest.0 => farthest = (reached, error),
             Err(_) => {}
         }
     }
-    let Some((singularity, joints)) = best else {
+    let Some(Followed { singularity, joints }) = best else {
         let at = points.get(farthest.0).unwrap_or(first).position_mm;
         return Err(ToolpathError::NotFollowed(Box::new(NotFollowed {
             name: file.name.clone(),
@@ -116,11 +117,35 @@ pub fn toolpath(file: &SurfaceFile, nominal: &Model, robot: &str) -> Result<Tool
     Ok(Toolpath { draft, points, joints, singularity })
 }
 
-fn follow(
-    inverse: &Inverse<'_>,
-    flanges: &[Pose],
-    start: Joints,
-) -> Result<(f64, Vec<Joints>), (usize, InverseError)> {
+/// A path that one branch follows.
+struct Followed {
+    /// Smallest distance to singularity on the way.
+    singularity: f64,
+    joints: Vec<Joints>,
+}
+
+impl Followed {
+    fn better_than(&self, other: &Self, nominal: &Model) -> bool {
+        // Whole turns of joints 4 and 6 differ by rounding here.
+        if (self.singularity - other.singularity).abs() > 1e-9 {
+            return self.singularity > other.singularity;
+        }
+        self.reach(nominal) < other.reach(nominal)
+    }
+
+    /// How far the joints leave the middle of their ranges: of each the largest share of half its range, squared and summed.
+    fn reach(&self, nominal: &Model) -> f64 {
+        let limits = &nominal.limits;
+        let share = |q: &Joints, j: usize| {
+            let (low, high) = (limits.min_rad[j], limits.max_rad[j]);
+            ((2.0 * q[j] - low - high) / (high - low)).abs()
+        };
+        let largest = |j: usize| self.joints.iter().map(|q| share(q, j)).fold(0.0, f64::max);
+        (0..6).map(|j| largest(j).powi(2)).sum()
+    }
+}
+
+fn follow(inverse: &Inverse<'_>, flanges: &[Pose], start: Joints) -> Result<Followed, (usize, InverseError)> {
     let mut near = start;
     let mut smallest = f64::INFINITY;
     let mut joints = Vec::with_capacity(flanges.len());
@@ -130,7 +155,7 @@ fn follow(
         smallest = smallest.min(solution.singularity);
         joints.push(near);
     }
-    Ok((smallest, joints))
+    Ok(Followed { singularity: smallest, joints })
 }
 
 fn draft(

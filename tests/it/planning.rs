@@ -1,3 +1,4 @@
 //! Tests of `planning`.
 
 mod poses;
+mod toolpath;

@@ -15,6 +15,12 @@ const NEARLY_SINGULAR: f64 = 0.15;
 const SPREAD: usize = 64;
 /// Spread seeds where a closed form leads to nothing although the target seems to be in reach.
 const SPREAD_RESCUE: usize = 24;
+/// A solution with a smaller margin to a singularity may have a neighbour across it.
+const FOLDED: f64 = 0.1;
+/// Seeds scattered around each solution where none has the wanted configuration.
+const SCATTERED: usize = 96;
+/// How far they are scattered, one third of them each (rad).
+const SCATTER_RAD: [f64; 3] = [0.1, 0.4, 1.2];
 
 impl Inverse<'_> {
     /// [`Inverse::solve_near`] where the kernel's answer does not count.
@@ -73,6 +79,9 @@ impl Inverse<'_> {
         };
         if !found.iter().any(fits) {
             found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
+        }
+        if !found.iter().any(fits) {
+            found = self.around(goal, near, found, &fits);
         }
         for found in found {
             let outcome = self.turned(goal, found, &wanted);
@@ -187,6 +196,34 @@ impl Inverse<'_> {
         })
     }
 
+    /// Solutions with more that lie about them: near a fold the wanted one is a neighbour of one that is found, but Newton
+    /// comes to it from few places only. Seeds are scattered around those near a singularity, wider and wider, until one
+    /// leads to what `fits`.
+    fn around(
+        &self,
+        goal: &Goal,
+        near: Option<&Joints>,
+        found: Vec<Outcome>,
+        fits: &dyn Fn(&Outcome) -> bool,
+    ) -> Vec<Outcome> {
+        let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
+        let folded = |joints: &Joints| self.margins(joints).iter().any(|m| m.abs() < FOLDED);
+        let roots: Vec<Joints> = found.iter().map(|o| o.joints).filter(folded).collect();
+        let mut search = Search { inverse: self, goal, around, found, stuck: Vec::new() };
+        for k in 0..SCATTERED {
+            let width = SCATTER_RAD[k * SCATTER_RAD.len() / SCATTERED];
+            let offset = Joints::from_fn(|axis, _| width * (2.0 * halton(axis, k) - 1.0));
+            for root in &roots {
+                let known = search.found.len();
+                search.attempt(&(root + offset));
+                if search.found[known..].iter().any(fits) {
+                    return search.found;
+                }
+            }
+        }
+        search.found
+    }
+
     /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again.
     fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
         let joints = on_turn_near(&outcome.joints, wanted);
@@ -204,17 +241,22 @@ impl Inverse<'_> {
     /// Point `k` of a Halton sequence over the joint ranges.
     fn spread_seed(&self, k: usize) -> Joints {
         Joints::from_fn(|axis, _| {
-            let base = [2, 3, 5, 7, 11, 13][axis];
-            let (mut fraction, mut scale, mut rest) = (0.0, 1.0, k + 1);
-            while rest > 0 {
-                scale /= base as f64;
-                fraction += scale * (rest % base) as f64;
-                rest /= base;
-            }
             let (low, high) = range(&self.arm.model.limits, axis);
-            low + fraction * (high - low)
+            low + halton(axis, k) * (high - low)
         })
     }
+}
+
+/// Point `k` of a Halton sequence, from 0 to 1, along an axis.
+fn halton(axis: usize, k: usize) -> f64 {
+    let base = [2, 3, 5, 7, 11, 13][axis];
+    let (mut fraction, mut scale, mut rest) = (0.0, 1.0, k + 1);
+    while rest > 0 {
+        scale /= base as f64;
+        fraction += scale * (rest % base) as f64;
+        rest /= base;
+    }
+    fraction
 }
 
 /// Solutions gathered from seed after seed.
