@@ -28,7 +28,9 @@ impl Mountings {
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
             // Nearly always that of the motion before.
-            if last.replace((tool, object)) == Some((tool, object)) || out.places.contains_key(&(tool, object)) {
+            if last.replace((tool, object)) == Some((tool, object))
+                || out.places.contains_key(&(tool, object))
+            {
                 continue;
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };

@@ -99,7 +99,9 @@ impl Expression {
                 text: text.to_owned(),
                 column: 1,
                 found: format!("an expression whose second derivative has {:.3e} terms", terms.second),
-                expected: format!("at most {MOST_TERMS}: fewer factors in a product, powers as x^3, fewer nested functions"),
+                expected: format!(
+                    "at most {MOST_TERMS}: fewer factors in a product, powers as x^3, fewer nested functions"
+                ),
             });
         }
         let written = whole.written();
@@ -229,7 +231,8 @@ impl Terms {
             _ if b.first == 0.0 => Terms { value, ..a.within(value) },
             _ => {
                 let inner = times(b.first, a.value) + times(b.value, a.first) + a.value;
-                let again = times(b.second, a.value) + times(b.value, a.second)
+                let again = times(b.second, a.value)
+                    + times(b.value, a.second)
                     + 4.0 * times(a.first, b.first)
                     + 2.0 * (a.value + a.first);
                 Terms { value, first: value + inner, second: value + 2.0 * inner + again }

@@ -314,6 +314,8 @@ impl Walk<'_, '_, '_> {
         }
         if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.set(which, on);
+            // One that also moves.
+            state.previous = motion.or(state.previous);
             if which == Which::Displacement {
                 let value = self.displaced(node, &state, name);
                 state.known.insert(DISPLACEMENT, value);

@@ -63,7 +63,8 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
 
 /// Where to cut a large file, one part for each thread.
 fn cuts(source: &[u8]) -> Vec<usize> {
-    let parts = if source.len() < LARGE { 1 } else { rayon::current_num_threads().min(source.len() / LARGE + 1) };
+    let parts =
+        if source.len() < LARGE { 1 } else { rayon::current_num_threads().min(source.len() / LARGE + 1) };
     let mut cuts: Vec<usize> = Vec::new();
     for part in 1..parts {
         let mut at = part * (source.len() / parts);

@@ -157,8 +157,13 @@ fn many_terms_are_differentiated_not_overflown() {
 fn derivatives_that_would_not_end_are_refused() {
     // Their second derivatives grow with the third power of the length: minutes and gigabytes for the longest.
     let nested = format!("{}x{}", "sin(".repeat(28), ")".repeat(28));
-    for text in [vec!["x"; 60].join("*"), vec!["x"; 990].join("*"), vec!["(x+y)"; 60].join("/"), nested, vec!["x"; 25].join("^")]
-    {
+    for text in [
+        vec!["x"; 60].join("*"),
+        vec!["x"; 990].join("*"),
+        vec!["(x+y)"; 60].join("/"),
+        nested,
+        vec!["x"; 25].join("^"),
+    ] {
         let error = Expression::parse(&text, &["x", "y"]).unwrap_err();
         assert!(error.expected.contains(&MOST_TERMS.to_string()), "{error}");
     }
