@@ -15,7 +15,7 @@ use truegrind::report::format;
 
 use super::files::{self, Batch};
 use super::identify::{Angles, DataArguments};
-use super::outputs::{Outputs, width};
+use super::outputs::{Outputs, say, width};
 use super::progress::Work;
 use super::{Common, Ending, identify, inputs, on_threads};
 
@@ -67,7 +67,7 @@ struct Measured {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.list {
         let table = view::list(&Experiment::shipped()?);
-        print!("{}", format::terminal::table(&table, width()));
+        say(&format::terminal::table(&table, width()))?;
         return Ok(Ending::Done);
     }
     let name = arguments.experiment.as_deref().unwrap_or_default();
@@ -137,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })
     })??;
     drop(work);
-    arguments.outputs.print(&view::summary(&experiment, &results));
+    arguments.outputs.print(&view::summary(&experiment, &results))?;
     let times = view::times(&results);
     if let Some(times) = &times {
         eprint!("{}", format::terminal::table(times, width()));

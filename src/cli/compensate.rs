@@ -24,7 +24,7 @@ use truegrind::surface::SurfaceFile;
 
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
-use super::outputs::Outputs;
+use super::outputs::{Outputs, say};
 use super::programs::{self, Job, Programs};
 use super::progress::Work;
 use super::{Common, Ending, inputs, on_threads};
@@ -248,9 +248,11 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     }
     Batch::check(&inputs_of, &checked)?;
     let mut batch = Batch::sparing(&inputs_of);
+    // Told when all is written: it says what was.
+    let mut summary = None;
     let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
         let listing = program.listing();
-        outputs.print(&view::summary(planned, listing, files));
+        summary = Some(view::summary(planned, listing, files));
         let report = PathReport {
             program: programs.name(),
             model: shop.model.to_owned(),
@@ -287,7 +289,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         eprintln!("note: {note}");
     }
     if done.row.ended == Ended::Already {
-        println!("{}: already compensated with this model; nothing written", done.row.file);
+        say(&format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
         return Ok(Ending::Flagged);
     }
     if let Some(path) = &arguments.diff {
@@ -303,6 +305,9 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         files::make_folder(folder)?;
     }
     batch.write()?;
+    if let Some(summary) = &summary {
+        outputs.print(summary)?;
+    }
     let would_change = arguments.check && done.changed;
     Ok(if done.clean && !would_change { Ending::Done } else { Ending::Flagged })
 }
@@ -345,7 +350,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
         programs.extend(done.json);
         diff.extend_from_slice(&done.diff);
     }
-    arguments.outputs.print(&batch::summary(&rows));
+    arguments.outputs.print(&batch::summary(&rows))?;
     let mut batch = Batch::sparing(jobs.iter().flat_map(|job| &job.paths));
     arguments.outputs.add_made(
         &mut batch,
@@ -589,7 +594,7 @@ fn unchanged(arguments: &Arguments, jobs: &[Job]) -> anyhow::Result<Ending> {
         }
         batch.write()?;
     }
-    println!("model nominal: nothing to correct, every byte stays");
+    say("model nominal: nothing to correct, every byte stays\n")?;
     Ok(Ending::Done)
 }
 

@@ -1,7 +1,8 @@
 //! `truegrind demo [-o DIR]`: the whole way on what ships with the project.
 //!
-//! The shipped surface becomes a RAPID program, the shipped simulated measurements identify the arm, the program is
-//! rewritten, and the simulated actual arm, which has effects and noise that geometry cannot hold, runs both.
+//! The shipped surface becomes a RAPID program, the shipped simulated measurements identify the arm and tell what geometry
+//! does not explain, the program is rewritten with each model, and the simulated actual arm, which has effects and noise
+//! that geometry cannot hold, runs all of them. The program of the diagnosed arm is the one that is written.
 
 use std::path::{Path, PathBuf};
 
@@ -10,27 +11,34 @@ use truegrind::comparison::grinding::taught_cell;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::rewrite::{Options as RewriteBounds, plan};
 use truegrind::compensation::verify::{Acting, Judged, judge};
+use truegrind::diagnosis;
 use truegrind::identification::identify::{Identification, Options};
 use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::import;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::program::motion::Mark;
 use truegrind::program::rapid::{Task, writer};
 use truegrind::program::rewrite::RewriteOptions;
 use truegrind::report::document::Document;
-use truegrind::report::{deviation as deviation_view, format, identification as identification_view};
+use truegrind::report::{
+    deviation as deviation_view, diagnosis as diagnosis_view, format, identification as identification_view,
+};
 use truegrind::surface::sample;
 
 use super::files::{self, Batch};
-use super::outputs::width;
+use super::outputs::{say, width};
 use super::progress::Work;
-use super::{Common, Ending, identify, inputs, on_threads, simulate};
+use super::{Common, Ending, diagnose, identify, inputs, on_threads, simulate};
 
 /// The shipped measurements and the recipe that made them.
 const DATA: &[u8] = include_bytes!("../../tests/data/irb120-cable.csv");
 const RECIPE: &str = include_str!("../../tests/data/irb120-cable.toml");
+
+/// How the arm is called that has the causes found beside its geometry.
+const DIAGNOSED: &str = "with causes";
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
@@ -77,15 +85,23 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     }
 
     drop(work);
-    let work = Work::start("rewriting the program, running both on the simulated actual arm");
+    let work = Work::start("asking what geometry does not explain");
+    let mut asked = diagnosis::diagnose::Options::default();
+    asked.selection.seed = seed;
+    let causes = diagnose::diagnosed(&dataset, &robot.sheet.name, nominal, &asked, &|step| work.tell(step))?;
+    let mut arms: Vec<(&str, &Estimated)> = vec![(DIAGNOSED, &causes.estimated)];
+    arms.extend(found.iter().map(|one| (one.estimated.provenance.method.as_str(), &one.estimated)));
+
+    drop(work);
+    let work = Work::start("rewriting the program, running all of them on the simulated actual arm");
     let mass = path.draft.tool.1.mass_kg;
     let condition = Condition { payload_kg: Some(mass), ..Condition::default() };
     let mut reports: Vec<PathReport> = Vec::new();
     let mut rewritten_program = None;
-    for one in &found {
+    for (name, estimated) in arms {
         let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
-        let planned = plan(&task.listing, &one.estimated, &cell, &bounds);
-        let text = one.estimated.to_toml().map_err(anyhow::Error::msg)?;
+        let planned = plan(&task.listing, estimated, &cell, &bounds);
+        let text = estimated.to_toml().map_err(anyhow::Error::msg)?;
         let mark =
             Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: inputs::hash(text.as_bytes()) };
         let rewrite = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
@@ -98,13 +114,13 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
             cell: &cell,
             surface: Some(&surface.surface),
             program: "blade.mod",
-            name: &one.estimated.provenance.method,
+            name,
             after: After::Achieved,
             loads: [None, None],
         };
         let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
         let mut report = judge(&judged, &acting);
-        report.held_out_mm = Some(one.estimated.geometry.held_out.rmse);
+        report.held_out_mm = Some(estimated.geometry.held_out.rmse);
         for (point, planned) in report.points.iter_mut().zip(&planned.points) {
             (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
             (point.status, point.reason) = (planned.status, planned.reason.clone());
@@ -134,6 +150,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))?);
     let identification = identification_view::document(&found[0], &dataset);
     batch.add(place("identification.html"), format::html::document(&identification));
+    batch.add(place("diagnosis.html"), format::html::document(&diagnosis_view::document(&causes, &dataset)));
     #[cfg(feature = "visual")]
     batch.add(
         place("demo.rrd"),
@@ -148,20 +165,27 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     );
     batch.write()?;
 
-    print!("{}", format::terminal::table(&deviation_view::block_table(&reports), width()));
-    println!();
-    print!("{}", format::terminal::table(&deviation_view::registered_table(&reports), width()));
-    println!();
-    println!("Simulated throughout: tests/data/README.md has recipe and seed. In {}:", folder.display());
+    let tables = [deviation_view::block_table(&reports), deviation_view::registered_table(&reports)];
+    let mut text = String::new();
+    for table in &tables {
+        text += &format::terminal::table(table, width());
+        text += "\n";
+    }
+    text += &format!(
+        "Simulated throughout: tests/data/README.md has recipe and seed. In {}:\n",
+        folder.display()
+    );
     for (name, what) in [
         ("deviation.html", "the page: deviation along the path before and after"),
-        ("identification.html", "what the measurements told of the arm"),
+        ("identification.html", "what the measurements told of the arm's geometry"),
+        ("diagnosis.html", "what geometry does not explain, and why"),
         ("blade.mod, blade-compensated.mod", "the program before and after"),
-        ("model.toml", "the estimated arm (method lm)"),
+        ("model.toml", "the estimated arm, causes included"),
         #[cfg(feature = "visual")]
         ("demo.rrd", "the picture: truegrind view, or any Rerun viewer"),
     ] {
-        println!("  {name:<34} {what}");
+        text += &format!("  {name:<34} {what}\n");
     }
+    say(&text)?;
     Ok(Ending::Done)
 }

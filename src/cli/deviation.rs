@@ -112,7 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut summary = Document::new(format!("Deviation of {name}"));
     summary.push(view::block_table(&reports));
     summary.push(view::registered_table(&reports));
-    arguments.outputs.print(&summary);
+    arguments.outputs.print(&summary)?;
     let mut batch = Batch::sparing(&all);
     arguments.outputs.add_made(
         &mut batch,

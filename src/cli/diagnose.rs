@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     for note in found.diagnosis.notes.iter().chain(&dataset.notes) {
         eprintln!("note: {note}");
     }
-    arguments.outputs.print(&view::summary(&found));
+    arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(given);
     let json = serde_json::to_value(&found.diagnosis)?;
     arguments.outputs.add_made(

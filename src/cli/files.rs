@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
+use super::outputs::say;
+
 /// The bytes of a file.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
@@ -94,8 +96,7 @@ impl Batch {
         }
         for (path, bytes) in &self.files {
             if path == Path::new("-") {
-                let mut out = std::io::stdout().lock();
-                out.write_all(bytes).and_then(|()| out.flush()).context("stdout cannot be written")?;
+                say(bytes)?;
             }
         }
         Ok(())

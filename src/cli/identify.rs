@@ -120,7 +120,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     for note in &dataset.notes {
         eprintln!("note: {note}");
     }
-    arguments.outputs.print(&view::summary(&found));
+    arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing([&arguments.data.data]);
     arguments.outputs.add_made(
         &mut batch,

@@ -1,7 +1,9 @@
 //! The outputs that every verb offers: --json, --csv, --parquet, --md, --html, --rrd.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::Args;
 use truegrind::report::document::Document;
 use truegrind::report::format;
@@ -85,9 +87,25 @@ impl Outputs {
     }
 
     /// Prints the summary, to stdout unless a result goes there.
-    pub(super) fn print(&self, page: &Document) {
+    pub(super) fn print(&self, page: &Document) -> anyhow::Result<()> {
         let text = format::terminal::document(page, width());
-        if self.takes_stdout() { eprint!("{text}") } else { print!("{text}") }
+        if self.takes_stdout() {
+            eprint!("{text}");
+            return Ok(());
+        }
+        say(&text)
+    }
+}
+
+/// Prints a result. A reader that has seen enough (`| head`) is no fault.
+///
+/// # Errors
+/// Where stdout cannot be written, such as to a full disk.
+pub(super) fn say(text: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_ref()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        done => done.context("stdout cannot be written"),
     }
 }
 

@@ -140,7 +140,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let planned = on_threads(arguments.common.threads, || plan(&wanted, &options))?
         .map_err(|e| anyhow!("{}: {e}", robot.sheet.name))?;
     drop(work);
-    arguments.outputs.print(&view::summary(&planned, &robot.sheet.name));
+    arguments.outputs.print(&view::summary(&planned, &robot.sheet.name))?;
     let mut batch = Batch::sparing(&inputs_of);
     let name = robot.sheet.name.as_str();
     arguments.outputs.add_made(

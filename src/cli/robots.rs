@@ -5,7 +5,7 @@ use truegrind::report::format;
 use truegrind::report::robots as view;
 use truegrind::robots;
 
-use super::outputs::width;
+use super::outputs::{say, width};
 use super::{Ending, inputs};
 
 /// Arguments of `robots`.
@@ -19,12 +19,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match &arguments.name {
         Some(name) => {
             let robot = inputs::robot(name)?;
-            print!("{}", format::terminal::document(&view::document(&robot), width()));
+            say(&format::terminal::document(&view::document(&robot), width()))?;
         }
         None => {
             let all = robots::catalogue();
             let sheets = all.iter().map(|name| robots::load(name)).collect::<Result<Vec<_>, _>>()?;
-            print!("{}", format::terminal::table(&view::catalogue_table(&sheets), width()));
+            say(&format::terminal::table(&view::catalogue_table(&sheets), width()))?;
         }
     }
     Ok(Ending::Done)

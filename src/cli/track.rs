@@ -192,7 +192,7 @@ fn pass(
     let model_path = folder.join(format!("{stem}-{date}-{:06}.toml", tracker.state().poses));
     let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
     let path = model_path.display().to_string();
-    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &path));
+    arguments.outputs.print(&view::summary(&tracker, fresh, &alarms, &path))?;
     let mut batch = Batch::sparing([&arguments.data, &arguments.model]);
     // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
     if !model_path.exists() {

@@ -183,6 +183,23 @@ fn a_full_disk_leaves_nothing() {
 }
 
 #[test]
+fn a_reader_that_has_seen_enough_is_no_fault() {
+    let dir = folder();
+    // A pipe whose other end is closed before anything is written.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_truegrind"))
+        .current_dir(dir.path())
+        .args(["demo", "-o", "made"])
+        .stdout(writer)
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{err}");
+    assert!(dir.path().join("made/blade-compensated.mod").exists() && !err.contains("panicked"), "{err}");
+}
+
+#[test]
 fn a_file_that_does_not_fit_is_not_there_at_all() {
     // No file may grow beyond some kilobytes, which is what a full disk comes to.
     if cfg!(not(target_os = "linux")) {
@@ -505,6 +522,35 @@ fn wrong_names_list_what_exists() {
     for verb in ["demo", "robots", "simulate", "identify", "path", "compensate", "deviation"] {
         assert!(out.contains(verb), "{verb} is not in the help");
     }
+}
+
+#[test]
+fn the_demo_goes_the_whole_way_and_the_causes_it_finds_straighten_the_path() {
+    let dir = folder();
+    let at = dir.path();
+    let (code, out, err) = truegrind(at, &["demo", "-o", "made"]);
+    assert_eq!(code, 0, "{err}");
+    for file in ["blade.mod", "blade-compensated.mod", "model.toml", "measurements.csv", "cell.toml"] {
+        assert!(at.join("made").join(file).exists(), "{file}");
+    }
+    for page in ["deviation.html", "identification.html", "diagnosis.html"] {
+        let text = fs::read_to_string(at.join("made").join(page)).unwrap();
+        assert!(text.contains("<svg") && out.contains(page), "{page}");
+    }
+    // The shape of the path: what is left of it after rigid registration.
+    let shape = |row: &str| -> f64 {
+        let table = out.split_once("Absolute, and the shape").unwrap().1;
+        let line = table.lines().find(|line| line.starts_with(row)).unwrap_or_else(|| panic!("{row}: {out}"));
+        line.split_whitespace().last().unwrap().parse().unwrap()
+    };
+    let (before, geometry, causes) = (shape("before"), shape("lm, "), shape("with causes, "));
+    assert!(before > 0.3 && geometry < 0.3 * before, "{before} to {geometry}");
+    assert!(causes < 0.6 * geometry, "{geometry} to {causes}");
+    // By the files that it wrote nothing is refused or flagged.
+    let args = ["compensate", "made/blade.mod", "--model", "made/model.toml", "--cell", "made/cell.toml"];
+    let (code, out, err) = truegrind(at, &[&args[..], &["-o", "again.mod"]].concat());
+    assert_eq!(code, 0, "{out}{err}");
+    assert!(out.contains("448 changed"), "{out}");
 }
 
 #[test]

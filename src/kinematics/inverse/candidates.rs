@@ -2,10 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use nalgebra::UnitQuaternion;
+
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::model::{Joints, Limits};
+use crate::math::se3::Pose;
 
 /// Solutions nearer than this are one (rad).
 const SAME_RAD: f64 = 1e-6;
@@ -17,10 +20,10 @@ const SPREAD: usize = 64;
 const SPREAD_RESCUE: usize = 24;
 /// A solution with a smaller margin to a singularity may have a neighbour across it.
 const FOLDED: f64 = 0.1;
-/// Seeds scattered around each solution where none has the wanted configuration.
-const SCATTERED: usize = 96;
-/// How far they are scattered, one third of them each (rad).
-const SCATTER_RAD: [f64; 3] = [0.1, 0.4, 1.2];
+/// Targets beside one whose wanted solution is not found.
+const BESIDE: usize = 60;
+/// How far beside, in turn (rad, and shares of the characteristic length).
+const BESIDE_WIDTH: [f64; 3] = [0.01, 0.04, 0.15];
 
 impl Inverse<'_> {
     /// [`Inverse::solve_near`] where the kernel's answer does not count.
@@ -81,7 +84,7 @@ impl Inverse<'_> {
             found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
         }
         if !found.iter().any(fits) {
-            found = self.around(goal, near, found, &fits);
+            found = self.beside(goal, near, found, &fits);
         }
         for found in found {
             let outcome = self.turned(goal, found, &wanted);
@@ -196,26 +199,30 @@ impl Inverse<'_> {
         })
     }
 
-    /// Solutions with more that lie about them: near a fold the wanted one is a neighbour of one that is found, but Newton
-    /// comes to it from few places only. Seeds are scattered around those near a singularity, wider and wider, until one
-    /// leads to what `fits`.
-    fn around(
+    /// Solutions with more that lie near a fold, until one of them `fits`. There the closed form of the target itself leads
+    /// to few places, but those of targets a little beside it stand all about the fold: they are the seeds.
+    fn beside(
         &self,
         goal: &Goal,
         near: Option<&Joints>,
         found: Vec<Outcome>,
         fits: &dyn Fn(&Outcome) -> bool,
     ) -> Vec<Outcome> {
+        let folded = |o: &Outcome| self.margins(&o.joints).iter().any(|m| m.abs() < FOLDED);
+        let Some(map_inverse) = self.map_inverse.filter(|_| found.iter().any(folded)) else { return found };
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
-        let folded = |joints: &Joints| self.margins(joints).iter().any(|m| m.abs() < FOLDED);
-        let roots: Vec<Joints> = found.iter().map(|o| o.joints).filter(folded).collect();
+        let mapped = (self.arm.model.joint_map * around).into();
         let mut search = Search { inverse: self, goal, around, found, stuck: Vec::new() };
-        for k in 0..SCATTERED {
-            let width = SCATTER_RAD[k * SCATTER_RAD.len() / SCATTERED];
-            let offset = Joints::from_fn(|axis, _| width * (2.0 * halton(axis, k) - 1.0));
-            for root in &roots {
+        for k in 0..BESIDE {
+            let width = BESIDE_WIDTH[k % BESIDE_WIDTH.len()];
+            let off = Joints::from_fn(|axis, _| width * (2.0 * halton(axis, k) - 1.0));
+            let shift = off.fixed_rows::<3>(0) * self.kernel.length_mm;
+            let turn = UnitQuaternion::from_scaled_axis(off.fixed_rows::<3>(3).into_owned());
+            let target =
+                Pose::from_parts((goal.last.translation.vector + shift).into(), turn * goal.last.rotation);
+            for seed in self.structure.seeds(&target, &mapped) {
                 let known = search.found.len();
-                search.attempt(&(root + offset));
+                search.attempt(&(map_inverse * Joints::from(seed.rotations)));
                 if search.found[known..].iter().any(fits) {
                     return search.found;
                 }

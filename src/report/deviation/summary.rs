@@ -38,7 +38,9 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
         let mut cells = row.first_cells(programs);
         cells.extend(five_mm.map(Cell::from));
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
-        cells.extend([sigma_rms(row.report).into(), row.report.held_out_mm.into()]);
+        // What a program does on an actual arm before anything is corrected is no model's prediction.
+        let model = (!row.before || row.report.after != After::Achieved).then_some(row.report);
+        cells.extend([model.and_then(sigma_rms).into(), model.and_then(|m| m.held_out_mm).into()]);
         table.push(cells);
     }
     let (mut with, mut without) = (0, 0);
@@ -98,6 +100,7 @@ pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
 /// One row of a summary.
 struct Row<'a, T> {
     report: &'a PathReport,
+    before: bool,
     path: String,
     value: T,
 }
@@ -141,12 +144,12 @@ fn rows<'a, T: PartialEq>(
         let shown = if agreed { 1 } else { before.len() };
         for (report, value) in before.into_iter().take(shown) {
             let path = if agreed { "before".to_owned() } else { format!("before, under {}", report.model) };
-            out.push(Row { report, path, value });
+            out.push(Row { report, before: true, path, value });
         }
         for report in of.into_iter().filter(|report| has(report, AFTER)) {
             if let Some(value) = value(report, AFTER) {
                 let path = format!("{}, {}", report.model, meaning(report.after));
-                out.push(Row { report, path, value });
+                out.push(Row { report, before: false, path, value });
             }
         }
     }

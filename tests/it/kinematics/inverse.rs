@@ -174,6 +174,7 @@ fn every_random_pose_is_found_from_its_configuration_alone() {
                 Err(error) => {
                     let near = inverse.singularity_distances(&joints).map(|d| d.nearest());
                     missed.push(format!("{} pose {k} ({near:?}): {error}", sheet.name));
+                    println!("{}, asked {wanted}, {:?}", missed[missed.len() - 1], joints.map(f64::to_degrees));
                 }
             }
         }
