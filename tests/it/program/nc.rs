@@ -226,6 +226,27 @@ fn modal_words_increments_units_and_shifts_are_followed() {
 }
 
 #[test]
+fn a_block_that_begins_with_its_centre_can_become_straight() {
+    use truegrind::program::motion::MotionKind;
+    use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};
+    let source = format!("{HEAD}G1 X0 Y0 Z0 A0 B0 C0 F100\nG2 X20 Y0 I10 J0\n I10 J0 X40\n");
+    let setup = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let motion = &task.listing.motions[2];
+    assert!(motion.straightens && motion.reason().is_none(), "{motion:?}");
+    let end = *motion.to().unwrap().value.unwrap().cartesian().unwrap();
+    let new = NewTarget::Cartesian { position_mm: [40.0, 0.5, 0.0], quaternion: end.quaternion, conf: None };
+    let targets = motion.targets.iter().map(|t| if t.role == Role::Via { NewTarget::Drop } else { new });
+    let change = Change { motion: 2, targets: targets.collect(), before: Vec::new() };
+    let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    let again = Task::read(&[("x", &text)], &setup);
+    let motion = &again.listing.motions[2];
+    assert_eq!(motion.kind, MotionKind::Linear, "{}", String::from_utf8_lossy(&text));
+    assert_eq!(motion.to().unwrap().value.unwrap().cartesian().unwrap().position_mm, [40.0, 0.5, 0.0]);
+}
+
+#[test]
 fn heidenhain_presets_and_datum_shifts_are_followed() {
     let go = "L X+1 Y+2 Z+3 A+0 B+0 C+0\n";
     let in_base = |body: &str| -> Vec<Result<[f64; 3], Reason>> {
