@@ -2,7 +2,10 @@
 //!
 //! `cargo bench --no-default-features --bench program`
 
+use std::fs;
 use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::LazyLock;
 
 use divan::Bencher;
@@ -133,6 +136,32 @@ fn compensate_module(bencher: Bencher<'_, '_>) {
         let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).expect("disjoint edits");
         assert!(planned.changes.len() > 99_000, "{} changes", planned.changes.len());
         rewritten.files[0].edits.apply(module).expect("edits are within the file")
+    });
+}
+
+/// The same two as files, where they stay to be looked at.
+static FILES: LazyLock<PathBuf> = LazyLock::new(|| {
+    let (module, estimated) = &*BLADE;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("module");
+    fs::create_dir_all(&folder).expect("a folder");
+    fs::write(folder.join("path.mod"), module).expect("a module");
+    let model = estimated.to_toml().expect("finite numbers");
+    fs::write(folder.join("model.toml"), model).expect("a model");
+    folder
+});
+
+/// The whole way from file to file, as a user goes it.
+#[divan::bench(sample_count = 10)]
+fn compensate_file(bencher: Bencher<'_, '_>) {
+    let folder = &*FILES;
+    bencher.bench_local(|| {
+        let output = Command::new(env!("CARGO_BIN_EXE_truegrind"))
+            .current_dir(folder)
+            .args(["compensate", "path.mod", "--model", "model.toml", "-o", "out.mod"])
+            .output()
+            .expect("the binary starts");
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", String::from_utf8_lossy(&output.stderr));
     });
 }
 

@@ -17,6 +17,7 @@ use super::curve::{Curve, beside, between};
 use super::rewrite::Arms;
 use super::segment::{Ends, STEPS, largest_from};
 use super::slack::Slack;
+use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
 
 /// A corner that cuts off less than this has the shape of the lines that it joins (mm): over so short a way an arm's
@@ -101,8 +102,9 @@ pub(super) fn corner_bend(
         return None;
     }
     let told = Corner::of(&ways.told[0], &ways.told[1], zone_mm);
+    let flange = |t: f64| point.mounted.told.flange_for(&told.at(t));
     let motor = |t: f64| {
-        let solution = arms.nominal.solve_near(&point.mounted.told.flange_for(&told.at(t)), &point.joints);
+        let solution = arms.nominal.solve_near(&flange(t), &point.joints);
         solution.ok().map(|solution| solution.joints)
     };
     let off = |t: f64, flange: &Pose| meant.distance(&point.mounted.real.target_of(flange), t);
@@ -111,9 +113,23 @@ pub(super) fn corner_bend(
         let links = Slack::at(&start, places[0], places[1], &arms.acting);
         return Some(links.most_off(2 * STEPS, &motor, &off));
     }
-    let even = |t: f64| match motor(t) {
+    let reached = |t: f64, joints: Option<Joints>| match joints {
         Some(joints) => off(t, &arms.acting.arm(places[0]).forward(&joints)),
         None => f64::INFINITY,
     };
-    Some(largest_from([even(0.0), even(1.0)], 4, &even))
+    // The samples that every corner needs, in lanes.
+    let solved = arms.nominal.solve_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let first: [f64; FIRST.len()] =
+        std::array::from_fn(|k| reached(FIRST[k], solved[k].as_ref().ok().map(|solution| solution.joints)));
+    let even = |t: f64| match FIRST.iter().position(|first| *first == t) {
+        Some(k) => first[k],
+        None => reached(t, motor(t)),
+    };
+    Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
 }
+
+/// Equal pieces of a corner that are halved until their chords tell enough.
+const PIECES: usize = 4;
+
+/// The ends, the pieces' ends and their middles: what [`largest_from`] asks for first.
+const FIRST: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];

@@ -24,9 +24,13 @@ impl Mountings {
     pub(super) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
         let mut out =
             Self { places: HashMap::new(), list: Vec::new(), base: [false; 6], assumed: Vec::new() };
+        let mut last = None;
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
-            if out.places.contains_key(&(tool, object)) {
+            // Nearly always that of the motion before.
+            if last.replace((tool, object)) == Some((tool, object))
+                || out.places.contains_key(&(tool, object))
+            {
                 continue;
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };

@@ -10,6 +10,7 @@
 use std::collections::HashMap;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::kinematics::model::Model;
 use crate::math::se3::Pose;
@@ -63,11 +64,7 @@ impl Loads {
 
     /// The loads of RAPID modules.
     pub fn of_task(task: &Task<'_>) -> Self {
-        let walk = Walk::new(task);
-        if walk.says_nothing() {
-            return Self::default();
-        }
-        walk.run()
+        if says_nothing(task) { Self::default() } else { Walk::new(task).run() }
     }
 
     fn grip(&self, motion: usize) -> Grip {
@@ -106,6 +103,21 @@ fn together(a: &Load, b: &Load) -> Load {
         (a.mass_kg * a.centre_mm[k] + b.mass_kg * b.centre_mm[k]) / mass_kg.max(f64::MIN_POSITIVE)
     });
     Load { mass_kg, centre_mm }
+}
+
+/// Whether no statement grips anything and no motion states its load.
+fn says_nothing(task: &Task<'_>) -> bool {
+    const PORTION: usize = 1 << 16;
+    let names = |tree: &RapidTree<'_>, token: usize| {
+        let text = tree.text(token as u32);
+        same_name(text, b"GripLoad") || same_name(text, b"TLoad")
+    };
+    task.trees.iter().all(|tree| {
+        tree.kinds().par_chunks(PORTION).enumerate().all(|(portion, kinds)| {
+            let named = kinds.iter().enumerate().filter(|(_, kind)| **kind == Token::Ident);
+            named.into_iter().all(|(index, _)| !names(tree, portion * PORTION + index))
+        })
+    })
 }
 
 /// What is held at a place of a routine. `None`: as at the entry of the routine.
@@ -150,18 +162,6 @@ impl<'t, 's> Walk<'t, 's> {
             unit: 0,
             silent: false,
         }
-    }
-
-    /// Whether no statement grips anything and no motion states its load.
-    fn says_nothing(&self) -> bool {
-        self.task.trees.iter().all(|tree| {
-            (0..tree.len() as u32).all(|token| {
-                tree.kind(token) != Some(Token::Ident) || {
-                    let text = tree.text(token);
-                    !same_name(text, b"GripLoad") && !same_name(text, b"TLoad")
-                }
-            })
-        })
     }
 
     fn run(mut self) -> Loads {

@@ -1,5 +1,7 @@
 //! What a controller makes of numbers that it holds in single precision, as RAPID's `num` is.
 
+use rayon::prelude::*;
+
 use crate::program::motion::Frame;
 use crate::program::rewrite::{Change, NewTarget};
 
@@ -14,42 +16,52 @@ pub struct SinglePrecision {
     pub joint_deg: f64,
 }
 
+/// Changes that one thread takes at a time.
+const PORTION: usize = 4096;
+
 /// The largest of all new targets; `None` without any.
 pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
+    let most = changes.par_chunks(PORTION).map(|changes| {
+        let targets = changes
+            .iter()
+            .flat_map(|change| change.targets.iter().chain(change.before.iter().map(|extra| &extra.target)));
+        targets.filter_map(of).reduce(SinglePrecision::max)
+    });
+    most.flatten().reduce_with(SinglePrecision::max)
+}
+
+/// By how much one target moves.
+fn of(target: &NewTarget) -> Option<SinglePrecision> {
     let short = |value: f64| f64::from(value as f32);
-    let targets = changes
-        .iter()
-        .flat_map(|change| change.targets.iter().chain(change.before.iter().map(|extra| &extra.target)));
-    let mut most: Option<SinglePrecision> = None;
-    for target in targets {
-        let found = match *target {
-            NewTarget::Keep | NewTarget::Drop => continue,
-            NewTarget::Cartesian { position_mm, quaternion, .. } => {
-                let off = position_mm.map(|value| short(value) - value);
-                let written = Frame { position_mm, quaternion };
-                let held = Frame { position_mm, quaternion: quaternion.map(short) };
-                SinglePrecision {
-                    position_mm: off.iter().map(|off| off * off).sum::<f64>().sqrt(),
-                    orientation_deg: written.pose().rotation.angle_to(&held.pose().rotation).to_degrees(),
-                    joint_deg: 0.0,
-                }
-            }
-            NewTarget::Joint { robot_deg } => SinglePrecision {
-                joint_deg: robot_deg.iter().map(|angle| (short(*angle) - angle).abs()).fold(0.0, f64::max),
-                ..SinglePrecision::default()
-            },
-        };
-        let so_far = most.unwrap_or_default();
-        most = Some(SinglePrecision {
-            position_mm: so_far.position_mm.max(found.position_mm),
-            orientation_deg: so_far.orientation_deg.max(found.orientation_deg),
-            joint_deg: so_far.joint_deg.max(found.joint_deg),
-        });
+    match *target {
+        NewTarget::Keep | NewTarget::Drop => None,
+        NewTarget::Cartesian { position_mm, quaternion, .. } => {
+            let off = position_mm.map(|value| short(value) - value);
+            let written = Frame { position_mm, quaternion };
+            let held = Frame { position_mm, quaternion: quaternion.map(short) };
+            Some(SinglePrecision {
+                position_mm: off.iter().map(|off| off * off).sum::<f64>().sqrt(),
+                orientation_deg: written.pose().rotation.angle_to(&held.pose().rotation).to_degrees(),
+                joint_deg: 0.0,
+            })
+        }
+        NewTarget::Joint { robot_deg } => Some(SinglePrecision {
+            joint_deg: robot_deg.iter().map(|angle| (short(*angle) - angle).abs()).fold(0.0, f64::max),
+            ..SinglePrecision::default()
+        }),
     }
-    most
 }
 
 impl SinglePrecision {
+    /// The larger of each.
+    fn max(self, other: Self) -> Self {
+        Self {
+            position_mm: self.position_mm.max(other.position_mm),
+            orientation_deg: self.orientation_deg.max(other.orientation_deg),
+            joint_deg: self.joint_deg.max(other.joint_deg),
+        }
+    }
+
     /// One sentence for a report.
     pub fn text(&self) -> String {
         // A bound is rounded up.

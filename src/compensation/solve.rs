@@ -567,6 +567,7 @@ fn finish(
         }
         None => vec![0.0; way.len()],
     };
+    let mut near = 0;
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
             out[w.index] = Err(why);
@@ -589,7 +590,7 @@ fn finish(
             sigma_mm: sigmas[k].hypot(in_play_mm),
             in_play_mm,
             place: w.place,
-            outside: arms.knowledge.and_then(|knowledge| knowledge.region.outside(&w.after)),
+            outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
             singularity: w.singularity,
         });
     }

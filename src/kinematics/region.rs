@@ -100,6 +100,12 @@ impl Region {
 
     /// Whether a joint vector (rad) leaves the region: the joint that leaves its range farthest, else coverage.
     pub fn outside(&self, q: &Joints) -> Option<Outside> {
+        self.outside_near(q, &mut 0)
+    }
+
+    /// The same along a path: the sample that was near enough last is asked first, and left in `near` for the next one.
+    /// The answer does not depend on it.
+    pub fn outside_near(&self, q: &Joints, near: &mut usize) -> Option<Outside> {
         let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
         let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);
         let worst = (0..6).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b))).unwrap_or(0);
@@ -107,11 +113,16 @@ impl Region {
             return Some(Outside::Joint { joint: worst, by_deg: beyond(worst) });
         }
         let allowed = SPACINGS * self.spacing_deg.max(SLACK_DEG);
+        let close = |sample: &[f64; 6]| square(sample, &degrees) <= allowed * allowed;
+        if self.samples_deg.get(*near).is_some_and(close) {
+            return None;
+        }
         // The first sample that is near enough settles it.
         let mut nearest = f64::INFINITY;
-        for sample in &self.samples_deg {
+        for (index, sample) in self.samples_deg.iter().enumerate() {
             nearest = nearest.min(square(sample, &degrees));
             if nearest <= allowed * allowed {
+                *near = index;
                 return None;
             }
         }

@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// Why edits cannot be applied.
@@ -28,14 +29,28 @@ pub enum EditError {
         /// Length of the file.
         length: usize,
     },
+    /// Offsets are 32 bits.
+    #[error("more than 4 GiB of file or of new text: nothing was changed")]
+    TooLong,
 }
 
+/// Offsets of 32 bits: there may be millions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Entry {
-    start: usize,
-    end: usize,
-    text_start: usize,
-    text_end: usize,
+    start: u32,
+    end: u32,
+    text_start: u32,
+    text_end: u32,
+}
+
+impl Entry {
+    fn range(&self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
+
+    fn text<'t>(&self, text: &'t [u8]) -> &'t [u8] {
+        &text[self.text_start as usize..self.text_end as usize]
+    }
 }
 
 /// The edits of one file, in any order until they are applied.
@@ -43,7 +58,12 @@ struct Entry {
 pub struct Edits {
     entries: Vec<Entry>,
     text: Vec<u8>,
+    /// Whether an offset did not fit.
+    too_long: bool,
 }
+
+/// Edits that one thread carries out at a time.
+const PORTION: usize = 1 << 15;
 
 impl Edits {
     /// No edits.
@@ -75,8 +95,14 @@ impl Edits {
     pub fn replace_with(&mut self, range: Range<usize>, write: impl FnOnce(&mut Vec<u8>)) {
         let text_start = self.text.len();
         write(&mut self.text);
-        let text_end = self.text.len();
-        self.entries.push(Entry { start: range.start, end: range.end, text_start, text_end });
+        let offset = |at: usize| u32::try_from(at);
+        let offsets = (offset(range.start), offset(range.end), offset(text_start), offset(self.text.len()));
+        match offsets {
+            (Ok(start), Ok(end), Ok(text_start), Ok(text_end)) => {
+                self.entries.push(Entry { start, end, text_start, text_end });
+            }
+            _ => self.too_long = true,
+        }
     }
 
     /// Makes room for lists that will be appended.
@@ -92,7 +118,11 @@ impl Edits {
 
     /// Adds the edits of another list behind those of this one.
     pub fn append(&mut self, other: &Edits) {
-        let shift = self.text.len();
+        self.too_long |= other.too_long || self.text.len() + other.text.len() > u32::MAX as usize;
+        if self.too_long {
+            return;
+        }
+        let shift = self.text.len() as u32;
         self.text.extend_from_slice(&other.text);
         self.entries.extend(other.entries.iter().map(|entry| Entry {
             text_start: entry.text_start + shift,
@@ -103,24 +133,22 @@ impl Edits {
 
     /// Each edit: the bytes to replace and what shall stand there.
     pub fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[u8])> {
-        self.entries
-            .iter()
-            .map(|entry| (entry.start..entry.end, &self.text[entry.text_start..entry.text_end]))
+        self.entries.iter().map(|entry| (entry.range(), entry.text(&self.text)))
     }
 
     /// Sorts the edits by place and checks that no two overlap. An insertion at the first byte of a replacement goes
     /// before it.
     pub fn sort(&mut self) -> Result<(), EditError> {
+        if self.too_long {
+            return Err(EditError::TooLong);
+        }
         let key = |entry: &Entry| (entry.start, entry.end);
         if !self.entries.is_sorted_by_key(key) {
             self.entries.sort_by_key(key);
         }
         for pair in self.entries.windows(2) {
             if pair[1].start < pair[0].end {
-                return Err(EditError::Overlap {
-                    first: pair[0].start..pair[0].end,
-                    second: pair[1].start..pair[1].end,
-                });
+                return Err(EditError::Overlap { first: pair[0].range(), second: pair[1].range() });
             }
         }
         Ok(())
@@ -128,32 +156,55 @@ impl Edits {
 
     /// The new bytes. Sorts a copy of the list where it is not sorted.
     pub fn apply(&self, source: &[u8]) -> Result<Vec<u8>, EditError> {
+        if self.too_long {
+            return Err(EditError::TooLong);
+        }
         let key = |entry: &Entry| (entry.start, entry.end);
         let mut sorted = Cow::Borrowed(&self.entries);
         if !sorted.is_sorted_by_key(key) {
             sorted.to_mut().sort_by_key(key);
         }
-        let mut length = source.len();
+        // For each portion of edits the bytes of the source before the first of them, and how long its new bytes are.
+        let mut portions: Vec<(usize, usize)> = Vec::with_capacity(sorted.len() / PORTION + 1);
         let mut last = 0..0;
-        for entry in sorted.iter() {
-            let range = entry.start..entry.end;
-            if entry.start > entry.end || entry.end > source.len() {
-                return Err(EditError::Outside { range, length: source.len() });
+        for entries in sorted.chunks(PORTION) {
+            let (from, mut length) = (last.end, 0);
+            for entry in entries {
+                let range = entry.range();
+                if range.start > range.end || range.end > source.len() {
+                    return Err(EditError::Outside { range, length: source.len() });
+                }
+                if range.start < last.end {
+                    return Err(EditError::Overlap { first: last, second: range });
+                }
+                length += range.start - last.end + (entry.text_end - entry.text_start) as usize;
+                last = range;
             }
-            if entry.start < last.end {
-                return Err(EditError::Overlap { first: last, second: range });
+            portions.push((from, length));
+        }
+        let rest = &source[last.end..];
+        let mut out = vec![0; portions.iter().map(|portion| portion.1).sum::<usize>() + rest.len()];
+        let mut work = Vec::with_capacity(portions.len());
+        let mut open = out.as_mut_slice();
+        for (entries, (from, length)) in sorted.chunks(PORTION).zip(portions) {
+            let (place, after) = open.split_at_mut(length);
+            work.push((entries, from, place));
+            open = after;
+        }
+        open.copy_from_slice(rest);
+        work.into_par_iter().for_each(|(entries, from, mut place)| {
+            let mut put = |bytes: &[u8]| {
+                let (here, after) = std::mem::take(&mut place).split_at_mut(bytes.len());
+                here.copy_from_slice(bytes);
+                place = after;
+            };
+            let mut at = from;
+            for entry in entries {
+                put(&source[at..entry.start as usize]);
+                put(entry.text(&self.text));
+                at = entry.end as usize;
             }
-            length = length + (entry.text_end - entry.text_start) - range.len();
-            last = range;
-        }
-        let mut out = Vec::with_capacity(length);
-        let mut at = 0;
-        for entry in sorted.iter() {
-            out.extend_from_slice(&source[at..entry.start]);
-            out.extend_from_slice(&self.text[entry.text_start..entry.text_end]);
-            at = entry.end;
-        }
-        out.extend_from_slice(&source[at..]);
+        });
         Ok(out)
     }
 }

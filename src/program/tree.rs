@@ -73,6 +73,27 @@ impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
         }
     }
 
+    /// The tokens of a later part of the file, for [`Tree::append`].
+    pub fn part(source: &'s [u8], estimate: usize) -> Self {
+        Tree { lines: Vec::new(), ..Tree::new(source, estimate) }
+    }
+
+    /// Appends the tokens of the next parts of the same file.
+    pub fn append(&mut self, parts: &[Self])
+    where
+        T: Send + Sync,
+        N: Sync,
+    {
+        let Tree { kinds, starts, lines, .. } = self;
+        rayon::join(
+            || parts.iter().for_each(|part| starts.extend_from_slice(&part.starts)),
+            || {
+                parts.iter().for_each(|part| kinds.extend_from_slice(&part.kinds));
+                parts.iter().for_each(|part| lines.extend_from_slice(&part.lines));
+            },
+        );
+    }
+
     /// Appends the token that begins at `start`; it ends where the next begins.
     #[inline]
     pub fn push(&mut self, kind: T, start: usize) {

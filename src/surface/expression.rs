@@ -7,7 +7,9 @@
 //! **Shapes.** Up to three variables; a gradient of three, a symmetric 3 × 3 matrix of second derivatives (unused
 //! rows zero).
 //!
-//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused. exmex goes into
+//! **Stops.** A text longer than [`LONGEST`] characters or nested deeper than [`DEEPEST`] is refused, and so is one whose
+//! second derivative has more than [`MOST_TERMS`] terms by the rules of differentiation, counted before it is taken: it
+//! grows with the third power of a product's factors, and exmex's time with more than the square of that. exmex goes into
 //! itself once for every term, with some 100 kB each time: it runs on a thread with a stack for the longest text.
 //!
 //! **Source and departures.** exmex alone reads `-x^2` as (−x)², has no `1e-3`, and reports errors without a
@@ -30,6 +32,8 @@ use nalgebra::{Matrix3, Vector3};
 pub const LONGEST: usize = 2000;
 /// Deepest nesting that is read.
 pub const DEEPEST: usize = 60;
+/// Most terms of a second derivative.
+pub const MOST_TERMS: f64 = 6000.0;
 /// The functions an equation may use.
 pub const FUNCTIONS: [&str; 14] = [
     "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "ln", "log10", "sqrt", "abs",
@@ -87,7 +91,20 @@ impl Expression {
     /// The position of the first character that does not belong there, what was found and what was expected.
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {
         let mut reader = Reader::new(text, variables);
-        let written = reader.whole()?.written();
+        let whole = reader.whole()?;
+        let terms = whole.terms();
+        // Not a number counts as too many.
+        if !(terms.second <= MOST_TERMS) {
+            return Err(ExpressionError {
+                text: text.to_owned(),
+                column: 1,
+                found: format!("an expression whose second derivative has {:.3e} terms", terms.second),
+                expected: format!(
+                    "at most {MOST_TERMS}: fewer factors in a product, powers as x^3, fewer nested functions"
+                ),
+            });
+        }
+        let written = whole.written();
         on_ample_stack(|| Self::differentiated(text, variables, &written)).unwrap_or_else(|| {
             Err(ExpressionError {
                 text: text.to_owned(),
@@ -169,16 +186,84 @@ impl Expression {
 /// A part of an expression on its way to exmex; constants are folded so that exponents arrive as plain numbers.
 enum Part {
     Number(f64),
-    Text(String),
+    Text(String, Terms),
+}
+
+/// How many operands and functions an expression and its derivatives have, written out as the rules of differentiation
+/// have it.
+#[derive(Debug, Clone, Copy)]
+struct Terms {
+    value: f64,
+    first: f64,
+    second: f64,
+}
+
+impl Terms {
+    const CONSTANT: Terms = Terms { value: 1.0, first: 0.0, second: 0.0 };
+    const VARIABLE: Terms = Terms { value: 1.0, first: 1.0, second: 0.0 };
+
+    /// Of two parts under an operator.
+    fn combined(self, sign: char, other: Terms) -> Terms {
+        let (a, b) = (self, other);
+        // A part that does not vary, and a derivative that vanishes, are left away.
+        let times = |x: f64, y: f64| if x == 0.0 || y == 0.0 { 0.0 } else { x + y };
+        let value = a.value + b.value;
+        match sign {
+            '+' | '-' => Terms { value, first: a.first + b.first, second: a.second + b.second },
+            '*' => Terms {
+                value,
+                first: times(a.first, b.value) + times(a.value, b.first),
+                second: times(a.second, b.value) + 2.0 * times(a.first, b.first) + times(a.value, b.second),
+            },
+            // (a′b − ab′) / b², and its derivative by the same rule.
+            '/' if b.first > 0.0 => {
+                let over = times(a.first, b.value) + times(a.value, b.first);
+                let again =
+                    times(a.second, b.value) + 2.0 * times(a.first, b.first) + times(a.value, b.second);
+                Terms {
+                    value,
+                    first: over + b.value,
+                    second: again + 2.0 * over + 4.0 * b.value + 2.0 * b.first,
+                }
+            }
+            '/' => Terms { value, first: a.first + b.value, second: a.second + b.value },
+            // b a^(b−1) a′ for a constant power, else a^b (b′ ln a + b a′ / a).
+            _ if b.first == 0.0 => Terms { value, ..a.within(value) },
+            _ => {
+                let inner = times(b.first, a.value) + times(b.value, a.first) + a.value;
+                let again = times(b.second, a.value)
+                    + times(b.value, a.second)
+                    + 4.0 * times(a.first, b.first)
+                    + 2.0 * (a.value + a.first);
+                Terms { value, first: value + inner, second: value + 2.0 * inner + again }
+            }
+        }
+    }
+
+    /// Of a function of it, itself of `outer` terms: f′(a) a′, and f″(a) a′² + f′(a) a″.
+    fn within(self, outer: f64) -> Terms {
+        if self.first == 0.0 {
+            return Terms { value: outer, ..Terms::CONSTANT };
+        }
+        let second = outer + 2.0 * self.first + if self.second > 0.0 { outer + self.second } else { 0.0 };
+        Terms { value: outer, first: outer + self.first, second }
+    }
 }
 
 impl Part {
+    fn terms(&self) -> Terms {
+        match self {
+            Part::Number(_) => Terms::CONSTANT,
+            Part::Text(_, terms) => *terms,
+        }
+    }
+
     fn written(self) -> String {
         match self {
             // `Display` never writes an exponent, which exmex could not read.
             Part::Number(value) if value.is_sign_negative() => format!("(-{})", -value),
             Part::Number(value) => format!("{value}"),
-            Part::Text(text) => text,
+            Part::Text(text, _) => text,
         }
     }
 }
@@ -338,7 +423,7 @@ impl<'a> Reader<'a> {
                 self.advance()?;
                 match self.signed()? {
                     Part::Number(value) => Part::Number(-value),
-                    Part::Text(text) => Part::Text(format!("(-{text})")),
+                    Part::Text(text, terms) => Part::Text(format!("(-{text})"), terms),
                 }
             }
             Token::Sign('+') => {
@@ -373,7 +458,8 @@ impl<'a> Reader<'a> {
             };
             return self.finite(value, at);
         }
-        Ok(Part::Text(format!("({}{sign}{})", left.written(), right.written())))
+        let terms = left.terms().combined(sign, right.terms());
+        Ok(Part::Text(format!("({}{sign}{})", left.written(), right.written()), terms))
     }
 
     fn finite(&self, value: f64, at: usize) -> Result<Part, ExpressionError> {
@@ -393,7 +479,7 @@ impl<'a> Reader<'a> {
             Token::Sign('(') => self.parenthesised(),
             Token::Name(name) if self.variables.contains(&name.as_str()) => {
                 self.advance()?;
-                Ok(Part::Text(name))
+                Ok(Part::Text(name, Terms::VARIABLE))
             }
             Token::Name(name) if FUNCTIONS.contains(&name.as_str()) => {
                 let at = self.start;
@@ -403,8 +489,13 @@ impl<'a> Reader<'a> {
                 }
                 match self.parenthesised()? {
                     Part::Number(value) => self.finite(constant(&name, value), at),
-                    Part::Text(text) if name == "abs" => Ok(Part::Text(format!("sqrt(({text})^2)"))),
-                    Part::Text(text) => Ok(Part::Text(format!("{name}({text})"))),
+                    Part::Text(text, terms) if name == "abs" => {
+                        let square = terms.within(terms.value + 1.0);
+                        Ok(Part::Text(format!("sqrt(({text})^2)"), square.within(square.value + 1.0)))
+                    }
+                    Part::Text(text, terms) => {
+                        Ok(Part::Text(format!("{name}({text})"), terms.within(terms.value + 1.0)))
+                    }
                 }
             }
             Token::Name(name) => match CONSTANTS.iter().find(|(known, _)| *known == name) {
@@ -441,7 +532,7 @@ impl<'a> Reader<'a> {
         self.advance()?;
         Ok(match inner {
             Part::Number(value) => Part::Number(value),
-            Part::Text(text) => Part::Text(format!("({text})")),
+            Part::Text(text, terms) => Part::Text(format!("({text})"), terms),
         })
     }
 }

@@ -266,11 +266,13 @@ impl<'s> Follower<'_, 's> {
             }
             _ => {}
         }
+        let first = slots.first.map(|word| word.first);
         for word in slots.centre.iter_mut().chain([&mut slots.radius]).filter_map(Option::take) {
             let range = tree.range(word.first, word.end);
             let blanks =
                 tree.source()[..range.start].iter().rev().take_while(|byte| matches!(byte, b' ' | b'\t'));
-            let begin = range.start - blanks.count();
+            // Before the first word G1 may be put in.
+            let begin = range.start - if first == Some(word.first) { 0 } else { blanks.count() };
             let end = tree.start(word.end - 1) + tree.text(word.end - 1).len();
             edits.replace(begin..end, b"");
         }

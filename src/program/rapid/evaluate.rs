@@ -463,6 +463,13 @@ impl<'a, 's> Evaluator<'a, 's> {
                         (b"rz", Some(value)) => options.turns[2] = Some(value),
                         (b"wobj", Some(value)) if name == b"mirpos" => options.work_object = Some(value),
                         (b"miry", None) => options.mirrors_y = true,
+                        (b"origin", Some(value)) if name == b"defframe" => options.origin = Some(value),
+                        (b"dec", Some(value)) if name == b"round" || name == b"trunc" => {
+                            options.decimals = Some(value);
+                        }
+                        ([letter @ b'x'..=b'z'], None) if name == b"eulerzyx" => {
+                            options.axis = Some(usize::from(letter - b'x'));
+                        }
                         _ => return Value::Unknown(Reason::RunTimeFunction),
                     }
                 }

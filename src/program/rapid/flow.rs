@@ -232,7 +232,7 @@ impl Walk<'_, '_, '_> {
         !self.settings(node).leaves(Which::Displacement)
     }
 
-    /// The displacement after PDispSet, PDispOn or PDispOff.
+    /// The displacement after PDispSet, PDispOn, PDispAdd or PDispOff.
     fn displaced(&self, node: u32, state: &State, name: &[u8]) -> Value {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         if same_name(name, b"PDispOff") {
@@ -248,7 +248,7 @@ impl Walk<'_, '_, '_> {
                     Err(_) => Value::Unknown(Reason::Displacement),
                 }
             }
-            // PDispOn counts from where the robot stands.
+            // PDispOn counts from where the robot stands, PDispAdd from what a search found.
             None => Value::Unknown(Reason::Displacement),
         }
     }
@@ -304,17 +304,18 @@ impl Walk<'_, '_, '_> {
         for id in symbols.changed_by(tree, self.unit.scope, node) {
             state.known.insert(id, Value::Unknown(Reason::Assigned));
         }
-        let known_motion = !late && instruction::find(name).is_some() && !symbols.hides_instruction;
-        if known_motion {
+        let known = if late || symbols.hides_instruction { None } else { instruction::find(name) };
+        if let Some(known) = known {
             if motion.is_some() {
                 // A search stops where its signal comes.
-                let searches = instruction::find(name).is_some_and(|index| INSTRUCTIONS[index].searches());
-                state.previous = motion.filter(|_| !searches);
+                state.previous = motion.filter(|_| !INSTRUCTIONS[known].searches());
             }
             return state;
         }
         if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.set(which, on);
+            // One that also moves.
+            state.previous = motion.or(state.previous);
             if which == Which::Displacement {
                 let value = self.displaced(node, &state, name);
                 state.known.insert(DISPLACEMENT, value);

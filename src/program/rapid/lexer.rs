@@ -9,6 +9,7 @@ use nom::bytes::complete::{tag, tag_no_case, take, take_while, take_while1};
 use nom::character::complete::digit1;
 use nom::combinator::recognize;
 use nom::{IResult, Parser};
+use rayon::prelude::*;
 
 use super::syntax::Syntax;
 use super::token::{Token, keyword};
@@ -24,7 +25,13 @@ const PLACEHOLDERS: [&str; 13] =
 /// How far the second `%%%` of a header may be from the first.
 const HEADER_LIMIT: usize = 1024;
 
+/// Files from here on are split into tokens on all threads (bytes).
+const LARGE: usize = 1 << 20;
+
 /// Splits a file into tokens.
+///
+/// A large file is cut where a line begins with something other than white space: no token but white space and the
+/// header goes over the end of a line, so the parts are the same as of the whole.
 pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
     if source.len() >= u32::MAX as usize || is_binary(source) {
         let mut tree = Tree::new(source, 1);
@@ -32,14 +39,66 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
         return tree;
     }
     let mut tree = Tree::new(source, source.len() / 2);
-    let mut rest = source;
-    while !rest.is_empty() {
-        let at = source.len() - rest.len();
-        let (after, kind) = match rest[0] {
-            b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0 => {
-                (space(rest, at, &mut tree), Token::Space)
+    let cuts = cuts(source);
+    let Some(&first) = cuts.first() else {
+        tokens(source, 0..source.len(), &mut tree);
+        return tree;
+    };
+    let ends = cuts[1..].iter().copied().chain([source.len()]);
+    let later: Vec<std::ops::Range<usize>> = cuts.iter().zip(ends).map(|(&from, to)| from..to).collect();
+    let ((), later) = rayon::join(
+        || tokens(source, 0..first, &mut tree),
+        || -> Vec<_> {
+            let part = |range: &std::ops::Range<usize>| {
+                let mut part = Tree::part(source, range.len() / 2);
+                tokens(source, range.clone(), &mut part);
+                part
+            };
+            later.par_iter().map(part).collect()
+        },
+    );
+    tree.append(&later);
+    tree
+}
+
+/// Where to cut a large file, one part for each thread.
+fn cuts(source: &[u8]) -> Vec<usize> {
+    let parts =
+        if source.len() < LARGE { 1 } else { rayon::current_num_threads().min(source.len() / LARGE + 1) };
+    let mut cuts: Vec<usize> = Vec::new();
+    for part in 1..parts {
+        let mut at = part * (source.len() / parts);
+        let cut = loop {
+            let Some(line) = source[at..].iter().position(|&byte| byte == b'\n') else { break source.len() };
+            let begin = source[at + line..].iter().position(|&byte| !is_space(byte));
+            let Some(begin) = begin.map(|begin| at + line + begin) else { break source.len() };
+            // Not within what may be a header.
+            let near = &source[begin.saturating_sub(HEADER_LIMIT + 8)..begin];
+            if !near.windows(3).any(|three| three == b"%%%") {
+                break begin;
             }
-            _ => token(rest).unwrap_or((&rest[1..], Token::Unknown)),
+            at = begin;
+        };
+        if cut < source.len() && cuts.last().is_none_or(|&last| last < cut) {
+            cuts.push(cut);
+        }
+    }
+    cuts
+}
+
+fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0)
+}
+
+/// The tokens of a part of a file that begins and ends between tokens.
+fn tokens(source: &[u8], range: std::ops::Range<usize>, tree: &mut Tree<'_, Token, Syntax>) {
+    let mut rest = &source[range.clone()];
+    while !rest.is_empty() {
+        let at = range.end - rest.len();
+        let (after, kind) = if is_space(rest[0]) {
+            (space(rest, at, tree), Token::Space)
+        } else {
+            token(rest).unwrap_or((&rest[1..], Token::Unknown))
         };
         if kind == Token::Header {
             let header = &rest[..rest.len() - after.len()];
@@ -50,7 +109,6 @@ pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
         tree.push(kind, at);
         rest = after;
     }
-    tree
 }
 
 /// White space; notes the beginnings of lines.
@@ -60,7 +118,7 @@ fn space<'s>(input: Bytes<'s>, at: usize, tree: &mut Tree<'_, Token, Syntax>) ->
     while let Some(&byte) = input.get(index) {
         match byte {
             b'\n' => tree.line_starts(at + index + 1),
-            b' ' | b'\t' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0 => {}
+            byte if is_space(byte) => {}
             _ => break,
         }
         index += 1;

@@ -52,6 +52,33 @@ pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
     Some(found)
 }
 
+/// Where the first numbers of a literal stand whose values are known: [`numbers`] without reading them again. `shape` are
+/// the groups that they fill.
+pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
+    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
+    found.values.get_mut(..values.len())?.copy_from_slice(values);
+    let mut count = 0;
+    let mut rest = symbol(b'[')(text).ok()?.0;
+    for (index, &length) in shape.iter().enumerate() {
+        if index > 0 {
+            rest = symbol(b',')(rest).ok()?.0;
+        }
+        rest = symbol(b'[')(rest).ok()?.0;
+        for position in 0..length {
+            if position > 0 {
+                rest = symbol(b',')(rest).ok()?.0;
+            }
+            let start = trivia(rest);
+            let after = lexer::number(unsigned(start).0).ok()?.0;
+            found.spans[count] = ((text.len() - start.len()) as u32, (text.len() - after.len()) as u32);
+            count += 1;
+            rest = after;
+        }
+        rest = symbol(b']')(rest).ok()?.0;
+    }
+    (count == values.len()).then_some(found)
+}
+
 /// White space and comments.
 #[inline]
 fn trivia(mut input: &[u8]) -> &[u8] {
@@ -79,14 +106,20 @@ fn symbol(wanted: u8) -> impl Fn(&[u8]) -> Rest<'_, ()> {
 /// A number with an optional sign.
 #[inline]
 fn signed(input: &[u8]) -> Rest<'_, f64> {
-    let (rest, negative) = match input {
-        [b'-', rest @ ..] => (trivia(rest), true),
-        [b'+', rest @ ..] => (trivia(rest), false),
-        _ => (input, false),
-    };
+    let (rest, negative) = unsigned(input);
     let (rest, text) = lexer::number(rest)?;
     let value = number::value(text).ok_or(nom::Err::Error(()))?;
     Ok((rest, if negative { -value } else { value }))
+}
+
+/// What stands behind a sign, and whether that is a minus.
+#[inline]
+fn unsigned(input: &[u8]) -> (&[u8], bool) {
+    match input {
+        [b'-', rest @ ..] => (trivia(rest), true),
+        [b'+', rest @ ..] => (trivia(rest), false),
+        _ => (input, false),
+    }
 }
 
 /// The decimals that the number in `span` of a literal states.

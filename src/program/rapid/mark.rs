@@ -13,8 +13,16 @@ pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
 
 /// The token of the mark.
 pub fn token(tree: &RapidTree<'_>) -> Option<u32> {
-    let mut tokens = 0..tree.len() as u32;
-    tokens.find(|&token| tree.kind(token) == Some(Token::Comment) && read(tree.text(token)).is_some())
+    // Long stretches hold no comment: that is told without looking at each token by itself.
+    const STRETCH: usize = 4096;
+    let comment = |kind: &&Token| **kind == Token::Comment;
+    let stretches = tree.kinds().chunks(STRETCH).enumerate();
+    let mut with_comments = stretches.filter(|(_, kinds)| kinds.iter().filter(comment).count() > 0);
+    with_comments.find_map(|(stretch, kinds)| {
+        let tokens = (stretch * STRETCH..).zip(kinds).filter(|(_, kind)| comment(kind));
+        let mut tokens = tokens.map(|(token, _)| token as u32);
+        tokens.find(|&token| read(tree.text(token)).is_some())
+    })
 }
 
 /// Reads a comment as a mark.

@@ -22,7 +22,7 @@ pub enum Which {
     ConfLinear,
     /// ConfJ.
     ConfJoint,
-    /// PDispOn, PDispSet, PDispOff.
+    /// PDispOn, PDispSet, PDispAdd, PDispOff.
     Displacement,
     /// EOffsOn, EOffsSet, EOffsOff.
     ExternalOffset,
@@ -34,7 +34,7 @@ pub enum Which {
     Synchronised,
     /// CorrCon, CorrDiscon.
     Correction,
-    /// SoftAct, SoftDeact.
+    /// SoftAct, SoftDeact; CSSAct, CSSDeact, CSSDeactMoveL.
     Soft,
 }
 
@@ -144,7 +144,7 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
         (Which::ConfLinear, !option(&["Off"]))
     } else if is("ConfJ") {
         (Which::ConfJoint, !option(&["Off"]))
-    } else if is("PDispOn") || is("PDispSet") {
+    } else if is("PDispOn") || is("PDispSet") || is("PDispAdd") {
         (Which::Displacement, true)
     } else if is("PDispOff") {
         (Which::Displacement, false)
@@ -164,9 +164,9 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
         (Which::Correction, true)
     } else if is("CorrDiscon") || is("CorrClear") {
         (Which::Correction, false)
-    } else if is("SoftAct") {
+    } else if is("SoftAct") || is("CSSAct") {
         (Which::Soft, true)
-    } else if is("SoftDeact") {
+    } else if is("SoftDeact") || is("CSSDeact") || is("CSSDeactMoveL") || is("SCSSDeactMoveL") {
         (Which::Soft, false)
     } else {
         return None;

@@ -80,10 +80,11 @@ pub(super) fn changes(old: &TargetValue, fresh: &Fresh, options: &RewriteOptions
 }
 
 /// Replaces the numbers of the literal `text`, whose first byte is byte `at` of its file. Answers whether anything
-/// changed; `None` where the text is no plain literal of that kind.
+/// changed; `None` where the text is no plain literal of that kind. `old`: what was read from it, where it is plain.
 pub(super) fn replace_numbers(
     text: &[u8],
     at: usize,
+    old: Option<&TargetValue>,
     fresh: &Fresh,
     options: &RewriteOptions,
     edits: &mut Edits,
@@ -95,7 +96,14 @@ pub(super) fn replace_numbers(
     };
     match fresh {
         Fresh::Cartesian { position_mm, quaternion, conf } => {
-            let numbers = literal::numbers(text, ROBTARGET)?;
+            let numbers = match old.and_then(TargetValue::cartesian) {
+                Some(RobTarget { position_mm: [x, y, z], quaternion: [q1, q2, q3, q4], conf, .. }) => {
+                    let [cf1, cf4, cf6, cfx] = conf.map(f64::from);
+                    let values = [*x, *y, *z, *q1, *q2, *q3, *q4, cf1, cf4, cf6, cfx];
+                    literal::places(text, &ROBTARGET[..3], &values)?
+                }
+                None => literal::numbers(text, ROBTARGET)?,
+            };
             let decimals = |index: usize| literal::decimals(text, numbers.spans[index]);
             for (index, &new) in position_mm.iter().enumerate() {
                 let decimals = decimals(index).max(options.position_decimals);

@@ -244,7 +244,7 @@ impl<'r, 's> Rewriter<'r, 's> {
             }
             match target.origin {
                 Origin::Inline => {
-                    if self.literal(motion.place.file, target.argument, &old, &fresh) {
+                    if self.literal(motion.place.file, target.argument, (&old, true), &fresh) {
                         outcome = worse(outcome, Outcome::InPlace);
                     }
                 }
@@ -261,11 +261,12 @@ impl<'r, 's> Rewriter<'r, 's> {
         outcome
     }
 
-    /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers.
-    fn literal(&mut self, file: u32, span: Span, old: &TargetValue, fresh: &Fresh) -> bool {
+    /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers. `plain`: it is.
+    fn literal(&mut self, file: u32, span: Span, (old, plain): (&TargetValue, bool), fresh: &Fresh) -> bool {
         let text = &self.task.trees[file as usize].source()[span.range()];
         let edits = &mut self.edits[file as usize];
-        match print::replace_numbers(text, span.start as usize, fresh, self.options, edits) {
+        let known = Some(old).filter(|_| plain);
+        match print::replace_numbers(text, span.start as usize, known, fresh, self.options, edits) {
             Some(changed) => changed,
             None if print::changes(old, fresh, self.options) => {
                 let value = print::merged(old, fresh);
@@ -351,7 +352,7 @@ impl<'r, 's> Rewriter<'r, 's> {
             }
             let outcome = if free {
                 free = false;
-                self.literal(declaration.place.file, literal, &old, &group[0].fresh);
+                self.literal(declaration.place.file, literal, (&old, false), &group[0].fresh);
                 self.moved_bases.insert(index);
                 Outcome::InPlace
             } else if declaration.array {
@@ -379,7 +380,7 @@ impl<'r, 's> Rewriter<'r, 's> {
     /// The text of a literal with new values.
     fn written(&self, text: &[u8], old: &TargetValue, fresh: &Fresh) -> Vec<u8> {
         let mut edits = Edits::new();
-        match print::replace_numbers(text, 0, fresh, self.options, &mut edits) {
+        match print::replace_numbers(text, 0, None, fresh, self.options, &mut edits) {
             Some(_) => edits.apply(text).unwrap_or_else(|_| text.to_vec()),
             None if print::changes(old, fresh, self.options) => {
                 let mut out = Vec::new();

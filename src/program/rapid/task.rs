@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::evaluate::{Context, Evaluator, Source};
+use super::evaluate::{Context, Evaluator, Known, Source};
 use super::flow::{CallSite, State, Surroundings, Visitor, walk};
 use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
 use super::literal;
@@ -111,7 +111,24 @@ struct Lister<'a, 's> {
     tools: Cached<'s>,
     work_objects: Cached<'s>,
     late_calls: bool,
+    /// Targets written out as numbers, whose values are read last, on all threads.
+    literals: Vec<Literal>,
 }
+
+/// A target that is written out in the instruction as an aggregate of numbers: no statement changes its value.
+#[derive(Debug, Clone, Copy)]
+struct Literal {
+    motion: u32,
+    /// Its place among the targets of the motion.
+    target: u32,
+    role: Role,
+    unit: Unit,
+    node: u32,
+    joints: bool,
+}
+
+/// Motions whose literals one thread reads at a time.
+const PORTION: usize = 1024;
 
 /// How deeply exits of routines are followed through calls; beyond, anything may be set.
 const CALL_DEPTH: u32 = 12;
@@ -140,6 +157,7 @@ impl<'a, 's> Lister<'a, 's> {
             tools: Cached::default(),
             work_objects: Cached::default(),
             late_calls: false,
+            literals: Vec::new(),
         }
     }
 
@@ -169,9 +187,54 @@ impl<'a, 's> Lister<'a, 's> {
                 self.exits[routine as usize] = Some(exit);
             }
         }
+        self.read_literals();
         self.settle_modal();
         self.other_uses();
         (self.listing, self.statements)
+    }
+
+    /// The values of the targets that stand in the instructions as numbers.
+    fn read_literals(&mut self) {
+        let (trees, symbols, literals) = (self.trees, self.symbols, &self.literals);
+        self.listing.motions.par_chunks_mut(PORTION).enumerate().for_each(|(portion, motions)| {
+            let first = (portion * PORTION) as u32;
+            let evaluator = Evaluator::new(trees, symbols);
+            let nothing = Known::new();
+            let begin = literals.partition_point(|literal| literal.motion < first);
+            let end = first + motions.len() as u32;
+            let here = literals[begin..].iter().take_while(|literal| literal.motion < end);
+            for literal in here {
+                let Literal { role, unit, node, joints, .. } = *literal;
+                let context = Context::new(unit.file, unit.scope, &nothing);
+                let (value, source) = evaluator.target(context, Child::Node(node), joints);
+                let origin = match source {
+                    Source::Inline => Origin::Inline,
+                    Source::Computed => Origin::Computed,
+                    _ => Origin::Unknown,
+                };
+                let argument = trees[unit.file as usize].node_span(node);
+                let targets = &mut motions[(literal.motion - first) as usize].targets;
+                // A hundred thousand motions: no room for targets that never come.
+                targets.reserve_exact(1);
+                targets.insert(literal.target as usize, MotionTarget { role, value, origin, argument });
+            }
+        });
+    }
+
+    /// Whether an argument is an aggregate of nothing but numbers.
+    fn literal(&self, unit: Unit, argument: Child) -> Option<u32> {
+        let Child::Node(node) = argument else { return None };
+        let tree = &self.trees[unit.file as usize];
+        let found = tree.nodes[node as usize];
+        let plain = |kind: &Token| {
+            kind.is_trivia()
+                || matches!(
+                    kind,
+                    Token::Number | Token::Comma | Token::BracketOpen | Token::BracketClose | Token::Minus
+                )
+        };
+        let tokens = &tree.kinds()[found.first as usize..found.end as usize];
+        (found.kind == Syntax::Aggregate && tokens.iter().all(plain)).then_some(node)
     }
 
     // ---- switches ----
@@ -315,6 +378,27 @@ impl<'a, 's> Lister<'a, 's> {
         MotionTarget { role, value, origin, argument: tree.span(first, end) }
     }
 
+    /// A target of the next motion, the one after `before` others; one that stands there as numbers is read later.
+    fn take(
+        &mut self,
+        motion: &mut Motion,
+        (unit, state): (Unit, &State),
+        argument: Child,
+        joints: bool,
+        (role, before): (Role, u32),
+    ) {
+        match self.literal(unit, argument) {
+            Some(node) => {
+                let motion = self.listing.motions.len() as u32;
+                self.literals.push(Literal { motion, target: before, role, unit, node, joints });
+            }
+            None => {
+                motion.targets.reserve_exact(1);
+                motion.targets.push(self.target(unit, state, argument, joints, role));
+            }
+        }
+    }
+
     fn declaration(&mut self, symbol: u32) -> u32 {
         if let Some(&index) = self.declarations.get(&symbol) {
             return index;
@@ -349,10 +433,9 @@ impl<'a, 's> Lister<'a, 's> {
         let mut motion = self.motion(unit, node, state, around);
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
-        // A hundred thousand motions: no room for targets that never come.
-        motion.targets.reserve_exact(if instruction.kind == MotionKind::Circular { 2 } else { 1 });
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let (mut index, mut work_object, mut has_tool) = (0, None, false);
+        let (mut targets, mut to, mut via) = (0, false, instruction.kind != MotionKind::Circular);
         let mut options = Options::default();
         for argument in arguments(tree, node) {
             if argument.optional {
@@ -375,10 +458,14 @@ impl<'a, 's> Lister<'a, 's> {
             let Some(value) = argument.value else { continue };
             match slot {
                 Some(Slot::To) => {
-                    let target = self.target(unit, state, value, instruction.takes_joints(), Role::To);
-                    motion.targets.push(target);
+                    let joints = instruction.takes_joints();
+                    self.take(&mut motion, (unit, state), value, joints, (Role::To, targets));
+                    (targets, to) = (targets + 1, true);
                 }
-                Some(Slot::Via) => motion.targets.push(self.target(unit, state, value, false, Role::Via)),
+                Some(Slot::Via) => {
+                    self.take(&mut motion, (unit, state), value, false, (Role::Via, targets));
+                    (targets, via) = (targets + 1, true);
+                }
                 Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),
                 Some(Slot::Zone) => motion.zone = Some(self.zone(unit, state, value)),
                 Some(Slot::Tool) => {
@@ -397,9 +484,6 @@ impl<'a, 's> Lister<'a, 's> {
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
-        let to = motion.targets.iter().any(|target| target.role == Role::To);
-        let via = instruction.kind != MotionKind::Circular
-            || motion.targets.iter().any(|target| target.role == Role::Via);
         motion.left = if instruction.kind == MotionKind::External {
             Some(Reason::ExternalOnly)
         } else if !to || !via || count < instruction.least() {

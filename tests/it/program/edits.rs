@@ -35,6 +35,22 @@ fn overlapping_and_outlying_edits_are_errors() {
     assert_eq!(edits.apply(b"0123456789"), Err(EditError::Outside { range: 8..11, length: 10 }));
 }
 
+#[test]
+fn a_hundred_thousand_edits_are_carried_out_in_portions() {
+    let source: Vec<u8> = (0..1_000_000_u32).map(|at| b'a' + (at % 26) as u8).collect();
+    let (mut edits, mut expected, mut last) = (Edits::new(), Vec::new(), 0);
+    for edit in 0..100_000_usize {
+        let at = edit * 9 + 4;
+        let (length, text) = (edit % 5, &b"0123456789"[..edit % 7]);
+        edits.replace(at..at + length, text);
+        expected.extend_from_slice(&source[last..at]);
+        expected.extend_from_slice(text);
+        last = at + length;
+    }
+    expected.extend_from_slice(&source[last..]);
+    assert!(edits.apply(&source).unwrap() == expected);
+}
+
 proptest! {
     #[test]
     fn bytes_outside_edits_stay(cuts in proptest::collection::btree_set(0_usize..200, 0..20), source in proptest::collection::vec(any::<u8>(), 200)) {

@@ -236,6 +236,38 @@ fn mirpos_mirrors_position_and_two_axes() {
     assert_eq!(target(&data, "", "MirPos(p,unknown)"), Err(Reason::Undeclared));
 }
 
+#[test]
+fn functions_with_options_and_of_vectors_are_worth_what_the_reference_says() {
+    let data = base();
+    let x = |expression: &str| {
+        target(&data, "", &format!("Offs(p,{expression},0,0)")).unwrap().position_mm[0] - 500.0
+    };
+    let near = |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-9, "{found} {wanted}");
+    near(x("Round(0.3852138\\Dec:=3)"), 0.385);
+    near(x("Trunc(-1.987\\Dec:=1)"), -1.9);
+    near(x("Round(2.5)"), 3.0);
+    near(x("EulerZYX(\\X,OrientZYX(10,-20,30))"), 30.0);
+    near(x("EulerZYX(\\Y,OrientZYX(10,-20,30))"), -20.0);
+    near(x("EulerZYX(\\Z,OrientZYX(10,-20,30))"), 10.0);
+    near(x("VectMagn([3,4,12])"), 13.0);
+    near(x("Distance([1,2,3],[1,5,7])"), 5.0);
+    near(x("DotProd([1,2,3],[4,-5,6])"), 12.0);
+    near(x("Max(1,Min(7,3))"), 3.0);
+    // DefFrame with its origin in the second point, or where the third lies on y.
+    let point = |x: f64, y: f64| format!("[[{x},{y},0],[1,0,0,0],[0,0,0,0],{EXT}]");
+    let frame = |origin: &str| {
+        let frame =
+            format!("DefFrame({},{},{}{origin})", point(10.0, 0.0), point(50.0, 0.0), point(30.0, 20.0));
+        let found = target(&data, "", &format!("[PoseVect({frame},[0,0,0]),[1,0,0,0],[0,0,0,0],{EXT}]"));
+        found.unwrap().position_mm
+    };
+    assert_eq!(frame(""), [10.0, 0.0, 0.0]);
+    assert_eq!(frame("\\Origin:=2"), [50.0, 0.0, 0.0]);
+    assert_eq!(frame("\\Origin:=3"), [30.0, 0.0, 0.0]);
+    // An option that is not known leaves the value to run time.
+    assert_eq!(target(&data, "", "Offs(p,Round(1\\Other:=2),0,0)"), Err(Reason::RunTimeOffset));
+}
+
 /// Positions of the motions of main in the base, or why they are left.
 fn displaced(body: &str) -> Vec<Result<[f64; 3], Reason>> {
     let source = format!(
@@ -274,6 +306,8 @@ fn a_displacement_that_the_text_tells_is_part_of_the_work_object() {
     assert_eq!(displaced(&format!("WHILE x DO\n{go}{set}{go}ENDWHILE\n{go}")), [left, moved, left]);
     assert_eq!(displaced(&format!("{set}neither;\n{go}sets;\n{go}ends;\n{go}")), [moved, left, plain]);
     assert_eq!(displaced(&format!("PDispSet found;\n{go}PDispOn p,tool0;\n{go}")), [left, left]);
+    // SmarTac adds what it found to what is set already.
+    assert_eq!(displaced(&format!("{set}{go}PDispAdd found;\n{go}PDispOff;\n{go}")), [moved, left, plain]);
     assert_eq!(displaced(&format!("{set}EOffsSet [1,0,0,0,0,0];\n{go}")), [left]);
     assert_eq!(displaced(&format!("{set}here:\n{go}")), [left]);
 }

@@ -225,6 +225,64 @@ fn modal_words_increments_units_and_shifts_are_followed() {
     assert_eq!(siemens, expected.map(Ok));
 }
 
+#[test]
+fn a_block_that_begins_with_its_centre_can_become_straight() {
+    use truegrind::program::motion::MotionKind;
+    use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions};
+    let source = format!("{HEAD}G1 X0 Y0 Z0 A0 B0 C0 F100\nG2 X20 Y0 I10 J0\n I10 J0 X40\n");
+    let setup = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let motion = &task.listing.motions[2];
+    assert!(motion.straightens && motion.reason().is_none(), "{motion:?}");
+    let end = *motion.to().unwrap().value.unwrap().cartesian().unwrap();
+    let new = NewTarget::Cartesian { position_mm: [40.0, 0.5, 0.0], quaternion: end.quaternion, conf: None };
+    let targets = motion.targets.iter().map(|t| if t.role == Role::Via { NewTarget::Drop } else { new });
+    let change = Change { motion: 2, targets: targets.collect(), before: Vec::new() };
+    let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    let again = Task::read(&[("x", &text)], &setup);
+    let motion = &again.listing.motions[2];
+    assert_eq!(motion.kind, MotionKind::Linear, "{}", String::from_utf8_lossy(&text));
+    assert_eq!(motion.to().unwrap().value.unwrap().cartesian().unwrap().position_mm, [40.0, 0.5, 0.0]);
+}
+
+#[test]
+fn heidenhain_presets_and_datum_shifts_are_followed() {
+    let go = "L X+1 Y+2 Z+3 A+0 B+0 C+0\n";
+    let in_base = |body: &str| -> Vec<Result<[f64; 3], Reason>> {
+        let preset = "; truegrind frame PRESET1 w [[600,0,0],[1,0,0,0]]\n";
+        let listing = listing_of(&format!("{preset}M128 F1000\n{body}"), Dialect::Heidenhain);
+        let stands = |motion: &truegrind::program::motion::Motion| {
+            if let Some(reason) = motion.reason() {
+                return Err(reason);
+            }
+            let object = listing.work_object(motion).unwrap().value.clone().unwrap();
+            let told = motion.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+            let pose = object.user_frame.pose() * object.object_frame.pose() * told;
+            Ok(pose.translation.vector.map(|x| (x * 1e6).round() / 1e6).into())
+        };
+        listing.motions.iter().map(stands).collect()
+    };
+    let shift = "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+10\nCYCL DEF 7.2 Y-5,5\n";
+    assert_eq!(
+        in_base(&format!("{go}{shift}{go}CYCL DEF 7.1 IX+5\n{go}CYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\n{go}")),
+        [[501.0, 2.0, 3.0], [511.0, -3.5, 3.0], [516.0, -3.5, 3.0], [501.0, 2.0, 3.0]].map(Ok)
+    );
+    assert_eq!(
+        in_base(&format!("TRANS DATUM AXIS Z+7\n{go}TRANS DATUM RESET\n{go}")),
+        [[501.0, 2.0, 10.0], [501.0, 2.0, 3.0]].map(Ok)
+    );
+    assert_eq!(
+        in_base(&format!("CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;NUMBER\n{go}{shift}{go}")),
+        [[601.0, 2.0, 3.0], [611.0, -3.5, 3.0]].map(Ok)
+    );
+    // A preset of which nobody says where it is, a row of a table, a turn.
+    let left = |body: &str| in_base(&format!("{body}\n{go}"))[0];
+    assert_eq!(left("CYCL DEF 247 DATUM SETTING Q339=+4"), Err(Reason::WorkObjectUnknown));
+    assert_eq!(left("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 #5"), Err(Reason::Transformed));
+    assert_eq!(left("CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+30"), Err(Reason::Transformed));
+}
+
 fn via(listing: &Listing, motion: usize) -> [f64; 3] {
     let target = listing.motions[motion].targets.iter().find(|target| target.role == Role::Via).unwrap();
     target.value.unwrap().cartesian().unwrap().position_mm

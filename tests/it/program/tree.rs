@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use truegrind::program::motion::OpaqueReason;
+use truegrind::program::rapid::lexer::lex;
 use truegrind::program::rapid::parser::parse;
 
 pub(crate) const PROGRAM: &str = r#"%%%
@@ -158,5 +159,39 @@ proptest! {
         let mut bytes = PROGRAM.as_bytes().to_vec();
         bytes.splice(at..(at + cut).min(PROGRAM.len()), insert);
         check(&bytes);
+    }
+}
+
+#[test]
+fn a_large_file_is_split_into_the_same_tokens_on_any_number_of_threads() {
+    // What goes over the end of a line, or looks as if: white space, headers, open strings, comments, other encodings.
+    let lines: [&[u8]; 9] = [
+        b"%%%\n  VERSION:1\n  LANGUAGE:ENGLISH\n%%%\n",
+        b"  MoveL [[1.5,-2,3E-2],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\r\n",
+        b"\n\t \x0c \xa0  \n",
+        b"TPWrite \"open ; ! string\n",
+        b"! comment \"%%%\n",
+        b"\xcc\xe1\xb9\xa9:=\"\xb0\x5c\";\n\xa0x:=1;\r",
+        b"%\"proc\"+name% 1,2;  <SMT>\n",
+        b"a:=b%%%c;\n",
+        b"IF a<=b THEN c:=0x1F; ENDIF",
+    ];
+    let mut source = Vec::new();
+    let mut state = 7_u32;
+    while source.len() < (3 << 20) {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        source.extend_from_slice(lines[(state >> 24) as usize % lines.len()]);
+    }
+    let told = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let tree = pool.install(|| lex(&source));
+        let starts: Vec<usize> = (0..tree.len() as u32).map(|token| tree.start(token)).collect();
+        let places: Vec<(u32, u32)> = starts.iter().step_by(101).map(|&at| tree.line_column(at)).collect();
+        (tree.kinds().to_vec(), starts, places)
+    };
+    let one = told(1);
+    assert!(one.0.len() > 100_000);
+    for threads in [2, 3, 8] {
+        assert!(told(threads) == one, "{threads} threads");
     }
 }

@@ -1,5 +1,5 @@
 use truegrind::math::difference;
-use truegrind::surface::expression::{DEEPEST, Expression, FUNCTIONS, LONGEST};
+use truegrind::surface::expression::{DEEPEST, Expression, FUNCTIONS, LONGEST, MOST_TERMS};
 
 fn value(text: &str, at: [f64; 3]) -> f64 {
     Expression::parse(text, &["x", "y", "z"]).unwrap().value(&at)
@@ -148,8 +148,31 @@ fn what_cannot_be_read_says_where_and_why() {
 fn many_terms_are_differentiated_not_overflown() {
     let many = Expression::parse(&format!("{}x", "x+".repeat(149)), &["x", "y"]).unwrap();
     assert_eq!((many.value(&[2.0, 0.0]), many.gradient(&[2.0, 0.0])[0]), (300.0, 150.0));
-    let product = Expression::parse(&vec!["x"; 60].join("*"), &["x", "y"]).unwrap();
-    assert!((product.gradient(&[1.0, 0.0])[0] - 60.0).abs() < 1e-9);
+    let product = Expression::parse(&vec!["x"; 24].join("*"), &["x", "y"]).unwrap();
+    assert!((product.gradient(&[1.0, 0.0])[0] - 24.0).abs() < 1e-9);
+    assert!((product.hessian(&[1.0, 0.0])[(0, 0)] - 24.0 * 23.0).abs() < 1e-9);
+}
+
+#[test]
+fn derivatives_that_would_not_end_are_refused() {
+    // Their second derivatives grow with the third power of the length: minutes and gigabytes for the longest.
+    let nested = format!("{}x{}", "sin(".repeat(28), ")".repeat(28));
+    for text in [
+        vec!["x"; 60].join("*"),
+        vec!["x"; 990].join("*"),
+        vec!["(x+y)"; 60].join("/"),
+        nested,
+        vec!["x"; 25].join("^"),
+    ] {
+        let error = Expression::parse(&text, &["x", "y"]).unwrap_err();
+        assert!(error.expected.contains(&MOST_TERMS.to_string()), "{error}");
+    }
+    // Written as a power, or as a polynomial of many terms, it is no matter.
+    let power = Expression::parse("x^60", &["x", "y"]).unwrap();
+    assert!((power.hessian(&[1.0, 0.0])[(0, 0)] - 60.0 * 59.0).abs() < 1e-9);
+    let terms: Vec<String> = (0..60).map(|k| format!("0.{k}1*x^{}*y^{}", k % 7, k % 5)).collect();
+    let polynomial = Expression::parse(&terms.join("+"), &["x", "y"]).unwrap();
+    assert!(polynomial.value(&[1.0, 1.0]).is_finite());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::super::machine::{Group, Mode, Turn};
 use super::super::syntax::Word;
 use super::super::token::Token;
 use super::{Event, Lister, Said};
+use crate::math::se3::Pose;
 use crate::program::motion::Reason;
 
 impl Lister<'_, '_> {
@@ -83,9 +84,20 @@ impl Lister<'_, '_> {
                     .get(2)
                     .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
                     .unwrap_or_default();
-                if matches!(&*number, b"7" | b"8" | b"10" | b"11" | b"19" | b"26" | b"247") {
-                    self.state.transform = Some(Reason::Transformed);
-                    self.set(Group::Transform);
+                let sets = matches!(&*number, b"7" | b"8" | b"10" | b"11" | b"19" | b"26" | b"247");
+                match &*number {
+                    b"7" => self.datum_shift(&words[3..]),
+                    b"247" => {
+                        self.state.frame = self.preset(first);
+                        self.set(Group::Frame);
+                    }
+                    _ if sets => {
+                        self.state.transform = Some(Reason::Transformed);
+                        self.set(Group::Transform);
+                    }
+                    _ => {}
+                }
+                if sets {
                     self.state.lose_position();
                     self.events.push(Event::Lost(super::POSITION));
                 }
@@ -104,6 +116,21 @@ impl Lister<'_, '_> {
             b"FUNCTION" if words.contains(&&b"TCPM"[..]) => {
                 self.state.tip = false;
                 self.set(Group::Tip);
+            }
+            b"TRANS" if second == b"DATUM" => {
+                match words.get(2).copied() {
+                    Some(b"RESET") => {
+                        self.state.programmable = None;
+                        self.set(Group::Frame);
+                    }
+                    Some(b"AXIS") => self.datum_shift(&words[3..]),
+                    _ => {
+                        self.state.transform = Some(Reason::Transformed);
+                        self.set(Group::Transform);
+                    }
+                }
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
             }
             b"TRANS" => {
                 self.state.transform = Some(Reason::Transformed);
@@ -129,6 +156,62 @@ impl Lister<'_, '_> {
             b"BEGIN" | b"END" if words.contains(&&b"INCH"[..]) => self.state.unit_mm = 25.4,
             _ => {}
         }
+    }
+
+    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs; a
+    /// row of the datum table is not known here.
+    fn datum_shift(&mut self, words: &[&[u8]]) {
+        let known = self.state.programmable.unwrap_or_else(Pose::identity);
+        let mut shift = known.translation.vector;
+        let mut good = known.rotation.angle() == 0.0;
+        for word in words {
+            let (axis, increment) = match *word {
+                [b'I', axis @ b'X'..=b'Z', ..] => (axis, true),
+                [axis @ b'X'..=b'Z', ..] => (axis, false),
+                // The title of the cycle.
+                [first, ..] if first.is_ascii_alphabetic() => break,
+                _ => {
+                    good = false;
+                    break;
+                }
+            };
+            let value = match &word[1 + usize::from(increment)..] {
+                [b'-', digits @ ..] => literal(digits).map(|value| -value),
+                [b'+', digits @ ..] | digits => literal(digits),
+            };
+            match value {
+                Some(value) => {
+                    let entry = &mut shift[usize::from(axis - b'X')];
+                    *entry = value * self.state.unit_mm + if increment { *entry } else { 0.0 };
+                }
+                None => good = false,
+            }
+        }
+        if good {
+            self.state.programmable =
+                (shift.norm() > 0.0).then(|| Pose::translation(shift.x, shift.y, shift.z));
+            self.set(Group::Frame);
+        } else {
+            self.state.transform = Some(Reason::Transformed);
+            self.set(Group::Transform);
+        }
+    }
+
+    /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
+    fn preset(&self, first: &Word<'_>) -> String {
+        const NEAR: usize = 200;
+        let start = self.tree.start(first.first);
+        let source = &self.tree.source()[start..];
+        let text = source[..source.len().min(NEAR)].to_ascii_uppercase();
+        let at = text.windows(5).position(|five| five == b"Q339=").map(|at| at + 5);
+        let digits: String = at
+            .into_iter()
+            .flat_map(|at| &text[at..])
+            .map(|&byte| char::from(byte))
+            .skip_while(|c| matches!(c, ' ' | '+'))
+            .take_while(char::is_ascii_digit)
+            .collect();
+        format!("PRESET{digits}")
     }
 
     /// `Q1 = +5`, `FN 0: Q1 = +5`.

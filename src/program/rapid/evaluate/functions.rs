@@ -25,6 +25,35 @@ pub(super) struct Options {
     pub(super) work_object: Option<Value>,
     /// `\MirY`.
     pub(super) mirrors_y: bool,
+    /// `\Origin` of DefFrame.
+    pub(super) origin: Option<Value>,
+    /// `\Dec` of Round and Trunc.
+    pub(super) decimals: Option<Value>,
+    /// `\X`, `\Y` or `\Z` of EulerZYX, as 0, 1 or 2.
+    pub(super) axis: Option<usize>,
+}
+
+/// x to the decimals that `\Dec` states, by a way of rounding.
+fn to_decimals(x: f64, options: &Options, rounded: fn(f64) -> f64) -> Result<Value, Reason> {
+    let decimals = options.decimals.as_ref().map_or(Ok(0.0), Value::number)?;
+    if !(0.0..=15.0).contains(&decimals) {
+        return Err(Reason::WrongShape);
+    }
+    let scale = 10_f64.powi(decimals.round() as i32);
+    Ok(Value::Number(rounded(x * scale) / scale))
+}
+
+/// The angle about z, y or x (degrees) of a rotation R = Rz Ry Rx; `axis` counts x, y, z.
+fn euler_zyx(q: [f64; 4], axis: usize) -> Result<f64, Reason> {
+    crate::program::rapid::value::usable(&q)?;
+    let turn = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
+    let r = turn.to_rotation_matrix();
+    let radians = match axis {
+        0 => r[(2, 1)].atan2(r[(2, 2)]),
+        1 => (-r[(2, 0)]).atan2(r[(2, 1)].hypot(r[(2, 2)])),
+        _ => r[(1, 0)].atan2(r[(0, 0)]),
+    };
+    Ok(radians.to_degrees())
 }
 
 /// A predefined function of values.
@@ -33,6 +62,9 @@ pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result
     // An unknown offset is another reason than an unknown base.
     let offset = |value: &Value| value.number().map_err(|_| Reason::RunTimeOffset);
     let one = |function: fn(f64) -> f64| Ok(Value::Number(function(number(0)?)));
+    let vector = |index: usize| -> Result<Vector3<f64>, Reason> {
+        Ok(Vector3::from(required.get(index).ok_or(Reason::MissingArgument)?.numbers::<3>()?))
+    };
     match name {
         b"offs" => {
             let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
@@ -121,6 +153,13 @@ pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result
             }
             let (e1, e3) = ((x - origin).normalize(), normal.normalize());
             let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[e1, e3.cross(&e1), e3]));
+            // Where the origin is: in the first point, in the second, or where the third then lies on the y axis.
+            let origin = match options.origin.as_ref().map_or(Ok(1.0), Value::number)?.round() {
+                1.0 => origin,
+                2.0 => x,
+                3.0 => origin + e1 * e1.dot(&(xy - origin)),
+                _ => return Err(Reason::WrongShape),
+            };
             let pose = Pose::from_parts(origin.into(), rotation_from_matrix(rotation.matrix()));
             Ok(Value::from_frame(&Frame::from_pose(&pose)))
         }
@@ -133,8 +172,22 @@ pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result
         b"asin" => one(|x| x.asin().to_degrees()),
         b"acos" => one(|x| x.acos().to_degrees()),
         b"atan" => one(|x| x.atan().to_degrees()),
-        b"round" => one(f64::round),
-        b"trunc" => one(f64::trunc),
+        b"round" => to_decimals(number(0)?, options, f64::round),
+        b"trunc" => to_decimals(number(0)?, options, f64::trunc),
+        b"eulerzyx" => {
+            let axis = options.axis.ok_or(Reason::MissingArgument)?;
+            let turn = required.first().ok_or(Reason::MissingArgument)?.numbers::<4>()?;
+            Ok(Value::Number(euler_zyx(turn, axis)?))
+        }
+        b"vectmagn" => Ok(Value::Number(vector(0)?.norm())),
+        b"distance" => Ok(Value::Number((vector(0)? - vector(1)?).norm())),
+        b"dotprod" => Ok(Value::Number(vector(0)?.dot(&vector(1)?))),
+        b"crossprod" => {
+            let product = vector(0)?.cross(&vector(1)?);
+            Ok(Value::from_numbers(&[product.x, product.y, product.z]))
+        }
+        b"min" => Ok(Value::Number(number(0)?.min(number(1)?))),
+        b"max" => Ok(Value::Number(number(0)?.max(number(1)?))),
         b"atan2" => Ok(Value::Number(number(0)?.atan2(number(1)?).to_degrees())),
         b"pow" => Ok(Value::Number(number(0)?.powf(number(1)?))),
         _ => Err(Reason::RunTimeFunction),
