@@ -1,41 +1,26 @@
 //! A finding for every accepted cause: what it is, how sure that is, what else was fitted in its place.
 
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 use super::catalogue::{Candidate, Columns, MAP_KNOTS};
 use super::cause::Cause;
-use super::design::Whole;
+use super::design::{Design, Linear};
 use super::diagnose::VISIBLE;
 use super::extension::{Extended, Subject};
-use super::finding::{Alternative, Confidence, Finding, Gain, Step};
-use super::held::Held;
+use super::finding::{Alternative, Confidence, Finding, FoundParameter, Gain, Step};
 use super::picture::{Picture, picture};
 use super::score::{non_centrality, score};
-use super::selection::Accepted;
+use super::selection::{Accepted, Folds};
 use super::words;
 use crate::kinematics::effect::Effect;
 use crate::kinematics::effect::map::JointMap;
-use crate::math::statistics::ErrorSummary;
+use crate::measurement::split;
 
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
 
-/// A rival whose held-out error is below this share of the finding's, and by more than chance, is not beaten, whatever the
-/// Bayes factor says.
+/// A rival whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
 const BETTER: f64 = 0.99;
-
-/// Standard errors of the mean difference of squared errors, row by row, that are more than chance.
-const BY_CHANCE: f64 = 2.0;
-
-/// Whether errors of the same rows are smaller in the first list, by more than chance.
-fn smaller(errors: &[f64], others: &[f64]) -> bool {
-    let apart: Vec<f64> = errors.iter().zip(others).map(|(a, b)| b * b - a * a).collect();
-    let n = apart.len().max(1) as f64;
-    let mean = apart.iter().sum::<f64>() / n;
-    let square = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n;
-    mean > BY_CHANCE * (square / n).sqrt()
-}
 
 /// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
 const SHORT_ARC: f64 = 1.0;
@@ -53,13 +38,18 @@ pub(super) struct Context<'a> {
     /// The fit to all rows.
     pub(super) extended: &'a Extended,
     /// Linearised where causes were looked for.
-    pub(super) whole: &'a Whole,
-    /// The same with its rows in folds.
-    pub(super) held: &'a Held<'a>,
+    pub(super) linear: &'a Linear,
+    pub(super) whole: &'a Design,
+    pub(super) splits: &'a [split::Split],
     pub(super) set_aside: &'a [usize],
 }
 
 impl Context<'_> {
+    /// Held-out error of a design, with columns added or not, to first order (mm).
+    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
+        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
+    }
+
     /// A finding for every story, and which finding each cause went into.
     pub(super) fn findings(
         &self,
@@ -70,34 +60,33 @@ impl Context<'_> {
         let mut findings: Vec<Finding> = Vec::new();
         let mut places = Vec::new();
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
-        let after = self.held.without(&[]).errors_mm(None, self.set_aside);
-        let judged: Vec<(f64, Finding, Picture)> = accepted
-            .par_iter()
-            .enumerate()
-            .map(|(index, own)| {
-                let later: Vec<usize> =
-                    (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
-                let step = self.held.without(&later).rmse_mm(None, self.set_aside);
-                let (finding, picture) = self.finding(index, own, &after, last);
-                (step, finding, picture)
-            })
-            .collect();
-        for (index, (step, finding, picture)) in judged.into_iter().enumerate() {
+        for (index, own) in accepted.iter().enumerate() {
             let cause = &self.extended.causes[index];
-            steps.push(Step { added: told_short(cause), cv_rmse_mm: step });
+            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+            steps.push(Step {
+                added: told_short(cause),
+                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
+            });
+            let parameters = words::parameters(self.extended, index);
+            let mergeable = cause.rows().is_none();
             let told = findings.iter().position(|f: &Finding| {
-                cause.rows().is_none()
+                mergeable
                     && f.effect == cause.name()
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
             if let Some(place) = told {
-                findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
-                findings[place].parameters.extend(finding.parameters);
+                findings[place].parameters.extend(parameters);
+                findings[place].cause = format!(
+                    "{}; {}",
+                    findings[place].cause,
+                    words::cause(cause, &words::parameters(self.extended, index), last)
+                );
                 places.push(place);
                 continue;
             }
             places.push(findings.len());
+            let (finding, picture) = self.finding(index, cause, own, parameters, last);
             findings.push(finding);
             pictures.push(picture);
         }
@@ -116,15 +105,17 @@ impl Context<'_> {
         })
     }
 
-    fn finding(&self, index: usize, own: &Accepted, after: &[f64], last: usize) -> (Finding, Picture) {
-        let after_mm = ErrorSummary::of(after.to_vec()).rmse;
-        let cause = &self.extended.causes[index];
-        let parameters = words::parameters(self.extended, index);
-        let places = self.found.places(index);
-        let without = self.whole.without(&places);
-        let held = self.held.without(&places);
-        let before_mm = held.rmse_mm(None, self.set_aside);
-        let mut predicts_better = false;
+    fn finding(
+        &self,
+        index: usize,
+        cause: &Cause,
+        own: &Accepted,
+        parameters: Vec<FoundParameter>,
+        last: usize,
+    ) -> (Finding, Picture) {
+        let without = self.linear.design(&self.found.places(index));
+        let folds = Folds::of(&without, self.splits);
+        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
         let mut alternatives: Vec<Alternative> = own
             .rivals
             .iter()
@@ -132,19 +123,18 @@ impl Context<'_> {
             .map(|rival| {
                 let columns = rival.candidate.columns(&without);
                 let sizes = rival.candidate.cause.sizes();
-                let errors = held.errors_mm(Some((&columns, &sizes)), self.set_aside);
-                let cv_rmse_mm = ErrorSummary::of(errors.clone()).rmse;
-                predicts_better |= cv_rmse_mm < BETTER * after_mm && smaller(&errors, after);
                 Alternative {
                     effect: rival.candidate.cause.name().to_owned(),
                     joints: pendant(&rival.candidate.cause.joints()),
                     rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm,
+                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
                     beaten_by: own.own.merit - rival.score.merit,
                 }
             })
             .collect();
-        let mut clear = !predicts_better && alternatives.iter().all(|a| a.beaten_by >= CLEAR);
+        let after_mm = self.held_out(self.whole, None);
+        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
+        let mut clear = alternatives.iter().all(beaten);
         if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
             alternatives.insert(
@@ -166,15 +156,18 @@ impl Context<'_> {
                     effect: map.cause.name().to_owned(),
                     joints: pendant(&map.cause.joints()),
                     rows: None,
-                    cv_rmse_mm: held
-                        .rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
+                    cv_rmse_mm: folds.rmse_mm(
+                        &without,
+                        Some((&map.columns(&without), &map.cause.sizes())),
+                        self.set_aside,
+                    ),
                     beaten_by: own.own.merit - score(&without, &map).merit,
                 });
             }
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
-        let picture = picture(self.subject, cause, &without, &self.whole.design);
+        let picture = picture(self.subject, cause, &without, self.whole);
         let finding = Finding {
             effect: cause.name().to_owned(),
             cause: words::cause(cause, &parameters, last),

@@ -52,14 +52,12 @@ pub struct Board<'a> {
     /// What is diagnosed.
     pub subject: &'a Subject<'a>,
     /// The fit.
-    pub fit: Arc<Extended>,
+    pub fit: &'a Extended,
     /// The fit linearised.
-    pub linear: Linear,
-    /// Everything free in it.
     pub whole: Whole,
     listed: Vec<Entry>,
     shifts: Vec<Shift>,
-    fine: Vec<Vec<OnceLock<Entry>>>,
+    fine: Vec<OnceLock<Entry>>,
 }
 
 /// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
@@ -67,12 +65,11 @@ const CLOSER: f64 = 10.0;
 
 impl<'a> Board<'a> {
     /// All candidates of `catalogue` against `fit`.
-    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
-        let linear = Linear::of(subject, &fit);
-        let whole = linear.whole();
+    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: &'a Extended) -> Self {
+        let whole = Linear::of(subject, fit).whole();
         let design = &whole.design;
         let listed = catalogue.listed.par_iter().map(|c| Entry::of(c, design)).collect();
-        let known = known_load(&fit).map(|kind| {
+        let known = known_load(fit).map(|kind| {
             let always = Disturbance::new(kind, Course::Always);
             Candidate::measurement(always, &subject.observed.dataset, subject.nominal)
         });
@@ -85,8 +82,8 @@ impl<'a> Board<'a> {
                 Some(Shift { kind: disturbance.kind.clone(), strip })
             })
             .collect();
-        let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
-        Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
+        let fine = catalogue.fine.iter().map(|_| OnceLock::new()).collect();
+        Self { catalogue, subject, fit, whole, listed, shifts, fine }
     }
 
     /// All candidates against `design`, which is the whole one or a part of it, best first. Without `open` only the listed
@@ -126,10 +123,9 @@ impl<'a> Board<'a> {
         let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
         let fine: Vec<&Entry> = mapped
             .into_iter()
-            .filter_map(|(joint, level)| {
-                let candidate = self.catalogue.fine[joint].get(level)?;
-                let entry = &self.fine[joint][level];
-                Some(entry.get_or_init(|| Entry::of(candidate, &self.whole.design)))
+            .map(|joint| {
+                let candidate = &self.catalogue.fine[joint];
+                self.fine[joint].get_or_init(|| Entry::of(candidate, &self.whole.design))
             })
             .collect();
         out.par_extend(open.par_iter().map(|candidate| {

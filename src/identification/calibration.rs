@@ -222,39 +222,6 @@ impl Calibration {
         }
     }
 
-    /// Jᵀr at `x`, p, priors not included: what a step needs of the rows where their normal matrix is known.
-    pub fn gradient(&self, x: &[f64]) -> DVector<f64> {
-        let state = kernel::State::of(self, x);
-        let (p, c) = (self.parameters.len(), self.components());
-        let parts: Vec<DVector<f64>> = self
-            .blocks()
-            .into_par_iter()
-            .map_init(
-                || vec![0.0; (p + 1) * c * BLOCK_LANES * WIDTH],
-                |buffer, (from, lanes)| {
-                    let rows = c * lanes * WIDTH;
-                    let columns = &mut buffer[..(p + 1) * rows];
-                    self.fill(&state, from, lanes, true, columns);
-                    let (jacobian, residual) = columns.split_at(p * rows);
-                    let jacobian = MatRef::from_column_major_slice(jacobian, rows, p);
-                    let residual = MatRef::from_column_major_slice(residual, rows, 1);
-                    let mut out = DVector::zeros(p);
-                    let place = MatMut::from_column_major_slice_mut(out.as_mut_slice(), p, 1);
-                    faer::linalg::matmul::matmul(
-                        place,
-                        Accum::Replace,
-                        jacobian.transpose(),
-                        residual,
-                        1.0,
-                        Par::Seq,
-                    );
-                    out
-                },
-            )
-            .collect();
-        parts.iter().fold(DVector::zeros(p), |sum, part| sum + part)
-    }
-
     /// Fills columns of residuals (last) and Jacobian for `lanes` groups of eight rows from group `from`:
     /// `out[(k · components + c) · (8 · lanes) + i]`, k = p for the residual.
     fn fill(&self, state: &kernel::State, from: usize, lanes: usize, jacobian: bool, out: &mut [f64]) {

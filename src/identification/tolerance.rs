@@ -108,11 +108,7 @@ pub fn effect_sigma(effect: &Effect, parameter: usize) -> f64 {
         },
         Effect::GearEccentricity(_) | Effect::GearTransmission(_) => 0.2_f64.to_radians(),
         // The same curve over more knots, each of them smaller.
-        // The same curve whatever its knots; what only more than seventy can follow is finer in size too.
-        Effect::GearMap(map) => {
-            let knots = map.knots_rad.len().max(1) as f64;
-            0.05_f64.to_radians() * (24.0 / knots).sqrt() * (72.0 / knots).min(1.0).powf(1.5)
-        }
+        Effect::GearMap(map) => 0.05_f64.to_radians() * (24.0 / map.knots_rad.len().max(1) as f64).sqrt(),
         Effect::GearRatio(_) | Effect::JointCoupling(_) => 3e-3,
         Effect::Backlash(_) => 0.2_f64.to_radians(),
         Effect::ThermalDrift(_) => 1e-3,
