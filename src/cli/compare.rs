@@ -66,7 +66,7 @@ struct Measured {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.list {
-        say(&format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
+        say(format::terminal::document(&view::list(&Experiment::shipped()?), width()))?;
         return Ok(Ending::Done);
     }
     let name = arguments.experiment.as_deref().unwrap_or_default();

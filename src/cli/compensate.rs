@@ -289,7 +289,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         eprintln!("note: {note}");
     }
     if done.row.ended == Ended::Already {
-        say(&format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
+        say(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
         return Ok(Ending::Flagged);
     }
     if let Some(path) = &arguments.diff {

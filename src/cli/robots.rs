@@ -19,12 +19,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     match &arguments.name {
         Some(name) => {
             let robot = inputs::robot(name)?;
-            say(&format::terminal::document(&view::document(&robot), width()))?;
+            say(format::terminal::document(&view::document(&robot), width()))?;
         }
         None => {
             let all = robots::catalogue();
             let sheets = all.iter().map(|name| robots::load(name)).collect::<Result<Vec<_>, _>>()?;
-            say(&format::terminal::table(&view::catalogue_table(&sheets), width()))?;
+            say(format::terminal::table(&view::catalogue_table(&sheets), width()))?;
         }
     }
     Ok(Ending::Done)
