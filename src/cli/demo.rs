@@ -38,7 +38,7 @@ const DATA: &[u8] = include_bytes!("../../tests/data/irb120-cable.csv");
 const RECIPE: &str = include_str!("../../tests/data/irb120-cable.toml");
 
 /// How the arm is called that has the causes found beside its geometry.
-const DIAGNOSED: &str = "with causes";
+const DIAGNOSED: &str = "diagnosed";
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
@@ -88,8 +88,6 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let work = Work::start("asking what geometry does not explain");
     let mut asked = diagnosis::diagnose::Options::default();
     asked.selection.seed = seed;
-    // The priors of the methods beside it.
-    asked.tolerance = Tolerance::default();
     let causes = diagnose::diagnosed(&dataset, &robot.sheet.name, nominal, &asked, &|step| work.tell(step))?;
     let mut arms: Vec<(&str, &Estimated)> = vec![(DIAGNOSED, &causes.estimated)];
     arms.extend(found.iter().map(|one| (one.estimated.provenance.method.as_str(), &one.estimated)));

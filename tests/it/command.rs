@@ -543,7 +543,7 @@ fn the_demo_goes_the_whole_way_and_the_causes_it_finds_straighten_the_path() {
         let line = table.lines().find(|line| line.starts_with(row)).unwrap_or_else(|| panic!("{row}: {out}"));
         line.split_whitespace().last().unwrap().parse().unwrap()
     };
-    let (before, geometry, causes) = (shape("before"), shape("lm, "), shape("with causes, "));
+    let (before, geometry, causes) = (shape("before"), shape("lm, "), shape("diagnosed, "));
     assert!(before > 0.3 && geometry < 0.3 * before, "{before} to {geometry}");
     assert!(causes < 0.6 * geometry, "{geometry} to {causes}");
     // By the files that it wrote nothing is refused or flagged.
