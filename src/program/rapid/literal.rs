@@ -27,27 +27,7 @@ type Rest<'s, O> = IResult<&'s [u8], O, ()>;
 
 /// Reads an aggregate of aggregates of numbers with the given group lengths. Bytes after it are ignored.
 pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
-    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
-    let mut count = 0;
-    let mut rest = symbol(b'[')(text).ok()?.0;
-    for (index, &length) in shape.iter().enumerate() {
-        if index > 0 {
-            rest = symbol(b',')(rest).ok()?.0;
-        }
-        rest = symbol(b'[')(rest).ok()?.0;
-        for position in 0..length {
-            if position > 0 {
-                rest = symbol(b',')(rest).ok()?.0;
-            }
-            let start = trivia(rest);
-            let (after, value) = signed(start).ok()?;
-            found.values[count] = value;
-            found.spans[count] = ((text.len() - start.len()) as u32, (text.len() - after.len()) as u32);
-            count += 1;
-            rest = after;
-        }
-        rest = symbol(b']')(rest).ok()?.0;
-    }
+    let (found, _, rest) = groups(text, shape, |number| signed(number).ok())?;
     symbol(b']')(rest).ok()?;
     Some(found)
 }
@@ -55,8 +35,20 @@ pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
 /// Where the first numbers of a literal stand whose values are known: [`numbers`] without reading them again. `shape` are
 /// the groups that they fill.
 pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
-    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
+    let passed = |number| Some((lexer::number(unsigned(number).0).ok()?.0, 0.0));
+    let (mut found, count, _) = groups(text, shape, passed)?;
     found.values.get_mut(..values.len())?.copy_from_slice(values);
+    (count == values.len()).then_some(found)
+}
+
+/// The groups of an aggregate, each number taken by `read`; how many there are, and the bytes after the last group.
+#[inline]
+fn groups<'s>(
+    text: &'s [u8],
+    shape: &[usize],
+    read: impl Fn(&'s [u8]) -> Option<(&'s [u8], f64)>,
+) -> Option<(Numbers, usize, &'s [u8])> {
+    let mut found = Numbers { values: [0.0; 17], spans: [(0, 0); 17] };
     let mut count = 0;
     let mut rest = symbol(b'[')(text).ok()?.0;
     for (index, &length) in shape.iter().enumerate() {
@@ -69,14 +61,15 @@ pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
                 rest = symbol(b',')(rest).ok()?.0;
             }
             let start = trivia(rest);
-            let after = lexer::number(unsigned(start).0).ok()?.0;
+            let (after, value) = read(start)?;
+            found.values[count] = value;
             found.spans[count] = ((text.len() - start.len()) as u32, (text.len() - after.len()) as u32);
             count += 1;
             rest = after;
         }
         rest = symbol(b']')(rest).ok()?.0;
     }
-    (count == values.len()).then_some(found)
+    Some((found, count, rest))
 }
 
 /// White space and comments.
