@@ -33,7 +33,7 @@ pub const LONGEST: usize = 2000;
 /// Deepest nesting that is read.
 pub const DEEPEST: usize = 60;
 /// Most terms of a second derivative.
-pub const MOST_TERMS: f64 = 6000.0;
+pub const MOST_TERMS: f64 = 80_000.0;
 /// The functions an equation may use.
 pub const FUNCTIONS: [&str; 14] = [
     "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "ln", "log10", "sqrt", "abs",
