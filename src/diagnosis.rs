@@ -3,7 +3,7 @@
 //! The way of a diagnosis:
 //!
 //! 1. [`rows`]: rounded angles are sharpened by the read-out, rows whose own columns contradict each other are noted.
-//! 2. [`extension`]: a robust fit of frames, links and the causes accepted so far.
+//! 2. [`extension`]: a robust fit of frames, links and the causes accepted so far, by steps of [`newton`] where one is nearby.
 //! 3. [`design`]: that fit linearised and whitened, with frames, links and accepted causes projected off.
 //! 4. [`catalogue`]: every candidate cause as regressors; [`intervals`] finds the rows of shifts, [`lines`] the orders of
 //!    reducer lines.
@@ -17,14 +17,16 @@
 //!    explains; rounding and contradicting columns; what the rows cannot show.
 //! 9. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
+//! Products and factors of large matrices are in `algebra`.
+//!
 //! Every candidate's size prior takes part in its evidence, so a candidate with many parameters has to earn them.
 
 pub mod rows;
 pub mod cause;
 pub mod catalogue;
-mod newton;
-pub mod extension;
 mod algebra;
+pub mod newton;
+pub mod extension;
 pub mod design;
 pub mod held;
 pub mod score;

@@ -57,7 +57,7 @@
 
 pub mod problem;
 pub mod estimate;
-mod objective;
+pub(crate) mod objective;
 pub mod least_squares;
 pub mod filter;
 pub mod swarm;

@@ -16,12 +16,11 @@ use super::selection::Accepted;
 use super::words;
 use crate::kinematics::effect::Effect;
 use crate::kinematics::effect::map::JointMap;
-use crate::math::statistics::ErrorSummary;
 
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
 
-/// A rival whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
+/// A rival, the arm without the finding among them, whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
 const BETTER: f64 = 0.99;
 
 /// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
@@ -57,7 +56,7 @@ impl Context<'_> {
         let mut findings: Vec<Finding> = Vec::new();
         let mut places = Vec::new();
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
-        let after = self.held.without(&[]).errors_mm(None, self.set_aside);
+        let after_mm = self.held.without(&[]).rmse_mm(None, self.set_aside);
         let judged: Vec<(f64, Finding, Picture)> = accepted
             .par_iter()
             .enumerate()
@@ -65,7 +64,7 @@ impl Context<'_> {
                 let later: Vec<usize> =
                     (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
                 let step = self.held.without(&later).rmse_mm(None, self.set_aside);
-                let (finding, picture) = self.finding(index, own, &after, last);
+                let (finding, picture) = self.finding(index, own, after_mm, last);
                 (step, finding, picture)
             })
             .collect();
@@ -103,15 +102,13 @@ impl Context<'_> {
         })
     }
 
-    fn finding(&self, index: usize, own: &Accepted, after: &[f64], last: usize) -> (Finding, Picture) {
-        let after_mm = ErrorSummary::of(after.to_vec()).rmse;
+    fn finding(&self, index: usize, own: &Accepted, after_mm: f64, last: usize) -> (Finding, Picture) {
         let cause = &self.extended.causes[index];
         let parameters = words::parameters(self.extended, index);
         let places = self.found.places(index);
         let without = self.whole.without(&places);
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);
-        let mut predicts_better = false;
         let mut alternatives: Vec<Alternative> = own
             .rivals
             .iter()
@@ -119,20 +116,20 @@ impl Context<'_> {
             .map(|rival| {
                 let columns = rival.candidate.columns(&without);
                 let sizes = rival.candidate.cause.sizes();
-                let errors = held.errors_mm(Some((&columns, &sizes)), self.set_aside);
-                let cv_rmse_mm = ErrorSummary::of(errors.clone()).rmse;
-                predicts_better |= cv_rmse_mm < BETTER * after_mm;
                 Alternative {
                     effect: rival.candidate.cause.name().to_owned(),
                     joints: pendant(&rival.candidate.cause.joints()),
                     rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm,
+                    cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
                     beaten_by: own.own.merit - rival.score.merit,
                 }
             })
             .collect();
-        let mut clear = !predicts_better && alternatives.iter().all(|a| a.beaten_by >= CLEAR);
-        if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
+        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
+        let mut clear = alternatives.iter().all(beaten);
+        // Held-out rows that are told better without the finding do not confirm it, however well it explains the others.
+        let unconfirmed = before_mm < BETTER * after_mm;
+        if unconfirmed || own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
             alternatives.insert(
                 0,

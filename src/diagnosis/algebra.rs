@@ -143,7 +143,8 @@ pub(super) fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::identity(n, n)
 }
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one with entries that are no numbers.
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one with entries that are no numbers. One thread: faer is
+/// built without any of its own.
 pub(super) fn eigen(a: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = a.nrows();
     let found = shown(a).self_adjoint_eigen(faer::Side::Lower).ok()?;

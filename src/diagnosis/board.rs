@@ -134,8 +134,12 @@ impl<'a> Board<'a> {
             .into_par_iter()
             .filter_map(|(joint, level)| {
                 let candidate = self.catalogue.fine[joint].get(level)?;
-                let entry = &self.fine[joint][level];
-                Some(entry.get_or_init(|| Entry::of(candidate, &self.whole.design)))
+                let place = &self.fine[joint][level];
+                // Not under the lock: the products hand out work, and who waits for it may come by here again.
+                if place.get().is_none() {
+                    let _ = place.set(Entry::of(candidate, &self.whole.design));
+                }
+                place.get()
             })
             .collect();
         let columns: Vec<_> = open.par_iter().map(|c| c.columns(design)).collect();

@@ -23,6 +23,7 @@ use crate::kinematics::effect::{Effect, Statics};
 use crate::kinematics::model::Model;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::split;
 
 /// A cause with its regressors.
 #[derive(Debug, Clone)]
@@ -219,20 +220,24 @@ const COUPLINGS: [(usize, usize); 10] =
 
 /// Knots of an error map over a turn: a smooth curve.
 pub const MAP_KNOTS: usize = 24;
-/// Knots of those that follow the periods of a reducer's stages, tried where lines of the joint stand out that they reach.
-const FINE_KNOTS: [usize; 2] = [72, 144];
+/// Maps that follow the periods of a reducer's stages, tried where lines of the joint stand out within their reach: knots, and
+/// the highest order that they follow, for which a cubic spline needs nearly two and a half knots.
+pub const FINE: [(usize, usize); 2] = [(72, 30), (144, 60)];
 
 /// Poses for each knot of the finest map: with fewer, its lines one by one say as much.
 const POSES_PER_KNOT: usize = 10;
 
-/// The finely resolved error maps of a joint, coarsest first.
+/// The finely resolved error maps of a joint, coarsest first: those of [`FINE`] for which there are poses enough.
 pub fn fine_maps(subject: &Subject<'_>, joint: usize) -> Vec<Candidate> {
     let dataset = &subject.observed.dataset;
-    let [fine, finest] = FINE_KNOTS;
-    let knots = if dataset.rows.len() >= POSES_PER_KNOT * finest { vec![fine, finest] } else { vec![fine] };
-    knots
-        .into_iter()
-        .map(|knots| {
+    let enough = |knots: usize| {
+        let needed = POSES_PER_KNOT * knots;
+        dataset.rows.len() >= needed && split::poses(dataset).len() >= needed
+    };
+    FINE.iter()
+        .enumerate()
+        .take_while(|(level, (knots, _))| *level == 0 || enough(*knots))
+        .map(|(_, &(knots, _))| {
             let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
             Candidate::arm(effect, dataset, subject.nominal)
         })

@@ -228,7 +228,8 @@ impl Linear {
         Whole { design, lower, x: x - step }
     }
 
-    /// The design of the model without the parameters at `dropped`, with a basis of its own.
+    /// The design of the model without the parameters at `dropped`, with a basis of its own: what [`Whole::without`] is
+    /// compared with.
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
@@ -284,7 +285,7 @@ impl Whole {
 impl Design {
     /// The design of a whole fit.
     pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
-        Linear::of(subject, fit).design(&[])
+        Linear::of(subject, fit).whole().design
     }
 
     /// Columns against everything that is already free.
@@ -393,28 +394,11 @@ impl Design {
     }
 }
 
-/// Observations that one thread linearises.
-const CHUNK: usize = 64;
-
 /// Whitened residuals of a task at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
 fn linearised(task: &Calibration, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
-    let (p, n) = (x.len(), task.rows());
-    let chunk = CHUNK * task.rows_per_observation();
-    let (mut residual, mut rows) = (DVector::zeros(n), DMatrix::zeros(p, n));
-    residual
-        .as_mut_slice()
-        .par_chunks_mut(chunk)
-        .zip(rows.as_mut_slice().par_chunks_mut((chunk * p).max(1)))
-        .enumerate()
-        .for_each(|(k, (residual, rows))| {
-            let m = residual.len();
-            let mut jacobian = vec![0.0; m * p];
-            task.jacobian(x, k * chunk..k * chunk + m, residual, &mut jacobian);
-            residual.iter_mut().for_each(|r| *r = finite(*r));
-            for (i, row) in rows.chunks_exact_mut(p).enumerate() {
-                row.iter_mut().enumerate().for_each(|(k, v)| *v = finite(jacobian[k * m + i]));
-            }
-        });
+    let (mut residual, mut rows) = task.linearised(x);
+    residual.apply(|v| *v = finite(*v));
+    rows.apply(|v| *v = finite(*v));
     (residual, rows)
 }
 

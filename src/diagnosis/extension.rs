@@ -71,7 +71,7 @@ pub struct Extended {
     pub weights: Vec<Weight>,
     /// Standard deviation of a reading (mm), and of an orientation (rad).
     pub sigma: (f64, f64),
-    /// What the solver said, with the covariance of the parameters.
+    /// What the solver said, with the covariance of the parameters; without it in the middle of a search.
     pub estimate: Estimate,
 }
 
@@ -159,7 +159,8 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
     approached(subject, causes, freedom, near).polished()
 }
 
-/// The same for a search: near another fit to a small part of χ², and without a covariance.
+/// The same for a search: where `near` is near enough for Gauss and Newton, as close to the optimum as they stop, and without a
+/// covariance.
 pub(super) fn approached(
     subject: &Subject<'_>,
     causes: &[Cause],
@@ -187,7 +188,7 @@ pub(super) fn approached(
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
         let task = plain_task.reweighted(&trusted(&base, &trust));
-        let step = if nearby { Step::taken(&task, &priors, &mut x) } else { None };
+        let step = if nearby { Step::taken(&task, &mut x) } else { None };
         let mut covariance = None;
         nearby = step.is_some();
         if !nearby {
@@ -262,7 +263,7 @@ pub(super) fn approached(
                 })
                 .collect();
             let task = plain_task.reweighted(&trusted(&weights, &trust));
-            let estimate = if nearby && newton::descend(&task, &priors, &mut x) {
+            let estimate = if nearby && newton::descend(&task, &mut x) {
                 Estimate {
                     covariance: None,
                     cost: task.row_cost(&x) + prior_cost(&priors, &x),

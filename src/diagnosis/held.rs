@@ -36,7 +36,7 @@ pub struct Held<'a> {
 }
 
 /// A fold's normal matrix, factored, and L⁻¹ of its gradient.
-type Solved = Option<(DMatrix<f64>, DVector<f64>)>;
+type Factored = Option<(DMatrix<f64>, DVector<f64>)>;
 
 /// The model without some of its parameters, every fold of it solved.
 #[derive(Debug, Clone)]
@@ -44,7 +44,7 @@ pub struct Reduced<'a> {
     held: &'a Held<'a>,
     kept: Vec<usize>,
     residual: DVector<f64>,
-    solved: Vec<Solved>,
+    solved: Vec<Factored>,
 }
 
 /// Columns of a candidate with the standard deviations of its parameters.
@@ -137,7 +137,8 @@ impl Reduced<'_> {
         for (fold, residuals) in self.held.folds.iter().zip(self.residuals(added)) {
             for (scalars, r) in fold.out[..fold.judged].chunks(per).zip(residuals.as_slice().chunks(per)) {
                 if !set_aside.contains(&(scalars[0] / per)) {
-                    let square = scalars.iter().zip(r).map(|(&s, r)| (r * mm[s]).powi(2));
+                    let lengths = scalars.iter().zip(r).filter(|(s, _)| mm[**s] > 0.0);
+                    let square = lengths.map(|(&s, r)| (r * mm[s]).powi(2));
                     errors.push(square.sum::<f64>().sqrt());
                 }
             }
@@ -158,7 +159,8 @@ impl Reduced<'_> {
             .zip(&self.solved)
             .map(|(fold, solved)| {
                 let residual = picked(&self.residual, &fold.out);
-                let Some((lower, half)) = solved else { return residual * f64::INFINITY };
+                let unknown = || DVector::from_element(fold.out.len(), f64::INFINITY);
+                let Some((lower, half)) = solved else { return unknown() };
                 let (mut half, mut moved) = (half.clone(), residual.clone());
                 if let (Some((columns, sizes)), Some((shared, square, gradient))) = (added, &whole) {
                     let own = columns.select_rows(&fold.out);
@@ -169,13 +171,13 @@ impl Reduced<'_> {
                         (shared, square, gradient),
                         (&own, sizes, &residual),
                     ) else {
-                        return residual * f64::INFINITY;
+                        return unknown();
                     };
                     half.gemv(1.0, &border, &size, 1.0);
                     moved.gemv(1.0, &own, &size, 1.0);
                 }
                 let Some(step) = lower.tr_solve_lower_triangular(&half) else {
-                    return residual * f64::INFINITY;
+                    return unknown();
                 };
                 let mut full = DVector::zeros(linear.x.len());
                 self.kept.iter().zip(step.iter()).for_each(|(&k, s)| full[k] = -s);
@@ -198,7 +200,7 @@ impl Reduced<'_> {
         let border = solved(lower, cross);
         let mut left = square - gram(own) - gram(&border);
         for (k, size) in sizes.iter().enumerate() {
-            left[(k, k)] += size.powi(-2);
+            left[(k, k)] = (left[(k, k)] + size.powi(-2)) * (1.0 + 1e-12);
         }
         let slope = gradient - own.tr_mul(residual) - border.tr_mul(half);
         let size = left.cholesky()?.solve(&slope);

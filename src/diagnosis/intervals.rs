@@ -110,8 +110,8 @@ fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usi
     let mut out = DMatrix::zeros(p, k * cuts.len());
     let mut at = 0;
     for (c, &cut) in cuts.iter().enumerate() {
-        let (rows, first) = (at * per, (cut - at) * per);
-        let (basis, scaled) = (basis.columns(rows, first), scaled.rows(rows, first));
+        let (first, count) = (at * per, (cut - at) * per);
+        let (basis, scaled) = (basis.columns(first, count), scaled.rows(first, count));
         let (before, mut place) =
             out.columns_range_pair_mut(c.saturating_sub(1) * k..c * k, c * k..(c + 1) * k);
         if c > 0 {

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::catalogue::{Candidate, STILL_RAD};
+use super::catalogue::{Candidate, FINE, STILL_RAD};
 use super::design::Design;
 use super::extension::Subject;
 use crate::kinematics::effect::Effect;
@@ -16,9 +16,6 @@ use crate::kinematics::effect::harmonic::Harmonic;
 /// Orders 3 to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
 pub const HIGHEST: usize = 330;
 
-/// Highest orders that fine maps can follow: a cubic spline needs nearly two and a half knots for each period.
-const MAPPED: [usize; 2] = [30, 60];
-
 /// A line's χ² from which a fine map is worth a try.
 const STANDS_OUT: f64 = 25.0;
 
@@ -26,7 +23,7 @@ const STANDS_OUT: f64 = 25.0;
 const KEPT: usize = 2;
 
 /// The strongest lines of every joint as candidates, and the joints in which lines within the reach of a fine map stand
-/// out, with the coarsest map that follows them.
+/// out, each with the place in [`FINE`] of the coarsest map that follows them.
 pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Vec<(usize, usize)>) {
     let dataset = &subject.observed.dataset;
     let n = design.observations;
@@ -67,7 +64,7 @@ pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Ve
     let mut mapped: Vec<(usize, usize)> = strongest
         .iter()
         .filter(|(size, ..)| *size > STANDS_OUT)
-        .filter_map(|(_, joint, order)| Some((*joint, MAPPED.iter().position(|reach| order <= reach)?)))
+        .filter_map(|(_, joint, order)| Some((*joint, FINE.iter().position(|(_, reach)| order <= reach)?)))
         .collect();
     mapped.sort_unstable();
     mapped.dedup();

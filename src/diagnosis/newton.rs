@@ -1,63 +1,68 @@
-//! Gauss–Newton steps near an optimum: what a search needs of a fit, and a fold of its refit.
+//! Gauss–Newton from nearby: what a search needs of a fit, and a fold of its refit.
 //!
-//! With N = JᵀWJ + Λ and g = JᵀWr + Λ(x − m), a step is x ← x − t N⁻¹g, t the first of 1, 1/2, 1/4, 1/8 that does not raise the
-//! cost. Near an optimum with fixed weights a step leaves little, so that one pass over the rows with derivatives and one
-//! without make a step, and no covariance is paid for. Where no step lowers the cost, the caller goes on with Levenberg and
-//! Marquardt.
+//! **Method.** With N = JᵀWJ + Λ and g = JᵀWr + Λ(x − m), x ← x − t N⁻¹g, t the first of 1, 1/2, 1/4, 1/8 that does not raise
+//! the cost. A step is judged by its cost alone, and no covariance is computed: one pass over the rows with derivatives and one
+//! without make a step.
+//!
+//! **Shapes.** x, m and g have p entries, N is p × p; priors are the task's own.
+//!
+//! **Stops.** Where a step promises less than 10⁻⁷ for each scalar row, in units of χ²/2, or where the fall from the step before
+//! to this one says so of the next. Not at all where no length lowers the cost, or after eight steps: the caller then goes on
+//! with Levenberg and Marquardt.
+//!
+//! **Source and departures.** Nocedal and Wright, *Numerical Optimization*, 2nd ed., §10.3. Other than
+//! [`gauss_newton`](crate::estimation::least_squares::gauss_newton) it stops at an absolute promise: scores of candidates are
+//! compared by differences of χ² of about 1, and what is left over is far below.
+//!
+//! **Checked against** Levenberg–Marquardt on a fit with effects.
 
 use nalgebra::DMatrix;
 
 use super::algebra::{back_and_forth, factored, solved};
-use crate::estimation::problem::{Prior, Problem, prior_cost};
+use crate::estimation::objective::Objective;
+use crate::estimation::problem::{Prior, Problem};
 
-/// A task counts as solved where a step promises less than this for each scalar row, in units of χ²/2: what tells two
-/// candidates apart is some thousands of rows times as much.
+/// Promise for each scalar row below which a task counts as solved.
 const NEAR: f64 = 1e-7;
 
-/// Most steps of [`descend`].
+/// Most steps.
 const STEPS: usize = 8;
 
 /// A cost may rise by this share, which is rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// How often a step that raises the cost is halved.
-const HALVINGS: usize = 4;
+/// Lengths that are tried, each half of the one before.
+const LENGTHS: usize = 4;
 
-/// A step that was taken.
+/// A step from x, or the finding that x is where it should be.
 pub(super) struct Step {
     /// L of N = L Lᵀ before the step.
     lower: DMatrix<f64>,
     /// Fall of the cost that the whole step promised.
     promise: f64,
-    /// t.
+    /// t, or 0 where the promise is less than what costs can be told apart by.
     length: f64,
 }
 
 impl Step {
-    /// Takes a step of `x`; `None` where it would raise the cost, or where N is not positive definite: `x` then stays.
-    pub(super) fn taken(task: &dyn Problem, priors: &[Prior], x: &mut Vec<f64>) -> Option<Self> {
-        let mut normal = task.normal_equations(x);
-        for (k, prior) in priors.iter().enumerate() {
-            normal.matrix[(k, k)] += prior.sigma.powi(-2);
-            normal.gradient[k] += prior.sigma.powi(-2) * (x[k] - prior.mean);
-        }
-        let before = normal.cost + prior_cost(priors, x);
+    /// Moves `x`; `None` where the cost would rise, or where N is not positive definite: `x` then stays.
+    pub(super) fn taken(task: &dyn Problem, x: &mut Vec<f64>) -> Option<Self> {
+        let mut objective = Objective::new(task, x, true);
+        let normal = objective.normal_equations(x);
         let mut lower = normal.matrix;
         factored(&mut lower).then_some(())?;
         let step = back_and_forth(&lower, &normal.gradient)?;
         let promise = 0.5 * step.dot(&normal.gradient);
         let mut length = 1.0;
-        for _ in 0..HALVINGS {
+        for _ in 0..LENGTHS {
             let there: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x - length * s).collect();
-            let after = task.row_cost(&there) + prior_cost(priors, &there);
             // A cost that is no number is no lower one.
-            if after <= before * (1.0 + ROUNDING) {
+            if objective.cost(&there) <= normal.cost * (1.0 + ROUNDING) {
                 *x = there;
                 return Some(Self { lower, promise, length });
             }
             length *= 0.5;
         }
-        // What is promised is less than what the cost can be told by.
         (promise < NEAR * task.rows() as f64).then_some(Self { lower, promise, length: 0.0 })
     }
 
@@ -70,13 +75,12 @@ impl Step {
     }
 }
 
-/// Steps until the optimum is reached; `false` where that did not come about.
-pub(super) fn descend(task: &dyn Problem, priors: &[Prior], x: &mut Vec<f64>) -> bool {
+/// Moves `x` to the optimum; `false` where that did not come about.
+pub fn descend(task: &dyn Problem, x: &mut Vec<f64>) -> bool {
     let enough = NEAR * task.rows() as f64;
     let mut last = 0.0;
     for _ in 0..STEPS {
-        let Some(step) = Step::taken(task, priors, x) else { return false };
-        // Whole steps fall by a steady share at worst: the next would promise this.
+        let Some(step) = Step::taken(task, x) else { return false };
         let falls = step.length >= 1.0 && step.promise < last;
         if step.promise < enough || (falls && step.promise * step.promise / last < enough) {
             return true;

@@ -255,7 +255,7 @@ fn next<'a>(
     let held = Held::of(&board.linear, splits[0]);
     let random = held.without(&[]);
     let before = random.squares(None);
-    let (held, blocks) = (OnceCell::new(), OnceCell::new());
+    let (in_blocks, blocks) = (OnceCell::new(), OnceCell::new());
     significant.find(|scored| {
         let columns = scored.candidate.columns(design);
         let sizes = scored.candidate.cause.sizes();
@@ -263,7 +263,7 @@ fn next<'a>(
         let local = scored.candidate.cause.rows().is_some();
         let on_blocks = || {
             let (blocks, before) = blocks.get_or_init(|| {
-                let blocks = held.get_or_init(|| Held::of(&board.linear, splits[1])).without(&[]);
+                let blocks = in_blocks.get_or_init(|| Held::of(&board.linear, splits[1])).without(&[]);
                 let before = blocks.squares(None);
                 (blocks, before)
             });

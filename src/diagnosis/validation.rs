@@ -70,9 +70,9 @@ impl Validation {
         StageError { fitted, random, blocks }
     }
 
-    /// RMSE over the random folds.
+    /// RMSE over the random folds alone, refitted in full.
     pub fn random_rmse(&self, fit: &Extended) -> f64 {
-        self.stage(fit).random.rmse
+        self.held_out(fit, &self.random).rmse
     }
 
     /// Errors over random folds and blocks, every fold refitted in full.
@@ -150,7 +150,7 @@ impl Validation {
                     &weights,
                 );
                 let mut x = fit.x.clone();
-                if !newton::descend(&task, &fit.priors, &mut x) {
+                if !newton::descend(&task, &mut x) {
                     x = SOLVERS[0].solve(&task, &x, 0).x;
                 }
                 let (model, frames) = task.apply(&x);

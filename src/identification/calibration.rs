@@ -202,18 +202,45 @@ impl Calibration {
     /// position (reading minus model, in the base), then rad for the orientation of a pose. One entry per scalar row.
     pub fn plain_residuals(&self, x: &[f64]) -> Vec<f64> {
         let per = self.rows_per_observation();
+        let state = kernel::State::of(self, x);
         let mut out = vec![0.0; self.rows()];
-        let chunk = COST_LANES * WIDTH * per;
-        out.par_chunks_mut(chunk).enumerate().for_each(|(k, out)| {
+        let chunk = COST_LANES * WIDTH;
+        out.par_chunks_mut(chunk * per).enumerate().for_each(|(k, out)| {
             let first = k * chunk;
-            self.residuals(x, first..first + out.len(), out);
+            self.scatter(&state, first..first + out.len() / per, Some(out), None);
             for (i, r) in out.iter_mut().enumerate() {
-                let (row, component) = ((first + i) / per, i % per);
+                let (row, component) = (first + i / per, i % per);
                 let weight = if component < 3 { &self.columns.per_mm } else { &self.columns.per_rad }[row];
                 *r /= weight;
             }
         });
         out
+    }
+
+    /// Residuals at `x`, n, and the Jacobian transposed, p × n, rows in the order of the trait.
+    ///
+    /// # Panics
+    /// Where nothing may move.
+    pub fn linearised(&self, x: &[f64]) -> (DVector<f64>, nalgebra::DMatrix<f64>) {
+        let state = kernel::State::of(self, x);
+        let (p, n, per) = (self.parameters.len(), self.rows(), self.components());
+        assert!(p > 0, "a task without parameters has no Jacobian");
+        let chunk = COST_LANES * WIDTH;
+        let (mut residuals, mut transposed) = (DVector::zeros(n), nalgebra::DMatrix::zeros(p, n));
+        residuals
+            .as_mut_slice()
+            .par_chunks_mut(chunk * per)
+            .zip(transposed.as_mut_slice().par_chunks_mut(chunk * per * p))
+            .enumerate()
+            .for_each(|(k, (residuals, transposed))| {
+                let (first, rows) = (k * chunk, residuals.len());
+                let mut jacobian = vec![0.0; rows * p];
+                self.scatter(&state, first..first + rows / per, Some(residuals), Some(&mut jacobian));
+                for (i, row) in transposed.chunks_exact_mut(p).enumerate() {
+                    row.iter_mut().enumerate().for_each(|(k, v)| *v = jacobian[k * rows + i]);
+                }
+            });
+        (residuals, transposed)
     }
 
     /// The size of each row's position error at `x` (mm): signed for a cable, the norm otherwise.
@@ -244,7 +271,7 @@ impl Calibration {
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
 
-/// Groups of eight rows whose cost one thread sums up: few, so that threads end together.
+/// Groups of eight rows that one thread passes over where the pass costs much: few, so that threads end together.
 const COST_LANES: usize = 16;
 
 /// Parameters with which such a buffer stays there.
@@ -304,7 +331,7 @@ impl Problem for Calibration {
         let state = kernel::State::of(self, x);
         let c = self.components();
         let parts: Vec<f64> = self
-            .blocks_of(COST_LANES)
+            .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
             .into_par_iter()
             .map(|(from, lanes)| {
                 let mut out = vec![0.0; c * lanes * WIDTH];

@@ -11,9 +11,12 @@ use truegrind::diagnosis::extension::{Extended, Freedom, Subject, fit};
 use truegrind::diagnosis::held::Held;
 use truegrind::diagnosis::intervals::scan;
 use truegrind::diagnosis::levels::disjoint;
+use truegrind::diagnosis::newton::descend;
 use truegrind::diagnosis::rows::{mismatches, prepare};
 use truegrind::diagnosis::score::score_columns;
 use truegrind::diagnosis::validation::Validation;
+use truegrind::estimation::least_squares::lm;
+use truegrind::estimation::problem::{Problem, prior_cost};
 use truegrind::kinematics::condition::Condition;
 use truegrind::math::tail::{chi_square_tail, log_chi_square_tail, normal_two_sided};
 use truegrind::measurement::dataset::Sensor;
@@ -184,6 +187,49 @@ fn a_refit_by_one_step_is_a_refit() {
             assert!(alone > 1.5 * whole, "{cause:?} makes a difference: {alone} against {whole}");
             // Regressors are taken at the nominal arm.
             assert!((back / whole - 1.0).abs() < 1e-3, "{cause:?}: {back} against {whole}");
+        }
+    });
+}
+
+#[test]
+fn gauss_newton_from_nearby_ends_where_levenberg_marquardt_does() {
+    fitted(120, |_, fitted| {
+        let task = &fitted.task;
+        // Twenty standard deviations away from the optimum.
+        let covariance = fitted.estimate.covariance.clone().unwrap();
+        let away = |k: usize| if k.is_multiple_of(2) { 20.0 } else { -20.0 } * covariance[(k, k)].sqrt();
+        let mut x: Vec<f64> = fitted.x.iter().enumerate().map(|(k, x)| x + away(k)).collect();
+        let cost = |x: &[f64]| task.row_cost(x) + prior_cost(&fitted.priors, x);
+        assert!(cost(&x) > 10.0 * fitted.estimate.cost, "{}", cost(&x));
+        assert!(descend(task, &mut x));
+        let solved = lm::solve(task, &x, &lm::Options::default());
+        assert!(cost(&x) - solved.cost < 1e-6 * task.rows() as f64, "{} and {}", cost(&x), solved.cost);
+        for (k, (a, b)) in x.iter().zip(&solved.x).enumerate() {
+            assert!(
+                (a - b).abs() < 0.02 * covariance[(k, k)].sqrt(),
+                "{:?}: {a} and {b}",
+                fitted.parameters[k]
+            );
+        }
+    });
+}
+
+#[test]
+fn columns_of_many_candidates_are_projected_as_those_of_one() {
+    fitted(90, |subject, fitted| {
+        let design = Design::of(subject, fitted);
+        let dense = |k: usize| DMatrix::from_fn(270, k, |i, a| ((i * (3 + a) + k) % 11) as f64 - 5.0);
+        // Each column reaches one row in nine: an error map's knots.
+        let sparse = DMatrix::from_fn(270, 9, |i, a| if i % 9 == a { 1.0 + i as f64 / 90.0 } else { 0.0 });
+        let all = [dense(2), sparse, dense(1)];
+        for (columns, together) in all.iter().zip(design.project_all(&all)) {
+            let shared = &*design.basis * columns;
+            let information = columns.tr_mul(columns) - shared.tr_mul(&shared);
+            let alone = design.project(columns);
+            for projected in [&together, &alone] {
+                assert!((&projected.information - &information).amax() < 1e-9 * information.amax());
+                assert!((&projected.gradient - columns.tr_mul(&design.residual)).amax() < 1e-9);
+            }
         }
     });
 }
