@@ -26,7 +26,7 @@ use crate::kinematics::model::Joints;
 use crate::kinematics::region::Outside;
 use crate::math::se3::Pose;
 use crate::program::motion::{
-    Listing, Motion, MotionKind, MotionTarget, Reason, RobTarget, Role, Switch, TargetValue,
+    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
 };
 
 /// Motions that one thread takes at a time.
@@ -394,7 +394,7 @@ struct Told<'a> {
 impl<'a> Told<'a> {
     fn of(asked: &Asked<'a>, mountings: &Mountings) -> Option<Self> {
         let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
-        let mounted = mountings.of_motion(asked.motion)?;
+        let mounted = mountings.of_motion(asked.motion).ok()?;
         if mountings.moving_base(target).is_some() {
             return None;
         }
@@ -440,7 +440,7 @@ fn start(
     mountings: &Mountings,
 ) -> Result<Start, Why> {
     let value = asked.target.value.map_err(Why::Program)?;
-    let mounted = mountings.of_motion(asked.motion).ok_or(Why::Program(Reason::ToolUnknown))?;
+    let mounted = mountings.of_motion(asked.motion)?;
     let told = &mountings.list[mounted].told;
     match value {
         TargetValue::Cartesian(t) => {

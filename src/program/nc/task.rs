@@ -131,6 +131,8 @@ pub(super) struct Lister<'t, 's> {
     once: u32,
     /// Groups that have been set so far.
     seen: u32,
+    /// What held before the subprogram that is being passed.
+    passed: Option<(State, u32)>,
     /// Whether tools come in with M6.
     changes_tools: bool,
     next_tool: Option<String>,
@@ -198,6 +200,7 @@ impl<'t, 's> Lister<'t, 's> {
             several: 0,
             once: 0,
             seen: 0,
+            passed: None,
             changes_tools: false,
             next_tool: None,
             targets: BTreeSet::new(),

@@ -15,7 +15,8 @@ use super::literal;
 use super::mark;
 use super::modal::{States, Which};
 use super::parser::parse;
-use super::symbol::{Symbols, Unit, What, only_reads};
+use super::predefined;
+use super::symbol::{Symbols, Unit, What};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
 use crate::program::motion::{
@@ -495,23 +496,9 @@ impl<'a, 's> Lister<'a, 's> {
         } else if instruction.kind == MotionKind::AbsoluteJoint {
             None
         } else {
-            self.left_by_frames(&motion)
+            self.listing.left_by_frames(&motion)
         };
         motion
-    }
-
-    fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
-        let tool = match self.listing.tool(motion).map(|tool| &tool.value) {
-            Some(Ok(tool)) => tool,
-            Some(Err(_)) => return Some(Reason::ToolUnknown),
-            None => return Some(Reason::MissingArgument),
-        };
-        match self.listing.work_object(motion).map(|work_object| &work_object.value) {
-            Some(Ok(work_object)) if !work_object.fixed => Some(Reason::MovingWorkObject),
-            Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
-            Some(Ok(_)) => None,
-            _ => Some(Reason::WorkObjectUnknown),
-        }
     }
 
     /// A call that is no motion instruction of the table but takes a target.
@@ -548,7 +535,7 @@ impl<'a, 's> Lister<'a, 's> {
                     _ => {}
                 }
             }
-        } else if !only_reads(name) || late {
+        } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
                 let Some(value) = argument.value else { continue };
                 if let Some(joints) = self.looks_like_target(unit, value) {

@@ -336,6 +336,17 @@ fn orientations_by_angles_and_by_vector() {
 }
 
 #[test]
+fn the_way_goes_past_a_subprogram_of_linuxcnc() {
+    let sub = "o<shift> sub\nG91 G1 X5\n#1=7\no<shift> endsub\n";
+    let before = "G1 X1 Y2 Z3 A0 B0 C0\n#1=4\n";
+    let found = ends(&format!("{before}{sub}X#1 Y5\n"), Dialect::LinuxCnc);
+    assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
+    // A call may leave G91 behind, and another value of #1.
+    let found = ends(&format!("{before}{sub}o<shift> call\nG1 X2 Y5 Z3\n"), Dialect::LinuxCnc);
+    assert_eq!(found[2..], [Err(Reason::Subprogram), Err(Reason::UnknownFlow)]);
+}
+
+#[test]
 fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
     let body = "G90 G1 X1 Y2 Z3 A0 B0 C0\nN10 X2\nG1 X2 Y2 Z2 A0 B0 C0\nIF [#1 GT 5] GOTO 10\nX3\n";
     let found = ends(body, Dialect::LinuxCnc);

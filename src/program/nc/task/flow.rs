@@ -4,7 +4,7 @@ use super::super::dialect::Dialect;
 use super::super::expression::{Variable, numbered};
 use super::super::syntax::Belongs;
 use super::super::token::Token;
-use super::{Lister, Said};
+use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
 
 impl Lister<'_, '_> {
@@ -92,6 +92,17 @@ impl Lister<'_, '_> {
             match &*keyword {
                 b"CALL" => self.subprogram(said, "O call"),
                 b"IF" => {}
+                b"SUB" => {
+                    self.passed = Some((self.state.clone(), self.seen));
+                    self.forget();
+                }
+                // The way goes past a subprogram; what stands in it holds only where it is called.
+                b"ENDSUB" if self.passed.is_some() => {
+                    if let Some((state, seen)) = self.passed.take() {
+                        (self.state, self.seen) = (state, seen);
+                    }
+                    self.events.push(Event::Unknown);
+                }
                 _ => self.forget(),
             }
             return true;
