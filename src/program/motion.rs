@@ -552,8 +552,8 @@ reasons! {
         Uninitialised => "declared without a value: the controller holds it",
         /// The program assigns it while it runs.
         Assigned => "assigned while the program runs",
-        /// It is given to a routine that is declared in none of the files.
-        HandedOver => "given to a routine that is declared in none of the given files and may change it",
+        /// It is given to a routine that is declared in none of the files, or called by a computed name.
+        HandedOver => "given to a routine that is not known from the given files and may change it",
         /// A function whose result is known only when the program runs (CRobT, CalcRobT, a function of the program).
         RunTimeFunction => "result of a function that is known only at run time",
         /// Offs, RelTool or arithmetic with a value that is known only at run time.

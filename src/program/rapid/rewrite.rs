@@ -158,11 +158,8 @@ impl<'r, 's> Rewriter<'r, 's> {
             .collect();
         let (mut outcomes, mut wishes, mut computed) =
             (Vec::with_capacity(changes.len()), WishesOf::new(), Vec::new());
-        for (file, all) in self.edits.iter_mut().enumerate() {
-            all.reserve(portions.iter().map(|(edits, ..)| &edits[file]));
-        }
         for (edits, mut some, wished, mut left) in portions {
-            self.edits.iter_mut().zip(&edits).for_each(|(all, some)| all.append(some));
+            self.edits.iter_mut().zip(edits).for_each(|(all, some)| all.append(some));
             outcomes.append(&mut some);
             for (place, mut more) in wished {
                 wishes.entry(place).or_default().append(&mut more);

@@ -215,8 +215,6 @@ impl<'a, 's> Lister<'a, 's> {
                 };
                 let argument = trees[unit.file as usize].node_span(node);
                 let targets = &mut motions[(literal.motion - first) as usize].targets;
-                // A hundred thousand motions: no room for targets that never come.
-                targets.reserve_exact(1);
                 targets.insert(literal.target as usize, MotionTarget { role, value, origin, argument });
             }
         });
@@ -390,6 +388,8 @@ impl<'a, 's> Lister<'a, 's> {
     ) {
         match self.literal(unit, argument) {
             Some(node) => {
+                // A hundred thousand motions: no room for targets that never come.
+                motion.targets.reserve_exact(1);
                 let motion = self.listing.motions.len() as u32;
                 self.literals.push(Literal { motion, target: before, role, unit, node, joints });
             }

@@ -28,6 +28,15 @@ impl Lister<'_, '_> {
                 .is_some_and(|number| self.anywhere || self.targets.contains(&(number as u64)))
     }
 
+    /// Whether a block holds a synchronised action of Siemens.
+    pub(super) fn is_action(&self, said: &Said<'_>) -> bool {
+        self.dialect == Dialect::Siemens
+            && said
+                .words
+                .iter()
+                .any(|word| ["WHEN", "WHENEVER", "FROM", "EVERY"].iter().any(|name| word.is(name)))
+    }
+
     /// Values of variables. One that is assigned only where a condition holds is not known from here on.
     pub(super) fn assignments(&mut self, said: &Said<'_>) {
         let conditional = said.words.iter().any(|word| word.is("IF"));
@@ -56,6 +65,7 @@ impl Lister<'_, '_> {
                 _ => continue,
             };
             let value = match word.belongs {
+                _ if self.actions => Err(Reason::Variable),
                 _ if conditional => Err(Reason::UnknownFlow),
                 Belongs::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
                 Belongs::Expression { first, end } => self.evaluated((first, end)),

@@ -19,7 +19,7 @@ pub enum How {
     Whole,
     /// One component: the node of the place that is assigned.
     Part(u32),
-    /// It is given to a routine that is declared in none of the files.
+    /// It is given to a routine that is declared in none of the files, or called by a computed name.
     HandedOver,
 }
 
