@@ -7,6 +7,7 @@ MODULE Components
   PERS tooldata tool1:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];
   PERS tooldata tool2:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];
   PERS tooldata tool3:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];
+  PERS tooldata tool4:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];
   PERS wobjdata w:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   PERS wobjdata wBelt:=[FALSE,FALSE,"CNV1",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   PERS wobjdata wGiven:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
@@ -45,6 +46,7 @@ MODULE Components
     MoveL pGiven,v100,fine,tool2;
     elsewhere2 wGiven;
     MoveL p,v100,fine,tool2\WObj:=wGiven;
+    IF CurrentPos(p,tool4) MoveL p,v100,fine,tool4;
     MToolTCPCalib j1,j2,j3,j4,tool3,nFound,nFound;
     MoveL p,v100,fine,tool3;
     ! A trap routine may raise it between any two statements.

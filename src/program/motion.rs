@@ -478,7 +478,8 @@ impl Listing {
     pub fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
-            Some(Err(Reason::Assigned | Reason::HandedOver)) => return Some(Reason::ToolAssigned),
+            Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
+            Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
             None => return Some(Reason::MissingArgument),
@@ -487,7 +488,8 @@ impl Listing {
             Some(Ok(work_object)) if !work_object.fixed => Some(Reason::MovingWorkObject),
             Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
             Some(Ok(_)) => None,
-            Some(Err(Reason::Assigned | Reason::HandedOver)) => Some(Reason::WorkObjectAssigned),
+            Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
+            Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),
         }
@@ -584,10 +586,14 @@ reasons! {
         ToolUnknown => "the value of the tool is not known",
         /// The work object's value is not known.
         WorkObjectUnknown => "the value of the work object is not known",
-        /// The program assigns the tool, or gives it to what may.
+        /// The program assigns the tool.
         ToolAssigned => "the tool is or may be assigned while the program runs",
-        /// The program assigns the work object, or gives it to what may.
+        /// The program assigns the work object.
         WorkObjectAssigned => "the work object is or may be assigned while the program runs",
+        /// The tool is given to a routine that is not known.
+        ToolHandedOver => "the tool is given to a routine that is not known from the given files and may change it",
+        /// The work object is given to a routine that is not known.
+        WorkObjectHandedOver => "the work object is given to a routine that is not known from the given files and may change it",
         /// The tool is a parameter of the routine.
         ToolParameter => "the tool is a parameter of the routine: its value comes from the caller",
         /// The work object is a parameter of the routine.

@@ -277,7 +277,7 @@ impl Parser<'_, '_> {
             }
             Token::Plus | Token::Minus if self.dialect == Dialect::Heidenhain => self.value(after),
             // GOTO#5: to a computed block.
-            Token::Hash => self.primary(),
+            Token::Hash if self.tree.text(token).to_ascii_uppercase().starts_with(b"GOTO") => self.primary(),
             _ if self.takes_condition(token) => self.expression(),
             _ if self.is_action(token) => Some(self.line(after)),
             _ => Some(after),

@@ -8,7 +8,7 @@ mod change;
 
 use std::collections::HashMap;
 
-pub use self::change::{Change, How, Reach};
+pub use self::change::{Change, Ends, How, Reach};
 use super::instruction;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
 use super::token::{Token, display, fold, folded};
@@ -111,6 +111,8 @@ pub struct RoutineScope {
     pub written: Vec<Option<Reason>>,
     /// What a call of it may change.
     pub reach: Reach,
+    /// Index into [`Symbols::units`].
+    pub unit: u32,
 }
 
 /// Statements that run together: a routine, or the statements of a fragment outside routines.
@@ -141,6 +143,10 @@ pub struct Symbols {
     pub hides_instruction: bool,
     /// What the statements of each unit may change by themselves, in order.
     pub changed: Vec<Vec<u32>>,
+    /// The units in such an order that what a routine calls stands before it, as far as none calls itself.
+    pub callees_first: Vec<u32>,
+    /// How each unit leaves the switches.
+    pub ends: Vec<Ends>,
 }
 
 impl Symbols {
@@ -188,7 +194,10 @@ impl Symbols {
 
     /// What the statements of a unit may change by themselves, in order.
     pub fn changed_in(&self, unit: Unit) -> &[u32] {
-        let at = self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node));
+        let at = match unit.routine {
+            Some(routine) => Some(self.routines[routine as usize].unit as usize),
+            None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
+        };
         at.and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
     }
 
@@ -331,7 +340,8 @@ impl Symbols {
         let written = vec![None; head.parameters.len()];
         let module = module.to_owned();
         let reach = Reach::default();
-        self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach });
+        let unit = self.units.len() as u32;
+        self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
         self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
     }
 

@@ -16,7 +16,7 @@ use super::mark;
 use super::modal::{States, Which};
 use super::parser::parse;
 use super::predefined;
-use super::symbol::{Symbols, Unit, What};
+use super::symbol::{Ends, Symbols, Unit, What};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
 use crate::program::motion::{
@@ -180,6 +180,17 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         let units = self.symbols.units.clone();
+        // What is called ends before its callers are followed, however long the chain of calls is.
+        for &unit in &self.symbols.callees_first {
+            let Some(routine) = units[unit as usize].routine else { continue };
+            match self.symbols.ends[unit as usize] {
+                Ends::AsItBegins => self.exits[routine as usize] = Some(States::ENTRY),
+                Ends::Set { called: true } => {
+                    self.exit_of(routine);
+                }
+                Ends::Set { called: false } => {}
+            }
+        }
         for (index, unit) in units.iter().enumerate() {
             self.unit = index as u32;
             let evaluator = Evaluator::new(self.trees, self.symbols);
@@ -279,9 +290,16 @@ impl<'a, 's> Lister<'a, 's> {
                 }
             })
             .collect();
+        // Callers first: then one pass settles what does not call itself.
+        let mut rank = vec![0_u32; units.len()];
+        for (at, &unit) in (0..).zip(&self.symbols.callees_first) {
+            rank[unit as usize] = at;
+        }
+        let mut sites: Vec<&(u32, CallSite)> = self.sites.iter().collect();
+        sites.sort_by_key(|(unit, _)| std::cmp::Reverse(rank[*unit as usize]));
         loop {
             let mut changed = false;
-            for (unit, site) in &self.sites {
+            for (unit, site) in &sites {
                 let Some(&callee) = unit_of.get(&site.routine) else { continue };
                 let arriving = site.modal.entered(entries[*unit as usize]);
                 let joined = entries[callee as usize].or(arriving);
@@ -624,8 +642,7 @@ impl Visitor for Lister<'_, '_> {
         }
         // While it is being followed, a routine that calls itself may end in any state.
         self.exits[routine as usize] = Some(anything);
-        let unit = self.symbols.units.iter().find(|unit| unit.routine == Some(routine)).copied();
-        let Some(unit) = unit else { return anything };
+        let unit = self.symbols.units[self.symbols.routines[routine as usize].unit as usize];
         let was = std::mem::replace(&mut self.silent, true);
         self.depth += 1;
         let evaluator = Evaluator::new(self.trees, self.symbols);

@@ -407,6 +407,29 @@ fn only_what_may_change_a_value_makes_it_unknown() {
 }
 
 #[test]
+fn changes_are_carried_along_chains_of_calls_in_any_order() {
+    const COUNT: usize = 2000;
+    for backwards in [false, true] {
+        let mut routines: Vec<String> = (0..COUNT)
+            .map(|i| match i + 1 {
+                COUNT => format!("PROC p{i}(INOUT num a,num b)\na:=1;\nw.oframe.trans.x:=1;\nENDPROC\n"),
+                next => format!("PROC p{i}(INOUT num a,num b)\np{next} a,b;\nENDPROC\n"),
+            })
+            .collect();
+        if backwards {
+            routines.reverse();
+        }
+        let routines = format!("{}\nVAR num k:=5;\nVAR num l:=6;", routines.concat());
+        let set = "w.oframe.trans.x:=2;\n";
+        let go = "MoveL Offs(p,0,0,l),v100,fine,tool0\\WObj:=w;\n";
+        let found = objects(&format!("{set}{go}p0 k,l;\n{go}"), &routines);
+        assert_eq!(found, [Ok([3.0, 22.0, 33.0]), Err(Reason::WorkObjectAssigned)]);
+        let found = objects("p0 k,l;\nMoveL Offs(p,0,0,k),v100,fine,tool0;\n", &routines);
+        assert_eq!(found, [Err(Reason::RunTimeOffset)]);
+    }
+}
+
+#[test]
 fn predefined_names_stand_in_order() {
     use truegrind::program::rapid::predefined::{Effect, READERS, WRITERS, effect};
     assert!(READERS.windows(2).all(|two| two[0] < two[1]));

@@ -4,9 +4,13 @@
 //! it changes outside, is carried along the calls until nothing is added; both only grow. A routine that is declared in
 //! none of the files, and one that is called by a computed name, may change everything that is not its caller's own.
 
+use std::collections::HashSet;
+use std::ops::Range;
+
 use super::{Symbols, Unit, What};
 use crate::program::motion::Reason;
 use crate::program::rapid::instruction::{self, INSTRUCTIONS, Slot};
+use crate::program::rapid::modal::setting;
 use crate::program::rapid::predefined::{self, Effect};
 use crate::program::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts, token_kind};
 use crate::program::rapid::token::{Token, folded};
@@ -43,6 +47,32 @@ pub struct Reach {
     pub moves: bool,
 }
 
+impl Reach {
+    /// In order, each once; and anything where it is too much.
+    fn settle(&mut self) {
+        self.changes.sort_unstable();
+        self.changes.dedup();
+        if self.changes.len() > REACH {
+            self.anything = true;
+        }
+        if self.anything {
+            self.changes.clear();
+        }
+    }
+}
+
+/// How a unit leaves the switches that act in execution order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ends {
+    /// As they were at its entry.
+    AsItBegins,
+    /// As its statements set them.
+    Set {
+        /// Whether anything calls it.
+        called: bool,
+    },
+}
+
 /// What is gone through once for each unit.
 #[derive(Default)]
 struct Found {
@@ -50,30 +80,36 @@ struct Found {
     calls: Vec<u32>,
     unknown: bool,
     moves: bool,
+    /// Whether data is changed by a name that is computed.
+    by_name: bool,
+    /// Whether it sets a switch.
+    sets: bool,
 }
+
+/// A routine that changes more data outside than this may as well change anything.
+const REACH: usize = 1024;
 
 impl Symbols {
     /// Finds what the program changes.
     pub(super) fn settle(&mut self, trees: &[RapidTree<'_>]) {
-        self.settle_parameters(trees);
-        let units = self.units.clone();
-        let mut by_name = false;
-        let mut all: Vec<Found> = Vec::with_capacity(units.len());
-        for &unit in &units {
-            let tree = &trees[unit.file as usize];
-            let end = unit.node + tree.nodes[unit.node as usize].size;
-            all.push(self.found(tree, unit, unit.node + 1..end, &mut by_name));
+        let mut all = self.gone_through(trees);
+        self.callees_first = self.order(&all);
+        if self.settle_parameters(trees) {
+            // Calls change more than their own text says.
+            all = self.gone_through(trees);
         }
-        for (found, unit) in all.iter().zip(&units) {
-            for change in &found.changes {
-                self.note(&trees[unit.file as usize], change);
-            }
+        for found in &mut all {
             let mut changed: Vec<u32> = found.changes.iter().map(|change| change.symbol).collect();
             changed.sort_unstable();
             changed.dedup();
             self.changed.push(changed);
         }
-        if by_name {
+        for (found, unit) in all.iter().zip(self.units.clone()) {
+            for change in &found.changes {
+                self.note(&trees[unit.file as usize], change);
+            }
+        }
+        if all.iter().any(|found| found.by_name) {
             // SetDataVal with a computed name may mean any data.
             for symbol in &mut self.symbols {
                 if matches!(symbol.what, What::Data(_)) && !symbol.is_constant() {
@@ -81,8 +117,53 @@ impl Symbols {
                 }
             }
         }
-        self.settle_reaches(&all, &units);
-        self.settle_volatile(trees, &units);
+        self.settle_reaches(&all);
+        self.settle_volatile(trees);
+        let mut called = vec![false; all.len()];
+        for &routine in all.iter().flat_map(|found| &found.calls) {
+            called[self.routines[routine as usize].unit as usize] = true;
+        }
+        for (at, found) in all.iter().enumerate() {
+            let quiet = !found.sets && found.calls.is_empty();
+            self.ends.push(if quiet { Ends::AsItBegins } else { Ends::Set { called: called[at] } });
+        }
+    }
+
+    fn gone_through(&self, trees: &[RapidTree<'_>]) -> Vec<Found> {
+        let found = |&unit: &Unit| {
+            let tree = &trees[unit.file as usize];
+            self.found(tree, unit, unit.node + 1..unit.node + tree.nodes[unit.node as usize].size)
+        };
+        self.units.iter().map(found).collect()
+    }
+
+    /// The units in such an order that what a routine calls stands before it, as far as none calls itself.
+    fn order(&self, all: &[Found]) -> Vec<u32> {
+        let mut out = Vec::with_capacity(all.len());
+        let mut seen = vec![false; all.len()];
+        let mut open: Vec<(u32, usize)> = Vec::new();
+        for begin in 0..all.len() as u32 {
+            if std::mem::replace(&mut seen[begin as usize], true) {
+                continue;
+            }
+            open.push((begin, 0));
+            while let Some((unit, next)) = open.last_mut() {
+                match all[*unit as usize].calls.get(*next) {
+                    Some(&routine) => {
+                        *next += 1;
+                        let called = self.routines[routine as usize].unit;
+                        if !std::mem::replace(&mut seen[called as usize], true) {
+                            open.push((called, 0));
+                        }
+                    }
+                    None => {
+                        out.push(*unit);
+                        open.pop();
+                    }
+                }
+            }
+        }
+        out
     }
 
     /// Notes a change of data.
@@ -106,62 +187,55 @@ impl Symbols {
         }
     }
 
-    /// Which parameters a routine changes, by itself or through what it calls.
-    fn settle_parameters(&mut self, trees: &[RapidTree<'_>]) {
-        let units: Vec<Unit> = self.units.clone();
+    /// Which parameters routines change, by themselves or through what they call; whether any does.
+    fn settle_parameters(&mut self, trees: &[RapidTree<'_>]) -> bool {
+        let by_reference =
+            |routine: u32| self.routines[routine as usize].head.parameters.iter().any(|p| p.by_reference);
+        let units = self.callees_first.iter().map(|&unit| self.units[unit as usize]);
+        let units: Vec<(Unit, u32)> =
+            units.filter_map(|unit| Some((unit, unit.routine.filter(|&r| by_reference(r))?))).collect();
+        let mut any = false;
         loop {
-            let mut news: Vec<(u32, usize, Reason)> = Vec::new();
-            for unit in &units {
-                let Some(routine) = unit.routine else { continue };
-                let scope = &self.routines[routine as usize];
-                if !scope.head.parameters.iter().any(|parameter| parameter.by_reference) {
-                    continue;
-                }
-                let tree = &trees[unit.file as usize];
-                let end = unit.node + tree.nodes[unit.node as usize].size;
-                for node in unit.node + 1..end {
-                    if !tree.nodes[node as usize].kind.may_change() {
-                        continue;
+            let mut grown = false;
+            for &(unit, routine) in &units {
+                for (at, reason) in self.written_by(&trees[unit.file as usize], unit, routine) {
+                    let written = &mut self.routines[routine as usize].written[at];
+                    if *written != Some(Reason::Assigned) && *written != Some(reason) {
+                        *written = Some(reason);
+                        grown = true;
                     }
-                    self.changed_by(tree, unit.scope, node, &mut |change| {
-                        let symbol = &self.symbols[change.symbol as usize];
-                        if symbol.what != What::Parameter || symbol.scope != unit.scope {
-                            return;
-                        }
-                        let reason =
-                            if change.how == How::HandedOver { Reason::HandedOver } else { Reason::Assigned };
-                        let at = scope.head.parameters.iter().position(|p| p.name == symbol.name);
-                        if let Some(at) = at
-                            && scope.head.parameters[at].by_reference
-                            && (scope.written[at].is_none()
-                                || scope.written[at] == Some(Reason::HandedOver)
-                                    && reason == Reason::Assigned)
-                        {
-                            news.push((routine, at, reason));
-                        }
-                    });
                 }
             }
-            if news.is_empty() {
-                return;
-            }
-            for (routine, at, reason) in news {
-                let written = &mut self.routines[routine as usize].written[at];
-                if *written != Some(Reason::Assigned) {
-                    *written = Some(reason);
-                }
+            any |= grown;
+            if !grown {
+                return any;
             }
         }
     }
 
+    /// The parameters that the statements of a routine change.
+    fn written_by(&self, tree: &RapidTree<'_>, unit: Unit, routine: u32) -> Vec<(usize, Reason)> {
+        let parameters = &self.routines[routine as usize].head.parameters;
+        let mut out = Vec::new();
+        for node in unit.node + 1..unit.node + tree.nodes[unit.node as usize].size {
+            if !tree.nodes[node as usize].kind.may_change() {
+                continue;
+            }
+            self.changed_by(tree, unit.scope, node, &mut |change| {
+                let symbol = &self.symbols[change.symbol as usize];
+                if symbol.what != What::Parameter || symbol.scope != unit.scope {
+                    return;
+                }
+                let at = parameters.iter().position(|p| p.name == symbol.name && p.by_reference);
+                let handed = change.how == How::HandedOver;
+                out.extend(at.map(|at| (at, if handed { Reason::HandedOver } else { Reason::Assigned })));
+            });
+        }
+        out
+    }
+
     /// What the statements of some nodes do by themselves.
-    fn found(
-        &self,
-        tree: &RapidTree<'_>,
-        unit: Unit,
-        nodes: std::ops::Range<u32>,
-        by_name: &mut bool,
-    ) -> Found {
+    fn found(&self, tree: &RapidTree<'_>, unit: Unit, nodes: Range<u32>) -> Found {
         let mut found = Found::default();
         let mut node = nodes.start;
         while node < nodes.end {
@@ -179,14 +253,18 @@ impl Symbols {
                     let name = tree.text(tree.nodes[node as usize].first);
                     if kind == Syntax::Call && self.is_motion(unit.scope, name) {
                         found.moves = true;
-                    } else if let Some(routine) = self.routine(unit.scope, name) {
+                        node += 1;
+                        continue;
+                    }
+                    found.sets |= setting(tree, node, name).is_some();
+                    if let Some(routine) = self.routine(unit.scope, name) {
                         found.calls.push(routine);
                     } else if predefined::effect(name).is_none() {
                         (found.unknown, found.moves) = (true, true);
                     } else if name.eq_ignore_ascii_case(b"SetAllDataVal")
                         || name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none()
                     {
-                        *by_name = true;
+                        found.by_name = true;
                     }
                 }
                 _ => {}
@@ -202,49 +280,49 @@ impl Symbols {
     }
 
     /// What a call of each routine may change, through what it calls.
-    fn settle_reaches(&mut self, all: &[Found], units: &[Unit]) {
-        for (found, unit) in all.iter().zip(units) {
+    fn settle_reaches(&mut self, all: &[Found]) {
+        for (found, unit) in all.iter().zip(&self.units) {
             let Some(routine) = unit.routine else { continue };
             let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
-            let mut changes: Vec<u32> =
-                found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
-            changes.sort_unstable();
-            changes.dedup();
-            self.routines[routine as usize].reach =
-                Reach { changes, anything: found.unknown, moves: found.moves };
+            let changes = found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
+            let mut reach = Reach { changes, anything: found.unknown, moves: found.moves };
+            reach.settle();
+            self.routines[routine as usize].reach = reach;
         }
         loop {
-            let mut changed = false;
-            for (found, unit) in all.iter().zip(units) {
-                let Some(routine) = unit.routine else { continue };
+            let mut grown = false;
+            for &unit in &self.callees_first {
+                let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
                 let before = (reach.changes.len(), reach.anything, reach.moves);
-                for &called in &found.calls {
+                for &called in &all[unit as usize].calls {
                     let other = &self.routines[called as usize].reach;
                     reach.anything |= other.anything;
                     reach.moves |= other.moves;
                     reach.changes.extend_from_slice(&other.changes);
+                    if reach.changes.len() > 4 * REACH {
+                        reach.settle();
+                    }
                 }
-                reach.changes.sort_unstable();
-                reach.changes.dedup();
-                changed |= before != (reach.changes.len(), reach.anything, reach.moves);
+                reach.settle();
+                grown |= before != (reach.changes.len(), reach.anything, reach.moves);
                 self.routines[routine as usize].reach = reach;
             }
-            if !changed {
+            if !grown {
                 return;
             }
         }
     }
 
     /// Data that a trap routine, or an error handler that goes back to the statements, may change at any time.
-    fn settle_volatile(&mut self, trees: &[RapidTree<'_>], units: &[Unit]) {
+    fn settle_volatile(&mut self, trees: &[RapidTree<'_>]) {
         let mut changes: Vec<u32> = Vec::new();
         let mut anything = false;
         let mut take = |reach: &Reach| {
             changes.extend_from_slice(&reach.changes);
             anything |= reach.anything;
         };
-        for unit in units {
+        for unit in &self.units {
             let Some(routine) = unit.routine else { continue };
             if self.routines[routine as usize].head.kind == Syntax::Trap {
                 take(&self.routines[routine as usize].reach);
@@ -258,7 +336,7 @@ impl Symbols {
                 {
                     continue;
                 }
-                let found = self.found(tree, *unit, clause + 1..end, &mut false);
+                let found = self.found(tree, *unit, clause + 1..end);
                 let own = found.changes.iter().map(|change| change.symbol).collect();
                 take(&Reach { changes: own, anything: found.unknown, moves: false });
                 for called in found.calls {
@@ -270,7 +348,7 @@ impl Symbols {
             self.symbols[symbol as usize].volatile = true;
         }
         if anything {
-            let routines: Vec<u32> = self.routines.iter().map(|routine| routine.scope).collect();
+            let routines: HashSet<u32> = self.routines.iter().map(|routine| routine.scope).collect();
             for symbol in &mut self.symbols {
                 symbol.volatile |= symbol.assigned && !routines.contains(&symbol.scope);
             }
