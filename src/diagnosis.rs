@@ -12,7 +12,7 @@
 //! 6. [`selection`]: the best candidate is accepted when it passes the likelihood ratio corrected for all trials and lowers
 //!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again. [`levels`] tells shifts
 //!    that overlap as what stood where from which row to which.
-//! 7. [`validation`]: held-out errors by full refits, of all stages and of every rival.
+//! 7. [`validation`]: held-out errors by refits of all stages; [`held`]: those of candidates, steps and rivals to first order.
 //! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
 //!    explains; rounding and contradicting columns; what the rows cannot show.
 //! 9. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
@@ -22,8 +22,11 @@
 pub mod rows;
 pub mod cause;
 pub mod catalogue;
+mod newton;
 pub mod extension;
+mod algebra;
 pub mod design;
+pub mod held;
 pub mod score;
 pub mod intervals;
 pub mod board;

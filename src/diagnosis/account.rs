@@ -1,20 +1,22 @@
 //! A finding for every accepted cause: what it is, how sure that is, what else was fitted in its place.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::catalogue::{Candidate, Columns, MAP_KNOTS};
 use super::cause::Cause;
-use super::design::{Design, Linear};
+use super::design::Whole;
 use super::diagnose::VISIBLE;
 use super::extension::{Extended, Subject};
-use super::finding::{Alternative, Confidence, Finding, FoundParameter, Gain, Step};
+use super::finding::{Alternative, Confidence, Finding, Gain, Step};
+use super::held::Held;
 use super::picture::{Picture, picture};
 use super::score::{non_centrality, score};
-use super::selection::{Accepted, Folds};
+use super::selection::Accepted;
 use super::words;
 use crate::kinematics::effect::Effect;
 use crate::kinematics::effect::map::JointMap;
-use crate::measurement::split;
+use crate::math::statistics::ErrorSummary;
 
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
@@ -38,18 +40,13 @@ pub(super) struct Context<'a> {
     /// The fit to all rows.
     pub(super) extended: &'a Extended,
     /// Linearised where causes were looked for.
-    pub(super) linear: &'a Linear,
-    pub(super) whole: &'a Design,
-    pub(super) splits: &'a [split::Split],
+    pub(super) whole: &'a Whole,
+    /// The same with its rows in folds.
+    pub(super) held: &'a Held<'a>,
     pub(super) set_aside: &'a [usize],
 }
 
 impl Context<'_> {
-    /// Held-out error of a design, with columns added or not, to first order (mm).
-    fn held_out(&self, design: &Design, columns: Option<(&nalgebra::DMatrix<f64>, &[f64])>) -> f64 {
-        Folds::of(design, self.splits).rmse_mm(design, columns, self.set_aside)
-    }
-
     /// A finding for every story, and which finding each cause went into.
     pub(super) fn findings(
         &self,
@@ -60,33 +57,34 @@ impl Context<'_> {
         let mut findings: Vec<Finding> = Vec::new();
         let mut places = Vec::new();
         let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
-        for (index, own) in accepted.iter().enumerate() {
+        let after = self.held.without(&[]).errors_mm(None, self.set_aside);
+        let judged: Vec<(f64, Finding, Picture)> = accepted
+            .par_iter()
+            .enumerate()
+            .map(|(index, own)| {
+                let later: Vec<usize> =
+                    (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+                let step = self.held.without(&later).rmse_mm(None, self.set_aside);
+                let (finding, picture) = self.finding(index, own, &after, last);
+                (step, finding, picture)
+            })
+            .collect();
+        for (index, (step, finding, picture)) in judged.into_iter().enumerate() {
             let cause = &self.extended.causes[index];
-            let later: Vec<usize> = (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
-            steps.push(Step {
-                added: told_short(cause),
-                cv_rmse_mm: self.held_out(&self.linear.design(&later), None),
-            });
-            let parameters = words::parameters(self.extended, index);
-            let mergeable = cause.rows().is_none();
+            steps.push(Step { added: told_short(cause), cv_rmse_mm: step });
             let told = findings.iter().position(|f: &Finding| {
-                mergeable
+                cause.rows().is_none()
                     && f.effect == cause.name()
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
             if let Some(place) = told {
-                findings[place].parameters.extend(parameters);
-                findings[place].cause = format!(
-                    "{}; {}",
-                    findings[place].cause,
-                    words::cause(cause, &words::parameters(self.extended, index), last)
-                );
+                findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
+                findings[place].parameters.extend(finding.parameters);
                 places.push(place);
                 continue;
             }
             places.push(findings.len());
-            let (finding, picture) = self.finding(index, cause, own, parameters, last);
             findings.push(finding);
             pictures.push(picture);
         }
@@ -105,17 +103,15 @@ impl Context<'_> {
         })
     }
 
-    fn finding(
-        &self,
-        index: usize,
-        cause: &Cause,
-        own: &Accepted,
-        parameters: Vec<FoundParameter>,
-        last: usize,
-    ) -> (Finding, Picture) {
-        let without = self.linear.design(&self.found.places(index));
-        let folds = Folds::of(&without, self.splits);
-        let before_mm = folds.rmse_mm(&without, None, self.set_aside);
+    fn finding(&self, index: usize, own: &Accepted, after: &[f64], last: usize) -> (Finding, Picture) {
+        let after_mm = ErrorSummary::of(after.to_vec()).rmse;
+        let cause = &self.extended.causes[index];
+        let parameters = words::parameters(self.extended, index);
+        let places = self.found.places(index);
+        let without = self.whole.without(&places);
+        let held = self.held.without(&places);
+        let before_mm = held.rmse_mm(None, self.set_aside);
+        let mut predicts_better = false;
         let mut alternatives: Vec<Alternative> = own
             .rivals
             .iter()
@@ -123,18 +119,19 @@ impl Context<'_> {
             .map(|rival| {
                 let columns = rival.candidate.columns(&without);
                 let sizes = rival.candidate.cause.sizes();
+                let errors = held.errors_mm(Some((&columns, &sizes)), self.set_aside);
+                let cv_rmse_mm = ErrorSummary::of(errors.clone()).rmse;
+                predicts_better |= cv_rmse_mm < BETTER * after_mm;
                 Alternative {
                     effect: rival.candidate.cause.name().to_owned(),
                     joints: pendant(&rival.candidate.cause.joints()),
                     rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm: folds.rmse_mm(&without, Some((&columns, &sizes)), self.set_aside),
+                    cv_rmse_mm,
                     beaten_by: own.own.merit - rival.score.merit,
                 }
             })
             .collect();
-        let after_mm = self.held_out(self.whole, None);
-        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
-        let mut clear = alternatives.iter().all(beaten);
+        let mut clear = !predicts_better && alternatives.iter().all(|a| a.beaten_by >= CLEAR);
         if own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;
             alternatives.insert(
@@ -156,18 +153,15 @@ impl Context<'_> {
                     effect: map.cause.name().to_owned(),
                     joints: pendant(&map.cause.joints()),
                     rows: None,
-                    cv_rmse_mm: folds.rmse_mm(
-                        &without,
-                        Some((&map.columns(&without), &map.cause.sizes())),
-                        self.set_aside,
-                    ),
+                    cv_rmse_mm: held
+                        .rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
                     beaten_by: own.own.merit - score(&without, &map).merit,
                 });
             }
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
-        let picture = picture(self.subject, cause, &without, self.whole);
+        let picture = picture(self.subject, cause, &without, &self.whole.design);
         let finding = Finding {
             effect: cause.name().to_owned(),
             cause: words::cause(cause, &parameters, last),

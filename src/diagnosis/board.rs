@@ -14,7 +14,7 @@ use super::design::{Design, Linear, Projected, Whole};
 use super::extension::{Extended, Subject};
 use super::intervals::{self, Strip};
 use super::lines;
-use super::score::{score, score_projected};
+use super::score::score_projected;
 use super::selection::{Catalogue, Scored};
 use crate::kinematics::effect::Effect;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
@@ -52,12 +52,14 @@ pub struct Board<'a> {
     /// What is diagnosed.
     pub subject: &'a Subject<'a>,
     /// The fit.
-    pub fit: &'a Extended,
+    pub fit: Arc<Extended>,
     /// The fit linearised.
+    pub linear: Linear,
+    /// Everything free in it.
     pub whole: Whole,
     listed: Vec<Entry>,
     shifts: Vec<Shift>,
-    fine: Vec<OnceLock<Entry>>,
+    fine: Vec<Vec<OnceLock<Entry>>>,
 }
 
 /// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
@@ -65,11 +67,18 @@ const CLOSER: f64 = 10.0;
 
 impl<'a> Board<'a> {
     /// All candidates of `catalogue` against `fit`.
-    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: &'a Extended) -> Self {
-        let whole = Linear::of(subject, fit).whole();
+    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
+        let linear = Linear::of(subject, &fit);
+        let whole = linear.whole();
         let design = &whole.design;
-        let listed = catalogue.listed.par_iter().map(|c| Entry::of(c, design)).collect();
-        let known = known_load(fit).map(|kind| {
+        let columns: Vec<_> = catalogue.listed.par_iter().map(|c| c.columns(design)).collect();
+        let listed = catalogue
+            .listed
+            .iter()
+            .zip(design.project_all(&columns))
+            .map(|(candidate, projected)| Entry { candidate: Arc::clone(candidate), projected })
+            .collect();
+        let known = known_load(&fit).map(|kind| {
             let always = Disturbance::new(kind, Course::Always);
             Candidate::measurement(always, &subject.observed.dataset, subject.nominal)
         });
@@ -82,8 +91,8 @@ impl<'a> Board<'a> {
                 Some(Shift { kind: disturbance.kind.clone(), strip })
             })
             .collect();
-        let fine = catalogue.fine.iter().map(|_| OnceLock::new()).collect();
-        Self { catalogue, subject, fit, whole, listed, shifts, fine }
+        let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
+        Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
     }
 
     /// All candidates against `design`, which is the whole one or a part of it, best first. Without `open` only the listed
@@ -122,15 +131,18 @@ impl<'a> Board<'a> {
         let (spoken, mapped) = lines::candidates(self.subject, design);
         let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
         let fine: Vec<&Entry> = mapped
-            .into_iter()
-            .map(|joint| {
-                let candidate = &self.catalogue.fine[joint];
-                self.fine[joint].get_or_init(|| Entry::of(candidate, &self.whole.design))
+            .into_par_iter()
+            .filter_map(|(joint, level)| {
+                let candidate = self.catalogue.fine[joint].get(level)?;
+                let entry = &self.fine[joint][level];
+                Some(entry.get_or_init(|| Entry::of(candidate, &self.whole.design)))
             })
             .collect();
-        out.par_extend(open.par_iter().map(|candidate| {
-            let score = score(design, candidate);
-            Scored { candidate: Arc::clone(candidate), score }
+        let columns: Vec<_> = open.par_iter().map(|c| c.columns(design)).collect();
+        let projected = design.project_all(&columns);
+        out.par_extend(open.into_par_iter().zip(projected).map(|(candidate, projected)| {
+            let score = score_projected(&projected, &candidate.cause.sizes(), candidate.tried);
+            Scored { candidate, score }
         }));
         out.par_extend(fine.par_iter().map(|entry| entry.scored(design)));
     }

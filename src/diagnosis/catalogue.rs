@@ -219,13 +219,24 @@ const COUPLINGS: [(usize, usize); 10] =
 
 /// Knots of an error map over a turn: a smooth curve.
 pub const MAP_KNOTS: usize = 24;
-/// Knots of one that follows the periods of a reducer's stages, tried where lines of the joint stand out.
-const FINE_KNOTS: usize = 72;
+/// Knots of those that follow the periods of a reducer's stages, tried where lines of the joint stand out that they reach.
+const FINE_KNOTS: [usize; 2] = [72, 144];
 
-/// The finely resolved error map of a joint.
-pub fn fine_map(subject: &Subject<'_>, joint: usize) -> Candidate {
-    let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; FINE_KNOTS] });
-    Candidate::arm(effect, &subject.observed.dataset, subject.nominal)
+/// Poses for each knot of the finest map: with fewer, its lines one by one say as much.
+const POSES_PER_KNOT: usize = 10;
+
+/// The finely resolved error maps of a joint, coarsest first.
+pub fn fine_maps(subject: &Subject<'_>, joint: usize) -> Vec<Candidate> {
+    let dataset = &subject.observed.dataset;
+    let [fine, finest] = FINE_KNOTS;
+    let knots = if dataset.rows.len() >= POSES_PER_KNOT * finest { vec![fine, finest] } else { vec![fine] };
+    knots
+        .into_iter()
+        .map(|knots| {
+            let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
+            Candidate::arm(effect, dataset, subject.nominal)
+        })
+        .collect()
 }
 
 /// An axis that moved less than this shows nothing of itself (rad).

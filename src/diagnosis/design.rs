@@ -10,11 +10,10 @@
 
 use std::sync::Arc;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
-use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
 
+use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
 use super::extension::{Extended, Subject};
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::Calibration;
@@ -74,15 +73,19 @@ pub struct Reduction {
 /// A fit linearised, from which the design of any smaller model follows without a refit.
 #[derive(Debug, Clone)]
 pub struct Linear {
-    observations: usize,
-    per: usize,
-    jacobian: DMatrix<f64>,
+    pub(super) observations: usize,
+    pub(super) per: usize,
+    /// Jᵀ, p × n.
+    pub(super) rows: DMatrix<f64>,
     /// JᵀJ + Λ.
-    normal: DMatrix<f64>,
-    residual: DVector<f64>,
-    x: Vec<f64>,
-    precision: Vec<f64>,
-    slopes: Arc<Slopes>,
+    pub(super) normal: DMatrix<f64>,
+    /// r, n.
+    pub(super) residual: DVector<f64>,
+    /// Jᵀr + Λx.
+    pub(super) gradient: DVector<f64>,
+    pub(super) x: Vec<f64>,
+    pub(super) precision: Vec<f64>,
+    pub(super) slopes: Arc<Slopes>,
 }
 
 /// A whole design with what it takes to go on from it to smaller ones.
@@ -115,16 +118,13 @@ impl Linear {
         let dataset = &subject.observed.dataset;
         let per = fit.task.rows_per_observation();
         let rows = fit.task.rows();
-        let p = fit.parameters.len();
-        let mut residual = vec![0.0; rows];
-        let mut jacobian = vec![0.0; rows * p];
-        fit.task.jacobian(&fit.x, 0..rows, &mut residual, &mut jacobian);
-        let residual = DVector::from_vec(residual).map(finite);
-        let jacobian = DMatrix::from_vec(rows, p, jacobian).map(finite);
+        let (residual, transposed) = linearised(&fit.task, &fit.x);
         let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
-        let mut normal = gram(&jacobian);
+        let mut normal = outer(&transposed);
+        let mut gradient = &transposed * &residual;
         for (k, precision) in precision.iter().enumerate() {
             normal[(k, k)] += precision;
+            gradient[k] += precision * fit.x[k];
         }
         // Slopes by what candidates are made of, at the estimate.
         let anchors = dataset.anchors();
@@ -152,9 +152,8 @@ impl Linear {
             })
             .collect();
         let task = Calibration::new(dataset, &fit.model, &fit.frames, &probes, &[], &weights);
-        let (mut r, mut slopes) = (vec![0.0; rows], vec![0.0; rows * probes.len()]);
-        task.jacobian(&vec![0.0; probes.len()], 0..rows, &mut r, &mut slopes);
-        let column = |k: usize| DVector::from_column_slice(&slopes[k * rows..(k + 1) * rows]).map(finite);
+        let slopes = linearised(&task, &vec![0.0; probes.len()]).1;
+        let column = |k: usize| slopes.row(k).transpose();
         let mut by_growth = DVector::zeros(rows);
         for (joint, link) in fit.model.links.iter().enumerate() {
             by_growth += column(6 + joint) * link.a_mm + column(12 + joint) * link.d_mm;
@@ -183,19 +182,38 @@ impl Linear {
             mm,
         });
         let observations = dataset.rows.len();
-        Self { observations, per, jacobian, normal, residual, x: fit.x.clone(), precision, slopes }
+        Self {
+            observations,
+            per,
+            rows: transposed,
+            normal,
+            residual,
+            gradient,
+            x: fit.x.clone(),
+            precision,
+            slopes,
+        }
+    }
+
+    /// Residuals at x with the parameters at `dropped` set to 0.
+    pub(super) fn without(&self, dropped: &[usize]) -> DVector<f64> {
+        let mut residual = self.residual.clone();
+        if !dropped.is_empty() {
+            let mut taken = DVector::zeros(self.x.len());
+            dropped.iter().for_each(|&k| taken[k] = -self.x[k]);
+            residual.gemv_tr(1.0, &self.rows, &taken, 1.0);
+        }
+        residual
     }
 
     /// The design of the whole fit, from which those of smaller models follow at little cost.
     pub fn whole(&self) -> Whole {
         let lower = lower_factor(self.normal.clone());
-        let basis = solved(&lower, self.jacobian.transpose());
+        let basis = solved(&lower, self.rows.clone());
         let x = DVector::from_column_slice(&self.x);
-        let mut gradient = self.jacobian.tr_mul(&self.residual);
-        for (g, (x, precision)) in gradient.iter_mut().zip(self.x.iter().zip(&self.precision)) {
-            *g += precision * x;
-        }
-        let half = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(gradient.len()));
+        let half = lower
+            .solve_lower_triangular(&self.gradient)
+            .unwrap_or_else(|| DVector::zeros(self.gradient.len()));
         let mut residual = self.residual.clone();
         residual.gemv_tr(-1.0, &basis, &half, 1.0);
         let step = lower.tr_solve_lower_triangular(&half).unwrap_or_else(|| DVector::zeros(half.len()));
@@ -214,18 +232,15 @@ impl Linear {
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
-        let mut residual = self.residual.clone();
-        for &k in dropped {
-            residual.axpy(-self.x[k], &self.jacobian.column(k), 1.0);
-        }
+        let mut residual = self.without(dropped);
         let normal = DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]);
         let lower = lower_factor(normal);
-        let part = self.jacobian.select_columns(&kept);
-        let mut gradient = part.tr_mul(&residual);
+        let part = self.rows.select_rows(&kept);
+        let mut gradient = &part * &residual;
         for (g, &k) in gradient.iter_mut().zip(&kept) {
             *g += self.precision[k] * self.x[k];
         }
-        let basis = solved(&lower, part.transpose());
+        let basis = solved(&lower, part);
         let step = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
         residual.gemv_tr(-1.0, &basis, &step, 1.0);
         Design {
@@ -274,9 +289,66 @@ impl Design {
 
     /// Columns against everything that is already free.
     pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
-        let shared = product(&self.basis, columns);
+        let (shared, square) = self.sparse_product(columns).unwrap_or_else(|| {
+            let shared = product(&self.basis, columns);
+            (shared, gram(columns))
+        });
+        self.projected(columns, shared, square)
+    }
+
+    /// The same for the columns of many candidates, with one pass over the basis for those that are dense.
+    pub fn project_all(&self, all: &[DMatrix<f64>]) -> Vec<Projected> {
+        let sparse: Vec<_> = all.par_iter().map(|columns| self.sparse_product(columns)).collect();
+        let dense = || all.iter().zip(&sparse).filter(|(_, s)| s.is_none()).map(|(columns, _)| columns);
+        let mut side_by_side = DMatrix::zeros(self.rows(), dense().map(DMatrix::ncols).sum());
+        let mut first = 0;
+        for columns in dense() {
+            side_by_side.columns_mut(first, columns.ncols()).copy_from(columns);
+            first += columns.ncols();
+        }
+        let shared = product(&self.basis, &side_by_side);
+        let mut first = 0;
+        let work: Vec<_> = all
+            .iter()
+            .zip(sparse)
+            .map(|(columns, sparse)| {
+                let own = first;
+                first += if sparse.is_none() { columns.ncols() } else { 0 };
+                (columns, sparse, own)
+            })
+            .collect();
+        work.into_par_iter()
+            .map(|(columns, sparse, own)| {
+                let (shared, square) = sparse
+                    .unwrap_or_else(|| (shared.columns(own, columns.ncols()).into_owned(), gram(columns)));
+                self.projected(columns, shared, square)
+            })
+            .collect()
+    }
+
+    /// QᵀC and CᵀC of columns of which each reaches few rows, like a knot of an error map: what it does not reach costs
+    /// nothing.
+    fn sparse_product(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let reached = sparse(columns)?;
+        let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
+        let mut by_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); columns.nrows()];
+        for (k, rows) in reached.iter().enumerate() {
+            let mut place = shared.column_mut(k);
+            for &s in rows {
+                place.axpy(columns[(s, k)], &self.basis.column(s), 1.0);
+                by_row[s].push((k, columns[(s, k)]));
+            }
+        }
+        let mut square = DMatrix::zeros(columns.ncols(), columns.ncols());
+        for (a, x) in by_row.iter().flat_map(|row| row.iter().map(move |x| (row, x))) {
+            a.iter().for_each(|(k, y)| square[(*k, x.0)] += x.1 * y);
+        }
+        Some((shared, square))
+    }
+
+    fn projected(&self, columns: &DMatrix<f64>, shared: DMatrix<f64>, square: DMatrix<f64>) -> Projected {
         let gradient = columns.tr_mul(&self.residual);
-        let mut information = gram(columns) - gram(&shared);
+        let mut information = square - gram(&shared);
         let given_back = self.reduction.as_ref().map(|r| product_of_transposed(&r.directions, &shared));
         if let Some(back) = &given_back {
             information += gram(back);
@@ -321,91 +393,44 @@ impl Design {
     }
 }
 
-/// Replaces a positive definite matrix by its lower Cholesky factor; `false` for one that is not.
-pub(super) fn factored(a: &mut DMatrix<f64>) -> bool {
-    let n = a.nrows();
-    let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
-    let mut memory = MemBuffer::new(request);
-    let place = MatMut::from_column_major_slice_mut(a.as_mut_slice(), n, n);
-    let done = llt::factor::cholesky_in_place(
-        place,
-        Default::default(),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Default::default(),
-    );
-    a.fill_upper_triangle(0.0, 1);
-    done.is_ok() && a.diagonal().iter().all(|d| *d > 0.0)
+/// Observations that one thread linearises.
+const CHUNK: usize = 64;
+
+/// Whitened residuals of a task at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
+fn linearised(task: &Calibration, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    let (p, n) = (x.len(), task.rows());
+    let chunk = CHUNK * task.rows_per_observation();
+    let (mut residual, mut rows) = (DVector::zeros(n), DMatrix::zeros(p, n));
+    residual
+        .as_mut_slice()
+        .par_chunks_mut(chunk)
+        .zip(rows.as_mut_slice().par_chunks_mut((chunk * p).max(1)))
+        .enumerate()
+        .for_each(|(k, (residual, rows))| {
+            let m = residual.len();
+            let mut jacobian = vec![0.0; m * p];
+            task.jacobian(x, k * chunk..k * chunk + m, residual, &mut jacobian);
+            residual.iter_mut().for_each(|r| *r = finite(*r));
+            for (i, row) in rows.chunks_exact_mut(p).enumerate() {
+                row.iter_mut().enumerate().for_each(|(k, v)| *v = finite(jacobian[k * m + i]));
+            }
+        });
+    (residual, rows)
 }
 
-/// Solves L Lᵀ x = b.
-pub(super) fn back_and_forth(lower: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
-    lower.tr_solve_lower_triangular(&lower.solve_lower_triangular(b)?)
-}
+/// Columns count as sparse where at most one entry in so many is not 0.
+const SPARSE: usize = 4;
 
-/// AᵀA.
-pub(super) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
-    multiplied(shown(a).transpose(), shown(a))
-}
-
-/// A B.
-pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    multiplied(shown(a), shown(b))
-}
-
-/// Aᵀ B.
-pub(super) fn product_of_transposed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    multiplied(shown(a).transpose(), shown(b))
-}
-
-/// A Aᵀ.
-pub(super) fn outer(a: &DMatrix<f64>) -> DMatrix<f64> {
-    multiplied(shown(a), shown(a).transpose())
-}
-
-fn shown(a: &DMatrix<f64>) -> MatRef<'_, f64> {
-    MatRef::from_column_major_slice(a.as_slice(), a.nrows(), a.ncols())
-}
-
-/// On one thread, so that the bits are the same for any number of them.
-fn multiplied(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
-    let (rows, columns) = out.shape();
-    let place = MatMut::from_column_major_slice_mut(out.as_mut_slice(), rows, columns);
-    faer::linalg::matmul::matmul(place, Accum::Replace, a, b, 1.0, Par::Seq);
-    out
-}
-
-/// L⁻¹ B.
-fn solved(lower: &DMatrix<f64>, mut b: DMatrix<f64>) -> DMatrix<f64> {
-    let n = lower.nrows();
-    let (rows, columns) = b.shape();
-    let left = MatRef::from_column_major_slice(lower.as_slice(), n, n);
-    let place = MatMut::from_column_major_slice_mut(b.as_mut_slice(), rows, columns);
-    faer::linalg::triangular_solve::solve_lower_triangular_in_place(left, place, Par::Seq);
-    b.apply(|v| *v = finite(*v));
-    b
-}
-
-fn finite(v: f64) -> f64 {
-    if v.is_finite() { v } else { 0.0 }
-}
-
-/// Lower Cholesky factor; a matrix that is not positive definite gets a growing ridge.
-fn lower_factor(normal: DMatrix<f64>) -> DMatrix<f64> {
-    let n = normal.nrows();
-    let mut ridge = 0.0;
-    for _ in 0..12 {
-        let mut shifted = normal.clone();
-        for k in 0..n {
-            shifted[(k, k)] += ridge * normal[(k, k)].abs().max(f64::MIN_POSITIVE);
-        }
-        if factored(&mut shifted) {
-            return shifted;
-        }
-        ridge = if ridge == 0.0 { 1e-14 } else { ridge * 10.0 };
+/// The rows that each column reaches, where they are few.
+fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Vec<usize>>> {
+    let most = columns.len() / SPARSE;
+    if columns.ncols() < 2 * SPARSE || columns.iter().filter(|c| **c != 0.0).count() > most {
+        return None;
     }
-    DMatrix::identity(n, n)
+    let reached = |column: nalgebra::DVectorView<'_, f64>| {
+        column.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(s, _)| s).collect()
+    };
+    Some(columns.column_iter().map(reached).collect())
 }
 
 /// Slopes by the sensor's scale and by a cable's sag.

@@ -5,6 +5,7 @@ use super::cause::Cause;
 use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
+use super::held::Held;
 use super::picture::Picture;
 use super::record::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::remaining;
@@ -139,7 +140,7 @@ pub fn diagnose(
     let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
     tell("holding rows out");
     let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
-    let mut stages = [&registered, &geometric, &extended].map(|fit| validation.stage(&subject, fit));
+    let mut stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
     // What does not carry over to rows that were not seen together with it is no knowledge.
     while stages[2].blocks.rmse > stages[1].blocks.rmse
         && let Some(weakest) = weakest(&found, &accepted)
@@ -158,14 +159,14 @@ pub fn diagnose(
         };
         extended = without(&subject, &extended);
         found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
-        stages[2] = validation.stage(&subject, &extended);
+        stages[2] = validation.stage(&extended);
     }
     let structure = remaining::structure(&subject, &extended, &set_aside);
     let mut smoothed = None;
     if options.smooth && remaining::patterned(&structure) {
         tell("fitting a smooth correction to what is left");
         let smooth = smooth_correction(&subject, &extended);
-        let stage = validation.stage(&subject, &smooth);
+        let stage = validation.stage(&smooth);
         if stage.random.rmse < stages[2].random.rmse && stage.blocks.rmse < stages[2].blocks.rmse {
             smoothed = Some(stages[2].random.rmse);
             (extended, stages[2]) = (smooth, stage);
@@ -181,15 +182,15 @@ pub fn diagnose(
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
     let linear = Linear::of(&searched, &found);
-    let whole = linear.design(&[]);
+    let whole = linear.whole();
+    let held = Held::of(&linear, &split::folds(&searched.observed.dataset, 5, options.selection.seed));
     let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
     let context = Context {
         subject: &searched,
         found: &found,
         extended: &extended,
-        linear: &linear,
         whole: &whole,
-        splits: &split::folds(&searched.observed.dataset, 5, options.selection.seed),
+        held: &held,
         set_aside: &aside,
     };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
@@ -204,7 +205,7 @@ pub fn diagnose(
     let noise = remaining::noise_model(&subject, &extended, &set_aside);
     let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
     let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
-    let not_testable = not_testable(&searched.observed.dataset, &whole, &left, &names, &prepared);
+    let not_testable = not_testable(&searched.observed.dataset, &whole.design, &left, &names, &prepared);
     let remaining = told(&structure, &stages[2], smoothed, floor_mm, &mut findings);
     if let Err(why) = &prepared.sharpening
         && dataset.angle_step_rad.is_some()

@@ -4,11 +4,17 @@
 //! and k = 2. A bounded influence, not a redescending one: a block of rows that was shifted still pulls, so that its cause can
 //! be found, while single wild rows pull no more than a bad normal one. Scale by the median, refined at the end so that
 //! the weighted sum of squares has its degrees of freedom. Source: Huber, Robust Statistics, 1981, chapter 7.
+//!
+//! Near another fit the steps are Gauss and Newton's (see `newton`) as long as they descend. A search leaves it at that; any
+//! other fit ends with Levenberg and Marquardt.
+
+use nalgebra::DMatrix;
 
 use super::cause::Cause;
-use crate::estimation::estimate::Estimate;
+use super::newton::{self, Step};
+use crate::estimation::estimate::{Estimate, Evaluations, Termination};
 use crate::estimation::least_squares::lm;
-use crate::estimation::problem::Prior;
+use crate::estimation::problem::{Prior, Problem, prior_cost};
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
 use crate::identification::rounding;
@@ -72,8 +78,8 @@ pub struct Extended {
 /// Bend of Huber's weight, in standard deviations.
 const BEND: f64 = 2.0;
 
-/// At most this many rounds of solver and weights: from scratch, and from a fit nearby.
-const ROUNDS: [usize; 2] = [8, 4];
+/// At most this many rounds of solver and weights.
+const ROUNDS: usize = 8;
 
 /// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have.
 fn start(
@@ -146,6 +152,16 @@ fn median_size(k: usize) -> f64 {
 /// Fits the nominal arm extended by `causes` robustly, from the sizes that the causes have. `near` gives starting values of
 /// links and frames, and of the noise.
 pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
+    approached(subject, causes, freedom, near).polished()
+}
+
+/// The same for a search: near another fit to a small part of χ², and without a covariance.
+pub(super) fn approached(
+    subject: &Subject<'_>,
+    causes: &[Cause],
+    freedom: Freedom,
+    near: Option<&Extended>,
+) -> Extended {
     let observed = subject.observed;
     let dataset = &observed.dataset;
     let (start_model, start_frames, free) = start(subject, causes, freedom);
@@ -162,15 +178,22 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
     let plain_task =
         Calibration::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
     let (mut model, mut frames) = plain_task.apply(&x);
+    let mut nearby = near.is_some() && freedom == Freedom::All;
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
         let task = plain_task.reweighted(&trusted(&base, &trust));
-        // Weights still change: what is beyond a few steps would be thrown away.
-        let steps = if near.is_some() { 1 } else { 3 };
-        let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
-        let estimate = lm::solve(&task, &x, &rough);
-        x.clone_from(&estimate.x);
+        let step = if nearby { Step::taken(&task, &priors, &mut x) } else { None };
+        let mut covariance = None;
+        nearby = step.is_some();
+        if !nearby {
+            // Weights still change: what is beyond a few steps would be thrown away.
+            let steps = if near.is_some() { 1 } else { 3 };
+            let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
+            let estimate = lm::solve(&task, &x, &rough);
+            x.clone_from(&estimate.x);
+            covariance = estimate.covariance;
+        }
         (model, frames) = task.apply(&x);
         let plain = task.plain_residuals(&x);
         let whitened = |i: usize| {
@@ -205,15 +228,15 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
         let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
         let moved = next.iter().zip(&trust).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
-        if (settled && round > 1) || round >= ROUNDS[usize::from(near.is_some())] {
+        if (settled && round > 1) || round >= ROUNDS {
             // The scale under which the weighted squares have their degrees of freedom.
-            let spent: f64 = estimate.covariance.as_ref().map_or(0.0, |c| {
-                priors
-                    .iter()
-                    .enumerate()
-                    .map(|(k, p)| (1.0 - c[(k, k)] / p.sigma.powi(2)).clamp(0.0, 1.0))
-                    .sum()
-            });
+            let known = |c: &DMatrix<f64>| -> f64 {
+                let shares = priors.iter().enumerate();
+                shares.map(|(k, p)| (1.0 - c[(k, k)] / p.sigma.powi(2)).clamp(0.0, 1.0)).sum()
+            };
+            let spent = step
+                .as_ref()
+                .map_or_else(|| covariance.as_ref().map_or(0.0, known), |step| step.spent(&priors));
             let rows = (n * per) as f64;
             let dispersion = |range: std::ops::Range<usize>| {
                 let sum: f64 = (0..n)
@@ -232,7 +255,18 @@ pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Opti
                 .map(|w| Weight { per_mm: w.per_mm / by_length, per_rad: w.per_rad / by_angle })
                 .collect();
             let task = plain_task.reweighted(&trusted(&weights, &trust));
-            let estimate = lm::solve(&task, &x, &lm::Options::default());
+            let estimate = if nearby && newton::descend(&task, &priors, &mut x) {
+                Estimate {
+                    covariance: None,
+                    cost: task.row_cost(&x) + prior_cost(&priors, &x),
+                    evaluations: Evaluations::default(),
+                    termination: Termination::Cost,
+                    trace: Vec::new(),
+                    x,
+                }
+            } else {
+                lm::solve(&task, &x, &lm::Options::default())
+            };
             let (model, frames) = task.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),
@@ -291,6 +325,17 @@ fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
 }
 
 impl Extended {
+    /// The fit with the solver's last word on it: at the optimum, with a covariance.
+    pub(super) fn polished(self) -> Self {
+        if self.estimate.covariance.is_some() {
+            return self;
+        }
+        let estimate = lm::solve(&self.task, &self.x, &lm::Options::default());
+        let (model, frames) = self.task.apply(&estimate.x);
+        let causes = filled(&self.causes, &model, &frames);
+        Self { causes, x: estimate.x.clone(), model, frames, estimate, ..self }
+    }
+
     /// Places in x of the parameters of cause `index`.
     pub fn places(&self, index: usize) -> Vec<usize> {
         let arm = matches!(self.causes[index], Cause::Arm(_));

@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::design::{Design, gram};
+use super::algebra::gram;
+use super::design::Design;
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,13 +108,17 @@ fn add_products(scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usize, i: usiz
 fn sums_at(cuts: &[usize], scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usize) -> DMatrix<f64> {
     let (p, k) = (basis.nrows(), scaled.ncols());
     let mut out = DMatrix::zeros(p, k * cuts.len());
-    let (mut sum, mut at) = (vec![0.0; k * p], 0);
-    for (&cut, place) in cuts.iter().zip(out.as_mut_slice().chunks_exact_mut((k * p).max(1))) {
-        for i in at..cut {
-            add_products(scaled, basis, per, i, &mut sum);
+    let mut at = 0;
+    for (c, &cut) in cuts.iter().enumerate() {
+        let (rows, first) = (at * per, (cut - at) * per);
+        let (basis, scaled) = (basis.columns(rows, first), scaled.rows(rows, first));
+        let (before, mut place) =
+            out.columns_range_pair_mut(c.saturating_sub(1) * k..c * k, c * k..(c + 1) * k);
+        if c > 0 {
+            place.copy_from(&before);
         }
+        place.gemm(1.0, &basis, &scaled, 1.0);
         at = cut;
-        place.copy_from_slice(&sum);
     }
     out
 }

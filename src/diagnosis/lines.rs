@@ -16,8 +16,8 @@ use crate::kinematics::effect::harmonic::Harmonic;
 /// Orders 3 to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
 pub const HIGHEST: usize = 330;
 
-/// Highest order that a fine map can follow.
-const MAPPED: usize = 30;
+/// Highest orders that fine maps can follow: a cubic spline needs nearly two and a half knots for each period.
+const MAPPED: [usize; 2] = [30, 60];
 
 /// A line's χ² from which a fine map is worth a try.
 const STANDS_OUT: f64 = 25.0;
@@ -25,8 +25,9 @@ const STANDS_OUT: f64 = 25.0;
 /// Lines kept for each joint.
 const KEPT: usize = 2;
 
-/// The strongest lines of every joint as candidates, and the joints in which lines up to the reach of a fine map stand out.
-pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Vec<usize>) {
+/// The strongest lines of every joint as candidates, and the joints in which lines within the reach of a fine map stand
+/// out, with the coarsest map that follows them.
+pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Vec<(usize, usize)>) {
     let dataset = &subject.observed.dataset;
     let n = design.observations;
     let strongest: Vec<(f64, usize, usize)> = (0..6)
@@ -63,11 +64,12 @@ pub fn candidates(subject: &Subject<'_>, design: &Design) -> (Vec<Candidate>, Ve
             lines.into_iter().map(move |(size, order)| (size, joint, order))
         })
         .collect();
-    let mut mapped: Vec<usize> = strongest
+    let mut mapped: Vec<(usize, usize)> = strongest
         .iter()
-        .filter(|(size, _, order)| *size > STANDS_OUT && *order <= MAPPED)
-        .map(|l| l.1)
+        .filter(|(size, ..)| *size > STANDS_OUT)
+        .filter_map(|(_, joint, order)| Some((*joint, MAPPED.iter().position(|reach| order <= reach)?)))
         .collect();
+    mapped.sort_unstable();
     mapped.dedup();
     let candidates = strongest
         .into_par_iter()

@@ -11,6 +11,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::algebra::eigen;
 use super::catalogue::Candidate;
 use super::design::{Design, Projected};
 use crate::math::tail::log_chi_square_tail;
@@ -28,9 +29,23 @@ pub struct Score {
     pub estimate: DVector<f64>,
     /// Information, projected.
     pub information: DMatrix<f64>,
+    /// Gradient, projected.
+    pub gradient: DVector<f64>,
+}
+
+impl Score {
     /// Natural logarithm of the p-value of the candidate alone under the model's own noise, not corrected for trials:
-    /// what [`log_p`] goes on from.
-    pub log_p: f64,
+    /// what [`log_p`] goes on from. `sizes` as scored.
+    pub fn plain_log_p(&self, sizes: &[f64]) -> f64 {
+        if self.gain > SOME {
+            let scale = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
+            let (statistic, freedom) =
+                plain_statistic(&(&scale * &self.information * &scale), &(&scale * &self.gradient));
+            log_chi_square_tail(statistic, freedom.max(1))
+        } else {
+            log_chi_square_tail(self.gain, sizes.len())
+        }
+    }
 }
 
 /// Scores one candidate.
@@ -56,7 +71,7 @@ pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Scor
         merit: -2.0 * tried.ln(),
         estimate: DVector::zeros(k),
         information: projected.information.clone(),
-        log_p: 0.0,
+        gradient: DVector::zeros(k),
     };
     let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return nothing() };
     let step = factor.solve(&gradient);
@@ -67,39 +82,34 @@ pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Scor
         return nothing();
     }
     let merit = evidence - 2.0 * tried.ln();
-    let log_p = if gain > SOME {
-        let (statistic, freedom) = plain_statistic(&information, &gradient);
-        log_chi_square_tail(statistic, freedom.max(1))
-    } else {
-        log_chi_square_tail(gain, k)
-    };
     Score {
         gain,
         evidence,
         merit,
         estimate: -(&scale * step),
         information: projected.information.clone(),
-        log_p,
+        gradient: projected.gradient.clone(),
     }
 }
 
 /// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
 /// the residuals. Not corrected for trials.
 pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
-    if score.gain <= SOME {
-        return score.log_p;
+    let sizes = candidate.cause.sizes();
+    let plain = || score.plain_log_p(&sizes);
+    // Of many parameters the scatter of a few hundred rows says nothing.
+    if score.gain <= SOME || sizes.len() > MOST_SCATTERED {
+        return plain();
     }
     let columns = candidate.columns(design);
     let projected = design.project(&columns);
-    let scale = DMatrix::from_diagonal(&DVector::from_vec(candidate.cause.sizes()));
+    let scale = DMatrix::from_diagonal(&DVector::from_column_slice(&sizes));
     let information = &scale * &projected.information * &scale;
     let gradient = &scale * &projected.gradient;
     let k = columns.ncols();
-    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return score.log_p };
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return plain() };
     let step = factor.solve(&gradient);
-    let Some(scattered) = scatter_statistic(design, &columns, &projected, &scale, &gradient, &step) else {
-        return score.log_p;
-    };
+    let scattered = scatter_statistic(design, &columns, &projected, &scale, &gradient, &step);
     let (plain, freedom) = plain_statistic(&information, &gradient);
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
 }
@@ -107,11 +117,14 @@ pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
 /// A fall of χ² below this is nobody's evidence, whatever the noise.
 const SOME: f64 = 8.0;
 
+/// Most parameters whose gradient's covariance is taken from the residuals.
+const MOST_SCATTERED: usize = 6;
+
 /// gᵀ S⁺ g over the directions that the data see, and their number.
 fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {
-    let eigen = information.clone().symmetric_eigen();
     let (mut sum, mut freedom) = (0.0, 0);
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+    let Some((values, vectors)) = eigen(information) else { return (0.0, 1) };
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
         // A direction in which the size prior knows more than the data is none of the data's.
         if *value > 0.1 {
             sum += vector.dot(gradient).powi(2) / value;
@@ -130,11 +143,8 @@ fn scatter_statistic(
     scale: &DMatrix<f64>,
     gradient: &DVector<f64>,
     step: &DVector<f64>,
-) -> Option<f64> {
+) -> f64 {
     let k = columns.ncols();
-    if k > 6 {
-        return None;
-    }
     let pure = design.pure(columns, projected) * scale;
     let left = &design.residual - &pure * step;
     let mut scatter = DMatrix::zeros(k, k);
@@ -145,15 +155,15 @@ fn scatter_statistic(
         }
         scatter += &g * g.transpose();
     }
-    let eigen = scatter.symmetric_eigen();
-    let largest = eigen.eigenvalues.max();
+    let Some((values, vectors)) = eigen(&scatter) else { return 0.0 };
+    let largest = values.iter().copied().fold(0.0, f64::max);
     let mut sum = 0.0;
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
         if *value > 1e-10 * largest {
             sum += vector.dot(gradient).powi(2) / value;
         }
     }
-    Some(sum)
+    sum
 }
 
 /// Non-centrality of an effect of size `values`.

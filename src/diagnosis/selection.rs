@@ -1,19 +1,20 @@
 //! Which causes go into the model: forward by evidence and held-out error, backward, exchanged, until nothing helps.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::board::Board;
-use super::catalogue::{Candidate, arm_candidates, fine_map, measurement_candidates};
+use super::catalogue::{Candidate, arm_candidates, fine_maps, measurement_candidates};
 use super::cause::Cause;
-use super::design::{Design, back_and_forth, factored, gram, outer, product};
-use super::extension::{Extended, Freedom, Subject, fit};
+use super::design::Design;
+use super::extension::{Extended, Freedom, Subject, approached, fit};
+use super::held::Held;
 use super::levels;
 use super::score::{Score, log_p, score};
 use crate::kinematics::effect::Effect;
-use crate::math::statistics::ErrorSummary;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::split::{self, Split};
@@ -76,8 +77,8 @@ pub struct Selection {
 pub struct Catalogue {
     /// Those whose rows and orders are listed.
     pub listed: Vec<Arc<Candidate>>,
-    /// A fine error map of each joint.
-    pub fine: Vec<Arc<Candidate>>,
+    /// Fine error maps of each joint, by how fine they are.
+    pub fine: Vec<Vec<Arc<Candidate>>>,
     /// Kinds of shifts with their regressors over all rows.
     pub shifts: Vec<Candidate>,
     /// Kinds of candidates (name and joints).
@@ -110,7 +111,8 @@ impl Catalogue {
         stories.sort();
         stories.dedup();
         let families = stories.len() as f64;
-        let fine = (0..6).map(|joint| Arc::new(fine_map(subject, joint))).collect();
+        let fine =
+            (0..6).map(|joint| fine_maps(subject, joint).into_iter().map(Arc::new).collect()).collect();
         Self { listed: listed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 
@@ -124,107 +126,8 @@ impl Catalogue {
     /// does not settle it.
     fn significant(&self, design: &Design, scored: &Scored, alpha: f64) -> bool {
         let trials = (scored.candidate.tried * self.families).ln();
-        scored.score.log_p + trials <= alpha.ln() && self.corrected(design, scored) <= alpha.ln()
-    }
-}
-
-/// Grams of Q over the folds of a split, for held-out errors to first order.
-#[derive(Debug, Clone)]
-pub struct Folds {
-    tests: Vec<Vec<usize>>,
-    grams: Vec<DMatrix<f64>>,
-}
-
-impl Folds {
-    /// For a design with a basis of its own; `splits` in observations.
-    pub fn of(design: &Design, splits: &[Split]) -> Self {
-        debug_assert!(design.reduction.is_none(), "held out against a basis that is not the design's own");
-        let tests: Vec<Vec<usize>> = splits
-            .iter()
-            .map(|s| s.test.iter().flat_map(|&i| i * design.per..(i + 1) * design.per).collect())
-            .collect();
-        let grams = tests
-            .par_iter()
-            .map(|rows| {
-                let q = design.basis.select_columns(rows);
-                outer(&q)
-            })
-            .collect();
-        Self { tests, grams }
-    }
-
-    /// Sum of squares of the whitened held-out residuals.
-    fn held_out(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> f64 {
-        self.residuals(design, columns).iter().map(DVector::norm_squared).sum()
-    }
-
-    /// Sizes of the held-out position errors (mm), observation by observation, those at `set_aside` left out.
-    pub fn errors_mm(
-        &self,
-        design: &Design,
-        columns: Option<(&DMatrix<f64>, &[f64])>,
-        set_aside: &[usize],
-    ) -> Vec<f64> {
-        let mut out = Vec::new();
-        for (rows, residuals) in self.tests.iter().zip(self.residuals(design, columns)) {
-            for (scalars, r) in rows.chunks(design.per).zip(residuals.as_slice().chunks(design.per)) {
-                if !set_aside.contains(&(scalars[0] / design.per)) {
-                    let square = scalars.iter().zip(r).map(|(&s, r)| (r * design.slopes.mm[s]).powi(2));
-                    out.push(square.sum::<f64>().sqrt());
-                }
-            }
-        }
-        out
-    }
-
-    /// Root mean square of [`Folds::errors_mm`].
-    pub fn rmse_mm(
-        &self,
-        design: &Design,
-        columns: Option<(&DMatrix<f64>, &[f64])>,
-        set_aside: &[usize],
-    ) -> f64 {
-        ErrorSummary::of(self.errors_mm(design, columns, set_aside)).rmse
-    }
-
-    /// Whitened held-out residuals fold by fold, everything refitted in every fold to first order.
-    fn residuals(&self, design: &Design, columns: Option<(&DMatrix<f64>, &[f64])>) -> Vec<DVector<f64>> {
-        let p = design.basis.nrows();
-        let empty = DMatrix::zeros(design.rows(), 0);
-        let (columns, sizes) = columns.unwrap_or((&empty, &[]));
-        let k = columns.ncols();
-        let shared = product(&design.basis, columns);
-        let square = gram(columns);
-        let gradient = columns.tr_mul(&design.residual);
-        self.tests
-            .par_iter()
-            .zip(&self.grams)
-            .map(|(rows, part)| {
-                let q = design.basis.select_columns(rows);
-                let c = columns.select_rows(rows);
-                let r = DVector::from_iterator(rows.len(), rows.iter().map(|&s| design.residual[s]));
-                let mut normal = DMatrix::zeros(p + k, p + k);
-                normal.view_mut((0, 0), (p, p)).copy_from(&(DMatrix::identity(p, p) - part));
-                let cross = &shared - product(&q, &c);
-                normal.view_mut((0, p), (p, k)).copy_from(&cross);
-                normal.view_mut((p, 0), (k, p)).copy_from(&cross.transpose());
-                let mut own = &square - gram(&c);
-                for a in 0..k {
-                    own[(a, a)] += sizes[a].powi(-2);
-                }
-                normal.view_mut((p, p), (k, k)).copy_from(&own);
-                for a in 0..p + k {
-                    normal[(a, a)] *= 1.0 + 1e-12;
-                }
-                let mut right = DVector::zeros(p + k);
-                right.rows_mut(0, p).copy_from(&(-(&q * &r)));
-                right.rows_mut(p, k).copy_from(&(&gradient - c.tr_mul(&r)));
-                let solved = factored(&mut normal).then(|| back_and_forth(&normal, &right)).flatten();
-                let Some(step) = solved else { return r * f64::INFINITY };
-                let step = -step;
-                r + q.tr_mul(&step.rows(0, p)) + c * step.rows(p, k)
-            })
-            .collect()
+        let plain = scored.score.plain_log_p(&scored.candidate.cause.sizes());
+        plain + trials <= alpha.ln() && self.corrected(design, scored) <= alpha.ln()
     }
 }
 
@@ -242,35 +145,19 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let geometric = fit(subject, &[], Freedom::All, Some(&registered));
     let random = split::folds(dataset, 5, options.seed);
     let blocks = split::blocks(dataset, BLOCKS);
-    let mut current = geometric.clone();
+    let mut current = Arc::new(geometric.clone());
+    // The board of the current fit, where one was made already.
+    let mut known: Option<Board<'_>> = None;
     let mut refused: Vec<Cause> = Vec::new();
     // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
     // comes in too.
     let mut doubtful: Vec<(Cause, Vec<Cause>)> = Vec::new();
     let (mut told_again, mut ahead, mut turned_out) = (false, EXCHANGE, Vec::new());
     for _ in 0..4 * options.most.max(1) {
-        let board = Board::of(&catalogue, subject, &current);
-        let design = &board.whole.design;
-        let left = board.scored(design, true);
+        let board = known.take().unwrap_or_else(|| Board::of(&catalogue, subject, Arc::clone(&current)));
+        let left = board.scored(&board.whole.design, true);
         let taken = (current.causes.len() < options.most)
-            .then(|| {
-                let folds = (Folds::of(design, &random), Folds::of(design, &blocks));
-                let before = (folds.0.held_out(design, None), folds.1.held_out(design, None));
-                left.iter().take_while(|s| s.score.merit > 0.0).find(|scored| {
-                    if already(&refused, &scored.candidate.cause)
-                        || already(&current.causes, &scored.candidate.cause)
-                        || !catalogue.significant(design, scored, options.alpha)
-                    {
-                        return false;
-                    }
-                    let columns = scored.candidate.columns(design);
-                    let sizes = scored.candidate.cause.sizes();
-                    let after = folds.0.held_out(design, Some((&columns, &sizes)));
-                    let local = scored.candidate.cause.rows().is_some();
-                    let in_blocks = folds.1.held_out(design, Some((&columns, &sizes)));
-                    after < before.0 && (local || in_blocks < before.1 * BLOCK_SLACK)
-                })
-            })
+            .then(|| next(&board, &left, &refused, options, [&random, &blocks]))
             .flatten();
         let Some(taken) = taken else {
             let all: Vec<usize> = (0..current.causes.len()).collect();
@@ -282,19 +169,24 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                         list.push(gone.clone());
                     }
                     ahead *= HARDER;
-                    current = *settled;
+                    current = Arc::new(*settled);
                     continue;
                 }
                 Review::Settled(accepted) => {
                     if !told_again && let Some(causes) = levels::disjoint(&current.causes) {
                         told_again = true;
-                        let told = fit(subject, &causes, Freedom::All, Some(&current));
+                        let told = approached(subject, &causes, Freedom::All, Some(&current));
                         if levels::as_good(&told, &current) {
-                            current = told;
+                            current = Arc::new(told);
                             continue;
                         }
                     }
-                    return Selection { geometric, extended: current, accepted, left };
+                    return Selection {
+                        geometric,
+                        extended: Arc::unwrap_or_clone(current).polished(),
+                        accepted,
+                        left,
+                    };
                 }
             }
         };
@@ -308,7 +200,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
-        current = fit(subject, &causes, Freedom::All, Some(&current));
+        current = Arc::new(approached(subject, &causes, Freedom::All, Some(&current)));
         let asked: Vec<Cause> = doubtful
             .iter()
             .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(&cause)))
@@ -323,14 +215,13 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             if unsure.is_empty() {
                 break;
             }
-            match review(
-                &Board::of(&catalogue, subject, &current),
-                options,
-                &unsure,
-                &How { quick: true, ahead: EXCHANGE },
-            ) {
-                Review::Changed(settled) => current = *settled,
-                Review::Settled(_) => break,
+            let board = Board::of(&catalogue, subject, Arc::clone(&current));
+            match review(&board, options, &unsure, &How { quick: true, ahead: EXCHANGE }) {
+                Review::Changed(settled) => current = Arc::new(*settled),
+                Review::Settled(_) => {
+                    known = Some(board);
+                    break;
+                }
             }
         }
         if current.causes.len() <= count && !already(&current.causes, &cause) {
@@ -339,10 +230,47 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         }
     }
     // Causes that take turns without end: the last state is judged as it stands.
-    let board = Board::of(&catalogue, subject, &current);
+    let board = Board::of(&catalogue, subject, Arc::clone(&current));
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    Selection { geometric, extended: current, accepted, left }
+    Selection { geometric, extended: Arc::unwrap_or_clone(current).polished(), accepted, left }
+}
+
+/// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.
+fn next<'a>(
+    board: &Board<'_>,
+    left: &'a [Scored],
+    refused: &[Cause],
+    options: &Options,
+    splits: [&[Split]; 2],
+) -> Option<&'a Scored> {
+    let design = &board.whole.design;
+    let mut significant = left
+        .iter()
+        .take_while(|s| s.score.merit > 0.0)
+        .filter(|s| !already(refused, &s.candidate.cause) && !already(&board.fit.causes, &s.candidate.cause))
+        .filter(|s| board.catalogue.significant(design, s, options.alpha))
+        .peekable();
+    significant.peek()?;
+    let held = Held::of(&board.linear, splits[0]);
+    let random = held.without(&[]);
+    let before = random.squares(None);
+    let (held, blocks) = (OnceCell::new(), OnceCell::new());
+    significant.find(|scored| {
+        let columns = scored.candidate.columns(design);
+        let sizes = scored.candidate.cause.sizes();
+        let added = Some((&columns, sizes.as_slice()));
+        let local = scored.candidate.cause.rows().is_some();
+        let on_blocks = || {
+            let (blocks, before) = blocks.get_or_init(|| {
+                let blocks = held.get_or_init(|| Held::of(&board.linear, splits[1])).without(&[]);
+                let before = blocks.squares(None);
+                (blocks, before)
+            });
+            blocks.squares(added) < before * BLOCK_SLACK
+        };
+        random.squares(added) < before && (local || on_blocks())
+    })
 }
 
 /// A cause is in doubt beside rivals that have less merit by no more than this.
@@ -378,6 +306,9 @@ struct How {
     ahead: f64,
 }
 
+/// Causes that are looked at beside each other, before one of them may change the model.
+const BESIDE: usize = 4;
+
 /// What looking again at accepted causes came to.
 enum Review {
     /// One was dropped or exchanged.
@@ -389,31 +320,32 @@ enum Review {
 /// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
 /// explains better.
 fn review(board: &Board<'_>, options: &Options, which: &[usize], how: &How) -> Review {
-    let (subject, catalogue, current) = (board.subject, board.catalogue, board.fit);
+    let (subject, catalogue, current) = (board.subject, board.catalogue, &*board.fit);
     let mut accepted = Vec::new();
-    for &index in which {
-        let open = !how.quick || is_open(&board.fit.causes[index]);
-        let (judged, design, scored) = looked_at(board, index, open);
-        let mut others = current.causes.clone();
-        others.remove(index);
-        let enough = judged.own.merit + how.ahead;
-        let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
-            !already(&others, &s.candidate.cause) && catalogue.significant(&design, s, options.alpha)
-        });
-        let better =
-            best.filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
-        let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
-        if better.is_some() || !carries {
-            let reduced = fit(subject, &others, Freedom::All, Some(current));
-            return Review::Changed(Box::new(match better {
-                Some(better) => {
-                    others.push(better.candidate.cause.clone());
-                    fit(subject, &others, Freedom::All, Some(&reduced))
-                }
-                None => reduced,
-            }));
+    for some in which.chunks(BESIDE) {
+        let looked: Vec<_> = some
+            .par_iter()
+            .map(|&index| looked_at(board, index, !how.quick || is_open(&current.causes[index])))
+            .collect();
+        for (&index, (judged, design, scored)) in some.iter().zip(looked) {
+            let mut others = current.causes.clone();
+            others.remove(index);
+            let enough = judged.own.merit + how.ahead;
+            let best = scored.iter().take_while(|s| s.score.merit > enough).find(|s| {
+                !already(&others, &s.candidate.cause) && catalogue.significant(&design, s, options.alpha)
+            });
+            let better = best
+                .filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
+            let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+            if better.is_some() || !carries {
+                let reduced = approached(subject, &others, Freedom::All, Some(current));
+                let Some(better) = better else { return Review::Changed(Box::new(reduced)) };
+                others.push(better.candidate.cause.clone());
+                let settled = approached(subject, &others, Freedom::All, Some(&reduced));
+                return Review::Changed(Box::new(settled));
+            }
+            accepted.push(judged);
         }
-        accepted.push(judged);
     }
     Review::Settled(accepted)
 }
@@ -448,7 +380,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
 
 /// A cause against the model without it: the judgement, the design there, and every candidate's score in it.
 fn looked_at(board: &Board<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
-    let current = board.fit;
+    let current = &*board.fit;
     let cause = &current.causes[index];
     let design = board.whole.without(&current.places(index));
     let scored = board.scored(&design, open);

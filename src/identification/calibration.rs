@@ -203,12 +203,16 @@ impl Calibration {
     pub fn plain_residuals(&self, x: &[f64]) -> Vec<f64> {
         let per = self.rows_per_observation();
         let mut out = vec![0.0; self.rows()];
-        self.residuals(x, 0..self.rows(), &mut out);
-        for (i, r) in out.iter_mut().enumerate() {
-            let (row, component) = (i / per, i % per);
-            let weight = if component < 3 { &self.columns.per_mm } else { &self.columns.per_rad }[row];
-            *r /= weight;
-        }
+        let chunk = COST_LANES * WIDTH * per;
+        out.par_chunks_mut(chunk).enumerate().for_each(|(k, out)| {
+            let first = k * chunk;
+            self.residuals(x, first..first + out.len(), out);
+            for (i, r) in out.iter_mut().enumerate() {
+                let (row, component) = ((first + i) / per, i % per);
+                let weight = if component < 3 { &self.columns.per_mm } else { &self.columns.per_rad }[row];
+                *r /= weight;
+            }
+        });
         out
     }
 
@@ -239,6 +243,21 @@ impl Calibration {
 
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
+
+/// Groups of eight rows whose cost one thread sums up: few, so that threads end together.
+const COST_LANES: usize = 16;
+
+/// Parameters with which such a buffer stays there.
+const FEW: usize = 64;
+
+/// Bytes of a buffer for more of them.
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// Groups of eight rows in a block, for p parameters and c components: a function of the task alone, so that sums are the
+/// same for any number of threads.
+fn block_lanes(p: usize, c: usize) -> usize {
+    if p <= FEW { BLOCK_LANES } else { (BUFFER_BYTES / ((p + 1) * c * WIDTH * 8)).clamp(4, BLOCK_LANES) }
+}
 
 impl Problem for Calibration {
     fn parameters(&self) -> usize {
@@ -285,7 +304,7 @@ impl Problem for Calibration {
         let state = kernel::State::of(self, x);
         let c = self.components();
         let parts: Vec<f64> = self
-            .blocks()
+            .blocks_of(COST_LANES)
             .into_par_iter()
             .map(|(from, lanes)| {
                 let mut out = vec![0.0; c * lanes * WIDTH];
@@ -299,44 +318,52 @@ impl Problem for Calibration {
     fn normal_equations(&self, x: &[f64]) -> NormalEquations {
         let state = kernel::State::of(self, x);
         let (p, c) = (self.parameters.len(), self.components());
-        let parts: Vec<NormalEquations> = self
-            .blocks()
-            .into_par_iter()
+        let most = block_lanes(p, c);
+        let blocks = self.blocks_of(most);
+        // A square of its own for each block would cost more than its products where parameters are many.
+        let together = if p > FEW { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
+        let parts: Vec<nalgebra::DMatrix<f64>> = blocks
+            .par_chunks(together)
             .map_init(
-                || vec![0.0; (p + 1) * c * BLOCK_LANES * WIDTH],
-                |buffer, (from, lanes)| {
-                    let rows = c * lanes * WIDTH;
-                    let columns = &mut buffer[..(p + 1) * rows];
-                    self.fill(&state, from, lanes, true, columns);
-                    gram(columns, rows, p)
+                || vec![0.0; (p + 1) * c * most * WIDTH],
+                |buffer, blocks| {
+                    let mut square = nalgebra::DMatrix::zeros(p + 1, p + 1);
+                    for &(from, lanes) in blocks {
+                        let rows = c * lanes * WIDTH;
+                        let columns = &mut buffer[..(p + 1) * rows];
+                        self.fill(&state, from, lanes, true, columns);
+                        add_gram(columns, rows, &mut square);
+                    }
+                    square
                 },
             )
             .collect();
-        let mut total = NormalEquations::zeros(p);
-        parts.iter().for_each(|part| total.add(part));
-        total.mirror();
-        total
+        let total = parts.into_iter().reduce(|sum, part| sum + part);
+        let square = total.unwrap_or_else(|| nalgebra::DMatrix::zeros(p + 1, p + 1));
+        let mut out = NormalEquations {
+            matrix: square.view((0, 0), (p, p)).into_owned(),
+            gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
+            cost: 0.5 * square[(p, p)],
+        };
+        out.mirror();
+        out
     }
 }
 
-/// [J r]ᵀ[J r] of columns of `rows` entries, the residual in column p.
-fn gram(columns: &[f64], rows: usize, p: usize) -> NormalEquations {
-    let mut square = nalgebra::DMatrix::<f64>::zeros(p + 1, p + 1);
-    let a = MatRef::from_column_major_slice(columns, rows, p + 1);
-    let out = MatMut::from_column_major_slice_mut(square.as_mut_slice(), p + 1, p + 1);
+/// Adds [J r]ᵀ[J r] of columns of `rows` entries, the residual in the last, to the lower triangle of `square`.
+fn add_gram(columns: &[f64], rows: usize, square: &mut nalgebra::DMatrix<f64>) {
+    let size = square.nrows();
+    let a = MatRef::from_column_major_slice(columns, rows, size);
+    let out = MatMut::from_column_major_slice_mut(square.as_mut_slice(), size, size);
     let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-    triangular::matmul(out, lower, Accum::Replace, a.transpose(), full, a, full, 1.0, Par::Seq);
-    NormalEquations {
-        matrix: square.view((0, 0), (p, p)).into_owned(),
-        gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
-        cost: 0.5 * square[(p, p)],
-    }
+    triangular::matmul(out, lower, Accum::Add, a.transpose(), full, a, full, 1.0, Par::Seq);
 }
 
 impl Calibration {
-    fn blocks(&self) -> Vec<(usize, usize)> {
+    /// First group of eight rows and number of groups of each block of at most `lanes` groups.
+    fn blocks_of(&self, lanes: usize) -> Vec<(usize, usize)> {
         let groups = self.rows.div_ceil(WIDTH);
-        (0..groups).step_by(BLOCK_LANES).map(|from| (from, BLOCK_LANES.min(groups - from))).collect()
+        (0..groups).step_by(lanes).map(|from| (from, lanes.min(groups - from))).collect()
     }
 
     /// Writes rows in the order of the trait: observation by observation, components inside.

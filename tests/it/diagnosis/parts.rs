@@ -3,18 +3,22 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
+use truegrind::diagnosis::catalogue::Candidate;
 use truegrind::diagnosis::cause::Cause;
 use truegrind::diagnosis::design::{Design, Linear, Slopes};
 use truegrind::diagnosis::diagnose::Options;
-use truegrind::diagnosis::extension::{Freedom, Subject, fit};
+use truegrind::diagnosis::extension::{Extended, Freedom, Subject, fit};
+use truegrind::diagnosis::held::Held;
 use truegrind::diagnosis::intervals::scan;
 use truegrind::diagnosis::levels::disjoint;
 use truegrind::diagnosis::rows::{mismatches, prepare};
 use truegrind::diagnosis::score::score_columns;
+use truegrind::diagnosis::validation::Validation;
 use truegrind::kinematics::condition::Condition;
 use truegrind::math::tail::{chi_square_tail, log_chi_square_tail, normal_two_sided};
 use truegrind::measurement::dataset::Sensor;
 use truegrind::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind::measurement::split;
 use truegrind::robots;
 
 use super::scenarios;
@@ -130,17 +134,11 @@ fn rows_whose_columns_contradict_each_other_are_named() {
     assert_ne!(prepared.observed.dataset.rows[8].joints, data.rows[8].joints);
 }
 
-#[test]
-fn a_model_without_some_parameters_follows_from_the_whole_one() {
+/// A fit of two hidden effects, on `rows` rows.
+fn fitted(rows: usize, then: impl FnOnce(&Subject<'_>, &Extended)) {
     let nominal = robots::load("abb-irb-120").unwrap().model;
-    let setup = Setup {
-        sensor: Sensor::Position,
-        rows: 90,
-        sigma_mm: 0.05,
-        dirty: true,
-        seed: 11,
-        log: Log::default(),
-    };
+    let setup =
+        Setup { sensor: Sensor::Position, rows, sigma_mm: 0.05, dirty: true, seed: 11, log: Log::default() };
     let hidden = [
         Hidden::Gear { joint: 1, order: 1.0, peak_rad: 1.5e-3, phase: 0.4 },
         Hidden::Tool { from: 20, to: 50, mm: [0.8, -0.3, 0.2] },
@@ -156,8 +154,47 @@ fn a_model_without_some_parameters_follows_from_the_whole_one() {
         tolerance: &options.tolerance,
     };
     let causes: Vec<Cause> = hidden.iter().filter_map(scenarios::cause).collect();
-    let fitted = fit(&subject, &causes, Freedom::All, None);
-    let linear = Linear::of(&subject, &fitted);
+    then(&subject, &fit(&subject, &causes, Freedom::All, None));
+}
+
+#[test]
+fn a_refit_by_one_step_is_a_refit() {
+    fitted(150, |subject, fitted| {
+        let validation = Validation::of(subject, &[], 0, 10);
+        let steps = validation.by_steps(fitted).unwrap();
+        for (step, refit) in steps.iter().zip(&validation.by_refits(fitted)) {
+            let off = step.rmse / refit.rmse - 1.0;
+            assert!(off.abs() < 1e-3, "{} against {}", step.rmse, refit.rmse);
+        }
+        let dataset = &subject.observed.dataset;
+        let linear = Linear::of(subject, fitted);
+        let held = Held::of(&linear, &split::folds(dataset, 5, 0));
+        let whole = held.without(&[]).rmse_mm(None, &[]);
+        assert!((whole / steps[0].rmse - 1.0).abs() < 2e-3, "{whole} against {}", steps[0].rmse);
+        // What is taken out and added again as a candidate is where it was.
+        let design = linear.whole().design;
+        for (index, cause) in fitted.causes.iter().enumerate() {
+            let candidate = match cause.clone() {
+                Cause::Arm(effect) => Candidate::arm(effect, dataset, subject.nominal),
+                Cause::Measurement(d) => Candidate::measurement(d, dataset, subject.nominal),
+            };
+            let (columns, sizes) = (candidate.columns(&design), cause.sizes());
+            let without = held.without(&fitted.places(index));
+            let (alone, back) = (without.rmse_mm(None, &[]), without.rmse_mm(Some((&columns, &sizes)), &[]));
+            assert!(alone > 1.5 * whole, "{cause:?} makes a difference: {alone} against {whole}");
+            // Regressors are taken at the nominal arm.
+            assert!((back / whole - 1.0).abs() < 1e-3, "{cause:?}: {back} against {whole}");
+        }
+    });
+}
+
+#[test]
+fn a_model_without_some_parameters_follows_from_the_whole_one() {
+    fitted(90, part_of_the_whole);
+}
+
+fn part_of_the_whole(subject: &Subject<'_>, fitted: &Extended) {
+    let linear = Linear::of(subject, fitted);
     let whole = linear.whole();
     let columns = DMatrix::from_fn(270, 3, |i, k| ((i * (5 + k) + 3 * k) % 17) as f64 - 8.0);
     let on_whole = whole.design.project(&columns);
