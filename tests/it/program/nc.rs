@@ -354,7 +354,7 @@ fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
         let body = format!("G90\n{go}#2=4\nN10 #1=3\nG1 X#2 Y2 Z3 A0 B0 C0\n{jump}\n");
         let tree = parse(body.as_bytes(), Dialect::Iso);
         assert!(tree.opaque.is_empty(), "{jump}: {:?}", tree.opaque);
-        assert_eq!(ends(&body, Dialect::Iso), [Ok([1.0, 2.0, 3.0]), Err(Reason::Variable)], "{jump}");
+        assert_eq!(ends(&body, Dialect::Iso), [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow)], "{jump}");
     }
     let action = "N29 ID=1 WHEN $AA_IW[X]>10 DO R5=5\n";
     let body =
