@@ -30,7 +30,16 @@ use crate::program::motion::{
 };
 
 /// Motions that one thread takes at a time.
-const PORTION: usize = 256;
+const PORTION: usize = 64;
+
+/// About the memory that a portion keeps (bytes).
+const KEPT: usize = 100 << 10;
+
+/// Makes the allocator take the room for a portion from the system at once. Left alone it asks for each few thousand bytes
+/// by themselves, and every thread waits while it does.
+pub(super) fn take_room() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
+}
 
 /// Targets along which the program as it is is followed in one go: the first one has no neighbour and costs as much as
 /// hundreds of others.
@@ -216,6 +225,7 @@ impl Work<'_> {
                 if stale.is_some_and(|stale| !stale[begin / PORTION]) {
                     return Vec::new();
                 }
+                take_room();
                 let targets = self.targets(begin);
                 let places = [&before[targets.clone()], &places[targets.clone()]];
                 let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);

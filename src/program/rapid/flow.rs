@@ -337,18 +337,13 @@ impl Walk<'_, '_, '_> {
     fn settings(&mut self, node: u32) -> States {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let end = node + tree.nodes[node as usize].size;
+        let symbols = self.evaluator.symbols;
         let mut out = States::NONE;
-        for node in node..end {
-            if tree.nodes[node as usize].kind != Syntax::Call {
-                continue;
-            }
+        for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
-            if instruction::find(name).is_some() {
-                continue;
-            }
             if let Some((which, on)) = setting(tree, node, name) {
                 out = out.or(States::NONE.set(which, on));
-            } else if let Some(routine) = self.evaluator.symbols.routine(self.unit.scope, name) {
+            } else if let Some(routine) = symbols.routine(self.unit.scope, name) {
                 out = out.or(self.visitor.exit_of(routine));
             }
         }
@@ -369,10 +364,12 @@ impl Walk<'_, '_, '_> {
             state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
         let motion = self.visitor.call(self.unit, node, &state, place);
-        symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
-            state.known.remove(&change.symbol);
-        });
         let known = if late || symbols.hides_instruction { None } else { instruction::find(name) };
+        if known.is_none_or(|known| INSTRUCTIONS[known].searches()) {
+            symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
+                state.known.remove(&change.symbol);
+            });
+        }
         if let Some(known) = known {
             if motion.is_some() {
                 // A search stops where its signal comes.

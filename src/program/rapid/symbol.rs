@@ -147,6 +147,8 @@ pub struct Symbols {
     pub callees_first: Vec<u32>,
     /// How each unit leaves the switches.
     pub ends: Vec<Ends>,
+    /// The calls of each unit that set a switch or call a routine of the program, in order.
+    pub switches: Vec<Vec<u32>>,
 }
 
 impl Symbols {
@@ -194,11 +196,22 @@ impl Symbols {
 
     /// What the statements of a unit may change by themselves, in order.
     pub fn changed_in(&self, unit: Unit) -> &[u32] {
-        let at = match unit.routine {
+        self.place_of(unit).and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The calls among some nodes of a unit that set a switch or call a routine of the program.
+    pub fn switches_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
+        let all = self.place_of(unit).and_then(|at| self.switches.get(at)).map_or(&[][..], Vec::as_slice);
+        let first = all.partition_point(|&node| node < nodes.start);
+        let end = all.partition_point(|&node| node < nodes.end);
+        &all[first..end]
+    }
+
+    fn place_of(&self, unit: Unit) -> Option<usize> {
+        match unit.routine {
             Some(routine) => Some(self.routines[routine as usize].unit as usize),
             None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
-        };
-        at.and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
+        }
     }
 
     /// Every declared name, in lower case.

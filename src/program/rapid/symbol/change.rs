@@ -82,8 +82,8 @@ struct Found {
     moves: bool,
     /// Whether data is changed by a name that is computed.
     by_name: bool,
-    /// Whether it sets a switch.
-    sets: bool,
+    /// The calls that set a switch or call a routine of the program.
+    switches: Vec<u32>,
 }
 
 /// A routine that changes more data outside than this may as well change anything.
@@ -123,9 +123,10 @@ impl Symbols {
         for &routine in all.iter().flat_map(|found| &found.calls) {
             called[self.routines[routine as usize].unit as usize] = true;
         }
-        for (at, found) in all.iter().enumerate() {
-            let quiet = !found.sets && found.calls.is_empty();
+        for (at, found) in all.into_iter().enumerate() {
+            let quiet = found.switches.is_empty();
             self.ends.push(if quiet { Ends::AsItBegins } else { Ends::Set { called: called[at] } });
+            self.switches.push(found.switches);
         }
     }
 
@@ -244,6 +245,11 @@ impl Symbols {
                 node += tree.nodes[node as usize].size;
                 continue;
             }
+            if kind == Syntax::Call && self.moves_only(tree, unit.scope, node) {
+                found.moves = true;
+                node += 1;
+                continue;
+            }
             if kind.may_change() {
                 self.changed_by(tree, unit.scope, node, &mut |change| found.changes.push(change));
             }
@@ -256,8 +262,11 @@ impl Symbols {
                         node += 1;
                         continue;
                     }
-                    found.sets |= setting(tree, node, name).is_some();
-                    if let Some(routine) = self.routine(unit.scope, name) {
+                    let routine = self.routine(unit.scope, name);
+                    if kind == Syntax::Call && (routine.is_some() || setting(tree, node, name).is_some()) {
+                        found.switches.push(node);
+                    }
+                    if let Some(routine) = routine {
                         found.calls.push(routine);
                     } else if predefined::effect(name).is_none() {
                         (found.unknown, found.moves) = (true, true);
@@ -277,6 +286,13 @@ impl Symbols {
     /// Whether a call by this name is a motion instruction of the table.
     pub fn is_motion(&self, scope: u32, name: &[u8]) -> bool {
         instruction::find(name).is_some() && !(self.hides_instruction && self.routine(scope, name).is_some())
+    }
+
+    /// Whether a call is a motion instruction that writes no argument: nearly every statement of a long program is one.
+    pub fn moves_only(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> bool {
+        let name = tree.text(tree.nodes[node as usize].first);
+        instruction::find(name).is_some_and(|known| !INSTRUCTIONS[known].searches())
+            && !(self.hides_instruction && self.routine(scope, name).is_some())
     }
 
     /// What a call of each routine may change, through what it calls.
