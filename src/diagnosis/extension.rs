@@ -78,6 +78,10 @@ pub struct Extended {
 /// Bend of Huber's weight, in standard deviations.
 const BEND: f64 = 2.0;
 
+/// No sensor reads better than this (mm, rad). Fewer rows than parameters fit without any error: what is then held is held
+/// by the priors, which must not be lost beside weights without bound.
+const FINEST: (f64, f64) = (1e-3, 1e-6);
+
 /// At most this many rounds of solver and weights.
 const ROUNDS: usize = 8;
 
@@ -252,7 +256,10 @@ pub(super) fn approached(
             let by_angle = if angles > 0 { dispersion(lengths..per) } else { 1.0 };
             let weights: Vec<Weight> = base
                 .iter()
-                .map(|w| Weight { per_mm: w.per_mm / by_length, per_rad: w.per_rad / by_angle })
+                .map(|w| Weight {
+                    per_mm: (w.per_mm / by_length).min(FINEST.0.recip()),
+                    per_rad: (w.per_rad / by_angle).min(FINEST.1.recip()),
+                })
                 .collect();
             let task = plain_task.reweighted(&trusted(&weights, &trust));
             let estimate = if nearby && newton::descend(&task, &priors, &mut x) {
@@ -293,7 +300,7 @@ fn narrowed(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64 {
     let of = |w: &Weight| if lengths { w.per_mm } else { w.per_rad };
     let total = median(&base.iter().map(|w| 1.0 / of(w).powi(2)).collect::<Vec<_>>()).unwrap_or(1.0);
     let share = (total - sigma * sigma).max(0.0);
-    let smallest = if lengths { 1e-4 } else { 1e-6 };
+    let smallest = if lengths { FINEST.0 } else { FINEST.1 };
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 

@@ -203,3 +203,14 @@ fn too_few_rows_say_how_many_are_needed() {
     assert!(page.contains("[not evaluated]") && page.contains(&needed.to_string()), "{page}");
     assert!(!page.contains("[ok]"), "a fit that follows its few rows is no good news: {page}");
 }
+
+#[test]
+fn rows_that_a_fit_follows_without_error_are_still_held_out() {
+    // 18 readings for 33 parameters.
+    let out = outcome(&arm(), &[], &setup(Sensor::Position, 6, 12));
+    let fits = &out.diagnosed.diagnosis.fits;
+    assert!(fits.geometric.rmse_mm < 0.01, "{}", fits.geometric.rmse_mm);
+    for held_out in [fits.geometric.cv_rmse_mm, fits.geometric.cv_blocks_rmse_mm] {
+        assert!(held_out > 0.03, "{held_out} is less than the sensor's noise");
+    }
+}
