@@ -22,6 +22,9 @@ use crate::program::tree::Child;
 /// the displacement is as at the entry of the routine.
 pub(super) const DISPLACEMENT: u32 = u32::MAX;
 
+/// Longer arrays are not followed element by element.
+const ELEMENTS: f64 = 64.0;
+
 /// What holds before a statement.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct State {
@@ -433,8 +436,11 @@ impl Walk<'_, '_, '_> {
         let new = match place {
             Child::Token(_) => value,
             Child::Node(place) => {
-                let old = self.evaluator.symbol_value(context, root);
                 let path: Vec<Child> = parts(tree, place).skip(1).collect();
+                let mut old = self.evaluator.symbol_value(context, root);
+                if let (Value::Unknown(reason), Some(Child::Node(_))) = (&old, path.first()) {
+                    old = self.elements(context, root, *reason);
+                }
                 let type_name = symbols.symbols[root as usize].type_name.clone();
                 self.replaced(context, old, &type_name, &path, value)
             }
@@ -444,6 +450,26 @@ impl Walk<'_, '_, '_> {
             state.known.remove(&root);
         } else {
             state.known.insert(root, new);
+        }
+    }
+
+    /// An array of which nothing is known, element by element, so that those that are assigned are.
+    fn elements(&self, context: Context<'_>, root: u32, reason: Reason) -> Value {
+        let symbol = &self.evaluator.symbols.symbols[root as usize];
+        let tree = &self.evaluator.trees[symbol.file as usize];
+        let dimensions = match &symbol.what {
+            What::Data(data) => data.dimensions,
+            _ => None,
+        };
+        let Some(dimensions) = dimensions else { return Value::Unknown(reason) };
+        let mut sizes = expressions(tree, dimensions);
+        let (Some(size), None) = (sizes.next(), sizes.next()) else { return Value::Unknown(reason) };
+        let there = Context::new(symbol.file, symbol.scope, context.known);
+        match self.evaluator.value(there, size).number() {
+            Ok(size) if (1.0..=ELEMENTS).contains(&size) => {
+                Value::List(vec![Value::Unknown(reason); size as usize])
+            }
+            _ => Value::Unknown(reason),
         }
     }
 

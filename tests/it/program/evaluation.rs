@@ -407,6 +407,23 @@ fn only_what_may_change_a_value_makes_it_unknown() {
 }
 
 #[test]
+fn elements_of_an_array_are_followed_where_their_index_is_known() {
+    let data = format!("{}\nVAR robtarget a{{3}};\nVAR robtarget long{{500}};\nVAR num n:=1;", base());
+    let filled = "a{1}:=p; a{2}:=Offs(p,0,5,0);";
+    let y =
+        |body: &str, expression: &str| target(&data, body, expression).map(|target| target.position_mm[1]);
+    assert_eq!(y(filled, "a{1}"), Ok(-20.0));
+    assert_eq!(y(filled, "a{2}"), Ok(-15.0));
+    assert_eq!(y(&format!("{filled} a{{2}}.trans.y:=7;"), "a{2}"), Ok(7.0));
+    assert_eq!(y(filled, "a{3}"), Err(Reason::Assigned));
+    assert_eq!(y(filled, "a{4}"), Err(Reason::IndexOutOfRange));
+    assert_eq!(y(&format!("{filled} n:=ReadNum(d); a{{n}}:=p;"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y(&format!("{filled} FOR i FROM 1 TO 3 DO a{{i}}:=p; ENDFOR"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y(&format!("{filled} elsewhere;"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y("long{2}:=p;", "long{2}"), Err(Reason::Assigned));
+}
+
+#[test]
 fn changes_are_carried_along_chains_of_calls_in_any_order() {
     const COUNT: usize = 2000;
     for backwards in [false, true] {
