@@ -10,7 +10,35 @@ use super::outputs::say;
 
 /// The bytes of a file.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+    whole(path).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+/// Files from here on are read in parts, on all threads (bytes).
+#[cfg(unix)]
+const LARGE: u64 = 1 << 22;
+
+#[cfg(unix)]
+fn whole(path: &Path) -> std::io::Result<Vec<u8>> {
+    use std::os::unix::fs::FileExt;
+
+    use rayon::prelude::*;
+
+    let length = fs::metadata(path).ok().filter(fs::Metadata::is_file).map_or(0, |meta| meta.len());
+    if length < LARGE {
+        return fs::read(path);
+    }
+    let file = fs::File::open(path)?;
+    let mut bytes = vec![0; length as usize];
+    let part = LARGE as usize;
+    let parts = bytes.par_chunks_mut(part).enumerate();
+    parts.try_for_each(|(index, bytes)| file.read_exact_at(bytes, (index * part) as u64))?;
+    // One that grew meanwhile is read again, to its end.
+    if file.metadata()?.len() == length { Ok(bytes) } else { fs::read(path) }
+}
+
+#[cfg(not(unix))]
+fn whole(path: &Path) -> std::io::Result<Vec<u8>> {
+    fs::read(path)
 }
 
 /// The text of a file.

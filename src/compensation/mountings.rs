@@ -8,11 +8,12 @@ use super::rewrite::{Arms, configured};
 use super::why::Why;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
-use crate::program::motion::{Listing, Motion, RobTarget, Switch, WorkObjectValue};
+use crate::program::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
 
 /// Mountings by (tool, work object) as motions use them.
 pub(super) struct Mountings {
-    places: HashMap<(u32, u32), usize>,
+    /// The place of each in the list, or why there is none.
+    places: HashMap<(u32, u32), Result<usize, Why>>,
     pub(super) list: Vec<Mounted>,
     /// External axes that carry the base.
     base: [bool; 6],
@@ -34,7 +35,11 @@ impl Mountings {
                 continue;
             }
             let (Some(t), Some(o)) = (listing.tool(motion), listing.work_object(motion)) else { continue };
-            let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else { continue };
+            let (Ok(tv), Ok(ov)) = (&t.value, &o.value) else {
+                let reason = listing.left_by_frames(motion).unwrap_or(Reason::ToolUnknown);
+                out.places.insert((tool, object), Err(Why::Program(reason)));
+                continue;
+            };
             let nominal = arms.nominal.arm();
             let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
             out.list.push(mount(
@@ -46,7 +51,7 @@ impl Mountings {
                 arms.knowledge,
                 &usual,
             ));
-            out.places.insert((tool, object), out.list.len() - 1);
+            out.places.insert((tool, object), Ok(out.list.len() - 1));
         }
         out.external_axes(listing, arms, cell);
         out
@@ -65,7 +70,7 @@ impl Mountings {
                 if target.external == [None; 6] {
                     continue;
                 }
-                let far = self.of_motion(motion).is_some_and(|mounted| {
+                let far = self.of_motion(motion).is_ok_and(|mounted| {
                     let flange = self.list[mounted].told.flange_for(&target.pose());
                     !(flange.translation.vector.norm() <= longest)
                 });
@@ -98,8 +103,11 @@ impl Mountings {
         Some(Why::MovingBase { axis })
     }
 
-    pub(super) fn of_motion(&self, motion: &Motion) -> Option<usize> {
-        self.places.get(&(motion.tool?, motion.work_object?)).copied()
+    /// The mounting of a motion, or why its tool or work object tells none.
+    pub(super) fn of_motion(&self, motion: &Motion) -> Result<usize, Why> {
+        let missing = Err(Why::Program(Reason::MissingArgument));
+        let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { return missing };
+        self.places.get(&(tool, object)).copied().unwrap_or(missing)
     }
 
     pub(super) fn notes(&self) -> Vec<String> {

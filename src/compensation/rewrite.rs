@@ -19,7 +19,7 @@ use super::mountings::Mountings;
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
 use super::segment::{Ends, Path, middles_off};
-use super::solve::{Solved, SolvedTargets, solve_all};
+use super::solve::{Solved, SolvedTargets, solve_all, take_room};
 use super::speed::fastest;
 use super::why::Why;
 use crate::kinematics::condition::Condition;
@@ -263,7 +263,7 @@ fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<Stri
 }
 
 /// Motions that one thread takes at a time.
-const PORTION: usize = 256;
+const PORTION: usize = 64;
 
 /// What the motions of a program are worked out from.
 struct Job<'a> {
@@ -356,6 +356,7 @@ struct Worked {
 
 impl<'a> Job<'a> {
     fn portion(&self, motions: std::ops::Range<usize>) -> Portion {
+        take_room();
         let count = motions.len();
         let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
         // Whether lines are straight shows in their middles, which are worked out together.

@@ -26,11 +26,20 @@ use crate::kinematics::model::Joints;
 use crate::kinematics::region::Outside;
 use crate::math::se3::Pose;
 use crate::program::motion::{
-    Listing, Motion, MotionKind, MotionTarget, Reason, RobTarget, Role, Switch, TargetValue,
+    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
 };
 
 /// Motions that one thread takes at a time.
-const PORTION: usize = 256;
+const PORTION: usize = 64;
+
+/// About the memory that a portion keeps (bytes).
+const KEPT: usize = 100 << 10;
+
+/// Makes the allocator take the room for a portion from the system at once. Left alone it asks for each few thousand bytes
+/// by themselves, and every thread waits while it does.
+pub(super) fn take_room() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
+}
 
 /// Targets along which the program as it is is followed in one go: the first one has no neighbour and costs as much as
 /// hundreds of others.
@@ -216,6 +225,7 @@ impl Work<'_> {
                 if stale.is_some_and(|stale| !stale[begin / PORTION]) {
                     return Vec::new();
                 }
+                take_room();
                 let targets = self.targets(begin);
                 let places = [&before[targets.clone()], &places[targets.clone()]];
                 let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
@@ -394,7 +404,7 @@ struct Told<'a> {
 impl<'a> Told<'a> {
     fn of(asked: &Asked<'a>, mountings: &Mountings) -> Option<Self> {
         let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
-        let mounted = mountings.of_motion(asked.motion)?;
+        let mounted = mountings.of_motion(asked.motion).ok()?;
         if mountings.moving_base(target).is_some() {
             return None;
         }
@@ -440,7 +450,7 @@ fn start(
     mountings: &Mountings,
 ) -> Result<Start, Why> {
     let value = asked.target.value.map_err(Why::Program)?;
-    let mounted = mountings.of_motion(asked.motion).ok_or(Why::Program(Reason::ToolUnknown))?;
+    let mounted = mountings.of_motion(asked.motion)?;
     let told = &mountings.list[mounted].told;
     match value {
         TargetValue::Cartesian(t) => {

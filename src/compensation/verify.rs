@@ -218,7 +218,7 @@ fn send(
     let motion = &listing.motions[index];
     let target = motion.to().ok_or(Why::Program(Reason::ExternalOnly))?;
     let value = target.value.map_err(Why::Program)?;
-    let mounted = mountings.of_motion(motion).ok_or(Why::Program(Reason::ToolUnknown))?;
+    let mounted = mountings.of_motion(motion)?;
     let mounting = &mountings.list[mounted].told;
     let (told, joints) = match value {
         TargetValue::Cartesian(t) => {

@@ -117,11 +117,20 @@ impl Region {
         if self.samples_deg.get(*near).is_some_and(close) {
             return None;
         }
-        // The first sample that is near enough settles it.
-        let mut nearest = f64::INFINITY;
+        // The first sample that is near enough settles it. One whose first joints alone are farther away than the nearest
+        // so far, which is the nearest of the pose before to begin with, is passed over.
+        let mut nearest =
+            self.samples_deg.get(*near).map_or(f64::INFINITY, |sample| square(sample, &degrees));
         for (index, sample) in self.samples_deg.iter().enumerate() {
-            nearest = nearest.min(square(sample, &degrees));
-            if nearest <= allowed * allowed {
+            let part: f64 = sample[..3].iter().zip(&degrees).map(|(a, b)| (a - b) * (a - b)).sum();
+            if part > nearest {
+                continue;
+            }
+            let whole = square(sample, &degrees);
+            if whole < nearest {
+                (nearest, *near) = (whole, index);
+            }
+            if whole <= allowed * allowed {
                 *near = index;
                 return None;
             }

@@ -1,7 +1,7 @@
 //! Edits: byte ranges of one file and what shall stand there instead.
 //!
 //! Edits are sorted and disjoint; bytes outside them never change. Two that overlap are an error of the caller and
-//! are reported, never resolved silently. All new text stands in one buffer, so that a million edits cost no million
+//! are reported, never resolved silently. New text stands in few buffers, so that a million edits cost no million
 //! allocations.
 
 use std::borrow::Cow;
@@ -53,14 +53,30 @@ impl Entry {
     }
 }
 
-/// The edits of one file, in any order until they are applied.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Edits {
+/// Edits that were made one after the other: their new text stands in one buffer.
+#[derive(Debug, Clone, Default)]
+struct Part {
     entries: Vec<Entry>,
     text: Vec<u8>,
+}
+
+/// The edits of one file, in any order until they are applied.
+///
+/// They stand in parts, so that lists made by several threads are put behind each other without copying them.
+#[derive(Debug, Clone, Default)]
+pub struct Edits {
+    parts: Vec<Part>,
     /// Whether an offset did not fit.
     too_long: bool,
 }
+
+impl PartialEq for Edits {
+    fn eq(&self, other: &Edits) -> bool {
+        self.too_long == other.too_long && self.iter().eq(other.iter())
+    }
+}
+
+impl Eq for Edits {}
 
 /// Edits that one thread carries out at a time.
 const PORTION: usize = 1 << 15;
@@ -71,14 +87,20 @@ impl Edits {
         Edits::default()
     }
 
+    /// No edits yet, with room for so many and so many bytes of new text.
+    pub fn with_capacity(entries: usize, text: usize) -> Edits {
+        let part = Part { entries: Vec::with_capacity(entries), text: Vec::with_capacity(text) };
+        Edits { parts: vec![part], too_long: false }
+    }
+
     /// Whether nothing changes.
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.parts.iter().all(|part| part.entries.is_empty())
     }
 
     /// How many edits there are.
     pub fn len(&self) -> usize {
-        self.entries.len()
+        self.parts.iter().map(|part| part.entries.len()).sum()
     }
 
     /// Replaces `range` by `text`. Several insertions at one byte keep the order in which they were made.
@@ -93,63 +115,60 @@ impl Edits {
 
     /// Replaces `range` by what `write` appends to the buffer.
     pub fn replace_with(&mut self, range: Range<usize>, write: impl FnOnce(&mut Vec<u8>)) {
-        let text_start = self.text.len();
-        write(&mut self.text);
+        if self.parts.is_empty() {
+            self.parts.push(Part::default());
+        }
+        let Some(part) = self.parts.last_mut() else { return };
+        let text_start = part.text.len();
+        write(&mut part.text);
         let offset = |at: usize| u32::try_from(at);
-        let offsets = (offset(range.start), offset(range.end), offset(text_start), offset(self.text.len()));
+        let offsets = (offset(range.start), offset(range.end), offset(text_start), offset(part.text.len()));
         match offsets {
             (Ok(start), Ok(end), Ok(text_start), Ok(text_end)) => {
-                self.entries.push(Entry { start, end, text_start, text_end });
+                part.entries.push(Entry { start, end, text_start, text_end });
             }
             _ => self.too_long = true,
         }
     }
 
-    /// Makes room for lists that will be appended.
-    pub fn reserve<'e>(&mut self, others: impl Iterator<Item = &'e Edits>) {
-        let (mut entries, mut text) = (0, 0);
-        for other in others {
-            entries += other.entries.len();
-            text += other.text.len();
-        }
-        self.entries.reserve_exact(entries);
-        self.text.reserve_exact(text);
+    /// Adds the edits of another list behind those of this one.
+    pub fn append(&mut self, other: Edits) {
+        self.too_long |= other.too_long;
+        self.parts.extend(other.parts.into_iter().filter(|part| !part.entries.is_empty()));
     }
 
-    /// Adds the edits of another list behind those of this one.
-    pub fn append(&mut self, other: &Edits) {
-        self.too_long |= other.too_long || self.text.len() + other.text.len() > u32::MAX as usize;
-        if self.too_long {
-            return;
-        }
-        let shift = self.text.len() as u32;
-        self.text.extend_from_slice(&other.text);
-        self.entries.extend(other.entries.iter().map(|entry| Entry {
-            text_start: entry.text_start + shift,
-            text_end: entry.text_end + shift,
-            ..*entry
-        }));
+    fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.parts.iter().flat_map(|part| &part.entries)
     }
 
     /// Each edit: the bytes to replace and what shall stand there.
     pub fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[u8])> {
-        self.entries.iter().map(|entry| (entry.range(), entry.text(&self.text)))
+        let parts = self.parts.iter();
+        parts.flat_map(|part| part.entries.iter().map(|entry| (entry.range(), entry.text(&part.text))))
     }
 
     /// Sorts the edits by place and checks that no two overlap. An insertion at the first byte of a replacement goes
     /// before it.
     pub fn sort(&mut self) -> Result<(), EditError> {
+        let key = |entry: &Entry| (entry.start, entry.end);
+        if !self.entries().is_sorted_by_key(key) {
+            // As one part; those of one place stay in the order in which they were made.
+            let mut whole =
+                Edits::with_capacity(self.len(), self.parts.iter().map(|part| part.text.len()).sum());
+            self.iter().for_each(|(range, text)| whole.replace(range, text));
+            whole.too_long |= self.too_long;
+            *self = whole;
+            self.parts.iter_mut().for_each(|part| part.entries.sort_by_key(key));
+        }
         if self.too_long {
             return Err(EditError::TooLong);
         }
-        let key = |entry: &Entry| (entry.start, entry.end);
-        if !self.entries.is_sorted_by_key(key) {
-            self.entries.sort_by_key(key);
-        }
-        for pair in self.entries.windows(2) {
-            if pair[1].start < pair[0].end {
-                return Err(EditError::Overlap { first: pair[0].range(), second: pair[1].range() });
+        let mut last = 0..0;
+        for entry in self.entries() {
+            if (entry.start as usize) < last.end {
+                return Err(EditError::Overlap { first: last, second: entry.range() });
             }
+            last = entry.range();
         }
         Ok(())
     }
@@ -159,15 +178,20 @@ impl Edits {
         if self.too_long {
             return Err(EditError::TooLong);
         }
-        let key = |entry: &Entry| (entry.start, entry.end);
-        let mut sorted = Cow::Borrowed(&self.entries);
-        if !sorted.is_sorted_by_key(key) {
-            sorted.to_mut().sort_by_key(key);
+        let mut sorted = Cow::Borrowed(self);
+        if !self.entries().is_sorted_by_key(|entry| (entry.start, entry.end)) {
+            sorted.to_mut().sort()?;
         }
         // For each portion of edits the bytes of the source before the first of them, and how long its new bytes are.
-        let mut portions: Vec<(usize, usize)> = Vec::with_capacity(sorted.len() / PORTION + 1);
+        let chunks = || {
+            sorted
+                .parts
+                .iter()
+                .flat_map(|part| part.entries.chunks(PORTION).map(|entries| (entries, &part.text)))
+        };
+        let mut portions: Vec<(usize, usize)> = Vec::new();
         let mut last = 0..0;
-        for entries in sorted.chunks(PORTION) {
+        for (entries, _) in chunks() {
             let (from, mut length) = (last.end, 0);
             for entry in entries {
                 let range = entry.range();
@@ -186,13 +210,13 @@ impl Edits {
         let mut out = vec![0; portions.iter().map(|portion| portion.1).sum::<usize>() + rest.len()];
         let mut work = Vec::with_capacity(portions.len());
         let mut open = out.as_mut_slice();
-        for (entries, (from, length)) in sorted.chunks(PORTION).zip(portions) {
+        for ((entries, text), (from, length)) in chunks().zip(portions) {
             let (place, after) = open.split_at_mut(length);
-            work.push((entries, from, place));
+            work.push((entries, text, from, place));
             open = after;
         }
         open.copy_from_slice(rest);
-        work.into_par_iter().for_each(|(entries, from, mut place)| {
+        work.into_par_iter().for_each(|(entries, text, from, mut place)| {
             let mut put = |bytes: &[u8]| {
                 let (here, after) = std::mem::take(&mut place).split_at_mut(bytes.len());
                 here.copy_from_slice(bytes);
@@ -201,7 +225,7 @@ impl Edits {
             let mut at = from;
             for entry in entries {
                 put(&source[at..entry.start as usize]);
-                put(entry.text(&self.text));
+                put(entry.text(text));
                 at = entry.end as usize;
             }
         });

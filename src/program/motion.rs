@@ -474,6 +474,27 @@ impl Listing {
         motion.work_object.and_then(|index| self.work_objects.get(index as usize))
     }
 
+    /// Why tool and work object of a motion do not tell where its targets are.
+    pub fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
+        let tool = match self.tool(motion).map(|tool| &tool.value) {
+            Some(Ok(tool)) => tool,
+            Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
+            Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
+            Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
+            Some(Err(_)) => return Some(Reason::ToolUnknown),
+            None => return Some(Reason::MissingArgument),
+        };
+        match self.work_object(motion).map(|work_object| &work_object.value) {
+            Some(Ok(work_object)) if !work_object.fixed => Some(Reason::MovingWorkObject),
+            Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
+            Some(Ok(_)) => None,
+            Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
+            Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
+            Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
+            _ => Some(Reason::WorkObjectUnknown),
+        }
+    }
+
     /// The speed of a motion.
     pub fn speed(&self, motion: &Motion) -> Option<&Speed> {
         motion.speed.and_then(|index| self.speeds.get(index as usize))
@@ -533,6 +554,8 @@ reasons! {
         Uninitialised => "declared without a value: the controller holds it",
         /// The program assigns it while it runs.
         Assigned => "assigned while the program runs",
+        /// It is given to a routine that is declared in none of the files, or called by a computed name.
+        HandedOver => "given to a routine that is not known from the given files and may change it",
         /// A function whose result is known only when the program runs (CRobT, CalcRobT, a function of the program).
         RunTimeFunction => "result of a function that is known only at run time",
         /// Offs, RelTool or arithmetic with a value that is known only at run time.
@@ -563,6 +586,18 @@ reasons! {
         ToolUnknown => "the value of the tool is not known",
         /// The work object's value is not known.
         WorkObjectUnknown => "the value of the work object is not known",
+        /// The program assigns the tool.
+        ToolAssigned => "the tool is or may be assigned while the program runs",
+        /// The program assigns the work object.
+        WorkObjectAssigned => "the work object is or may be assigned while the program runs",
+        /// The tool is given to a routine that is not known.
+        ToolHandedOver => "the tool is given to a routine that is not known from the given files and may change it",
+        /// The work object is given to a routine that is not known.
+        WorkObjectHandedOver => "the work object is given to a routine that is not known from the given files and may change it",
+        /// The tool is a parameter of the routine.
+        ToolParameter => "the tool is a parameter of the routine: its value comes from the caller",
+        /// The work object is a parameter of the routine.
+        WorkObjectParameter => "the work object is a parameter of the routine: its value comes from the caller",
         /// Tool and work object are both held by the robot, or neither is.
         HeldByBoth => "exactly one of tool and work object must be held by the robot",
         /// Only external axes move.

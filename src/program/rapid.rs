@@ -22,6 +22,7 @@ pub mod parser;
 pub mod number;
 pub mod literal;
 pub mod instruction;
+pub mod predefined;
 pub mod value;
 pub mod symbol;
 pub mod evaluate;

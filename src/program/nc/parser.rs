@@ -110,12 +110,8 @@ impl Parser<'_, '_> {
     fn word(&mut self, begins: bool) -> Option<u32> {
         if begins && self.dialect == Dialect::Heidenhain && !self.is_path() {
             // Everything but path blocks is looked at by its first words only.
-            let mut end = self.at;
-            while !matches!(self.peek(), Token::LineEnd | Token::End) {
-                end = self.at + 1;
-                self.bump();
-            }
-            return Some(end);
+            let at = self.at;
+            return Some(self.line(at));
         }
         match self.peek() {
             Token::Address => {
@@ -158,6 +154,17 @@ impl Parser<'_, '_> {
                 Some(token + 1)
             }
             Token::BracketOpen => self.group(Token::BracketOpen, Token::BracketClose),
+            // G65 <NAME>, M98 <NAME>: a subprogram by its name.
+            Token::Less if self.dialect.paren_comments() => {
+                self.bump();
+                while !matches!(self.peek(), Token::Greater | Token::LineEnd | Token::End) {
+                    self.bump();
+                }
+                (self.peek() == Token::Greater).then_some(())?;
+                let end = self.at + 1;
+                self.bump();
+                Some(end)
+            }
             // An expression of a control structure goes on: TO 10, OF 1, REPEAT 3.
             Token::Number | Token::Minus | Token::String => self.expression(),
             _ => None,
@@ -269,9 +276,30 @@ impl Parser<'_, '_> {
                 Some(end)
             }
             Token::Plus | Token::Minus if self.dialect == Dialect::Heidenhain => self.value(after),
+            // GOTO#5: to a computed block.
+            Token::Hash if self.tree.text(token).to_ascii_uppercase().starts_with(b"GOTO") => self.primary(),
             _ if self.takes_condition(token) => self.expression(),
+            _ if self.is_action(token) => Some(self.line(after)),
             _ => Some(after),
         }
+    }
+
+    /// A synchronised action of Siemens, which the control carries out beside the blocks.
+    fn is_action(&self, token: u32) -> bool {
+        self.dialect == Dialect::Siemens
+            && ["WHEN", "WHENEVER", "FROM", "EVERY"]
+                .iter()
+                .any(|word| self.tree.text(token).eq_ignore_ascii_case(word.as_bytes()))
+    }
+
+    /// Over the rest of the line; answers one past its last token that is no trivia.
+    fn line(&mut self, after: u32) -> u32 {
+        let mut end = after;
+        while !matches!(self.peek(), Token::LineEnd | Token::End) {
+            end = self.at + 1;
+            self.bump();
+        }
+        end
     }
 
     fn takes_condition(&self, token: u32) -> bool {

@@ -131,6 +131,10 @@ pub(super) struct Lister<'t, 's> {
     once: u32,
     /// Groups that have been set so far.
     seen: u32,
+    /// Whether synchronised actions may set variables.
+    actions: bool,
+    /// What held before the subprogram that is being passed.
+    passed: Option<(State, u32)>,
     /// Whether tools come in with M6.
     changes_tools: bool,
     next_tool: Option<String>,
@@ -198,6 +202,8 @@ impl<'t, 's> Lister<'t, 's> {
             several: 0,
             once: 0,
             seen: 0,
+            actions: false,
+            passed: None,
             changes_tools: false,
             next_tool: None,
             targets: BTreeSet::new(),
@@ -414,6 +420,13 @@ impl<'t, 's> Lister<'t, 's> {
             self.forget();
         }
         if self.dialect == Dialect::Heidenhain && self.heidenhain(said) {
+            return;
+        }
+        if self.is_action(said) {
+            // What it sets, it sets at any time from here on.
+            self.actions = true;
+            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
+            self.forget();
             return;
         }
         self.assignments(said);

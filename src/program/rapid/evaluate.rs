@@ -1,7 +1,8 @@
 //! What an expression is worth, as far as the text tells it.
 //!
 //! Method: constants are folded in double precision; data that nothing in the given files changes has its initial
-//! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]). Target functions
+//! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]), else its initial
+//! value without the components that anything assigns. Target functions
 //! follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along the
 //! axes of the target's tool frame and then turns about its x, the new y and the new z. Everything else is
 //! [`Value::Unknown`] with its reason.
@@ -246,16 +247,37 @@ impl<'a, 's> Evaluator<'a, 's> {
             What::Data(_) if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) => {
                 Value::Unknown(Reason::Ambiguous)
             }
-            What::Data(data) if !symbol.assigned => match data.value {
+            What::Data(_) if symbol.assigned && symbol.whole => Value::Unknown(symbol.unknown),
+            What::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
-                    self.value(self.at(context, symbol.scope, symbol.file), initial)
+                    let mut value = self.value(self.at(context, symbol.scope, symbol.file), initial);
+                    for part in &symbol.parts {
+                        self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown);
+                    }
+                    value
                 }
                 Some(_) => Value::Unknown(Reason::WrongShape),
+                None if symbol.assigned => Value::Unknown(symbol.unknown),
                 None => Value::Unknown(Reason::Uninitialised),
             },
-            What::Data(_) | What::Loop => Value::Unknown(Reason::Assigned),
+            What::Loop => Value::Unknown(Reason::Assigned),
             What::Parameter => Value::Unknown(Reason::Parameter),
             _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    /// Makes the component at a path of names unknown.
+    fn hide(&self, value: &mut Value, (scope, type_name): (u32, &[u8]), path: &[u8], reason: Reason) {
+        let mut names = path.splitn(2, |&byte| byte == b'.');
+        let (Some(name), rest) = (names.next(), names.next()) else { return };
+        let found = self.component(scope, type_name, name);
+        match (found, &mut *value) {
+            (Some((index, type_name)), Value::List(list)) if index < list.len() => match rest {
+                Some(rest) => self.hide(&mut list[index], (scope, &type_name), rest, reason),
+                None => list[index] = Value::Unknown(reason),
+            },
+            (_, Value::Unknown(_)) => {}
+            _ => *value = Value::Unknown(reason),
         }
     }
 

@@ -3,12 +3,15 @@
 //!
 //! One pass per routine. Straight-line assignments are followed exactly; where ways join, only what they agree on
 //! stays known; what a loop assigns is unknown at its beginning; a label or an error handler can be reached from
-//! anywhere in the routine.
+//! anywhere in the routine. What a called routine or function may change is forgotten, and what a trap routine or an
+//! error handler may change is never known. What is not known from the statements before has, as far as nothing
+//! assigns its components, its initial value.
 
 use super::evaluate::{Context, Evaluator, Known};
 use super::instruction::{self, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
-use super::symbol::{Unit, What, only_reads};
+use super::predefined;
+use super::symbol::{Unit, What};
 use super::syntax::{Syntax, arguments, expressions, parts, token_kind};
 use super::token::{Token, folded, same_name};
 use super::value::Value;
@@ -18,6 +21,9 @@ use crate::program::tree::Child;
 /// The key in [`Known`] under which the program displacement stands: no name of the program has it. Where it is absent
 /// the displacement is as at the entry of the routine.
 pub(super) const DISPLACEMENT: u32 = u32::MAX;
+
+/// Longer arrays are not followed element by element.
+const ELEMENTS: f64 = 64.0;
 
 /// What holds before a statement.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,15 +44,14 @@ impl State {
             return self;
         }
         let mut known = Known::new();
-        for key in self.known.keys().chain(other.known.keys()) {
-            if known.contains_key(key) {
-                continue;
+        for (key, value) in &self.known {
+            if let Some(other) = other.known.get(key) {
+                known.insert(*key, agreed(value, other));
             }
-            let value = match (self.known.get(key), other.known.get(key)) {
-                (Some(a), Some(b)) if a == b => a.clone(),
-                _ => Value::Unknown(Reason::Assigned),
-            };
-            known.insert(*key, value);
+        }
+        // What one way alone tells is, where the ways join, as if no way told it.
+        if self.known.contains_key(&DISPLACEMENT) != other.known.contains_key(&DISPLACEMENT) {
+            known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
         State {
             known,
@@ -54,6 +59,17 @@ impl State {
             previous: self.previous.filter(|_| self.previous == other.previous),
             reached: true,
         }
+    }
+}
+
+/// What two values agree on.
+fn agreed(a: &Value, b: &Value) -> Value {
+    match (a, b) {
+        _ if a == b => a.clone(),
+        (Value::List(a), Value::List(b)) if a.len() == b.len() => {
+            Value::List(a.iter().zip(b).map(|(a, b)| agreed(a, b)).collect())
+        }
+        _ => Value::Unknown(Reason::Assigned),
     }
 }
 
@@ -86,15 +102,16 @@ pub(super) struct Surroundings {
 /// Walks one unit; hands back the states of the switches at its end.
 pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn Visitor) -> States {
     let mut walk =
-        Walk { evaluator, unit, visitor, exits: States::NONE, any: States::NONE, assigned: Vec::new() };
-    walk.assigned = walk.assigned_in(unit.node);
+        Walk { evaluator, unit, visitor, exits: States::NONE, any: States::NONE, handled: States::NONE };
     walk.any = walk.settings(unit.node).or(States::ENTRY);
+    walk.handled = walk.handled();
     let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
     if unit.routine.is_some() {
-        for &id in &walk.assigned {
+        for &id in evaluator.symbols.changed_in(unit) {
             // A variable of the routine has its initial value at every call.
             let symbol = &evaluator.symbols.symbols[id as usize];
             if symbol.scope == unit.scope
+                && !symbol.volatile
                 && matches!(&symbol.what, What::Data(data) if data.storage == Token::Var)
             {
                 let context = Context::new(unit.file, unit.scope, &state.known);
@@ -115,8 +132,8 @@ struct Walk<'w, 'a, 's> {
     exits: States,
     /// What any statement of the unit may set.
     any: States,
-    /// What any statement of the unit may assign.
-    assigned: Vec<u32>,
+    /// What an error handler may set before it goes back to the statements.
+    handled: States,
 }
 
 impl Walk<'_, '_, '_> {
@@ -154,20 +171,17 @@ impl Walk<'_, '_, '_> {
                 let mut entry = state;
                 entry.modal = entry.modal.or(self.settings(node));
                 entry.previous = None;
-                let assigned = self.assigned_in(node);
                 let displaces = self.displaces(node);
-                let forget = |state: &mut State| {
-                    for &id in &assigned {
-                        state.known.insert(id, Value::Unknown(Reason::Assigned));
-                    }
+                let forget = |walk: &Self, state: &mut State| {
+                    walk.forget_changed(node, state);
                     if displaces {
                         state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
                     }
                 };
-                forget(&mut entry);
+                forget(self, &mut entry);
                 let inside = Surroundings { in_loop: true, guarded: false, ..place };
                 let mut after = self.block(node, entry.clone(), inside).joined(entry);
-                forget(&mut after);
+                forget(self, &mut after);
                 after.previous = None;
                 after
             }
@@ -188,18 +202,23 @@ impl Walk<'_, '_, '_> {
             }
             Syntax::Opaque | Syntax::Unwritten => {
                 // What could not be read may do anything to what the routine assigns.
-                State { previous: None, known: self.forgotten(&state.known), ..state }
+                State { previous: None, known: self.anywhere().known, ..state }
             }
-            _ => state,
+            // Conditions and bounds: the functions in them.
+            _ => {
+                self.forget_changed(node, &mut state);
+                state
+            }
         }
     }
 
-    fn branches(&mut self, node: u32, state: State, place: Surroundings, otherwise: Token) -> State {
+    fn branches(&mut self, node: u32, mut state: State, place: Surroundings, otherwise: Token) -> State {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let mut joined: Option<State> = None;
         let mut complete = false;
         for branch in tree.child_nodes(node) {
             if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
+                self.forget_changed(branch, &mut state);
                 continue;
             }
             let first = parts(tree, branch).next();
@@ -219,8 +238,7 @@ impl Walk<'_, '_, '_> {
 
     /// What holds at a place that can be reached from anywhere in the routine.
     fn anywhere(&self) -> State {
-        let known = self.assigned.iter().map(|&id| (id, Value::Unknown(Reason::Assigned)));
-        let mut known: Known = known.collect();
+        let mut known = Known::new();
         if !self.any.keeps(Which::Displacement) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
@@ -253,41 +271,82 @@ impl Walk<'_, '_, '_> {
         }
     }
 
-    fn forgotten(&self, known: &Known) -> Known {
-        known.keys().map(|&id| (id, Value::Unknown(Reason::Assigned))).collect()
-    }
-
-    /// Everything that statements under a node may assign.
-    fn assigned_in(&self, node: u32) -> Vec<u32> {
+    /// Forgets what anything under a node may change: assignments, arguments that come back changed, what called
+    /// routines and functions do.
+    fn forget_changed(&self, node: u32, state: &mut State) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
-        let end = node + tree.nodes[node as usize].size;
-        let mut out: Vec<u32> = Vec::new();
-        for node in node..end {
-            if tree.nodes[node as usize].kind.may_change() {
-                out.extend(self.evaluator.symbols.changed_by(tree, self.unit.scope, node));
+        let symbols = self.evaluator.symbols;
+        for node in node..node + tree.nodes[node as usize].size {
+            let kind = tree.nodes[node as usize].kind;
+            if !kind.may_change() {
+                continue;
+            }
+            symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
+                state.known.remove(&change.symbol);
+            });
+            if kind == Syntax::LateCall {
+                self.forget_outside(state);
+            } else if matches!(kind, Syntax::Call | Syntax::Function) {
+                let name = tree.text(tree.nodes[node as usize].first);
+                self.forget_called(name, kind, state);
             }
         }
-        out.sort_unstable();
-        out.dedup();
-        out
+    }
+
+    /// Forgets what the routine or instruction of this name may change apart from its arguments.
+    fn forget_called(&self, name: &[u8], kind: Syntax, state: &mut State) {
+        let symbols = self.evaluator.symbols;
+        if kind == Syntax::Call && symbols.is_motion(self.unit.scope, name) {
+            return;
+        }
+        let moves = match symbols.routine(self.unit.scope, name) {
+            Some(routine) => {
+                let reach = &symbols.routines[routine as usize].reach;
+                for symbol in &reach.changes {
+                    state.known.remove(symbol);
+                }
+                if reach.anything {
+                    self.forget_outside(state);
+                }
+                reach.moves
+            }
+            None if predefined::effect(name).is_some() => false,
+            None => {
+                self.forget_outside(state);
+                true
+            }
+        };
+        if moves {
+            state.previous = None;
+        }
+    }
+
+    /// A routine that is not known here may change everything that is declared outside this one.
+    fn forget_outside(&self, state: &mut State) {
+        let symbols = &self.evaluator.symbols.symbols;
+        state.known.retain(|&id, _| symbols.get(id as usize).is_none_or(|s| s.scope == self.unit.scope));
+    }
+
+    /// What the error handlers of the unit set before they go back to the statements.
+    fn handled(&mut self) -> States {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let clauses = tree.child_nodes(self.unit.node);
+        let clauses: Vec<u32> =
+            clauses.filter(|&clause| tree.nodes[clause as usize].kind == Syntax::ErrorClause).collect();
+        clauses.into_iter().fold(States::NONE, |all, clause| all.or(self.settings(clause)))
     }
 
     /// Everything that statements under a node may set.
     fn settings(&mut self, node: u32) -> States {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let end = node + tree.nodes[node as usize].size;
+        let symbols = self.evaluator.symbols;
         let mut out = States::NONE;
-        for node in node..end {
-            if tree.nodes[node as usize].kind != Syntax::Call {
-                continue;
-            }
+        for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
-            if instruction::find(name).is_some() {
-                continue;
-            }
             if let Some((which, on)) = setting(tree, node, name) {
                 out = out.or(States::NONE.set(which, on));
-            } else if let Some(routine) = self.evaluator.symbols.routine(self.unit.scope, name) {
+            } else if let Some(routine) = symbols.routine(self.unit.scope, name) {
                 out = out.or(self.visitor.exit_of(routine));
             }
         }
@@ -300,11 +359,20 @@ impl Walk<'_, '_, '_> {
         let symbols = self.evaluator.symbols;
         let name = tree.text(tree.nodes[node as usize].first);
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-        let motion = self.visitor.call(self.unit, node, &state, place);
-        for id in symbols.changed_by(tree, self.unit.scope, node) {
-            state.known.insert(id, Value::Unknown(Reason::Assigned));
+        for inside in tree.child_nodes(node) {
+            self.forget_changed(inside, &mut state);
         }
+        state.modal = state.modal.or(self.handled);
+        if !self.handled.leaves(Which::Displacement) {
+            state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+        }
+        let motion = self.visitor.call(self.unit, node, &state, place);
         let known = if late || symbols.hides_instruction { None } else { instruction::find(name) };
+        if known.is_none_or(|known| INSTRUCTIONS[known].searches()) {
+            symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
+                state.known.remove(&change.symbol);
+            });
+        }
         if let Some(known) = known {
             if motion.is_some() {
                 // A search stops where its signal comes.
@@ -336,20 +404,16 @@ impl Walk<'_, '_, '_> {
                     };
                     state.known.insert(DISPLACEMENT, value);
                 }
+                self.forget_called(name, Syntax::Call, &mut state);
             }
-            None if motion.is_some() && !late => {
-                state.previous = motion;
-                return state;
-            }
-            None if !late && only_reads(name) => return state,
-            None => {}
-        }
-        // A routine may change everything that is declared outside this one.
-        for (id, value) in &mut state.known {
-            let outside =
-                symbols.symbols.get(*id as usize).is_some_and(|symbol| symbol.scope != self.unit.scope);
-            if outside {
-                *value = Value::Unknown(Reason::Assigned);
+            None if late => self.forget_outside(&mut state),
+            None if predefined::effect(name).is_some() => return state,
+            None => {
+                self.forget_outside(&mut state);
+                if motion.is_some() {
+                    state.previous = motion;
+                    return state;
+                }
             }
         }
         state.previous = None;
@@ -363,21 +427,50 @@ impl Walk<'_, '_, '_> {
             .filter(|&part| !matches!(token_kind(tree, part), Some(Token::Assign | Token::Semicolon)));
         let (Some(place), Some(expression)) = (sides.next(), sides.next()) else { return };
         let symbols = self.evaluator.symbols;
+        for inside in tree.child_nodes(node) {
+            self.forget_changed(inside, state);
+        }
         let Some(root) = symbols.root(tree, self.unit.scope, place) else { return };
         let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let value = self.evaluator.value(context, expression);
         let new = match place {
             Child::Token(_) => value,
             Child::Node(place) => {
-                let old = self.evaluator.symbol_value(context, root);
                 let path: Vec<Child> = parts(tree, place).skip(1).collect();
+                let mut old = self.evaluator.symbol_value(context, root);
+                if let (Value::Unknown(reason), Some(Child::Node(_))) = (&old, path.first()) {
+                    old = self.elements(context, root, *reason);
+                }
                 let type_name = symbols.symbols[root as usize].type_name.clone();
                 self.replaced(context, old, &type_name, &path, value)
             }
         };
         // A big array that is filled element by element is not worth keeping.
-        let new = if size(&new, 0) > 4096 { Value::Unknown(Reason::Assigned) } else { new };
-        state.known.insert(root, new);
+        if size(&new, 0) > 4096 || symbols.symbols[root as usize].volatile {
+            state.known.remove(&root);
+        } else {
+            state.known.insert(root, new);
+        }
+    }
+
+    /// An array of which nothing is known, element by element, so that those that are assigned are.
+    fn elements(&self, context: Context<'_>, root: u32, reason: Reason) -> Value {
+        let symbol = &self.evaluator.symbols.symbols[root as usize];
+        let tree = &self.evaluator.trees[symbol.file as usize];
+        let dimensions = match &symbol.what {
+            What::Data(data) => data.dimensions,
+            _ => None,
+        };
+        let Some(dimensions) = dimensions else { return Value::Unknown(reason) };
+        let mut sizes = expressions(tree, dimensions);
+        let (Some(size), None) = (sizes.next(), sizes.next()) else { return Value::Unknown(reason) };
+        let there = Context::new(symbol.file, symbol.scope, context.known);
+        match self.evaluator.value(there, size).number() {
+            Ok(size) if (1.0..=ELEMENTS).contains(&size) => {
+                Value::List(vec![Value::Unknown(reason); size as usize])
+            }
+            _ => Value::Unknown(reason),
+        }
     }
 
     /// `old` with the component at `path` replaced.

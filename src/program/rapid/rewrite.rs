@@ -38,14 +38,18 @@ impl Task<'_> {
             let mut file = FileEdits { edits, unmarked: false };
             if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
                 let comment = mark::text(mark);
+                // Before the others, so that the list stays in order.
+                let mut marked = Edits::new();
                 if let Some(old) = mark::token(tree) {
-                    file.edits.replace(tree.range(old, old + 1), comment.as_bytes());
+                    marked.replace(tree.range(old, old + 1), comment.as_bytes());
                 } else if let Some(place) = mark::place(tree) {
                     let line = [comment.as_bytes(), mark::line_end(tree.source())].concat();
-                    file.edits.insert(place, &line);
+                    marked.insert(place, &line);
                 } else {
                     file.unmarked = true;
                 }
+                marked.append(std::mem::take(&mut file.edits));
+                file.edits = marked;
             }
             file.edits.sort()?;
             files.push(file);
@@ -142,6 +146,10 @@ impl<'r, 's> Rewriter<'r, 's> {
             .enumerate()
             .map(|(portion, changes)| {
                 let mut part = Rewriter::new(task, options);
+                if let [edits] = &mut part.edits[..] {
+                    // About eight numbers of a target change, each by a few digits.
+                    *edits = Edits::with_capacity(8 * changes.len(), 64 * changes.len());
+                }
                 let (mut wishes, mut computed) = (WishesOf::new(), Vec::new());
                 let outcomes: Vec<Outcome> = (portion * PORTION..)
                     .zip(changes)
@@ -158,11 +166,8 @@ impl<'r, 's> Rewriter<'r, 's> {
             .collect();
         let (mut outcomes, mut wishes, mut computed) =
             (Vec::with_capacity(changes.len()), WishesOf::new(), Vec::new());
-        for (file, all) in self.edits.iter_mut().enumerate() {
-            all.reserve(portions.iter().map(|(edits, ..)| &edits[file]));
-        }
         for (edits, mut some, wished, mut left) in portions {
-            self.edits.iter_mut().zip(&edits).for_each(|(all, some)| all.append(some));
+            self.edits.iter_mut().zip(edits).for_each(|(all, some)| all.append(some));
             outcomes.append(&mut some);
             for (place, mut more) in wished {
                 wishes.entry(place).or_default().append(&mut more);

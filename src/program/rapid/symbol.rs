@@ -2,15 +2,17 @@
 //!
 //! Look-up goes from the routine to its module to the task (all files given together). LOCAL declarations and those
 //! of routines hide others. What a file assigns, or hands to something that may assign it, is marked: its initial
-//! value then says nothing about its value at a motion.
+//! value then says nothing about its value at a motion, or only about the components that nothing assigns.
+
+mod change;
 
 use std::collections::HashMap;
 
-use super::instruction::{self, INSTRUCTIONS, Slot};
-use super::syntax::{
-    Argument, Data, RapidTree, RoutineHead, Syntax, arguments, data, parts, routine_head, text_of, token_kind,
-};
+pub use self::change::{Change, Ends, How, Reach};
+use super::instruction;
+use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
 use super::token::{Token, display, fold, folded};
+use crate::program::motion::Reason;
 use crate::program::tree::Child;
 
 /// What a name stands for.
@@ -45,8 +47,45 @@ pub struct Symbol {
     pub type_name: Vec<u8>,
     /// Whether anything may change it while the program runs.
     pub assigned: bool,
+    /// Whether it is changed otherwise than by assignments to components that `parts` names.
+    pub whole: bool,
+    /// The components that are assigned, each as its path of lower-case names with a point between.
+    pub parts: Vec<Vec<u8>>,
+    /// Why its value is not known where no statement before tells it.
+    pub unknown: Reason,
+    /// Whether it may change between any two statements: in a trap routine or an error handler.
+    pub volatile: bool,
     /// Whether another module declares the same global name.
     pub ambiguous: bool,
+}
+
+impl Symbol {
+    /// A name that nothing changes.
+    fn new((file, scope): (u32, u32), name: u32, what: What, type_name: Vec<u8>) -> Symbol {
+        Symbol {
+            file,
+            scope,
+            name,
+            what,
+            type_name,
+            assigned: false,
+            whole: false,
+            parts: Vec::new(),
+            unknown: Reason::Assigned,
+            volatile: false,
+            ambiguous: false,
+        }
+    }
+
+    /// One that always has another value: a parameter, the variable of a loop.
+    fn varying(self) -> Symbol {
+        Symbol { assigned: true, whole: true, ..self }
+    }
+
+    /// Whether it is declared as a constant.
+    pub fn is_constant(&self) -> bool {
+        matches!(&self.what, What::Data(data) if data.storage == Token::Const)
+    }
 }
 
 /// A scope: the task, a module, or a routine.
@@ -68,6 +107,12 @@ pub struct RoutineScope {
     pub scope: u32,
     /// The name of its module.
     pub module: String,
+    /// Why what is handed to each parameter may come back changed; `None` where it does not.
+    pub written: Vec<Option<Reason>>,
+    /// What a call of it may change.
+    pub reach: Reach,
+    /// Index into [`Symbols::units`].
+    pub unit: u32,
 }
 
 /// Statements that run together: a routine, or the statements of a fragment outside routines.
@@ -96,6 +141,14 @@ pub struct Symbols {
     pub units: Vec<Unit>,
     /// Whether a routine has the name of a motion instruction.
     pub hides_instruction: bool,
+    /// What the statements of each unit may change by themselves, in order.
+    pub changed: Vec<Vec<u32>>,
+    /// The units in such an order that what a routine calls stands before it, as far as none calls itself.
+    pub callees_first: Vec<u32>,
+    /// How each unit leaves the switches.
+    pub ends: Vec<Ends>,
+    /// The calls of each unit that set a switch or call a routine of the program, in order.
+    pub switches: Vec<Vec<u32>>,
 }
 
 impl Symbols {
@@ -105,9 +158,7 @@ impl Symbols {
         for (file, tree) in trees.iter().enumerate() {
             symbols.file(tree, file as u32);
         }
-        for unit in symbols.units.clone() {
-            symbols.changes(&trees[unit.file as usize], unit);
-        }
+        symbols.settle(trees);
         symbols
     }
 
@@ -140,6 +191,26 @@ impl Symbols {
         match self.symbols[self.find(scope, name)? as usize].what {
             What::Routine(routine) => Some(routine),
             _ => None,
+        }
+    }
+
+    /// What the statements of a unit may change by themselves, in order.
+    pub fn changed_in(&self, unit: Unit) -> &[u32] {
+        self.place_of(unit).and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The calls among some nodes of a unit that set a switch or call a routine of the program.
+    pub fn switches_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
+        let all = self.place_of(unit).and_then(|at| self.switches.get(at)).map_or(&[][..], Vec::as_slice);
+        let first = all.partition_point(|&node| node < nodes.start);
+        let end = all.partition_point(|&node| node < nodes.end);
+        &all[first..end]
+    }
+
+    fn place_of(&self, unit: Unit) -> Option<usize> {
+        match unit.routine {
+            Some(routine) => Some(self.routines[routine as usize].unit as usize),
+            None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
         }
     }
 
@@ -223,15 +294,8 @@ impl Symbols {
 
     fn data(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module_level: bool) {
         let Some(data) = data(tree, node) else { return };
-        let symbol = Symbol {
-            file,
-            scope,
-            name: data.name,
-            what: What::Data(data),
-            type_name: folded(tree.text(data.type_name)),
-            assigned: false,
-            ambiguous: false,
-        };
+        let type_name = folded(tree.text(data.type_name));
+        let symbol = Symbol::new((file, scope), data.name, What::Data(data), type_name);
         self.declare(tree.text(data.name), symbol, module_level && !data.local);
     }
 
@@ -256,7 +320,7 @@ impl Symbols {
             });
             (name, Vec::new(), What::Record(components.collect()))
         };
-        let symbol = Symbol { file, scope, name, what, type_name, assigned: false, ambiguous: false };
+        let symbol = Symbol::new((file, scope), name, what, type_name);
         self.declare(tree.text(name), symbol, true);
     }
 
@@ -266,27 +330,12 @@ impl Symbols {
         let index = self.routines.len() as u32;
         let text = tree.text(head.name);
         self.hides_instruction |= instruction::find(text).is_some();
-        let symbol = Symbol {
-            file,
-            scope,
-            name: head.name,
-            what: What::Routine(index),
-            type_name: Vec::new(),
-            assigned: false,
-            ambiguous: false,
-        };
+        let symbol = Symbol::new((file, scope), head.name, What::Routine(index), Vec::new());
         self.declare(text, symbol, !head.local);
         for parameter in &head.parameters {
-            let symbol = Symbol {
-                file,
-                scope: inner,
-                name: parameter.name,
-                what: What::Parameter,
-                type_name: folded(tree.text(parameter.type_name)),
-                assigned: true,
-                ambiguous: false,
-            };
-            self.declare(tree.text(parameter.name), symbol, false);
+            let type_name = folded(tree.text(parameter.type_name));
+            let symbol = Symbol::new((file, inner), parameter.name, What::Parameter, type_name);
+            self.declare(tree.text(parameter.name), symbol.varying(), false);
         }
         for inside in node + 1..node + tree.nodes[node as usize].size {
             match tree.nodes[inside as usize].kind {
@@ -294,123 +343,19 @@ impl Symbols {
                 Syntax::For => {
                     let name = parts(tree, inside).find(|&part| token_kind(tree, part) == Some(Token::Ident));
                     if let Some(Child::Token(name)) = name {
-                        let symbol = Symbol {
-                            file,
-                            scope: inner,
-                            name,
-                            what: What::Loop,
-                            type_name: b"num".to_vec(),
-                            assigned: true,
-                            ambiguous: false,
-                        };
-                        self.declare(tree.text(name), symbol, false);
+                        let symbol = Symbol::new((file, inner), name, What::Loop, b"num".to_vec());
+                        self.declare(tree.text(name), symbol.varying(), false);
                     }
                 }
                 _ => {}
             }
         }
-        self.routines.push(RoutineScope { file, head, scope: inner, module: module.to_owned() });
+        let written = vec![None; head.parameters.len()];
+        let module = module.to_owned();
+        let reach = Reach::default();
+        let unit = self.units.len() as u32;
+        self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
         self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
-    }
-
-    // ---- what the program changes ----
-
-    fn changes(&mut self, tree: &RapidTree<'_>, unit: Unit) {
-        let end = unit.node + tree.nodes[unit.node as usize].size;
-        let mut node = unit.node + 1;
-        while node < end {
-            let kind = tree.nodes[node as usize].kind;
-            if unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module) {
-                node += tree.nodes[node as usize].size;
-                continue;
-            }
-            if kind.may_change() {
-                for symbol in self.changed_by(tree, unit.scope, node) {
-                    self.symbols[symbol as usize].assigned = true;
-                }
-            }
-            node += 1;
-        }
-    }
-
-    /// The symbols that a statement or function call may change by itself (not by what the called routine does).
-    /// Constants never change.
-    pub fn changed_by(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> Vec<u32> {
-        let mut changed = self.given_by(tree, scope, node);
-        changed.retain(|&symbol| {
-            !matches!(&self.symbols[symbol as usize].what, What::Data(data) if data.storage == Token::Const)
-        });
-        changed
-    }
-
-    fn given_by(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> Vec<u32> {
-        match tree.nodes[node as usize].kind {
-            Syntax::Assignment => {
-                let place = parts(tree, node).next();
-                place.and_then(|place| self.root(tree, scope, place)).into_iter().collect()
-            }
-            Syntax::For => {
-                let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident));
-                name.and_then(|name| self.root(tree, scope, name)).into_iter().collect()
-            }
-            Syntax::Call | Syntax::Function => {
-                let name = tree.text(tree.nodes[node as usize].first);
-                self.changed_by_call(tree, scope, node, name)
-            }
-            Syntax::LateCall => {
-                arguments(tree, node).filter_map(|argument| self.root(tree, scope, argument.value?)).collect()
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    fn changed_by_call(&self, tree: &RapidTree<'_>, scope: u32, node: u32, name: &[u8]) -> Vec<u32> {
-        let is_call = tree.nodes[node as usize].kind == Syntax::Call;
-        if is_call
-            && !self.hides_instruction
-            && let Some(known) = instruction::find(name)
-        {
-            let known = &INSTRUCTIONS[known];
-            // Only searches write an argument.
-            if known.slot(1, 4) != Some(Slot::Output) {
-                return Vec::new();
-            }
-        }
-        if let Some(routine) = self.routine(scope, name) {
-            let parameters = &self.routines[routine as usize].head.parameters;
-            let mut position = 0;
-            return arguments(tree, node)
-                .filter_map(|argument| {
-                    let by_reference = match argument {
-                        Argument { name: None, .. } => {
-                            let mut required = parameters.iter().filter(|parameter| !parameter.optional);
-                            let parameter = required.nth(position);
-                            position += 1;
-                            parameter.is_some_and(|parameter| parameter.by_reference)
-                        }
-                        // By name: taken as changed where any parameter could be.
-                        Argument { name: Some(_), .. } => {
-                            parameters.iter().any(|parameter| parameter.by_reference)
-                        }
-                    };
-                    if by_reference { self.root(tree, scope, argument.value?) } else { None }
-                })
-                .collect();
-        }
-        if only_reads(name) {
-            return Vec::new();
-        }
-        if is_call && let Some(known) = instruction::find(name) {
-            let known = &INSTRUCTIONS[known];
-            let count = arguments(tree, node).filter(|argument| !argument.optional).count();
-            let required = arguments(tree, node).filter(|argument| !argument.optional).enumerate();
-            return required
-                .filter(|&(index, _)| known.slot(index, count) == Some(Slot::Output))
-                .filter_map(|(_, argument)| self.root(tree, scope, argument.value?))
-                .collect();
-        }
-        // Not known here: it may change what it is given.
-        arguments(tree, node).filter_map(|argument| self.root(tree, scope, argument.value?)).collect()
     }
 
     /// The symbol that a name or place begins with.
@@ -427,121 +372,4 @@ impl Symbols {
         }
         self.find(scope, tree.text(token))
     }
-}
-
-/// Predefined instructions and functions that leave their arguments as they are.
-pub fn only_reads(name: &[u8]) -> bool {
-    const READERS: &[&str] = &[
-        "abs",
-        "accset",
-        "acos",
-        "actunit",
-        "aorder",
-        "asin",
-        "atan",
-        "atan2",
-        "calcjointt",
-        "calcrobt",
-        "confj",
-        "confl",
-        "corrcon",
-        "cos",
-        "crobt",
-        "crossprod",
-        "cjointt",
-        "deactunit",
-        "defframe",
-        "dim",
-        "distance",
-        "dotprod",
-        "eoffsset",
-        "erwrite",
-        "eulerzyx",
-        "exp",
-        "fcact",
-        "fccalib",
-        "fcdeact",
-        "gripload",
-        "incrdisp",
-        "ispers",
-        "isvar",
-        "max",
-        "min",
-        "mirpos",
-        "norient",
-        "numtostr",
-        "offs",
-        "orientzyx",
-        "orobt",
-        "pdispoff",
-        "pdispon",
-        "pdispset",
-        "poseinv",
-        "posemult",
-        "posevect",
-        "pow",
-        "pulsedo",
-        "reltool",
-        "reset",
-        "round",
-        "set",
-        "setao",
-        "setdo",
-        "setgo",
-        "sin",
-        "singarea",
-        "softact",
-        "sqrt",
-        "strlen",
-        "strpart",
-        "tan",
-        "tasksync",
-        "testdi",
-        "tpwrite",
-        "trunc",
-        "valtostr",
-        "velset",
-        "vectmagn",
-        "waitdi",
-        "waitdo",
-        "waitsynctask",
-        "waittime",
-        "waituntil",
-        "write",
-        "wzsphdef",
-        "syncmoveon",
-        "syncmoveoff",
-        "tperase",
-        "stop",
-        "clkstart",
-        "clkreset",
-        "clkstop",
-        "isignaldi",
-        "idelete",
-        "waitrob",
-        "syncmoveundo",
-        "cirpathmode",
-        "eoffson",
-        "eoffsoff",
-        "corrdiscon",
-        "egmreset",
-        "incrmove",
-        "triggio",
-        "bool",
-        "doutput",
-        "dinput",
-        "goutput",
-        "accmax",
-        "worldacclim",
-        "pathacclim",
-        "spdoverride",
-        "speedrefresh",
-        "motionsup",
-        "exitcycle",
-        "waitload",
-        "softdeact",
-        "corrclear",
-        "setallDO",
-    ];
-    READERS.iter().any(|reader| reader.as_bytes().eq_ignore_ascii_case(name))
 }

@@ -15,7 +15,8 @@ use super::literal;
 use super::mark;
 use super::modal::{States, Which};
 use super::parser::parse;
-use super::symbol::{Symbols, Unit, What, only_reads};
+use super::predefined;
+use super::symbol::{Ends, Symbols, Unit, What};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
 use crate::program::motion::{
@@ -179,6 +180,17 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         let units = self.symbols.units.clone();
+        // What is called ends before its callers are followed, however long the chain of calls is.
+        for &unit in &self.symbols.callees_first {
+            let Some(routine) = units[unit as usize].routine else { continue };
+            match self.symbols.ends[unit as usize] {
+                Ends::AsItBegins => self.exits[routine as usize] = Some(States::ENTRY),
+                Ends::Set { called: true } => {
+                    self.exit_of(routine);
+                }
+                Ends::Set { called: false } => {}
+            }
+        }
         for (index, unit) in units.iter().enumerate() {
             self.unit = index as u32;
             let evaluator = Evaluator::new(self.trees, self.symbols);
@@ -214,8 +226,6 @@ impl<'a, 's> Lister<'a, 's> {
                 };
                 let argument = trees[unit.file as usize].node_span(node);
                 let targets = &mut motions[(literal.motion - first) as usize].targets;
-                // A hundred thousand motions: no room for targets that never come.
-                targets.reserve_exact(1);
                 targets.insert(literal.target as usize, MotionTarget { role, value, origin, argument });
             }
         });
@@ -280,9 +290,16 @@ impl<'a, 's> Lister<'a, 's> {
                 }
             })
             .collect();
+        // Callers first: then one pass settles what does not call itself.
+        let mut rank = vec![0_u32; units.len()];
+        for (at, &unit) in (0..).zip(&self.symbols.callees_first) {
+            rank[unit as usize] = at;
+        }
+        let mut sites: Vec<&(u32, CallSite)> = self.sites.iter().collect();
+        sites.sort_by_key(|(unit, _)| std::cmp::Reverse(rank[*unit as usize]));
         loop {
             let mut changed = false;
-            for (unit, site) in &self.sites {
+            for (unit, site) in &sites {
                 let Some(&callee) = unit_of.get(&site.routine) else { continue };
                 let arriving = site.modal.entered(entries[*unit as usize]);
                 let joined = entries[callee as usize].or(arriving);
@@ -389,6 +406,8 @@ impl<'a, 's> Lister<'a, 's> {
     ) {
         match self.literal(unit, argument) {
             Some(node) => {
+                // A hundred thousand motions: no room for targets that never come.
+                motion.targets.reserve_exact(1);
                 let motion = self.listing.motions.len() as u32;
                 self.literals.push(Literal { motion, target: before, role, unit, node, joints });
             }
@@ -495,23 +514,9 @@ impl<'a, 's> Lister<'a, 's> {
         } else if instruction.kind == MotionKind::AbsoluteJoint {
             None
         } else {
-            self.left_by_frames(&motion)
+            self.listing.left_by_frames(&motion)
         };
         motion
-    }
-
-    fn left_by_frames(&self, motion: &Motion) -> Option<Reason> {
-        let tool = match self.listing.tool(motion).map(|tool| &tool.value) {
-            Some(Ok(tool)) => tool,
-            Some(Err(_)) => return Some(Reason::ToolUnknown),
-            None => return Some(Reason::MissingArgument),
-        };
-        match self.listing.work_object(motion).map(|work_object| &work_object.value) {
-            Some(Ok(work_object)) if !work_object.fixed => Some(Reason::MovingWorkObject),
-            Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
-            Some(Ok(_)) => None,
-            _ => Some(Reason::WorkObjectUnknown),
-        }
     }
 
     /// A call that is no motion instruction of the table but takes a target.
@@ -548,7 +553,7 @@ impl<'a, 's> Lister<'a, 's> {
                     _ => {}
                 }
             }
-        } else if !only_reads(name) || late {
+        } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
                 let Some(value) = argument.value else { continue };
                 if let Some(joints) = self.looks_like_target(unit, value) {
@@ -637,8 +642,7 @@ impl Visitor for Lister<'_, '_> {
         }
         // While it is being followed, a routine that calls itself may end in any state.
         self.exits[routine as usize] = Some(anything);
-        let unit = self.symbols.units.iter().find(|unit| unit.routine == Some(routine)).copied();
-        let Some(unit) = unit else { return anything };
+        let unit = self.symbols.units[self.symbols.routines[routine as usize].unit as usize];
         let was = std::mem::replace(&mut self.silent, true);
         self.depth += 1;
         let evaluator = Evaluator::new(self.trees, self.symbols);

@@ -96,6 +96,56 @@ fn each_motion_of_the_sample_states_the_reason_beside_it() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Plans of the scenes that `programs/bounds.mod` names.
+fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
+    let cell = Cell::default();
+    let (mut arm, mut options) = (known(), Options::default());
+    match name {
+        "bound" => options.max_correction_mm = 1e-4,
+        "turn" => options.max_turn_rad = 1e-7,
+        "singular" => options.min_singularity = 1.0,
+        "unsure" => arm.region.sigma_mm = 1e-12,
+        "elsewhere" => (arm.region.spacing_deg, arm.region.samples_deg) = (1.0, vec![[150.0; 6]]),
+        "narrow" => arm.region.max_deg[1] = 5.0,
+        "loose" => (options.tolerance_mm, options.circles) = (0.5, Circles::Segments),
+        "joints" => options.joint_targets = true,
+        "branch" => {
+            options.min_singularity = 0.0;
+            (options.max_turn_rad, options.max_correction_mm) = (1.0, 50.0);
+            let arms = (0..12).map(|seed| estimated(perturbed(seed, 1.0), &[Joints::zeros()]));
+            return arms.map(|arm| planned(source, &arm, &cell, &options)).collect();
+        }
+        other => panic!("no scene {other}"),
+    }
+    vec![planned(source, &arm, &cell, &options)]
+}
+
+#[test]
+fn each_motion_of_the_sample_states_the_reason_of_its_scene() {
+    let source = sample("bounds.mod");
+    let task = Task::read(&[("p.mod", &source)]);
+    let text = String::from_utf8(source.clone()).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let mut scenes: BTreeSet<&str> = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for (index, motion) in task.listing.motions.iter().enumerate() {
+        let line = lines[motion.place.line as usize - 1];
+        let Some(expected) = line.split("! expect ").nth(1) else { continue };
+        for expected in expected.split(" | ") {
+            let (name, expected) = expected.split_once(": ").unwrap();
+            scenes.insert(name);
+            let reasons = scene(name, &source).into_iter().map(|plan| plan.outcomes[index].reason);
+            let found: Vec<String> =
+                reasons.map(|why| why.map_or("nothing".to_owned(), |why| why.to_string())).collect();
+            if !found.iter().any(|found| found.contains(expected)) {
+                wrong.push(format!("{} {name}: {expected}: {found:?}", motion.place.line));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert_eq!(scenes.len(), 9);
+}
+
 #[test]
 fn every_reason_there_is_shows_in_a_program() {
     let mut seen: BTreeSet<&str> = BTreeSet::new();

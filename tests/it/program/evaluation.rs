@@ -311,3 +311,149 @@ fn a_displacement_that_the_text_tells_is_part_of_the_work_object() {
     assert_eq!(displaced(&format!("{set}EOffsSet [1,0,0,0,0,0];\n{go}")), [left]);
     assert_eq!(displaced(&format!("{set}here:\n{go}")), [left]);
 }
+
+/// Where the work objects of the motions of main stand, or why that is not known.
+fn objects(body: &str, routines: &str) -> Vec<Result<[f64; 3], Reason>> {
+    let source = format!(
+        "MODULE M\nCONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\n\
+         PERS wobjdata w:=[FALSE,TRUE,\"\",[[1,2,3],[1,0,0,0]],[[10,20,30],[1,0,0,0]]];\n\
+         VAR num n;\nPROC main()\n{body}\nENDPROC\n{routines}\nENDMODULE\n"
+    );
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let listing = &task.listing;
+    let moving = listing.motions.iter().filter(|motion| &*motion.instruction == "MoveL");
+    moving
+        .map(|motion| match motion.reason() {
+            Some(reason) => Err(reason),
+            None => {
+                let object = listing.work_object(motion).unwrap().value.clone().unwrap();
+                let at = object.user_frame.pose() * object.object_frame.pose();
+                Ok(at.translation.vector.into())
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn components_that_nothing_assigns_keep_the_declared_value() {
+    let go = "MoveL p,v100,fine,tool0\\WObj:=w;\n";
+    let left = Err(Reason::WorkObjectAssigned);
+    let set = "w.uframe.trans:=[100,0,0];\n";
+    assert_eq!(objects(go, ""), [Ok([11.0, 22.0, 33.0])]);
+    assert_eq!(objects(&format!("{go}{set}{go}"), ""), [left, Ok([110.0, 20.0, 30.0])]);
+    assert_eq!(objects(&format!("w.oframe.trans.y:=7;\n{go}"), ""), [Ok([11.0, 9.0, 33.0])]);
+    // What is assigned elsewhere is not known here.
+    let other = "PROC other()\nw.oframe:=[[0,0,0],[1,0,0,0]];\nENDPROC";
+    assert_eq!(objects(&format!("{set}{go}"), other), [left]);
+    assert_eq!(
+        objects(&format!("{set}w.oframe:=wobj0.oframe;\n{go}other;\n{go}"), other),
+        [Ok([100.0, 0.0, 0.0]), left]
+    );
+    // An index, a whole from run time, a joint of ways, a loop, a label.
+    let found = objects(&format!("w:=found();\n{go}{set}{go}"), "");
+    assert_eq!(found, [Err(Reason::WorkObjectUnknown), Err(Reason::WorkObjectUnknown)]);
+    let tables = "PERS wobjdata many{2}:=[[FALSE,TRUE,\"\",[[1,2,3],[1,0,0,0]],[[0,0,0],[1,0,0,0]]],\
+                  [FALSE,TRUE,\"\",[[4,5,6],[1,0,0,0]],[[0,0,0],[1,0,0,0]]]];\n\
+                  PROC other()\nmany{n}.uframe.trans.x:=7;\nENDPROC";
+    assert_eq!(objects("MoveL p,v100,fine,tool0\\WObj:=many{2};\n", tables), [left]);
+    assert_eq!(objects(&format!("{set}IF n=1 w.uframe.trans.z:=5;\n{go}"), ""), [left]);
+    assert_eq!(
+        objects(&format!("{set}WHILE n<3 DO\n{go}{set}{go}ENDWHILE\n{go}"), ""),
+        [left, Ok([110.0, 20.0, 30.0]), left]
+    );
+    assert_eq!(objects(&format!("{set}again:\n{go}"), ""), [left]);
+}
+
+#[test]
+fn only_what_may_change_a_value_makes_it_unknown() {
+    let go = "MoveL p,v100,fine,tool0\\WObj:=w;\n";
+    let (known, left) = (Ok([110.0, 20.0, 30.0]), Err(Reason::WorkObjectAssigned));
+    let set = "w.uframe.trans:=[100,0,0];\n";
+    let after = |statement: &str, routines: &str| {
+        objects(&format!("{set}{statement}\n{go}"), routines).pop().unwrap()
+    };
+    let passive = "PROC other()\nTPWrite \"x\";\nn:=n+1;\nENDPROC";
+    assert_eq!(after("other;", passive), known);
+    assert_eq!(after("WaitWObj w\\RelDist:=3; Set do1; TPReadNum n,\"x\";", ""), known);
+    assert_eq!(after("unknown;", ""), left);
+    assert_eq!(after("n:=unknown(3);", ""), left);
+    assert_eq!(after("IF unknown(3)=2 n:=1;", ""), left);
+    assert_eq!(after("%\"other\"%;", passive), left);
+    // Given by reference: changed only where the routine changes it, or gives it on to what may.
+    let parameter = |body: &str| format!("PROC other(PERS wobjdata o \\num k)\n{body}\nENDPROC");
+    let plain = parameter("MoveJ p,v100,fine,tool0\\WObj:=o;");
+    assert_eq!(after("other w;", &plain), known);
+    assert_eq!(after("other w;", &parameter("o.oframe.trans.x:=3;")), left);
+    let through = format!("{}\nPROC next(PERS wobjdata q)\nq:=wobj0;\nENDPROC", parameter("next o;"));
+    assert_eq!(after("other w;", &through), left);
+    // Functions that change data outside, and predefined ones that write an argument.
+    let changing = "FUNC num other()\nw.uframe.trans.x:=n;\nRETURN 1;\nENDFUNC";
+    assert_eq!(after("n:=other();", changing), left);
+    assert_eq!(after("ok:=StrToVal(\"[1,2,3]\",w.uframe.trans);", ""), left);
+    assert_eq!(after("SetDataVal \"w\",n;", ""), left);
+    assert_eq!(after("SetDataVal name,n;", ""), left);
+    assert_eq!(after("SetDataVal \"n\",n;", ""), known);
+    // At any time: a trap routine, an error handler that goes back; not one that leaves.
+    let trap = "TRAP other\nw.uframe.trans.x:=n;\nENDTRAP";
+    assert_eq!(after("", trap), left);
+    let handler = |end: &str| format!("ERROR\nw.uframe.trans.x:=n;\n{end};");
+    assert_eq!(objects(&format!("{set}{go}{}", handler("RETRY")), ""), [left]);
+    assert_eq!(objects(&format!("{set}{go}{}", handler("TRYNEXT")), ""), [left]);
+    assert_eq!(objects(&format!("{set}{go}{}", handler("RAISE")), ""), [known]);
+    // A handler that goes back with a switch set otherwise.
+    let displaced = format!("{go}ERROR\nPDispOn p,tool0;\nRETRY;");
+    assert_eq!(objects(&displaced, ""), [Err(Reason::Displacement)]);
+}
+
+#[test]
+fn elements_of_an_array_are_followed_where_their_index_is_known() {
+    let data = format!("{}\nVAR robtarget a{{3}};\nVAR robtarget long{{500}};\nVAR num n:=1;", base());
+    let filled = "a{1}:=p; a{2}:=Offs(p,0,5,0);";
+    let y =
+        |body: &str, expression: &str| target(&data, body, expression).map(|target| target.position_mm[1]);
+    assert_eq!(y(filled, "a{1}"), Ok(-20.0));
+    assert_eq!(y(filled, "a{2}"), Ok(-15.0));
+    assert_eq!(y(&format!("{filled} a{{2}}.trans.y:=7;"), "a{2}"), Ok(7.0));
+    assert_eq!(y(filled, "a{3}"), Err(Reason::Assigned));
+    assert_eq!(y(filled, "a{4}"), Err(Reason::IndexOutOfRange));
+    assert_eq!(y(&format!("{filled} n:=ReadNum(d); a{{n}}:=p;"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y(&format!("{filled} FOR i FROM 1 TO 3 DO a{{i}}:=p; ENDFOR"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y(&format!("{filled} elsewhere;"), "a{2}"), Err(Reason::Assigned));
+    assert_eq!(y("long{2}:=p;", "long{2}"), Err(Reason::Assigned));
+}
+
+#[test]
+fn changes_are_carried_along_chains_of_calls_in_any_order() {
+    const COUNT: usize = 2000;
+    for backwards in [false, true] {
+        let mut routines: Vec<String> = (0..COUNT)
+            .map(|i| match i + 1 {
+                COUNT => format!("PROC p{i}(INOUT num a,num b)\na:=1;\nw.oframe.trans.x:=1;\nENDPROC\n"),
+                next => format!("PROC p{i}(INOUT num a,num b)\np{next} a,b;\nENDPROC\n"),
+            })
+            .collect();
+        if backwards {
+            routines.reverse();
+        }
+        let routines = format!("{}\nVAR num k:=5;\nVAR num l:=6;", routines.concat());
+        let set = "w.oframe.trans.x:=2;\n";
+        let go = "MoveL Offs(p,0,0,l),v100,fine,tool0\\WObj:=w;\n";
+        let found = objects(&format!("{set}{go}p0 k,l;\n{go}"), &routines);
+        assert_eq!(found, [Ok([3.0, 22.0, 33.0]), Err(Reason::WorkObjectAssigned)]);
+        let found = objects("p0 k,l;\nMoveL Offs(p,0,0,k),v100,fine,tool0;\n", &routines);
+        assert_eq!(found, [Err(Reason::RunTimeOffset)]);
+    }
+}
+
+#[test]
+fn predefined_names_stand_in_order() {
+    use truegrind::program::rapid::predefined::{Effect, READERS, WRITERS, effect};
+    assert!(READERS.windows(2).all(|two| two[0] < two[1]));
+    assert!(WRITERS.windows(2).all(|two| two[0].0 < two[1].0));
+    assert!(READERS.iter().all(|name| effect(name.to_uppercase().as_bytes()) == Some(Effect::Reads)));
+    assert!(matches!(effect(b"TPReadFK"), Some(Effect::Writes(_))));
+    for name in ["MoveL", "myOwn", "", "a_name_that_is_longer_than_any_that_a_controller_takes"] {
+        assert_eq!(effect(name.as_bytes()), None, "{name}");
+    }
+}

@@ -336,6 +336,38 @@ fn orientations_by_angles_and_by_vector() {
 }
 
 #[test]
+fn the_way_goes_past_a_subprogram_of_linuxcnc() {
+    let sub = "o<shift> sub\nG91 G1 X5\n#1=7\no<shift> endsub\n";
+    let before = "G1 X1 Y2 Z3 A0 B0 C0\n#1=4\n";
+    let found = ends(&format!("{before}{sub}X#1 Y5\n"), Dialect::LinuxCnc);
+    assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
+    // A call may leave G91 behind, and another value of #1.
+    let found = ends(&format!("{before}{sub}o<shift> call\nG1 X2 Y5 Z3\n"), Dialect::LinuxCnc);
+    assert_eq!(found[2..], [Err(Reason::Subprogram), Err(Reason::UnknownFlow)]);
+}
+
+#[test]
+fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
+    let go = "G1 X1 Y2 Z3 A0 B0 C0\n";
+    // A computed jump may go to any numbered block.
+    for jump in ["GOTO#5", "GOTO #5", "GOTO [#5+1]"] {
+        let body = format!("G90\n{go}#2=4\nN10 #1=3\nG1 X#2 Y2 Z3 A0 B0 C0\n{jump}\n");
+        let tree = parse(body.as_bytes(), Dialect::Iso);
+        assert!(tree.opaque.is_empty(), "{jump}: {:?}", tree.opaque);
+        assert_eq!(ends(&body, Dialect::Iso), [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow)], "{jump}");
+    }
+    let action = "N29 ID=1 WHEN $AA_IW[X]>10 DO R5=5\n";
+    let body =
+        format!("TRAORI\nR5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\n{action}R5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\nX1 Y2 Z3\n");
+    assert!(parse(body.as_bytes(), Dialect::Siemens).opaque.is_empty());
+    let found = ends(&body, Dialect::Siemens);
+    assert_eq!(found[..2], [Ok([4.0, 2.0, 3.0]), Err(Reason::Variable)]);
+    for call in ["G65 <MY_SUB> A1.", "M98 <O1000>"] {
+        assert!(parse(call.as_bytes(), Dialect::Fanuc).opaque.is_empty(), "{call}");
+    }
+}
+
+#[test]
 fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
     let body = "G90 G1 X1 Y2 Z3 A0 B0 C0\nN10 X2\nG1 X2 Y2 Z2 A0 B0 C0\nIF [#1 GT 5] GOTO 10\nX3\n";
     let found = ends(body, Dialect::LinuxCnc);

@@ -4,7 +4,7 @@ use super::super::dialect::Dialect;
 use super::super::expression::{Variable, numbered};
 use super::super::syntax::Belongs;
 use super::super::token::Token;
-use super::{Lister, Said};
+use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
 
 impl Lister<'_, '_> {
@@ -26,6 +26,15 @@ impl Lister<'_, '_> {
             || number
                 .and_then(|word| self.literal(word))
                 .is_some_and(|number| self.anywhere || self.targets.contains(&(number as u64)))
+    }
+
+    /// Whether a block holds a synchronised action of Siemens.
+    pub(super) fn is_action(&self, said: &Said<'_>) -> bool {
+        self.dialect == Dialect::Siemens
+            && said
+                .words
+                .iter()
+                .any(|word| ["WHEN", "WHENEVER", "FROM", "EVERY"].iter().any(|name| word.is(name)))
     }
 
     /// Values of variables. One that is assigned only where a condition holds is not known from here on.
@@ -56,6 +65,7 @@ impl Lister<'_, '_> {
                 _ => continue,
             };
             let value = match word.belongs {
+                _ if self.actions => Err(Reason::Variable),
                 _ if conditional => Err(Reason::UnknownFlow),
                 Belongs::Literal { .. } => self.literal(word).ok_or(Reason::WrongShape),
                 Belongs::Expression { first, end } => self.evaluated((first, end)),
@@ -92,6 +102,17 @@ impl Lister<'_, '_> {
             match &*keyword {
                 b"CALL" => self.subprogram(said, "O call"),
                 b"IF" => {}
+                b"SUB" => {
+                    self.passed = Some((self.state.clone(), self.seen));
+                    self.forget();
+                }
+                // The way goes past a subprogram; what stands in it holds only where it is called.
+                b"ENDSUB" if self.passed.is_some() => {
+                    if let Some((state, seen)) = self.passed.take() {
+                        (self.state, self.seen) = (state, seen);
+                    }
+                    self.events.push(Event::Unknown);
+                }
                 _ => self.forget(),
             }
             return true;

@@ -32,7 +32,12 @@ impl Lister<'_, '_> {
                         self.targets.insert(number as u64);
                         continue;
                     }
-                    (None, _) => {}
+                    // A label; anything else is computed.
+                    (None, _)
+                        if said
+                            .name
+                            .first()
+                            .is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
                     _ => self.anywhere = true,
                 }
             }
