@@ -7,8 +7,8 @@
 //! **Shapes.** x, m and g have p entries, N is p × p; priors are the task's own.
 //!
 //! **Stops.** Where a step promises less than 10⁻⁷ for each scalar row, in units of χ²/2, or where the fall from the step before
-//! to this one says so of the next. Not at all where no length lowers the cost, or after eight steps: the caller then goes on
-//! with Levenberg and Marquardt.
+//! to this one, to a twentieth at most, says so of the next. Not at all where no length lowers the cost, or after eight
+//! steps: the caller then goes on with Levenberg and Marquardt.
 //!
 //! **Source and departures.** Nocedal and Wright, *Numerical Optimization*, 2nd ed., §10.3. Other than
 //! [`gauss_newton`](crate::estimation::least_squares::gauss_newton) it stops at an absolute promise: scores of candidates are
@@ -27,6 +27,10 @@ const NEAR: f64 = 1e-7;
 
 /// Most steps.
 const STEPS: usize = 8;
+
+/// Promises are not counted on to fall below this share from step to step: with residuals that remain, Gauss and Newton
+/// converge linearly.
+const STEADY: f64 = 0.05;
 
 /// A cost may rise by this share, which is rounding.
 const ROUNDING: f64 = 1e-10;
@@ -78,11 +82,12 @@ impl Step {
 /// Moves `x` to the optimum; `false` where that did not come about.
 pub fn descend(task: &dyn Problem, x: &mut Vec<f64>) -> bool {
     let enough = NEAR * task.rows() as f64;
-    let mut last = 0.0;
+    let mut last = f64::MIN_POSITIVE;
     for _ in 0..STEPS {
         let Some(step) = Step::taken(task, x) else { return false };
-        let falls = step.length >= 1.0 && step.promise < last;
-        if step.promise < enough || (falls && step.promise * step.promise / last < enough) {
+        // What the next step would promise, as far as the steps before this one tell.
+        let share = if step.length < 1.0 { 1.0 } else { (step.promise / last).clamp(STEADY, 1.0) };
+        if step.promise < enough || share * step.promise < enough {
             return true;
         }
         last = step.promise;
