@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use rayon::prelude::*;
+
 use crate::estimation::estimate::Termination;
 use crate::estimation::problem::Problem;
 use crate::identification::calibration::{Calibration, Frames, Weight};
@@ -418,14 +420,15 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
     let condition = estimated.condition;
     let posed = estimated.model.under(&condition);
     let target = fitted.frames.flange_from_target;
-    region.sigma_mm = region
+    let sigmas: Vec<f64> = region
         .samples_deg
-        .iter()
+        .par_iter()
         .map(|q| {
             let q = Joints::from_fn(|i, _| q[i].to_radians());
             estimated.position_covariance(&posed, &q, &target).trace().max(0.0).sqrt()
         })
-        .fold(0.0, f64::max);
+        .collect();
+    region.sigma_mm = sigmas.into_iter().fold(0.0, f64::max);
     estimated.region = region;
     estimated
 }
