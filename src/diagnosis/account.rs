@@ -20,7 +20,8 @@ use crate::kinematics::effect::map::JointMap;
 /// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
 const CLEAR: f64 = 6.0;
 
-/// A rival, the arm without the finding among them, whose held-out error is below this share of the finding's is not beaten, whatever the Bayes factor says.
+/// A rival, the arm without the finding among them, whose held-out error is below this share of the finding's is not beaten,
+/// whatever the Bayes factor says.
 const BETTER: f64 = 0.99;
 
 /// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.

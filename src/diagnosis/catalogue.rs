@@ -4,6 +4,8 @@
 //! [`measurement_candidates`]. Shifts between unknown rows and reducer lines have rooms of their own (`intervals`, `lines`),
 //! because which rows and which orders is found, not listed.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -227,21 +229,17 @@ pub const FINE: [(usize, usize); 2] = [(72, 30), (144, 60)];
 /// Poses for each knot of the finest map: with fewer, its lines one by one say as much.
 const POSES_PER_KNOT: usize = 10;
 
-/// The finely resolved error maps of a joint, coarsest first: those of [`FINE`] for which there are poses enough.
-pub fn fine_maps(subject: &Subject<'_>, joint: usize) -> Vec<Candidate> {
+/// The finely resolved error maps of each joint, coarsest first: those of [`FINE`] for which there are poses enough.
+pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
     let dataset = &subject.observed.dataset;
-    let enough = |knots: usize| {
-        let needed = POSES_PER_KNOT * knots;
-        dataset.rows.len() >= needed && split::poses(dataset).len() >= needed
+    let needed = POSES_PER_KNOT * FINE[1].0;
+    let all = dataset.rows.len() >= needed && split::poses(dataset).len() >= needed;
+    let map = |joint: usize, knots: usize| {
+        let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
+        Arc::new(Candidate::arm(effect, dataset, subject.nominal))
     };
-    FINE.iter()
-        .enumerate()
-        .take_while(|(level, (knots, _))| *level == 0 || enough(*knots))
-        .map(|(_, &(knots, _))| {
-            let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
-            Candidate::arm(effect, dataset, subject.nominal)
-        })
-        .collect()
+    let tried = if all { &FINE[..] } else { &FINE[..1] };
+    (0..6).map(|joint| tried.iter().map(|&(knots, _)| map(joint, knots)).collect()).collect()
 }
 
 /// An axis that moved less than this shows nothing of itself (rad).

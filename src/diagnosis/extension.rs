@@ -8,8 +8,6 @@
 //! Near another fit the steps are Gauss and Newton's (see `newton`) as long as they descend. A search leaves it at that; any
 //! other fit ends with Levenberg and Marquardt.
 
-use nalgebra::DMatrix;
-
 use super::cause::Cause;
 use super::newton::{self, Step};
 use crate::estimation::estimate::{Estimate, Evaluations, Termination};
@@ -235,13 +233,15 @@ pub(super) fn approached(
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {
             // The scale under which the weighted squares have their degrees of freedom.
-            let known = |c: &DMatrix<f64>| -> f64 {
-                let shares = priors.iter().enumerate();
-                shares.map(|(k, p)| (1.0 - c[(k, k)] / p.sigma.powi(2)).clamp(0.0, 1.0)).sum()
+            let variances = match (&step, &covariance) {
+                (Some(step), _) => step.variances(),
+                (None, Some(covariance)) => covariance.diagonal().as_slice().to_vec(),
+                (None, None) => Vec::new(),
             };
-            let spent = step
-                .as_ref()
-                .map_or_else(|| covariance.as_ref().map_or(0.0, known), |step| step.spent(&priors));
+            // Each parameter counts by the share that its prior does not determine.
+            let shares =
+                priors.iter().zip(&variances).map(|(p, v)| (1.0 - v / p.sigma.powi(2)).clamp(0.0, 1.0));
+            let spent: f64 = shares.sum();
             let rows = (n * per) as f64;
             let dispersion = |range: std::ops::Range<usize>| {
                 let sum: f64 = (0..n)

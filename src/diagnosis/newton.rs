@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 
 use super::algebra::{back_and_forth, factored, solved};
 use crate::estimation::objective::Objective;
-use crate::estimation::problem::{Prior, Problem};
+use crate::estimation::problem::Problem;
 
 /// Promise for each scalar row below which a task counts as solved.
 const NEAR: f64 = 1e-7;
@@ -70,12 +70,10 @@ impl Step {
         (promise < NEAR * task.rows() as f64).then_some(Self { lower, promise, length: 0.0 })
     }
 
-    /// Parameters that the rows determine, each counted by the share that its prior does not.
-    pub(super) fn spent(&self, priors: &[Prior]) -> f64 {
-        let p = priors.len();
-        let inverse = solved(&self.lower, DMatrix::identity(p, p));
-        let known = inverse.column_iter().zip(priors);
-        known.map(|(c, prior)| (1.0 - c.norm_squared() / prior.sigma.powi(2)).clamp(0.0, 1.0)).sum()
+    /// Variances of the parameters: the diagonal of N⁻¹.
+    pub(super) fn variances(&self) -> Vec<f64> {
+        let p = self.lower.nrows();
+        solved(&self.lower, DMatrix::identity(p, p)).column_iter().map(|c| c.norm_squared()).collect()
     }
 }
 

@@ -38,9 +38,8 @@ impl Score {
     /// what [`log_p`] goes on from. `sizes` as scored.
     pub fn plain_log_p(&self, sizes: &[f64]) -> f64 {
         if self.gain > SOME {
-            let scale = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
-            let (statistic, freedom) =
-                plain_statistic(&(&scale * &self.information * &scale), &(&scale * &self.gradient));
+            let (information, gradient) = in_sizes(&self.information, &self.gradient, sizes);
+            let (statistic, freedom) = plain_statistic(&information, &gradient);
             log_chi_square_tail(statistic, freedom.max(1))
         } else {
             log_chi_square_tail(self.gain, sizes.len())
@@ -61,10 +60,7 @@ pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tri
 /// Scores columns whose projection is known.
 pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Score {
     let k = sizes.len();
-    // In units of the sizes: well scaled.
-    let scale = DMatrix::from_diagonal(&DVector::from_column_slice(sizes));
-    let information = &scale * &projected.information * &scale;
-    let gradient = &scale * &projected.gradient;
+    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, sizes);
     let nothing = || Score {
         gain: 0.0,
         evidence: 0.0,
@@ -86,10 +82,21 @@ pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Scor
         gain,
         evidence,
         merit,
-        estimate: -(&scale * step),
+        estimate: DVector::from_iterator(k, step.iter().zip(sizes).map(|(step, size)| -(size * step))),
         information: projected.information.clone(),
         gradient: projected.gradient.clone(),
     }
+}
+
+/// Information and gradient in units of the sizes: well scaled.
+fn in_sizes(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    sizes: &[f64],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let k = sizes.len();
+    let information = DMatrix::from_fn(k, k, |a, b| sizes[a] * information[(a, b)] * sizes[b]);
+    (information, DVector::from_fn(k, |a, _| sizes[a] * gradient[a]))
 }
 
 /// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
@@ -103,13 +110,11 @@ pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
     }
     let columns = candidate.columns(design);
     let projected = design.project(&columns);
-    let scale = DMatrix::from_diagonal(&DVector::from_column_slice(&sizes));
-    let information = &scale * &projected.information * &scale;
-    let gradient = &scale * &projected.gradient;
+    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, &sizes);
     let k = columns.ncols();
     let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return plain() };
     let step = factor.solve(&gradient);
-    let scattered = scatter_statistic(design, &columns, &projected, &scale, &gradient, &step);
+    let scattered = scatter_statistic(design, &columns, &projected, &sizes, &gradient, &step);
     let (plain, freedom) = plain_statistic(&information, &gradient);
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
 }
@@ -140,12 +145,13 @@ fn scatter_statistic(
     design: &Design,
     columns: &DMatrix<f64>,
     projected: &Projected,
-    scale: &DMatrix<f64>,
+    sizes: &[f64],
     gradient: &DVector<f64>,
     step: &DVector<f64>,
 ) -> f64 {
     let k = columns.ncols();
-    let pure = design.pure(columns, projected) * scale;
+    let mut pure = design.pure(columns, projected);
+    pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
     let left = &design.residual - &pure * step;
     let mut scatter = DMatrix::zeros(k, k);
     for i in 0..design.observations {

@@ -111,8 +111,7 @@ impl Catalogue {
         stories.sort();
         stories.dedup();
         let families = stories.len() as f64;
-        let fine =
-            (0..6).map(|joint| fine_maps(subject, joint).into_iter().map(Arc::new).collect()).collect();
+        let fine = fine_maps(subject);
         Self { listed: listed.into_iter().map(Arc::new).collect(), fine, shifts, families }
     }
 

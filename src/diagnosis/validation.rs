@@ -95,11 +95,7 @@ impl Validation {
             .collect::<Option<Vec<NormalEquations>>>()?;
         let mut all = NormalEquations::zeros(p);
         parts.iter().for_each(|part| all.add(part));
-        for (k, (prior, x)) in fit.priors.iter().zip(&fit.x).enumerate() {
-            let precision = prior.sigma.powi(-2);
-            all.matrix[(k, k)] += precision;
-            all.gradient[k] += precision * (x - prior.mean);
-        }
+        all.add_priors(&fit.priors, &fit.x);
         let refitted = |split: &Split, part: &NormalEquations| -> Option<Vec<f64>> {
             let mut normal: DMatrix<f64> = &all.matrix - &part.matrix;
             let gradient: DVector<f64> = &all.gradient - &part.gradient;

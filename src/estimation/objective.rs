@@ -30,14 +30,7 @@ impl<'a> Objective<'a> {
     pub(crate) fn normal_equations(&mut self, x: &[f64]) -> NormalEquations {
         self.evaluations.jacobians += self.problem.rows() as u64;
         let mut equations = self.problem.normal_equations(x);
-        for (k, (prior, x)) in self.priors.iter().zip(x).enumerate() {
-            if prior.sigma.is_finite() {
-                let weight = 1.0 / (prior.sigma * prior.sigma);
-                equations.matrix[(k, k)] += weight;
-                equations.gradient[k] += weight * (x - prior.mean);
-            }
-        }
-        equations.cost += prior_cost(self.priors, x);
+        equations.add_priors(self.priors, x);
         equations
     }
 

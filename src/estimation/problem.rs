@@ -48,6 +48,18 @@ impl NormalEquations {
         self.cost += other.cost;
     }
 
+    /// Adds the priors of the parameters at `x`: one for each, or none at all; one of infinite width says nothing.
+    pub fn add_priors(&mut self, priors: &[Prior], x: &[f64]) {
+        for (k, (prior, x)) in priors.iter().zip(x).enumerate() {
+            if prior.sigma.is_finite() {
+                let weight = 1.0 / (prior.sigma * prior.sigma);
+                self.matrix[(k, k)] += weight;
+                self.gradient[k] += weight * (x - prior.mean);
+            }
+        }
+        self.cost += prior_cost(priors, x);
+    }
+
     /// Copies the lower triangle onto the upper one.
     pub fn mirror(&mut self) {
         self.matrix.fill_upper_triangle_with_lower_triangle();
