@@ -352,6 +352,8 @@ struct Worked {
     change: Option<Change>,
     outcome: MotionOutcome,
     point: Option<PathPoint>,
+    /// Its way, where its targets are all corrected.
+    passage: Option<Passage>,
 }
 
 impl<'a> Job<'a> {
@@ -368,6 +370,8 @@ impl<'a> Job<'a> {
             .filter_map(|(_, p)| p.as_ref())
             .collect();
         let mut middles = middles_off(&lines, self.arms, self.options.emit).into_iter();
+        // The way of the motion before, which a corner asks for.
+        let mut last: Option<(u32, Passage)> = None;
         let mut out = Portion {
             changes: Vec::with_capacity(count),
             outcomes: Vec::with_capacity(count),
@@ -375,7 +379,8 @@ impl<'a> Job<'a> {
         };
         for (index, path) in motions.zip(&paths) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
-            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY));
+            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY), last.as_ref());
+            last = worked.passage.map(|passage| (index as u32, passage));
             out.changes.extend(worked.change);
             out.outcomes.push(worked.outcome);
             out.points.extend(worked.point);
@@ -392,9 +397,8 @@ impl<'a> Job<'a> {
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
-        let changes = |target: &Result<Solved, Why>| {
-            target.as_ref().is_ok_and(|solved| forbidden(solved, self.arms, self.options).is_none())
-        };
+        let changes =
+            |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
         if !may_change(before, self.options) || !targets.iter().all(changes) {
             return None;
         }
@@ -404,8 +408,15 @@ impl<'a> Job<'a> {
         (from.index == to.index).then_some(Path { from, to, way })
     }
 
-    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it.
-    fn corner(&self, motion: &Motion, path: Option<&Path<'a>>, passage: &Passage) -> Option<f64> {
+    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
+    /// the motion that was worked out before this one.
+    fn corner(
+        &self,
+        motion: &Motion,
+        path: Option<&Path<'a>>,
+        passage: &Passage,
+        last: Option<&(u32, Passage)>,
+    ) -> Option<f64> {
         let Path { from: point, to, way } = path?;
         passage.courses.as_ref()?;
         let previous = motion.previous? as usize;
@@ -419,21 +430,40 @@ impl<'a> Job<'a> {
                 return None;
             }
         }
+        let places = [point.place, way.at(0.0)];
+        let bend =
+            |way_in: &Passage| corner(point, way_in, passage, zone_mm, places, self.arms, self.options.emit);
+        if let Some((index, way_in)) = last
+            && Some(*index) == motion.previous
+        {
+            return bend(way_in);
+        }
         let path = self.path(previous)?;
         let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
         let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
-        let way_in = Passage::of(before, Some(&path), &good, middle, self.arms, self.options);
-        let places = [point.place, way.at(0.0)];
-        corner(point, &way_in, passage, zone_mm, places, self.arms, self.options.emit)
+        bend(&Passage::of(before, Some(&path), &good, middle, self.arms, self.options))
     }
 
-    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
-    fn work(&self, index: usize, path: Option<&Path<'a>>, middle_mm: f64) -> Worked {
-        work(index, self, path, middle_mm)
+    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
+    /// that was worked out before this one.
+    fn work(
+        &self,
+        index: usize,
+        path: Option<&Path<'a>>,
+        middle_mm: f64,
+        last: Option<&(u32, Passage)>,
+    ) -> Worked {
+        work(index, self, path, middle_mm, last)
     }
 }
 
-fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) -> Worked {
+fn work<'a>(
+    index: usize,
+    job: &Job<'a>,
+    path: Option<&Path<'a>>,
+    middle_mm: f64,
+    last: Option<&(u32, Passage)>,
+) -> Worked {
     let Job { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome {
@@ -457,7 +487,7 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
             }
             p
         });
-        Worked { change, outcome, point }
+        Worked { change, outcome, point, passage: None }
     };
     if let Some(reason) = motion.left {
         return finish(outcome, Status::Left, Some(Why::Program(reason)), None, None);
@@ -484,14 +514,14 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
         return finish(outcome, Status::Left, Some(Why::JointTarget), None, point);
     }
-    if let Some(why) = good.iter().find_map(|s| forbidden(s, arms, options)) {
+    if let Some(why) = good.iter().find_map(|s| s.forbidden) {
         return finish(outcome, Status::Refused, Some(why), None, point);
     }
     // Then the path from the motion before.
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
     (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
     let mut flag = passage.flag;
-    if let Some(corner) = job.corner(motion, path, &passage) {
+    if let Some(corner) = job.corner(motion, path, &passage, last) {
         outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
         if !(corner <= options.tolerance_mm) {
             flag = flag.or(Some(Why::Corner { mm: corner }));
@@ -505,9 +535,9 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
     };
     let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
     outcome.after_mm = good.last().map(|s| s.deviation_after.norm_mm());
-    let change = Change { motion: index as u32, targets: new_targets, before: passage.before };
+    let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
-    finish(outcome, status, flag, Some(change), point)
+    Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
@@ -515,7 +545,8 @@ pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }
 
-fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
+/// Why a corrected target must not be written.
+pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
     let shift = (solved.told.translation.vector - solved.meant.translation.vector).norm();
     if !(shift <= options.max_correction_mm) {
         return Some(Why::TooFar { mm: shift });

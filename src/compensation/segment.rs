@@ -123,8 +123,7 @@ pub(super) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
                 line.to.mounted.told.flange_for(&between(&line.from.told, &line.to.told, 0.5))
             };
             let flanges: Vec<Pose> = lines.iter().map(told).collect();
-            let solved = arms.nominal.solve_seeded(&flanges, &halfway);
-            solved.into_iter().map(|s| s.ok().map(|s| s.joints)).collect()
+            arms.nominal.reach_seeded(&flanges, &halfway).into_iter().map(|reached| reached.1.ok()).collect()
         }
     };
     let places: Vec<usize> = lines.iter().map(|line| line.way.at(0.5)).collect();

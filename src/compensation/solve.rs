@@ -17,7 +17,7 @@ use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
 use super::mountings::Mountings;
 use super::payload::Load;
-use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
+use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
 use super::segment::Way;
 use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
@@ -62,6 +62,8 @@ pub(super) struct Solved {
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
+    /// Why it must not be written.
+    pub(super) forbidden: Option<Why>,
     /// The condition under which the arm comes there.
     pub(super) place: usize,
 }
@@ -109,6 +111,7 @@ struct Start {
     mounted: usize,
     meant: Pose,
     joints: Joints,
+    conf: Configuration,
 }
 
 /// Works out all targets.
@@ -426,16 +429,14 @@ fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut Sta
         return 0;
     }
     let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
-    let solved = arms.nominal.solve_path(&flanges, last);
-    let joints: Vec<Joints> = solved.iter().map_while(|s| s.as_ref().ok().map(|s| s.joints)).collect();
-    let configurations: Vec<Configuration> = told.iter().map(|t| wanted(t.target)).collect();
-    let fitting = arms.nominal.fitting(&joints, &configurations[..joints.len()]);
     let mut taken = 0;
-    for ((told, joints), fits) in told.iter().zip(joints).zip(fitting) {
-        if !fits && told.monitored != Switch::Off {
+    for (told, reached) in told.iter().zip(arms.nominal.reach_path(&flanges, last)) {
+        let Ok(reached) = reached else { break };
+        if told.monitored != Switch::Off && !reached.fits(&wanted(told.target)) {
             break;
         }
-        out.push(Ok(Start { mounted: told.mounted, meant: told.meant, joints }));
+        let (joints, conf) = (reached.joints, reached.configuration);
+        out.push(Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf }));
         *last = joints;
         taken += 1;
     }
@@ -460,7 +461,7 @@ fn start(
             let meant = t.pose();
             let flange = told.flange_for(&meant);
             let joints = configured(&arms.nominal, &flange, &t, monitored(asked.motion), near)?;
-            Ok(Start { mounted, meant, joints })
+            Ok(Start { mounted, meant, joints, conf: arms.nominal.configuration(&joints) })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -468,7 +469,8 @@ fn start(
             if let Some(joint) = nominal.model.limits.violated(&joints) {
                 return Err(Why::OutsideLimits { joint });
             }
-            Ok(Start { mounted, meant: told.target_of(&nominal.forward(&joints)), joints })
+            let meant = told.target_of(&nominal.forward(&joints));
+            Ok(Start { mounted, meant, joints, conf: arms.nominal.configuration(&joints) })
         }
     }
 }
@@ -500,11 +502,10 @@ fn finish(
     let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
     let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
     let reached_before = acting.forward(&places_before, &before);
-    let conf_before = arms.nominal.configurations(&before);
     // Joints that reach what was meant.
     let solutions = acting.each(&places, |place, items| match items {
-        None => acting.inverse(place).solve_seeded(&flanges, &before),
-        Some(items) => acting.inverse(place).solve_seeded(&picked(&flanges, items), &picked(&before, items)),
+        None => acting.inverse(place).solve_beside(&flanges, &before),
+        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
     });
     let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
@@ -516,7 +517,6 @@ fn finish(
                 flange: flanges[k],
                 after: solution.joints,
                 singularity: solution.singularity,
-                conf_before: conf_before[k],
                 reached_before: real(start).target_of(&reached_before[k]),
             }),
             Err(error) => out[*index] = Err(Why::of_inverse(error)),
@@ -540,15 +540,15 @@ fn finish(
         })
         .collect();
     let replayed = match options.emit {
-        Emit::Targets => arms.nominal.solve_seeded(&heard, &after),
+        Emit::Targets => arms.nominal.reach_seeded(&heard, &after),
         Emit::Joints => Vec::new(),
     };
     let mut last: Vec<Joints> = Vec::with_capacity(way.len());
     let mut failed: Vec<Option<Why>> = vec![None; way.len()];
     for (k, w) in way.iter().enumerate() {
         last.push(match replayed.get(k) {
-            Some(Ok(solution)) if !joint_form(w) => solution.joints,
-            Some(Err(error)) if !joint_form(w) => {
+            Some((_, Ok(joints))) if !joint_form(w) => *joints,
+            Some((_, Err(error))) if !joint_form(w) => {
                 failed[k] = Some(Why::of_inverse(*error));
                 w.after
             }
@@ -557,7 +557,6 @@ fn finish(
     }
     let places: Vec<usize> = way.iter().map(|w| w.place).collect();
     let reached_after = acting.forward(&places, &last);
-    let conf = arms.nominal.configurations(&after);
     let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
     let sigmas = match arms.knowledge {
         Some(knowledge) => {
@@ -587,14 +586,14 @@ fn finish(
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
-        out[w.index] = Ok(Solved {
+        let mut solved = Solved {
             mounted: w.start.mounted,
             meant,
             before: w.start.joints,
             after: w.after,
             told: told[k],
-            conf_before: w.conf_before,
-            conf: conf[k],
+            conf_before: w.start.conf,
+            conf: replayed.get(k).map_or_else(|| arms.nominal.configuration(&w.after), |heard| heard.0),
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
             sigma_mm: sigmas[k].hypot(in_play_mm),
@@ -602,7 +601,10 @@ fn finish(
             place: w.place,
             outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
             singularity: w.singularity,
-        });
+            forbidden: None,
+        };
+        solved.forbidden = forbidden(&solved, arms, options);
+        out[w.index] = Ok(solved);
     }
     out
 }
@@ -615,7 +617,6 @@ struct OnItsWay {
     flange: Pose,
     after: Joints,
     singularity: f64,
-    conf_before: Configuration,
     reached_before: Pose,
 }
 
