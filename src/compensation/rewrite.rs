@@ -13,12 +13,13 @@ use rayon::prelude::*;
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
+use super::curve::{CLOSED_MM, Curve};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
-use super::segment::{Ends, Path, middles_off};
+use super::segment::{Ends, Path, gap, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all, take_room};
 use super::speed::fastest;
 use super::why::Why;
@@ -188,6 +189,8 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     let mut notes = mountings.notes();
     notes.extend(play_note(&arms, &solved));
     notes.extend(load_notes(listing, &arms, options));
+    let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
+    notes.extend(open_notes(listing, &solved, &unchecked));
     let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
     plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
     plan.outcomes.reserve_exact(listing.motions.len());
@@ -220,6 +223,57 @@ fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
         "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
         plays.join(", ")
     ))
+}
+
+/// What was not looked at, or taken on trust, and where.
+fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(lines) = lines_of(listing, unchecked) {
+        out.push(format!(
+            "{} of the lines and arcs start where the text alone does not tell, or where the program was not corrected: their \
+             ends are right, the path between is not checked ({lines})",
+            unchecked.len()
+        ));
+    }
+    let curve = |m: &u32| {
+        let motion = &listing.motions[*m as usize];
+        motion.left.is_none()
+            && motion.modal.wrist_interpolation == Switch::On
+            && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+    };
+    let wrist: Vec<u32> = (0..listing.motions.len() as u32).filter(curve).collect();
+    if let Some(lines) = lines_of(listing, &wrist) {
+        out.push(format!(
+            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): their paths are \
+             checked as if the tool turned evenly, and no targets are put in ({lines})",
+            wrist.len()
+        ));
+    }
+    if let Some(lines) = lines_of(listing, &solved.guessed) {
+        out.push(format!(
+            "{} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
+             which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})",
+            solved.guessed.len()
+        ));
+    }
+    out
+}
+
+/// The lines of motions, the first few; `None` where there are none.
+fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
+    /// How many lines are named.
+    const NAMED: usize = 8;
+    let mut lines: Vec<String> =
+        motions.iter().map(|m| listing.motions[*m as usize].place.line.to_string()).take(4 * NAMED).collect();
+    lines.dedup();
+    let word = match lines.as_slice() {
+        [] => return None,
+        [_] => "line",
+        _ => "lines",
+    };
+    let more = if lines.len() > NAMED { " and more" } else { "" };
+    lines.truncate(NAMED);
+    Some(format!("{word} {}{more}", lines.join(", ")))
 }
 
 /// What was taken for the load of the arm.
@@ -276,6 +330,8 @@ struct Job<'a> {
 
 /// What became of some motions that follow each other.
 struct Portion {
+    /// Lines and arcs that are written without their path having been checked.
+    unchecked: Vec<u32>,
     changes: Vec<Change>,
     outcomes: Vec<MotionOutcome>,
     points: Vec<PathPoint>,
@@ -329,13 +385,13 @@ pub(super) fn monitored(motion: &Motion) -> Switch {
 
 /// The corrected end of a motion, where its last target was worked out.
 fn ends_of<'a>(
-    motion: &Motion,
+    motion: &'a Motion,
     targets: &[Result<Solved, Why>],
     mountings: &'a Mountings,
 ) -> Option<Ends<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
-    let stated =
-        motion.to().and_then(|target| target.value.ok()).and_then(|value| value.cartesian().copied());
+    let stated = motion.to().and_then(|target| target.value.as_ref().ok());
+    let cartesian = stated.and_then(TargetValue::cartesian);
     Some(Ends {
         mounted: &mountings.list[to.mounted],
         index: to.mounted,
@@ -344,7 +400,8 @@ fn ends_of<'a>(
         joints: to.after,
         place: to.place,
         before: to.before,
-        conf: stated.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        external: stated.map(TargetValue::external),
     })
 }
 
@@ -373,14 +430,20 @@ impl<'a> Job<'a> {
         // The way of the motion before, which a corner asks for.
         let mut last: Option<(u32, Passage)> = None;
         let mut out = Portion {
+            unchecked: Vec::new(),
             changes: Vec::with_capacity(count),
             outcomes: Vec::with_capacity(count),
-            points: Vec::with_capacity(count),
+            points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
         for (index, path) in motions.zip(&paths) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
             let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY), last.as_ref());
             last = worked.passage.map(|passage| (index as u32, passage));
+            let motion = &self.listing.motions[index];
+            let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+            if curve && path.is_none() && worked.change.is_some() {
+                out.unchecked.push(index as u32);
+            }
             out.changes.extend(worked.change);
             out.outcomes.push(worked.outcome);
             out.points.extend(worked.point);
@@ -399,13 +462,28 @@ impl<'a> Job<'a> {
         let targets = self.solved.of(previous);
         let changes =
             |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
-        if !may_change(before, self.options) || !targets.iter().all(changes) {
+        if !may_change(before, self.options) || !targets.iter().all(changes) || self.no_circle(previous) {
             return None;
         }
         let from = ends_of(before, targets, self.mountings)?;
         let to = ends_of(motion, self.solved.of(index), self.mountings)?;
         let way = self.solved.way(index, to.place);
         (from.index == to.index).then_some(Path { from, to, way })
+    }
+
+    /// Whether a circular motion has a known start with which its points make no circle. One that closes is another matter:
+    /// its ends say nothing of its plane.
+    fn no_circle(&self, index: usize) -> bool {
+        let motion = &self.listing.motions[index];
+        if motion.kind != MotionKind::Circular {
+            return false;
+        }
+        let Some(previous) = motion.previous else { return false };
+        let Some(Ok(from)) = self.solved.of(previous as usize).last() else { return false };
+        let [Ok(via), Ok(to)] = self.solved.of(index) else { return false };
+        from.mounted == to.mounted
+            && gap(&from.meant.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
+            && Curve::round(from.meant, &via.meant, to.meant, motion).is_none()
     }
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
@@ -516,6 +594,9 @@ fn work<'a>(
     }
     if let Some(why) = good.iter().find_map(|s| s.forbidden) {
         return finish(outcome, Status::Refused, Some(why), None, point);
+    }
+    if job.no_circle(index) {
+        return finish(outcome, Status::Refused, Some(Why::NoCircle), None, point);
     }
     // Then the path from the motion before.
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);

@@ -23,7 +23,7 @@ use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
 use crate::kinematics::inverse::configuration::Configuration;
 use crate::kinematics::model::Joints;
-use crate::kinematics::region::Outside;
+use crate::kinematics::region::{Nearest, Outside};
 use crate::math::se3::Pose;
 use crate::program::motion::{
     Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
@@ -76,6 +76,8 @@ pub(super) struct SolvedTargets {
     portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     ways: Vec<Way>,
+    /// Motions of which the configuration is not checked and the start not known.
+    pub(super) guessed: Vec<u32>,
 }
 
 impl SolvedTargets {
@@ -112,6 +114,8 @@ struct Start {
     meant: Pose,
     joints: Joints,
     conf: Configuration,
+    /// Whether the controller takes the solution next to where the arm stands, which is not known, and there are others.
+    guessed: bool,
 }
 
 /// Works out all targets.
@@ -162,7 +166,8 @@ impl Work<'_> {
                 motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
             };
             let portions = self.portions(arms, &places, &places, None);
-            return SolvedTargets { first: self.first, portions, ways: Vec::new() };
+            let guessed = self.guessed();
+            return SolvedTargets { first: self.first, portions, ways: Vec::new(), guessed };
         }
         let as_is = self.sides(arms, None);
         let before = self.places(arms, &as_is, &load);
@@ -205,7 +210,16 @@ impl Work<'_> {
             Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
         });
         let ways = ways.collect();
-        SolvedTargets { first: self.first, portions, ways }
+        let guessed = self.guessed();
+        SolvedTargets { first: self.first, portions, ways, guessed }
+    }
+
+    /// Motions of which a target was reached by guess.
+    fn guessed(&self) -> Vec<u32> {
+        let guessed = |m: &usize| {
+            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guessed)
+        };
+        (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
     }
 
     /// The targets of the portion that begins with a motion.
@@ -307,21 +321,18 @@ fn starts(
     mountings: &Mountings,
 ) -> Starts {
     let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
-    let mut out: Starts = asked
-        .par_chunks(STRETCH)
-        .flat_map_iter(|asked| {
-            let mut starts = Vec::with_capacity(asked.len());
-            let mut near = None;
-            for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
-                if depends(&run[0]) {
-                    starts.resize(starts.len() + run.len(), Err(Why::JointTarget));
-                } else {
-                    along(run, &mut near, arms, mountings, &mut starts);
-                }
+    // A place holder for those that depend on the motion before.
+    let mut out: Starts = asked.par_iter().map(|_| Err(Why::JointTarget)).collect();
+    out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).for_each(|(mut out, asked)| {
+        let mut near = None;
+        for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
+            let (here, rest) = out.split_at_mut(run.len());
+            out = rest;
+            if !depends(&run[0]) {
+                along(run, &mut near, arms, mountings, here);
             }
-            starts
-        })
-        .collect();
+        }
+    });
     // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
     let mut motion = 0;
     while motion < listing.motions.len() {
@@ -345,9 +356,7 @@ fn starts(
             reached.last().and_then(|start| start.as_ref().ok().map(|s| s.joints))
         });
         let run = first[motion]..first[end];
-        let mut starts = Vec::with_capacity(run.len());
-        along(&asked[run.clone()], &mut near, arms, mountings, &mut starts);
-        out[run].iter_mut().zip(starts).for_each(|(place, start)| *place = start);
+        along(&asked[run.clone()], &mut near, arms, mountings, &mut out[run]);
         motion = end;
     }
     out
@@ -363,7 +372,7 @@ fn along(
     near: &mut Option<Joints>,
     arms: &Arms<'_>,
     mountings: &Mountings,
-    out: &mut Starts,
+    out: &mut [Result<Start, Why>],
 ) {
     let mut at = 0;
     let mut run = RUNS[0];
@@ -373,7 +382,7 @@ fn along(
             Some(last) => {
                 let cartesian: Vec<Told<'_>> =
                     here.iter().map_while(|asked| Told::of(asked, mountings)).collect();
-                let taken = together(&cartesian, last, arms, out);
+                let taken = together(&cartesian, last, arms, &mut out[at..]);
                 at += taken;
                 taken == here.len()
             }
@@ -389,7 +398,7 @@ fn along(
             if let Ok(start) = &start {
                 *near = Some(start.joints);
             }
-            out.push(start);
+            out[at] = start;
             at += 1;
         }
     }
@@ -424,7 +433,7 @@ fn wanted(target: &RobTarget) -> Configuration {
 
 /// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
 /// were, and leaves `last` at the joints of the last of them.
-fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut Starts) -> usize {
+fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
     if told.is_empty() {
         return 0;
     }
@@ -436,7 +445,7 @@ fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut Sta
             break;
         }
         let (joints, conf) = (reached.joints, reached.configuration);
-        out.push(Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf }));
+        out[taken] = Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, guessed: false });
         *last = joints;
         taken += 1;
     }
@@ -460,8 +469,11 @@ fn start(
             }
             let meant = t.pose();
             let flange = told.flange_for(&meant);
-            let joints = configured(&arms.nominal, &flange, &t, monitored(asked.motion), near)?;
-            Ok(Start { mounted, meant, joints, conf: arms.nominal.configuration(&joints) })
+            let monitored = monitored(asked.motion);
+            let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
+            let conf = arms.nominal.configuration(&joints);
+            let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
+            Ok(Start { mounted, meant, joints, conf, guessed })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -470,7 +482,8 @@ fn start(
                 return Err(Why::OutsideLimits { joint });
             }
             let meant = told.target_of(&nominal.forward(&joints));
-            Ok(Start { mounted, meant, joints, conf: arms.nominal.configuration(&joints) })
+            let conf = arms.nominal.configuration(&joints);
+            Ok(Start { mounted, meant, joints, conf, guessed: false })
         }
     }
 }
@@ -576,7 +589,7 @@ fn finish(
         }
         None => vec![0.0; way.len()],
     };
-    let mut near = 0;
+    let mut near = Nearest::default();
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
             out[w.index] = Err(why);
