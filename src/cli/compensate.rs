@@ -308,7 +308,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     }
     batch.write()?;
     if let Some(summary) = &summary {
-        outputs.print(summary)?;
+        outputs.print_beside(summary, arguments.output.as_deref() == Some(Path::new("-")))?;
     }
     let would_change = arguments.check && done.changed;
     Ok(if done.clean && !would_change { Ending::Done } else { Ending::Flagged })
@@ -548,6 +548,9 @@ fn outputs_of(
     let several = several || programs.files.len() > 1;
     if !several && !output.is_dir() {
         return Ok(vec![Some(output.clone())]);
+    }
+    if output == Path::new("-") {
+        bail!("-o -: the standard output takes one program, these are several: name a folder");
     }
     if output.is_file() {
         bail!("{} is a file, but there are several programs: name a folder", output.display());

@@ -306,6 +306,10 @@ fn links_and_pipes_stay_what_they_are() {
         |output: &str| truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", output]);
     assert_eq!(compensate("plain.mod").0, 0);
     let plain = fs::read(at.join("plain.mod")).unwrap();
+    // The standard output: the program and nothing else.
+    let (code, text, err) = compensate("-");
+    assert_eq!((code, text.as_bytes() == plain), (0, true), "{text}");
+    assert!(err.contains("Compensation of a.mod") && !at.join("-").exists(), "{err}");
     // A link: the file that it names is written.
     fs::write(at.join("target.mod"), "old").unwrap();
     std::os::unix::fs::symlink("target.mod", at.join("link.mod")).unwrap();
