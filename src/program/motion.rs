@@ -7,6 +7,7 @@
 //! Units are those of the file's edge: mm, degrees for joint targets, quaternions scalar first and exactly as
 //! written (not normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -120,6 +121,14 @@ impl TargetValue {
         match self {
             TargetValue::Cartesian(target) => Some(target),
             TargetValue::Joint(_) => None,
+        }
+    }
+
+    /// The external axes (mm or degrees).
+    pub fn external(&self) -> &[Option<f64>; 6] {
+        match self {
+            TargetValue::Cartesian(target) => &target.external,
+            TargetValue::Joint(target) => &target.external,
         }
     }
 
@@ -344,7 +353,7 @@ pub struct Modal {
     pub circle_point_orientation: Switch,
     /// Whether other robots move in step (SyncMoveOn).
     pub synchronised: Switch,
-    /// Whether sensors move the path (CorrCon, EGM, soft servo).
+    /// Whether sensors or forces move the path (soft servo).
     pub sensor_guided: Switch,
 }
 
@@ -453,6 +462,8 @@ pub struct Listing {
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.
     pub speeds: Vec<Speed>,
+    /// How long motions take (s), where the program says so (`\T`), by motion.
+    pub durations_s: BTreeMap<u32, Result<f64, Reason>>,
     /// Zones that motions use.
     pub zones: Vec<Zone>,
     /// Routines that hold motions.
@@ -602,6 +613,8 @@ reasons! {
         HeldByBoth => "exactly one of tool and work object must be held by the robot",
         /// Only external axes move.
         ExternalOnly => "moves external axes only",
+        /// An instruction that moves the robot along a recorded or built-in path.
+        NoTarget => "moves the robot or an axis without a target in the text",
         /// A routine of the program that takes targets.
         OwnRoutine => "a routine of the program takes the target: its motions are inside",
         /// An instruction that is not in the table and takes a target.
