@@ -8,7 +8,7 @@
 mod pen;
 mod slots;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::UnitQuaternion;
 
@@ -52,12 +52,19 @@ impl Task<'_> {
                 }
             }
         }
+        let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
         let mut edits = vec![Edits::new(); self.trees.len()];
         let mut rounds = 0;
         while !wanted.is_empty() {
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
-            let mut follower =
-                Follower { task: self, options, edits: &mut edits, now: Now::default(), unfit: Vec::new() };
+            let mut follower = Follower {
+                task: self,
+                options,
+                edits: &mut edits,
+                now: Now::default(),
+                unfit: Vec::new(),
+                fixed: &fixed,
+            };
             for event in &self.events {
                 match *event {
                     Event::Start => follower.now = Now::default(),
@@ -115,6 +122,41 @@ impl Task<'_> {
             files.push(file);
         }
         Ok(Rewritten { files, outcomes })
+    }
+
+    /// An arc that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
+    /// last of them ends where it always did. Hands back the latter.
+    fn fixed_ends(
+        &self,
+        changes: &[Change],
+        wanted: &mut HashMap<u32, usize>,
+        outcomes: &mut [Outcome],
+    ) -> BTreeSet<u32> {
+        let mut fixed = BTreeSet::new();
+        let mut refused = BTreeSet::new();
+        for index in (1..self.listing.motions.len() as u32).rev() {
+            let motion = &self.listing.motions[index as usize];
+            let stays = motion.reason().is_some() || refused.contains(&index);
+            if motion.kind != MotionKind::Circular || !stays {
+                continue;
+            }
+            let before = motion.previous.unwrap_or(index - 1);
+            if self.listing.motions[before as usize].place.file != motion.place.file {
+                continue;
+            }
+            match wanted.get(&before).copied() {
+                Some(change) if changes[change].straightens() => {
+                    fixed.insert(before);
+                }
+                Some(change) => {
+                    wanted.remove(&before);
+                    outcomes[change] = Outcome::Refused(Reason::BeforeLeftArc);
+                    refused.insert(before);
+                }
+                None => {}
+            }
+        }
+        fixed
     }
 
     fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
@@ -194,6 +236,8 @@ struct Follower<'f, 's> {
     now: Now,
     /// Arcs that no circle fits.
     unfit: Vec<u32>,
+    /// Motions that end where they always did, whatever is asked.
+    fixed: &'f BTreeSet<u32>,
 }
 
 impl<'s> Follower<'_, 's> {
@@ -217,7 +261,11 @@ impl<'s> Follower<'_, 's> {
         };
         let start: [Option<f64>; 3] =
             std::array::from_fn(|axis| self.now.position[axis].or(written.start[axis]));
-        let new = change.and_then(|change| aim_of(motion, change));
+        let new =
+            change.and_then(|change| aim_of(motion, change)).map(|aim| match self.fixed.contains(&index) {
+                true => Aim { position: to.position_mm, rotation: None, via: aim.via },
+                false => aim,
+            });
         let adds = change.is_some_and(|change| !change.before.is_empty());
         if new.is_none() && !adds && self.is_as_meant(written, &start) {
             self.arrive(&to, written, None);

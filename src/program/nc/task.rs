@@ -97,7 +97,8 @@ pub(super) struct Written {
 }
 
 impl Task<'_> {
-    /// An arc that stays as it is needs its start: the motion that ends there stays too, back to one that is straight.
+    /// An arc that stays as it is needs its start: the straight motion that ends there stays too. Where an arc ends there it is
+    /// the rewrite that sees to it, because that arc may become straight.
     fn spare_arcs(&mut self) {
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
@@ -109,7 +110,8 @@ impl Task<'_> {
             let Some(before) = before.map(|before| &mut self.listing.motions[before as usize]) else {
                 continue;
             };
-            if before.place.file == file && before.reason().is_none() {
+            let straight = before.kind != MotionKind::Circular;
+            if before.place.file == file && straight && before.reason().is_none() {
                 before.left = Some(Reason::BeforeLeftArc);
             }
         }
