@@ -355,9 +355,9 @@ pub fn is_function(name: &[u8]) -> bool {
     FUNCTIONS.iter().any(|known| name.eq_ignore_ascii_case(known))
 }
 
-const FUNCTIONS: [&[u8]; 22] = [
+const FUNCTIONS: [&[u8]; 23] = [
     b"SIN", b"COS", b"TAN", b"ASIN", b"ACOS", b"ATAN", b"ATAN2", b"SQRT", b"ABS", b"ROUND", b"FIX", b"FUP",
-    b"LN", b"EXP", b"TRUNC", b"POT", b"SQR", b"INT", b"FRAC", b"SGN", b"NEG", b"SQ",
+    b"LN", b"EXP", b"TRUNC", b"POT", b"SQR", b"INT", b"FRAC", b"SGN", b"NEG", b"SQ", b"EXISTS",
 ];
 
 fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Worth {
@@ -392,6 +392,7 @@ fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Worth
         (b"EXP", None) => x.exp(),
         (b"TRUNC", None) => x.trunc(),
         (b"POT" | b"SQR", None) => x * x,
+        (b"EXISTS", _) => return Err(Reason::Variable),
         _ => return Err(Reason::WrongShape),
     };
     match value.is_finite() {

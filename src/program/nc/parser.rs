@@ -284,11 +284,7 @@ impl Parser<'_, '_> {
                 Some(end)
             }
             // XSQRT[16].
-            Token::Name
-                if self.dialect == Dialect::LinuxCnc
-                    && is_function(self.tree.text(self.at))
-                    && self.touches(after) =>
-            {
+            Token::Name if self.dialect == Dialect::LinuxCnc && is_function(self.tree.text(self.at)) => {
                 self.primary()
             }
             Token::Address | Token::Name

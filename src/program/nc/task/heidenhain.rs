@@ -150,7 +150,11 @@ impl<'s> Lister<'_, 's> {
                 self.left(said, "TCH PROBE", Reason::Probe);
                 self.lose_position();
             }
-            b"FN" | b"Q" | b"QL" | b"QR" => self.parameter(first),
+            b"FN" | b"Q" | b"QL" | b"QR" => {
+                // FN 9 to FN 12 jump: what is set from here on may be passed over.
+                self.branched |= words.contains(&&b"GOTO"[..]);
+                self.parameter(first);
+            }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
                     self.state.unit_mm = 25.4;

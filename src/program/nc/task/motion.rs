@@ -122,6 +122,10 @@ impl Lister<'_, '_> {
         let vector_words = self.state.vector_words && matches!(mode, Mode::Rapid | Mode::Linear);
         let has_centre = said.centre.iter().any(Option::is_some) && !vector_words;
         let circular = matches!(mode, Mode::Circular(_));
+        // R, I and K of a straight block round or cut its corner, on controls that take them.
+        let cut = self.dialect.paren_comments()
+            && matches!(mode, Mode::Rapid | Mode::Linear)
+            && (has_centre || said.radius.is_some());
         let vector_moves = vector_words && said.centre.iter().any(Option::is_some);
         if !said.moves() && !(circular && (has_centre || said.radius.is_some())) && !vector_moves {
             self.without_axes(said);
@@ -218,6 +222,9 @@ impl Lister<'_, '_> {
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
         motion.left = self.left_because(said, mode, machine, &motion);
+        if cut && motion.left.is_none() {
+            motion.left = Some(Reason::NotFollowed);
+        }
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
             && !said.others

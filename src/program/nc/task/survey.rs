@@ -61,6 +61,12 @@ impl Lister<'_, '_> {
                 (Some(b'P'), Some(number)) => block.p = Some(number as u64),
                 (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
                 (Some(b'O'), Some(_)) => programs += 1,
+                // What the caller hands over has names too.
+                (None, _) if said.is("PROC") => block.declares = true,
+                (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
+                    let names = (said.first..said.end).filter(|&at| self.tree.kind(at) == Some(Token::Name));
+                    self.declared.extend(names.map(|at| self.tree.text(at).to_ascii_uppercase()));
+                }
                 (None, _) if said.is("DEF") || block.declares => {
                     block.declares = true;
                     self.declared.insert(said.name.to_ascii_uppercase());
