@@ -538,7 +538,7 @@ impl<'t, 's> Lister<'t, 's> {
             (
                 Dialect::Heidenhain,
                 b"L" | b"LN" | b"CC" | b"CR" | b"CT" | b"DR" | b"NX" | b"NY" | b"NZ" | b"FU" | b"FZ"
-                | b"FAUTO" | b"MB" | b"MAX" | b"TCPM",
+                | b"FAUTO" | b"AUTO" | b"FQ" | b"FQL" | b"FQR" | b"FT" | b"MB" | b"MAX" | b"TCPM",
             ) => {}
             (Dialect::Heidenhain, _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();

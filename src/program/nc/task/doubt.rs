@@ -26,6 +26,12 @@ impl Found {
         }
     }
 
+    /// The one thing that a group is set to so far.
+    fn settle(&mut self, group: Group, value: u64) {
+        self.value[group as usize] = Some(value);
+        self.several &= !(1 << group as u32);
+    }
+
     /// Every group may be set to anything.
     pub(super) fn add_all(&mut self) {
         self.several = (1 << GROUPS) - 1;
@@ -47,8 +53,11 @@ pub(super) fn key(text: &str) -> u64 {
 impl Lister<'_, '_> {
     /// A group is set to something.
     pub(super) fn set(&mut self, group: Group, value: u64) {
-        self.found.add(group, value);
-        if !self.branched && !self.skipping {
+        if self.branched || self.skipping {
+            self.found.add(group, value);
+        } else {
+            // Before ways part only the last one counts.
+            self.found.settle(group, value);
             self.settled |= 1 << group as u32;
         }
         self.state.certain(group);
@@ -56,7 +65,12 @@ impl Lister<'_, '_> {
 
     /// A group is set to what depends on where the tool stands.
     pub(super) fn set_any(&mut self, group: Group) {
-        self.found.add_any(group);
+        if self.branched || self.skipping {
+            self.found.add_any(group);
+        } else {
+            self.found.settle(group, u64::MAX);
+            self.settled |= 1 << group as u32;
+        }
         self.state.certain(group);
     }
 

@@ -147,6 +147,12 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("T1 M6\nX5 Y5 Z5", &[o]),
             ("G53 G0 X4 A10\nG1 X5 Y5 Z5", &[left(MachineCoordinates), o]),
             ("X1.2.3\nX5", &[left(Unread), p]),
+            // Of what a program says before its ways part only the last counts.
+            (&format!("G49\nT1 M6\nG43 H1\n{G}\no100 while [#1 lt 5]\no100 endwhile\n{G}"), &[None, None]),
+            (
+                &format!("o100 while [#1 lt 5]\nG91 {G}\no100 endwhile\n{G}"),
+                &[left(UnknownFlow), left(UnknownFlow)],
+            ),
             // R, I and K of a straight block round or cut its corner.
             ("X5 R2\nG0 X6 K1\nX7", &[left(NotFollowed), left(NotFollowed), None]),
             ("X EXISTS[#<a>]\nX5", &[left(Variable), None]),
@@ -169,6 +175,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("M129\nM128\nL Z+5", &[p]),
             ("L X+5 M99\nL Y+5", &[left(Cycle), p]),
             ("M118 X1 Y1\nL Z+5", &[None]),
+            ("L X+5 F AUTO\nL X+6 FQ5", &[None, None]),
             // A jump may pass over what is set after it.
             (
                 "FN 9: IF +Q1 EQU +Q2 GOTO LBL 5\nTOOL CALL 2 Z\nLBL 5\nL X+1 Y+1 Z+1 A+180 B+0 C+0",
