@@ -680,6 +680,8 @@ impl<'t, 's> Lister<'t, 's> {
             99 => self.dialect != Dialect::Heidenhain,
             _ => false,
         };
+        // M99 P100 jumps, perhaps over what comes next.
+        self.branched |= said.m.contains(&99);
         if said.m.iter().any(end) || said.words.iter().any(|word| word.is("RET")) {
             self.ended = true;
         } else if said.m.contains(&6) {

@@ -131,6 +131,7 @@ fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
             ("G10 L2 P1 X510. Y0. Z0.\nX5.", &[p]),
             ("G1 U-2.\nX5.", &[left(ExternalOnly), p]),
             ("X30. ,A45.\nX5.", &[left(NotFollowed), p]),
+            (&format!("/M99 P100\nG55\nN100 {F}"), &[left(UnknownFlow)]),
             // In a program that leaves G91 behind, where a first block of a subprogram leads is not known.
             (
                 "M98 P1000\nM30\nO1000\nX5.\nG1 X5. Y5. Z5. A180. B0. C0.\nG91 X1.\nM99",
