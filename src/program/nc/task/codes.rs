@@ -3,7 +3,7 @@
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
-use super::super::machine::{Group, Length, Mode, State};
+use super::super::machine::{Group, Length, Mode, State, Turn};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
 use super::doubt::key;
@@ -123,8 +123,11 @@ impl Lister<'_, '_> {
         (self.state.tip, self.state.vector_words) = (on, vector_words);
         self.set(Group::Tip, u64::from(on) + 2 * u64::from(vector_words));
         if changes {
-            // The axes stay where they are, and so does the way the tool points.
-            self.lose_position();
+            // The axes stay where they are, and so do A, B and C; a tool vector means nothing without control of the tip.
+            match self.state.turn {
+                Turn::Vector if !on => self.lose_all(),
+                _ => self.lose_position(),
+            }
         }
     }
 

@@ -347,6 +347,11 @@ fn what_is_left_goes_where_it_always_went() {
     });
     assert_eq!(rewritten.outcomes[..2], [Outcome::Refused(BeforeLeftArc), Outcome::Refused(WrongShape)]);
     assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
+    // Without TRAORI a tool vector is no word.
+    let vector = "TRAORI\nG1 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=0 F600\n";
+    let source = format!("{HEAD}{vector}TRAFOOF\nG1 X5 Y5 Z5\n");
+    let (text, _) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 0, [0.5, -0.25, 0.125])]);
+    assert!(text.ends_with("\nTRAFOOF\nG1 X5 Y5 Z5\n"), "{text}");
     // A Fanuc takes eight digits in a word.
     let source = format!("{HEAD}{}", begin(Fanuc));
     let setup = Setup { dialect: Some(Fanuc), ..Setup::default() };
