@@ -99,8 +99,9 @@ impl Task<'_> {
             }
             rounds += 1;
             if rounds == ROUNDS {
-                for (_, index) in wanted.drain() {
-                    outcomes[index] = Outcome::Refused(Reason::BeforeLeftArc);
+                wanted.clear();
+                for outcome in outcomes.iter_mut().filter(|outcome| !matches!(outcome, Outcome::Refused(_))) {
+                    *outcome = Outcome::Refused(Reason::BeforeLeftArc);
                 }
                 edits.iter_mut().for_each(|edits| *edits = Edits::new());
             }

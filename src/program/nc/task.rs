@@ -497,7 +497,7 @@ impl<'t, 's> Lister<'t, 's> {
             Some(_) => {}
             None => self.gather_name(said, index),
         }
-        said.opaque |= twice && self.dialect != Dialect::Siemens || twice && word.belongs != Belongs::Nothing;
+        said.opaque |= twice && (self.dialect != Dialect::Siemens || word.belongs != Belongs::Nothing);
     }
 
     /// Whether a word of a Heidenhain block is a value of an M word before it (M118 X1, M94 C), or of one of unknown kind.

@@ -286,11 +286,8 @@ impl Lister<'_, '_> {
                     self.state.mode = Mode::Other(Reason::Cycle);
                 }
                 // The motion word of before holds on a Fanuc; LinuxCNC wants a new one.
-                800 if fanuc => {
-                    if self.state.mode == Mode::Other(Reason::Cycle) {
-                        self.state.mode = self.state.before_cycle;
-                    }
-                }
+                800 if fanuc && self.state.mode != Mode::Other(Reason::Cycle) => {}
+                800 if fanuc => self.state.mode = self.state.before_cycle,
                 800 => self.state.mode = Mode::Lost(Reason::UnknownFlow),
                 900 | 910 => {
                     self.state.absolute = code == 900;

@@ -276,12 +276,11 @@ impl Lister<'_, '_> {
             && said.abc.iter().chain(&said.rpy).chain(&said.vector).any(Option::is_some)
         {
             self.lose_all();
-        } else if mode == Mode::Other(Reason::Cycle) || machine || call.is_some() {
-            self.lose_position();
-        } else if said.aside == Some(Reason::Transformed)
+        } else if mode == Mode::Other(Reason::Cycle)
+            || machine
+            || call.is_some()
+            || matches!(said.aside, Some(Reason::Transformed | Reason::NotFollowed | Reason::Probe))
             || said.opaque
-            || said.aside == Some(Reason::NotFollowed)
-            || said.aside == Some(Reason::Probe)
             || said.others && self.parallel()
         {
             self.lose_position();
