@@ -27,7 +27,7 @@ use super::parser::{parse, word};
 use super::setup::{Setup, Statement, statement};
 use super::syntax::{Belongs, NcTree, Syntax, Word};
 use super::token::Token;
-use crate::program::motion::{Frame, Listing, MotionKind, OpaqueRegion, Place, Reason};
+use crate::program::motion::{Frame, Listing, Motion, MotionKind, OpaqueRegion, Place, Reason};
 use crate::program::tree::Node;
 
 /// NC files, read together: each runs on its own, the setup holds for all.
@@ -177,6 +177,8 @@ pub(super) struct Lister<'t, 's> {
     passed: Option<State>,
     /// Whether tools come in with M6.
     changes_tools: bool,
+    /// Whether a block has words of NC and no others.
+    speaks: bool,
     /// Whether the program begins again at its end.
     repeats: bool,
     /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
@@ -274,6 +276,7 @@ impl<'t, 's> Lister<'t, 's> {
             actions: false,
             passed: None,
             changes_tools: false,
+            speaks: false,
             repeats: false,
             foreign: false,
             contours: Vec::new(),
@@ -318,6 +321,12 @@ impl<'t, 's> Lister<'t, 's> {
             (self.settled, self.branched, self.ended, self.actions) = (0, false, false, false);
             (self.passed, self.contour) = (None, None);
             self.follow();
+        }
+        // A text of which not one block is NC is no program: nothing in it moves.
+        let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unread | Reason::UnknownWord));
+        if !self.speaks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
+            self.back_to(&lengths);
+            self.events.push(Event::Start);
         }
     }
 
@@ -378,6 +387,7 @@ impl<'t, 's> Lister<'t, 's> {
 
     fn block(&mut self, node: u32, said: &mut Said<'s>) {
         self.gather(node, said);
+        self.speaks |= !said.opaque && (!said.g.is_empty() || !said.m.is_empty() || said.moves());
         if !said.skippable {
             self.run(said);
             return;

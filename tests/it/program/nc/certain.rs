@@ -311,6 +311,11 @@ fn the_name_of_a_file_tells_its_control_where_the_text_does_not() {
     let task =
         Task::read(&[("a.nc", b"%X G71 *\nN1 G54 X+10 Y+5 *\nN2 G01 X+1 Y+2 Z+3 *\n")], &Setup::default());
     assert!(task.listing.motions.iter().all(|motion| motion.left == Some(UnknownWord)));
+    // A text that is no program moves nothing.
+    for text in ["Dear reader,\nnothing here moves.\n", "q1_deg,q2_deg,x_mm\n0,1,2\n3.5,4,5\n"] {
+        let task = Task::read(&[("a.txt", text.as_bytes())], &Setup::default());
+        assert!(task.listing.motions.is_empty(), "{text}: {:?}", task.listing.motions);
+    }
     // Lines that end with CR alone are lines.
     let task = Task::read(&[("a.nc", b"G90 G54\rG1 X1 Y2 Z3\rX5\r")], &Setup::default());
     assert_eq!(task.listing.motions.len(), 2);
