@@ -236,10 +236,10 @@ impl Kernel {
                 step += 1;
                 if brief {
                     let mut last = alive;
-                    for j in 0..6 {
-                        last = last * delta[j].within(SETTLED_RAD);
+                    for turn in delta {
+                        last = last * turn.within(SETTLED_RAD);
                     }
-                    alive = alive - last;
+                    alive += -last;
                     ends = alive.max_abs() == 0.0;
                     if last.max_abs() > 0.0 {
                         let margins = structure.margins(&frames, &wrist);
