@@ -20,6 +20,6 @@ MODULE Circles
     DispC p2,p3,v100,bead1,z1,tool0;
     PaintC p2,p1,v100,z1,tool0;
     CirPathMode\CirPointOri;
-    MoveC p2,p3,v100,fine,tool0;
+    MoveC p2,p3,v100,fine,tool0; CirPathMode\PathFrame;
   ENDPROC
 ENDMODULE

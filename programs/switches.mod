@@ -26,7 +26,7 @@ MODULE Switches
     PDispOn\Rot,p,tool0;
     MoveL p,v100,fine,tool0;
     PDispOff;
-    MoveL p,v100,fine,tool0;
+    MoveL p,v100,fine,tool0; ConfL\On; SingArea\Off;
   ENDPROC
   PROC displaced()
     MoveL p,v100,fine,tool0;

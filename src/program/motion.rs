@@ -344,7 +344,7 @@ pub struct Modal {
     pub circle_point_orientation: Switch,
     /// Whether other robots move in step (SyncMoveOn).
     pub synchronised: Switch,
-    /// Whether sensors move the path (CorrCon, EGM, soft servo).
+    /// Whether sensors or forces move the path (soft servo).
     pub sensor_guided: Switch,
 }
 
@@ -602,6 +602,8 @@ reasons! {
         HeldByBoth => "exactly one of tool and work object must be held by the robot",
         /// Only external axes move.
         ExternalOnly => "moves external axes only",
+        /// An instruction that moves the robot along a recorded or built-in path.
+        NoTarget => "moves the robot or an axis without a target in the text",
         /// A routine of the program that takes targets.
         OwnRoutine => "a routine of the program takes the target: its motions are inside",
         /// An instruction that is not in the table and takes a target.

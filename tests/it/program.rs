@@ -6,6 +6,7 @@ mod tree;
 mod samples;
 mod rewriting;
 mod evaluation;
+mod circumstances;
 mod writing;
 mod edits;
 mod nc;

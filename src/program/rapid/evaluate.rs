@@ -4,14 +4,17 @@
 //! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]), else its initial
 //! value without the components that anything assigns. Target functions
 //! follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along the
-//! axes of the target's tool frame and then turns about its x, the new y and the new z. Everything else is
-//! [`Value::Unknown`] with its reason.
+//! axes of the target's tool frame and then turns about its x, the new y and the new z. A function of the program that does
+//! nothing but return an expression is worth that expression. Everything else is [`Value::Unknown`] with its reason.
+//!
+//! Stops: what a declaration is worth is worked out once; chains of declarations and of functions have a greatest
+//! length, values that refer to each other a greatest size.
 //!
 //! Departure: a controller computes `num` in single precision.
 
 mod functions;
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
@@ -33,6 +36,12 @@ pub type Known = BTreeMap<u32, Value>;
 
 /// How deeply constants may refer to constants.
 const REFERENCE_DEPTH: u32 = 32;
+
+/// How many numbers and texts data that refers to other data may hold.
+const REFERENCE_SIZE: usize = 1 << 16;
+
+/// How many functions of the program one expression may lead through.
+const FUNCTIONS: u32 = 256;
 
 /// Where an expression stands.
 #[derive(Debug, Clone, Copy)]
@@ -76,12 +85,25 @@ pub struct Evaluator<'a, 's> {
     /// Their names.
     pub symbols: &'a Symbols,
     elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
+    /// What declarations are worth that refer to others.
+    initial: RefCell<HashMap<u32, Value>>,
+    /// How many functions of the program the expression has led through.
+    functions: Cell<u32>,
+    /// What is known where a declaration stands.
+    nothing: Known,
 }
 
 impl<'a, 's> Evaluator<'a, 's> {
     /// For the files of one task.
     pub fn new(trees: &'a [RapidTree<'s>], symbols: &'a Symbols) -> Self {
-        Evaluator { trees, symbols, elements: RefCell::default() }
+        Evaluator {
+            trees,
+            symbols,
+            elements: RefCell::default(),
+            initial: RefCell::default(),
+            functions: Cell::new(0),
+            nothing: Known::new(),
+        }
     }
 
     fn tree(&self, file: u32) -> &'a RapidTree<'s> {
@@ -233,8 +255,8 @@ impl<'a, 's> Evaluator<'a, 's> {
     }
 
     /// The same context at a declaration elsewhere: nothing assigned is known there.
-    fn at<'k>(&self, context: Context<'k>, scope: u32, file: u32) -> Context<'k> {
-        Context { file, scope, known: context.known, depth: context.depth + 1 }
+    fn at(&self, context: Context<'_>, scope: u32, file: u32) -> Context<'_> {
+        Context { file, scope, known: &self.nothing, depth: context.depth + 1 }
     }
 
     /// What data or a parameter is worth.
@@ -250,7 +272,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             What::Data(_) if symbol.assigned && symbol.whole => Value::Unknown(symbol.unknown),
             What::Data(data) => match data.value {
                 Some(initial) if context.depth < REFERENCE_DEPTH => {
-                    let mut value = self.value(self.at(context, symbol.scope, symbol.file), initial);
+                    let mut value = self.declared(context, id, initial);
                     for part in &symbol.parts {
                         self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown);
                     }
@@ -285,11 +307,26 @@ impl<'a, 's> Evaluator<'a, 's> {
     pub fn initial_value(&self, context: Context<'_>, id: u32) -> Option<Value> {
         let symbol = &self.symbols.symbols[id as usize];
         match &symbol.what {
-            What::Data(data) => {
-                data.value.map(|value| self.value(self.at(context, symbol.scope, symbol.file), value))
-            }
+            What::Data(data) => data.value.map(|value| self.declared(context, id, value)),
             _ => None,
         }
+    }
+
+    /// The value of the initial expression of data; worked out once where it refers to other data.
+    fn declared(&self, context: Context<'_>, id: u32, initial: Child) -> Value {
+        let symbol = &self.symbols.symbols[id as usize];
+        let tree = self.tree(symbol.file);
+        let there = self.at(context, symbol.scope, symbol.file);
+        let (first, end) = tokens_of(tree, initial);
+        if !tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
+            return self.value(there, initial);
+        }
+        if let Some(value) = self.initial.borrow().get(&id) {
+            return value.clone();
+        }
+        let value = self.value(there, initial);
+        self.initial.borrow_mut().insert(id, value.clone());
+        value
     }
 
     /// The value of an expression.
@@ -298,9 +335,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         match expression {
             Child::Token(token) => self.operand(context, tree, token),
             Child::Node(node) => match tree.nodes[node as usize].kind {
-                Syntax::Aggregate => {
-                    Value::List(expressions(tree, node).map(|part| self.value(context, part)).collect())
-                }
+                Syntax::Aggregate => self.aggregate(context, tree, node),
                 Syntax::Paren => match expressions(tree, node).next() {
                     Some(inner) => self.value(context, inner),
                     None => Value::Unknown(Reason::WrongShape),
@@ -312,6 +347,24 @@ impl<'a, 's> Evaluator<'a, 's> {
                 _ => Value::Unknown(Reason::WrongShape),
             },
         }
+    }
+
+    fn aggregate(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut size = 0;
+        let mut list = Vec::new();
+        for part in expressions(tree, node) {
+            let value = self.value(context, part);
+            let (first, end) = tokens_of(tree, part);
+            // Numbers that stand here are no more than the text is long.
+            if tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
+                size += value.size(REFERENCE_SIZE);
+            }
+            if size > REFERENCE_SIZE {
+                return Value::Unknown(Reason::WrongShape);
+            }
+            list.push(value);
+        }
+        Value::List(list)
     }
 
     fn operand(&self, context: Context<'_>, tree: &RapidTree<'s>, token: u32) -> Value {
@@ -440,6 +493,66 @@ impl<'a, 's> Evaluator<'a, 's> {
         value
     }
 
+    /// The type of an expression, aliases resolved; `None` for an aggregate, an array, and what the text does not tell.
+    pub fn type_of(&self, (file, scope): (u32, u32), expression: Child) -> Option<Vec<u8>> {
+        let tree = self.tree(file);
+        let node = match expression {
+            Child::Token(_) => {
+                let (type_name, dimensions) = self.declared_type(tree, scope, expression)?;
+                return (dimensions == 0).then_some(type_name);
+            }
+            Child::Node(node) => node,
+        };
+        let inner = || expressions(tree, node).next();
+        match tree.nodes[node as usize].kind {
+            Syntax::Paren => self.type_of((file, scope), inner()?),
+            Syntax::Function => {
+                let name = tree.text(tree.nodes[node as usize].first);
+                let Some(id) = self.symbols.find(scope, name) else {
+                    return functions::result_type(&folded(name)).map(<[u8]>::to_vec);
+                };
+                let What::Routine(routine) = self.symbols.symbols[id as usize].what else { return None };
+                let routine = &self.symbols.routines[routine as usize];
+                let home = self.tree(routine.file);
+                let first = parts(home, routine.head.node)
+                    .find(|&part| token_kind(home, part) == Some(Token::Ident))?;
+                let type_name = folded(text_of(home, first));
+                Some(self.symbols.resolved_type(routine.scope, &type_name).to_vec())
+            }
+            Syntax::Place => {
+                let mut steps = parts(tree, node);
+                let (mut type_name, mut dimensions) = self.declared_type(tree, scope, steps.next()?)?;
+                for step in steps {
+                    match step {
+                        Child::Node(index) => {
+                            // An array that is a parameter does not state its dimensions.
+                            dimensions = dimensions.saturating_sub(expressions(tree, index).count());
+                        }
+                        Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {
+                            type_name = self.component(scope, &type_name, tree.text(token))?.1;
+                        }
+                        Child::Token(_) => {}
+                    }
+                }
+                (dimensions == 0).then(|| self.symbols.resolved_type(scope, &type_name).to_vec())
+            }
+            _ => None,
+        }
+    }
+
+    /// The type of data, aliases resolved, and how many dimensions it has.
+    fn declared_type(&self, tree: &RapidTree<'s>, scope: u32, name: Child) -> Option<(Vec<u8>, usize)> {
+        let symbol = &self.symbols.symbols[self.symbols.root(tree, scope, name)? as usize];
+        let dimensions = match &symbol.what {
+            What::Data(data) => {
+                data.dimensions.map_or(0, |node| expressions(self.tree(symbol.file), node).count())
+            }
+            What::Parameter | What::Loop => 0,
+            _ => return None,
+        };
+        Some((self.symbols.resolved_type(symbol.scope, &symbol.type_name).to_vec(), dimensions))
+    }
+
     /// The position and type of a component of a record type.
     pub fn component(&self, scope: u32, type_name: &[u8], name: &[u8]) -> Option<(usize, Vec<u8>)> {
         let type_name = self.symbols.resolved_type(scope, type_name);
@@ -467,15 +580,32 @@ impl<'a, 's> Evaluator<'a, 's> {
 
     fn function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
         let name = folded(tree.text(tree.nodes[node as usize].first));
-        if self.symbols.find(context.scope, &name).is_some() {
-            return Value::Unknown(Reason::RunTimeFunction);
+        if let Some(id) = self.symbols.find(context.scope, &name) {
+            let symbol = &self.symbols.symbols[id as usize];
+            return match symbol.what {
+                What::Routine(routine) if !symbol.ambiguous => {
+                    self.own_function(context, tree, node, routine)
+                }
+                _ => Value::Unknown(Reason::RunTimeFunction),
+            };
+        }
+        if name == b"dim" {
+            return self.dimension(context, tree, node).unwrap_or(Value::Unknown(Reason::RunTimeFunction));
         }
         let mut required = Vec::new();
         let mut options = Options::default();
         for argument in arguments(tree, node) {
             match (argument.name, argument.value) {
                 (None, None) => {}
-                (None, Some(value)) => required.push(self.value(context, value)),
+                (None, Some(value)) => {
+                    // reg1 to reg5: variables of the USER module that every controller has.
+                    let own =
+                        matches!(text_of(tree, value), [b'r' | b'R', b'e' | b'E', b'g' | b'G', b'1'..=b'5']);
+                    required.push(match self.value(context, value) {
+                        Value::Unknown(Reason::Undeclared) if own => Value::Unknown(Reason::RunTimeOffset),
+                        value => value,
+                    });
+                }
                 (Some(option), value) => {
                     let option: Vec<u8> = tree.text(option).iter().map(|&byte| fold(byte)).collect();
                     let value = value.map(|value| self.value(context, value));
@@ -502,6 +632,72 @@ impl<'a, 's> Evaluator<'a, 's> {
             Err(reason) => Value::Unknown(reason),
         }
     }
+
+    /// A function of the program: what it returns, where that is all that it does.
+    fn own_function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32, routine: u32) -> Value {
+        let unknown = Value::Unknown(Reason::RunTimeFunction);
+        self.functions.set(if context.depth == 0 { 0 } else { self.functions.get() + 1 });
+        if context.depth >= REFERENCE_DEPTH || self.functions.get() >= FUNCTIONS {
+            return unknown;
+        }
+        let found = &self.symbols.routines[routine as usize];
+        let home = self.tree(found.file);
+        let Some(returned) = only_returns(home, found.head.node) else { return unknown };
+        let parameters = &found.head.parameters;
+        if parameters.iter().any(|parameter| parameter.by_reference || parameter.array) {
+            return unknown;
+        }
+        let mut known = context.known.clone();
+        known.retain(|&id, _| self.symbols.symbols.get(id as usize).is_none_or(|s| s.scope != found.scope));
+        let mut required = parameters.iter().filter(|parameter| !parameter.optional);
+        for argument in arguments(tree, node) {
+            let parameter = match argument.name {
+                None => required.next(),
+                Some(name) => {
+                    parameters.iter().find(|parameter| same_name(home.text(parameter.name), tree.text(name)))
+                }
+            };
+            let (Some(parameter), Some(value)) = (parameter, argument.value) else { return unknown };
+            let Some(id) = self.symbols.find(found.scope, home.text(parameter.name)) else { return unknown };
+            known.insert(id, self.value(Context { depth: context.depth + 1, ..context }, value));
+        }
+        let depth = context.depth + 1;
+        match self.value(Context { file: found.file, scope: found.scope, known: &known, depth }, returned) {
+            // Not a parameter of the routine in which the call stands.
+            Value::Unknown(Reason::Parameter) => unknown,
+            value => value,
+        }
+    }
+
+    /// `Dim(array, number)`, where the declaration states the dimensions.
+    fn dimension(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Option<Value> {
+        let mut given = arguments(tree, node);
+        let (array, number) = (given.next()?.value?, given.next()?.value?);
+        let Child::Token(_) = array else { return None };
+        let symbol = &self.symbols.symbols[self.symbols.root(tree, context.scope, array)? as usize];
+        let What::Data(data) = &symbol.what else { return None };
+        if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+            return None;
+        }
+        let number = self.value(context, number).number().ok()?.round();
+        let at = if number >= 1.0 { number as usize - 1 } else { return None };
+        let size = expressions(self.tree(symbol.file), data.dimensions?).nth(at)?;
+        let size = self.value(self.at(context, symbol.scope, symbol.file), size).number().ok()?;
+        Some(Value::Number(size))
+    }
+}
+
+/// The expression that a function returns, where that is its only statement and it declares nothing.
+fn only_returns(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
+    let mut inside =
+        tree.child_nodes(function).filter(|&node| tree.nodes[node as usize].kind != Syntax::Parameters);
+    let (mut only, None) = (inside.next()?, inside.next()) else { return None };
+    if tree.nodes[only as usize].kind == Syntax::Body {
+        let mut statements = tree.child_nodes(only);
+        let (Some(first), None) = (statements.next(), statements.next()) else { return None };
+        only = first;
+    }
+    (tree.nodes[only as usize].kind == Syntax::Return).then(|| expressions(tree, only).next()).flatten()
 }
 
 /// The target that a literal of plain numbers is; `None` where it is no such literal.

@@ -3,15 +3,16 @@
 //!
 //! One pass per routine. Straight-line assignments are followed exactly; where ways join, only what they agree on
 //! stays known; what a loop assigns is unknown at its beginning; a label or an error handler can be reached from
-//! anywhere in the routine. What a called routine or function may change is forgotten, and what a trap routine or an
-//! error handler may change is never known. What is not known from the statements before has, as far as nothing
+//! anywhere in the routine. What a called routine or function may change is forgotten, and what a trap routine, an
+//! error handler or the controller itself may change at any time is never known. A parameter by reference may be another
+//! name of data outside or of another parameter: where one changes, the others are forgotten. What is not known from the statements before has, as far as nothing
 //! assigns its components, its initial value.
 
 use super::evaluate::{Context, Evaluator, Known};
-use super::instruction::{self, INSTRUCTIONS};
+use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
 use super::predefined;
-use super::symbol::{Unit, What};
+use super::symbol::{Unit, What, resumes};
 use super::syntax::{Syntax, arguments, expressions, parts, token_kind};
 use super::token::{Token, folded, same_name};
 use super::value::Value;
@@ -21,6 +22,9 @@ use crate::program::tree::Child;
 /// The key in [`Known`] under which the program displacement stands: no name of the program has it. Where it is absent
 /// the displacement is as at the entry of the routine.
 pub(super) const DISPLACEMENT: u32 = u32::MAX;
+
+/// Data that holds more numbers and texts is not followed.
+const KEPT: usize = 4096;
 
 /// Longer arrays are not followed element by element.
 const ELEMENTS: f64 = 64.0;
@@ -88,6 +92,12 @@ pub(super) trait Visitor {
     fn exit_of(&mut self, routine: u32) -> States;
     /// A call of a routine of the program.
     fn called(&mut self, site: CallSite);
+    /// A call by a computed name, with the switches as they stand there.
+    fn called_late(&mut self, modal: States);
+    /// A call of a routine that is in none of the files, which may call those that are.
+    fn called_outside(&mut self, modal: States);
+    /// The next cycle begins at main with the switches as they stand here.
+    fn cycled(&mut self, modal: States);
 }
 
 /// In what a statement stands.
@@ -101,15 +111,20 @@ pub(super) struct Surroundings {
 
 /// Walks one unit; hands back the states of the switches at its end.
 pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn Visitor) -> States {
-    let mut walk =
-        Walk { evaluator, unit, visitor, exits: States::NONE, any: States::NONE, handled: States::NONE };
-    walk.any = walk.settings(unit.node).or(States::ENTRY);
+    let symbols = evaluator.symbols;
+    let tree = &evaluator.trees[unit.file as usize];
+    let resumes = tree.child_nodes(unit.node).any(|clause| resumes(tree, clause));
+    let (exits, any, handled) = (States::NONE, States::NONE, States::NONE);
+    let aliases = aliases(evaluator, unit);
+    let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, aliases };
     walk.handled = walk.handled();
+    walk.any = walk.settings(unit.node).or(walk.handled).or(States::ENTRY);
     let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
-    if unit.routine.is_some() {
-        for &id in evaluator.symbols.changed_in(unit) {
+    // Where ExitCycle begins main anew, its variables may be as they were.
+    if unit.routine.is_some_and(|routine| !(symbols.cycles && is_main(evaluator, routine))) {
+        for &id in symbols.changed_in(unit) {
             // A variable of the routine has its initial value at every call.
-            let symbol = &evaluator.symbols.symbols[id as usize];
+            let symbol = &symbols.symbols[id as usize];
             if symbol.scope == unit.scope
                 && !symbol.volatile
                 && matches!(&symbol.what, What::Data(data) if data.storage == Token::Var)
@@ -125,6 +140,21 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     if end.reached { walk.exits.or(end.modal) } else { walk.exits }
 }
 
+/// Whether a routine is main.
+pub(super) fn is_main(evaluator: &Evaluator<'_, '_>, routine: u32) -> bool {
+    let routine = &evaluator.symbols.routines[routine as usize];
+    same_name(evaluator.trees[routine.file as usize].text(routine.head.name), b"main")
+}
+
+/// The parameters of a unit that may be other names of data outside it, or of each other.
+fn aliases(evaluator: &Evaluator<'_, '_>, unit: Unit) -> Vec<u32> {
+    let Some(routine) = unit.routine else { return Vec::new() };
+    let tree = &evaluator.trees[unit.file as usize];
+    let parameters = &evaluator.symbols.routines[routine as usize].head.parameters;
+    let referred = parameters.iter().filter(|parameter| parameter.by_reference);
+    referred.filter_map(|parameter| evaluator.symbols.find(unit.scope, tree.text(parameter.name))).collect()
+}
+
 struct Walk<'w, 'a, 's> {
     evaluator: &'w Evaluator<'a, 's>,
     unit: Unit,
@@ -132,8 +162,12 @@ struct Walk<'w, 'a, 's> {
     exits: States,
     /// What any statement of the unit may set.
     any: States,
-    /// What an error handler may set before it goes back to the statements.
+    /// What an error handler may set before it goes back to the statements, and what trap routines leave set.
     handled: States,
+    /// Whether an error handler goes back to the statements, so that what they call may end anywhere.
+    resumes: bool,
+    /// The parameters that may be other names of data outside, or of each other.
+    aliases: Vec<u32>,
 }
 
 impl Walk<'_, '_, '_> {
@@ -172,7 +206,7 @@ impl Walk<'_, '_, '_> {
                 entry.modal = entry.modal.or(self.settings(node));
                 entry.previous = None;
                 let displaces = self.displaces(node);
-                let forget = |walk: &Self, state: &mut State| {
+                let forget = |walk: &mut Self, state: &mut State| {
                     walk.forget_changed(node, state);
                     if displaces {
                         state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
@@ -187,12 +221,19 @@ impl Walk<'_, '_, '_> {
             }
             Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
                 let entry = self.anywhere();
-                self.block(node, entry, conditional);
+                let end = self.block(node, entry, conditional);
+                if end.reached && kind == Syntax::ErrorClause {
+                    self.exits = self.exits.or(end.modal);
+                }
+                if end.reached && kind == Syntax::UndoClause && self.evaluator.symbols.cycles {
+                    self.visitor.cycled(end.modal);
+                }
                 // The handler is no continuation of the statements before it.
                 state
             }
             Syntax::Label => state.joined(self.anywhere()),
             Syntax::Return => {
+                self.forget_changed(node, &mut state);
                 self.exits = self.exits.or(state.modal);
                 State { reached: false, ..state }
             }
@@ -256,24 +297,42 @@ impl Walk<'_, '_, '_> {
         if same_name(name, b"PDispOff") {
             return Value::from_frame(&Frame::IDENTITY);
         }
-        let frame =
+        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let first =
             arguments(tree, node).find(|argument| !argument.optional).and_then(|argument| argument.value);
-        match frame.filter(|_| same_name(name, b"PDispSet")) {
-            Some(frame) => {
-                let context = Context::new(self.unit.file, self.unit.scope, &state.known);
-                match self.evaluator.value(context, frame).frame() {
-                    Ok(frame) => Value::from_frame(&frame),
-                    Err(_) => Value::Unknown(Reason::Displacement),
+        let option = |wanted: &[u8]| {
+            arguments(tree, node)
+                .filter(|argument| argument.optional)
+                .find(|argument| argument.name.is_some_and(|name| same_name(tree.text(name), wanted)))
+        };
+        let target = |value: Child| {
+            let value = self.evaluator.value(context, value).target(false).ok()?;
+            value.cartesian().copied()
+        };
+        let frame = if same_name(name, b"PDispSet") {
+            first.and_then(|frame| self.evaluator.value(context, frame).frame().ok())
+        } else if same_name(name, b"PDispOn") {
+            // From the programmed point to the executed one; without \ExeP from where the robot stands.
+            let executed = option(b"ExeP").and_then(|argument| argument.value).and_then(target);
+            let programmed = first.and_then(target);
+            executed.zip(programmed).map(|(executed, programmed)| match option(b"Rot") {
+                Some(_) => Frame::from_pose(&(executed.pose() * programmed.pose().inverse())),
+                None => {
+                    let (to, from) = (executed.position_mm, programmed.position_mm);
+                    let position_mm = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+                    Frame { position_mm, ..Frame::IDENTITY }
                 }
-            }
-            // PDispOn counts from where the robot stands, PDispAdd from what a search found.
-            None => Value::Unknown(Reason::Displacement),
-        }
+            })
+        } else {
+            // PDispAdd counts from what a search found.
+            None
+        };
+        frame.map_or(Value::Unknown(Reason::Displacement), |frame| Value::from_frame(&frame))
     }
 
     /// Forgets what anything under a node may change: assignments, arguments that come back changed, what called
     /// routines and functions do.
-    fn forget_changed(&self, node: u32, state: &mut State) {
+    fn forget_changed(&mut self, node: u32, state: &mut State) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let symbols = self.evaluator.symbols;
         for node in node..node + tree.nodes[node as usize].size {
@@ -281,15 +340,63 @@ impl Walk<'_, '_, '_> {
             if !kind.may_change() {
                 continue;
             }
-            symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
-                state.known.remove(&change.symbol);
-            });
-            if kind == Syntax::LateCall {
-                self.forget_outside(state);
-            } else if matches!(kind, Syntax::Call | Syntax::Function) {
-                let name = tree.text(tree.nodes[node as usize].first);
-                self.forget_called(name, kind, state);
+            self.forget_written(node, state);
+            let name = tree.text(tree.nodes[node as usize].first);
+            match kind {
+                Syntax::LateCall => self.forget_outside(state),
+                Syntax::Call => self.forget_called(name, kind, state),
+                Syntax::Function => {
+                    if let Some(routine) = symbols.routine(self.unit.scope, name) {
+                        self.may_set(self.handled, state);
+                        self.visitor.called(CallSite { routine, modal: state.modal });
+                        self.may_set(symbols.routines[routine as usize].reach.sets, state);
+                    }
+                    self.forget_called(name, kind, state);
+                }
+                _ => {}
             }
+        }
+    }
+
+    /// Forgets what one statement or function writes by itself.
+    fn forget_written(&self, node: u32, state: &mut State) {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let symbols = self.evaluator.symbols;
+        symbols.changed_by(tree, self.unit.scope, node, &mut |change| self.forget(change.symbol, state));
+    }
+
+    /// Forgets data, and what may be the same data by another name.
+    fn forget(&self, symbol: u32, state: &mut State) {
+        state.known.remove(&symbol);
+        if self.aliases.is_empty() {
+            return;
+        }
+        let symbols = &self.evaluator.symbols.symbols;
+        if self.aliases.contains(&symbol) {
+            self.forget_outside(state);
+        } else if symbols[symbol as usize].scope != self.unit.scope {
+            for alias in &self.aliases {
+                state.known.remove(alias);
+            }
+        }
+    }
+
+    /// Forgets the data that all tasks share: while this one waits, another may have written it.
+    fn forget_shared(&self, state: &mut State) {
+        let symbols = &self.evaluator.symbols.symbols;
+        state.known.retain(|&id, _| {
+            symbols.get(id as usize).is_none_or(|symbol| match &symbol.what {
+                What::Data(data) => data.storage != Token::Pers || data.local || data.task,
+                _ => true,
+            })
+        });
+    }
+
+    /// Notes that switches may be set here, or not.
+    fn may_set(&self, sets: States, state: &mut State) {
+        state.modal = state.modal.or(sets);
+        if !sets.leaves(Which::Displacement) {
+            state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
     }
 
@@ -302,15 +409,26 @@ impl Walk<'_, '_, '_> {
         let moves = match symbols.routine(self.unit.scope, name) {
             Some(routine) => {
                 let reach = &symbols.routines[routine as usize].reach;
-                for symbol in &reach.changes {
-                    state.known.remove(symbol);
+                for &symbol in &reach.changes {
+                    self.forget(symbol, state);
                 }
                 if reach.anything {
                     self.forget_outside(state);
                 }
+                if reach.waits {
+                    self.forget_shared(state);
+                }
                 reach.moves
             }
-            None if predefined::effect(name).is_some() => false,
+            None if predefined::effect(name).is_some() => {
+                if kind == Syntax::Call && predefined::calls_by_name(name) {
+                    self.forget_outside(state);
+                }
+                if predefined::waits(name) {
+                    self.forget_shared(state);
+                }
+                predefined::displaces(name).is_some()
+            }
             None => {
                 self.forget_outside(state);
                 true
@@ -324,16 +442,25 @@ impl Walk<'_, '_, '_> {
     /// A routine that is not known here may change everything that is declared outside this one.
     fn forget_outside(&self, state: &mut State) {
         let symbols = &self.evaluator.symbols.symbols;
-        state.known.retain(|&id, _| symbols.get(id as usize).is_none_or(|s| s.scope == self.unit.scope));
+        state.known.retain(|&id, _| {
+            symbols.get(id as usize).is_none_or(|s| s.scope == self.unit.scope) && !self.aliases.contains(&id)
+        });
     }
 
-    /// What the error handlers of the unit set before they go back to the statements.
+    /// What the error handlers of the unit set before they go back to the statements, and what trap routines leave set.
     fn handled(&mut self) -> States {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let clauses = tree.child_nodes(self.unit.node);
         let clauses: Vec<u32> =
             clauses.filter(|&clause| tree.nodes[clause as usize].kind == Syntax::ErrorClause).collect();
-        clauses.into_iter().fold(States::NONE, |all, clause| all.or(self.settings(clause)))
+        let handled = clauses.into_iter().fold(States::NONE, |all, clause| all.or(self.settings(clause)));
+        let interrupts = &self.evaluator.symbols.interrupts;
+        // One trap routine waits for the other.
+        if self.unit.routine.is_some_and(|routine| interrupts[routine as usize]) {
+            return handled;
+        }
+        let traps = (0..).zip(interrupts).filter(|&(_, &interrupts)| interrupts);
+        traps.fold(handled, |all, (routine, _)| all.or(self.visitor.exit_of(routine).entered(States::NONE)))
     }
 
     /// Everything that statements under a node may set.
@@ -344,10 +471,16 @@ impl Walk<'_, '_, '_> {
         let mut out = States::NONE;
         for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
-            if let Some((which, on)) = setting(tree, node, name) {
+            let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+            if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
                 out = out.or(States::NONE.set(which, on));
-            } else if let Some(routine) = symbols.routine(self.unit.scope, name) {
+            } else if let Some(routine) = (!late).then(|| symbols.routine(self.unit.scope, name)).flatten() {
                 out = out.or(self.visitor.exit_of(routine));
+                if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
+                    out = out.or(symbols.routines[routine as usize].reach.sets);
+                }
+            } else {
+                out = out.or(symbols.late_sets_of(self.unit));
             }
         }
         // "As at the entry" of a called routine is what holds here anyway.
@@ -359,26 +492,34 @@ impl Walk<'_, '_, '_> {
         let symbols = self.evaluator.symbols;
         let name = tree.text(tree.nodes[node as usize].first);
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
+        self.may_set(self.handled, &mut state);
         for inside in tree.child_nodes(node) {
             self.forget_changed(inside, &mut state);
         }
-        state.modal = state.modal.or(self.handled);
-        if !self.handled.leaves(Which::Displacement) {
-            state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
-        }
         let motion = self.visitor.call(self.unit, node, &state, place);
-        let known = if late || symbols.hides_instruction { None } else { instruction::find(name) };
-        if known.is_none_or(|known| INSTRUCTIONS[known].searches()) {
-            symbols.changed_by(tree, self.unit.scope, node, &mut |change| {
-                state.known.remove(&change.symbol);
-            });
-        }
+        let known = if late { None } else { instruction::find(name).map(|known| &INSTRUCTIONS[known]) };
+        let hidden = symbols.hides_instruction && symbols.routine(self.unit.scope, name).is_some();
+        let known = known.filter(|_| !hidden);
         if let Some(known) = known {
+            if !known.only_moves() {
+                self.forget_written(node, &mut state);
+            }
+            if known.also == Also::Stiffens {
+                state.modal = state.modal.set(Which::Soft, false);
+            }
             if motion.is_some() {
                 // A search stops where its signal comes.
-                state.previous = motion.filter(|_| !INSTRUCTIONS[known].searches());
+                state.previous = motion.filter(|_| !known.ends_early());
             }
             return state;
+        }
+        let stepped = self.stepped(node, &state, name);
+        self.forget_written(node, &mut state);
+        if let Some((place, value)) = stepped {
+            self.put(place, value, &mut state);
+        }
+        if predefined::waits(name) {
+            self.forget_shared(&mut state);
         }
         if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.set(which, on);
@@ -388,27 +529,36 @@ impl Walk<'_, '_, '_> {
                 let value = self.displaced(node, &state, name);
                 state.known.insert(DISPLACEMENT, value);
             }
+            if predefined::displaces(name).is_some() {
+                state.previous = None;
+            }
             return state;
         }
         let routine = if late { None } else { symbols.routine(self.unit.scope, name) };
-        match routine {
-            Some(routine) => {
-                self.visitor.called(CallSite { routine, modal: state.modal });
-                let exit = self.visitor.exit_of(routine);
-                state.modal = exit.entered(state.modal);
-                if !exit.keeps(Which::Displacement) {
-                    let value = if exit.is_off(Which::Displacement) {
-                        Value::from_frame(&Frame::IDENTITY)
-                    } else {
-                        Value::Unknown(Reason::Displacement)
-                    };
-                    state.known.insert(DISPLACEMENT, value);
-                }
-                self.forget_called(name, Syntax::Call, &mut state);
+        if late || routine.is_none() && predefined::calls_by_name(name) {
+            self.visitor.called_late(state.modal);
+            if symbols.late_of(self.unit).is_empty() {
+                self.visitor.called_outside(state.modal);
             }
-            None if late => self.forget_outside(&mut state),
-            None if predefined::effect(name).is_some() => return state,
+            self.may_set(symbols.late_sets_of(self.unit), &mut state);
+            self.forget_outside(&mut state);
+            state.previous = None;
+            return state;
+        }
+        match routine {
+            Some(routine) => self.call_own(routine, name, &mut state),
+            None if predefined::effect(name).is_some() => {
+                if predefined::begins_cycle(name) {
+                    self.visitor.cycled(state.modal);
+                    return State { reached: false, ..state };
+                }
+                if predefined::displaces(name).is_some() {
+                    state.previous = None;
+                }
+                return state;
+            }
             None => {
+                self.visitor.called_outside(state.modal);
                 self.forget_outside(&mut state);
                 if motion.is_some() {
                     state.previous = motion;
@@ -420,19 +570,79 @@ impl Walk<'_, '_, '_> {
         state
     }
 
+    /// A call of a routine of the program.
+    fn call_own(&mut self, routine: u32, name: &[u8], state: &mut State) {
+        let sets = self.evaluator.symbols.routines[routine as usize].reach.sets;
+        if self.resumes {
+            // It may have been left anywhere by an error, and be called once more.
+            self.may_set(sets, state);
+        }
+        self.visitor.called(CallSite { routine, modal: state.modal });
+        let exit = self.visitor.exit_of(routine);
+        if exit == States::NONE {
+            state.reached = self.resumes;
+            return;
+        }
+        state.modal = exit.entered(state.modal);
+        if !exit.keeps(Which::Displacement) {
+            let value = if exit.is_off(Which::Displacement) {
+                Value::from_frame(&Frame::IDENTITY)
+            } else {
+                Value::Unknown(Reason::Displacement)
+            };
+            state.known.insert(DISPLACEMENT, value);
+        }
+        if self.resumes {
+            self.may_set(sets, state);
+        }
+        self.forget_called(name, Syntax::Call, state);
+    }
+
+    /// The new value of what Incr, Decr, Add or Clear changes, where the old one is known.
+    fn stepped(&self, node: u32, state: &State, name: &[u8]) -> Option<(Child, Value)> {
+        let is = |wanted: &[u8]| same_name(name, wanted);
+        if !(is(b"Incr") || is(b"Decr") || is(b"Add") || is(b"Clear"))
+            || self.evaluator.symbols.routine(self.unit.scope, name).is_some()
+        {
+            return None;
+        }
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
+        let mut given = arguments(tree, node).filter(|argument| !argument.optional);
+        let place = given.next()?.value?;
+        let old = self.evaluator.value(context, place).number().ok();
+        let new = if is(b"Clear") {
+            0.0
+        } else if is(b"Incr") {
+            old? + 1.0
+        } else if is(b"Decr") {
+            old? - 1.0
+        } else {
+            old? + self.evaluator.value(context, given.next()?.value?).number().ok()?
+        };
+        Some((place, Value::Number(new)))
+    }
+
     /// `place := value;`
     fn assignment(&mut self, node: u32, state: &mut State) {
         let tree = &self.evaluator.trees[self.unit.file as usize];
         let mut sides = parts(tree, node)
             .filter(|&part| !matches!(token_kind(tree, part), Some(Token::Assign | Token::Semicolon)));
         let (Some(place), Some(expression)) = (sides.next(), sides.next()) else { return };
-        let symbols = self.evaluator.symbols;
         for inside in tree.child_nodes(node) {
             self.forget_changed(inside, state);
         }
-        let Some(root) = symbols.root(tree, self.unit.scope, place) else { return };
         let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let value = self.evaluator.value(context, expression);
+        self.put(place, value, state);
+    }
+
+    /// Puts a value in a place.
+    fn put(&self, place: Child, value: Value, state: &mut State) {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let symbols = self.evaluator.symbols;
+        let Some(root) = symbols.root(tree, self.unit.scope, place) else { return };
+        let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let new = match place {
             Child::Token(_) => value,
             Child::Node(place) => {
@@ -445,8 +655,9 @@ impl Walk<'_, '_, '_> {
                 self.replaced(context, old, &type_name, &path, value)
             }
         };
+        self.forget(root, state);
         // A big array that is filled element by element is not worth keeping.
-        if size(&new, 0) > 4096 || symbols.symbols[root as usize].volatile {
+        if new.size(KEPT) > KEPT || symbols.symbols[root as usize].volatile {
             state.known.remove(&root);
         } else {
             state.known.insert(root, new);
@@ -520,13 +731,5 @@ impl Walk<'_, '_, '_> {
                 Value::List(list)
             }
         }
-    }
-}
-
-/// How many values a value holds, counted until it is too many.
-fn size(value: &Value, so_far: usize) -> usize {
-    match value {
-        Value::List(list) if so_far <= 4096 => list.iter().fold(so_far, |sum, value| size(value, sum)),
-        _ => so_far + 1,
     }
 }

@@ -38,6 +38,23 @@ pub enum Between {
     Nothing,
 }
 
+/// What a motion instruction does besides moving.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Also {
+    /// Nothing.
+    Nothing,
+    /// Writes the values of its options whose names begin with Ret.
+    Returns,
+    /// Calls the procedure that its last required argument names, between any two statements that follow.
+    Calls,
+    /// Ends where it touches something, before its target.
+    Stops,
+    /// Ends the soft servo.
+    Stiffens,
+    /// Does things at distances from its start or end, or at either: what is put before it would shift them.
+    Triggers,
+}
+
 /// A motion instruction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instruction {
@@ -54,6 +71,8 @@ pub struct Instruction {
     pub joint_form: Option<&'static str>,
     /// Whether a sensor moves the path.
     pub sensor_guided: bool,
+    /// What it does besides.
+    pub also: Also,
 }
 
 impl Instruction {
@@ -110,6 +129,16 @@ impl Instruction {
         self.pattern.contains('O')
     }
 
+    /// Whether it ends elsewhere than at its target: where a signal comes, or where it touches something.
+    pub fn ends_early(&self) -> bool {
+        self.also == Also::Stops || self.searches()
+    }
+
+    /// Whether it does nothing but move: nearly every statement of a long program is such a one.
+    pub fn only_moves(&self) -> bool {
+        matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
+    }
+
     /// How many required arguments there are at least.
     pub fn least(&self) -> usize {
         self.pattern.bytes().filter(|&letter| letter != b'*').count()
@@ -117,7 +146,8 @@ impl Instruction {
 }
 
 const fn plain(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
-    Instruction { name, kind, pattern, between: Between::Plain, joint_form: None, sensor_guided: false }
+    let (between, joint_form, also) = (Between::Plain, None, Also::Nothing);
+    Instruction { name, kind, pattern, between, joint_form, sensor_guided: false, also }
 }
 
 const fn same(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
@@ -145,6 +175,10 @@ const fn guided(instruction: Instruction) -> Instruction {
     Instruction { sensor_guided: true, between: Between::Nothing, ..instruction }
 }
 
+const fn besides(instruction: Instruction, also: Also) -> Instruction {
+    Instruction { also, ..instruction }
+}
+
 use MotionKind::{AbsoluteJoint, Circular, External, Joint, Linear};
 
 /// The instructions, the most frequent first.
@@ -166,15 +200,15 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     with_joints(plain("MoveJGO", Joint, "TSZt."), "MoveAbsJGO"),
     rigid("MoveCGO", Circular, "CTSZt."),
     plain("MoveAbsJGO", AbsoluteJoint, "JSZt."),
-    plain("MoveLSync", Linear, "TSZt."),
-    plain("MoveJSync", Joint, "TSZt."),
-    rigid("MoveCSync", Circular, "CTSZt."),
-    plain("TriggL", Linear, "TS.Zt"),
-    plain("TriggJ", Joint, "TS.Zt"),
+    besides(plain("MoveLSync", Linear, "TSZt."), Also::Calls),
+    besides(plain("MoveJSync", Joint, "TSZt."), Also::Calls),
+    besides(rigid("MoveCSync", Circular, "CTSZt."), Also::Calls),
+    besides(plain("TriggL", Linear, "TS.Zt"), Also::Triggers),
+    besides(plain("TriggJ", Joint, "TS.Zt"), Also::Triggers),
     rigid("TriggC", Circular, "CTS.Zt"),
-    plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"),
-    plain("TriggLIOs", Linear, "TSZt"),
-    plain("TriggJIOs", Joint, "TSZt"),
+    besides(plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"), Also::Triggers),
+    besides(plain("TriggLIOs", Linear, "TSZt"), Also::Triggers),
+    besides(plain("TriggJIOs", Joint, "TSZt"), Also::Triggers),
     rigid("SearchL", Linear, ".OTSt"),
     rigid("SearchC", Circular, ".OCTSt"),
     rigid("SearchExtJ", External, ".OJS"),
@@ -215,8 +249,8 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     same("FCPressL", Linear, "TS.Zt"),
     rigid("FCPressC", Circular, "CTS.Zt"),
     rigid("FCPressEnd", Linear, "TSt"),
-    same("PaintL", Linear, "TSZt"),
-    rigid("PaintC", Circular, "CTSZt"),
+    same("PaintL", Linear, "TS*Zt"),
+    rigid("PaintC", Circular, "CTS*Zt"),
     plain("SpotL", Linear, "TS*t"),
     plain("SpotJ", Joint, "TS*t"),
     plain("SpotML", Linear, "TS*t"),
@@ -231,23 +265,25 @@ pub const INSTRUCTIONS: &[Instruction] = &[
     rigid("LaserCStart", Circular, "CTS*Zt"),
     rigid("LaserC", Circular, "CTS*Zt"),
     rigid("LaserCEnd", Circular, "CTS*Zt"),
-    same("CapL", Linear, "TS*Zt"),
+    besides(same("CapL", Linear, "TS*Zt"), Also::Triggers),
     rigid("CapC", Circular, "CTS*Zt"),
-    rigid("ContactL", Linear, "TSt"),
+    besides(rigid("ContactL", Linear, "TSt"), Also::Stops),
+    besides(rigid("CSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
+    besides(rigid("SCSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
     with_joints(plain("SMoveL", Linear, "TSZt"), "MoveAbsJ"),
     with_joints(plain("SMoveJ", Joint, "TSZt"), "MoveAbsJ"),
     plain("SMoveLDO", Linear, "TSZt.."),
     plain("SMoveJDO", Joint, "TSZt.."),
     plain("SMoveLGO", Linear, "TSZt."),
     plain("SMoveJGO", Joint, "TSZt."),
-    plain("SMoveLSync", Linear, "TSZt."),
-    plain("SMoveJSync", Joint, "TSZt."),
-    plain("STriggL", Linear, "TS.Zt"),
-    plain("STriggJ", Joint, "TS.Zt"),
+    besides(plain("SMoveLSync", Linear, "TSZt."), Also::Calls),
+    besides(plain("SMoveJSync", Joint, "TSZt."), Also::Calls),
+    besides(plain("STriggL", Linear, "TS.Zt"), Also::Triggers),
+    besides(plain("STriggJ", Joint, "TS.Zt"), Also::Triggers),
     rigid("SSearchL", Linear, ".OTSt"),
-    rigid("CalibL", Linear, "TS*t"),
-    rigid("CalibJ", Joint, "TS*t"),
-    rigid("MeasureWearL", Linear, "TS*t"),
+    besides(rigid("CalibL", Linear, "TS*t"), Also::Returns),
+    besides(rigid("CalibJ", Joint, "TS*t"), Also::Returns),
+    besides(rigid("MeasureWearL", Linear, "TS*t"), Also::Returns),
     guided(rigid("EGMMoveL", Linear, ".TSZt")),
     guided(rigid("EGMMoveC", Circular, ".CTSZt")),
 ];

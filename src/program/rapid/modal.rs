@@ -5,13 +5,21 @@
 //! set with which the called routine ends. What the entries really are is then propagated along the calls from main
 //! (which starts with the controller's defaults) until nothing changes. Sets only grow where ways join, so a switch
 //! is never called off when it may be on.
+//!
+//! A routine also begins in the state at a call by a computed name that may mean it, and at a call of a routine that
+//! is in none of the files, which may call it in turn; main begins in the state in which it or ExitCycle ends a cycle (the
+//! next cycle resets no switch); a trap routine begins in any state, and whatever it leaves set may hold at every statement. Where an error
+//! handler goes back to the statements, a called routine may have ended anywhere.
+//!
+//! Departure: a routine that is in none of the files is taken to leave the switches as they are, and so are event
+//! routines, which only the system parameters name.
 
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
 use crate::program::motion::{Modal, Switch};
 
 /// The sets of states of all switches: three bits each, off, on, as at the entry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct States(u32);
 
 /// The switches.
@@ -32,13 +40,11 @@ pub enum Which {
     CirclePoint,
     /// SyncMoveOn, SyncMoveOff.
     Synchronised,
-    /// CorrCon, CorrDiscon.
-    Correction,
     /// SoftAct, SoftDeact; CSSAct, CSSDeact, CSSDeactMoveL.
     Soft,
 }
 
-const COUNT: u32 = 9;
+const COUNT: u32 = 8;
 const OFF: u32 = 1;
 const ON: u32 = 2;
 const ENTRY: u32 = 4;
@@ -124,7 +130,8 @@ impl States {
             wrist_interpolation: self.switch(Which::Wrist),
             circle_point_orientation: self.switch(Which::CirclePoint),
             synchronised: self.switch(Which::Synchronised),
-            sensor_guided: both(self.switch(Which::Correction), self.switch(Which::Soft)),
+            // Corrections (CorrCon) reach the motions with \Corr alone.
+            sensor_guided: self.switch(Which::Soft),
         }
     }
 }
@@ -160,10 +167,6 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
         (Which::Synchronised, true)
     } else if is("SyncMoveOff") {
         (Which::Synchronised, false)
-    } else if is("CorrCon") {
-        (Which::Correction, true)
-    } else if is("CorrDiscon") || is("CorrClear") {
-        (Which::Correction, false)
     } else if is("SoftAct") || is("CSSAct") {
         (Which::Soft, true)
     } else if is("SoftDeact") || is("CSSDeact") || is("CSSDeactMoveL") || is("SCSSDeactMoveL") {

@@ -8,8 +8,10 @@ mod change;
 
 use std::collections::HashMap;
 
+pub(super) use self::change::resumes;
 pub use self::change::{Change, Ends, How, Reach};
 use super::instruction;
+use super::modal::States;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
 use super::token::{Token, display, fold, folded};
 use crate::program::motion::Reason;
@@ -147,8 +149,20 @@ pub struct Symbols {
     pub callees_first: Vec<u32>,
     /// How each unit leaves the switches.
     pub ends: Vec<Ends>,
-    /// The calls of each unit that set a switch or call a routine of the program, in order.
+    /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
     pub switches: Vec<Vec<u32>>,
+    /// The routines that each unit may call by a computed name, in order.
+    pub late: Vec<Vec<u32>>,
+    /// What they set.
+    pub late_sets: Vec<States>,
+    /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
+    pub interrupts: Vec<bool>,
+    /// What any statement sets.
+    pub everything: States,
+    /// Whether the next cycle may begin in the middle of this one.
+    pub cycles: bool,
+    /// File, scope and name of the variables of loops, until they are settled.
+    loop_names: Vec<(u32, u32, u32)>,
 }
 
 impl Symbols {
@@ -158,6 +172,7 @@ impl Symbols {
         for (file, tree) in trees.iter().enumerate() {
             symbols.file(tree, file as u32);
         }
+        symbols.loops(trees);
         symbols.settle(trees);
         symbols
     }
@@ -205,6 +220,16 @@ impl Symbols {
         let first = all.partition_point(|&node| node < nodes.start);
         let end = all.partition_point(|&node| node < nodes.end);
         &all[first..end]
+    }
+
+    /// The routines that a unit may call by a computed name.
+    pub fn late_of(&self, unit: Unit) -> &[u32] {
+        self.place_of(unit).and_then(|at| self.late.get(at)).map_or(&[], Vec::as_slice)
+    }
+
+    /// What the routines set that a unit may call by a computed name.
+    pub fn late_sets_of(&self, unit: Unit) -> States {
+        self.place_of(unit).map_or(States::NONE, |at| self.late_sets[at])
     }
 
     fn place_of(&self, unit: Unit) -> Option<usize> {
@@ -343,8 +368,7 @@ impl Symbols {
                 Syntax::For => {
                     let name = parts(tree, inside).find(|&part| token_kind(tree, part) == Some(Token::Ident));
                     if let Some(Child::Token(name)) = name {
-                        let symbol = Symbol::new((file, inner), name, What::Loop, b"num".to_vec());
-                        self.declare(tree.text(name), symbol.varying(), false);
+                        self.loop_names.push((file, inner, name));
                     }
                 }
                 _ => {}
@@ -356,6 +380,25 @@ impl Symbols {
         let unit = self.units.len() as u32;
         self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
         self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
+    }
+
+    /// The variables of loops: names of their routines where nothing else has the name. One that hides other data within its
+    /// loop stands for that data, which the loop is then taken to change; one that hides what never changes stands
+    /// for it in the whole routine.
+    fn loops(&mut self, trees: &[RapidTree<'_>]) {
+        for (file, inner, name) in std::mem::take(&mut self.loop_names) {
+            let text = trees[file as usize].text(name);
+            let hides = self.find(inner, text).is_some_and(|found| {
+                let found = &self.symbols[found as usize];
+                matches!(found.what, What::Data(_) | What::Parameter | What::Loop) && !found.is_constant()
+            });
+            if !hides {
+                let symbol = Symbol::new((file, inner), name, What::Loop, b"num".to_vec()).varying();
+                let id = self.symbols.len() as u32;
+                self.symbols.push(symbol);
+                self.scopes[inner as usize].names.insert(folded(text), id);
+            }
+        }
     }
 
     /// The symbol that a name or place begins with.

@@ -127,7 +127,15 @@ impl Syntax {
 
     /// Whether it may change data by itself.
     pub(super) fn may_change(self) -> bool {
-        matches!(self, Syntax::Assignment | Syntax::Call | Syntax::LateCall | Syntax::Function | Syntax::For)
+        matches!(
+            self,
+            Syntax::Assignment
+                | Syntax::Call
+                | Syntax::LateCall
+                | Syntax::Function
+                | Syntax::For
+                | Syntax::Connect
+        )
     }
 
     /// Whether it is closed by an END of its own.

@@ -9,15 +9,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator, Known, Source};
-use super::flow::{CallSite, State, Surroundings, Visitor, walk};
-use super::instruction::{self, Between, INSTRUCTIONS, Instruction, Slot};
-use super::literal;
+use super::flow::{CallSite, State, Surroundings, Visitor, is_main, walk};
+use super::instruction::{self, Also, Between, INSTRUCTIONS, Instruction, Slot};
 use super::mark;
 use super::modal::{States, Which};
 use super::parser::parse;
 use super::predefined;
 use super::symbol::{Ends, Symbols, Unit, What};
-use super::syntax::{Argument, RapidTree, Syntax, arguments, parts, text_of, tokens_of};
+use super::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use super::token::{Token, display, folded, same_name};
 use crate::program::motion::{
     Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, Place, Reason, Role,
@@ -33,7 +32,7 @@ pub struct Task<'s> {
     /// The files, as trees.
     pub trees: Vec<RapidTree<'s>>,
     /// Their names.
-    pub symbols: Symbols,
+    pub symbols: Box<Symbols>,
     /// What they tell the robot to do.
     pub listing: Listing,
     /// The statement of each motion.
@@ -53,7 +52,7 @@ impl<'s> Task<'s> {
     /// Reads files, given by name and bytes, as one task. Never fails: what cannot be read is listed.
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
-        let symbols = Symbols::gather(&trees);
+        let symbols = Box::new(Symbols::gather(&trees));
         let (listing, statements) = Lister::new(&trees, &symbols).listing();
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
         Task { names, trees, symbols, listing, statements }
@@ -111,7 +110,11 @@ struct Lister<'a, 's> {
     zones: Cached<'s>,
     tools: Cached<'s>,
     work_objects: Cached<'s>,
-    late_calls: bool,
+    /// The switches at the calls of each unit by computed names, and of routines that are in none of the files.
+    late: Vec<States>,
+    outside: Vec<States>,
+    /// The routines named main.
+    mains: Vec<u32>,
     /// Targets written out as numbers, whose values are read last, on all threads.
     literals: Vec<Literal>,
 }
@@ -131,7 +134,7 @@ struct Literal {
 /// Motions whose literals one thread reads at a time.
 const PORTION: usize = 1024;
 
-/// How deeply exits of routines are followed through calls; beyond, anything may be set.
+/// How deeply exits of routines are followed through calls; beyond, anything that they set may be set.
 const CALL_DEPTH: u32 = 12;
 
 impl<'a, 's> Lister<'a, 's> {
@@ -157,7 +160,9 @@ impl<'a, 's> Lister<'a, 's> {
             zones: Cached::default(),
             tools: Cached::default(),
             work_objects: Cached::default(),
-            late_calls: false,
+            late: vec![States::NONE; symbols.units.len()],
+            outside: vec![States::NONE; symbols.units.len()],
+            mains: Vec::new(),
             literals: Vec::new(),
         }
     }
@@ -180,6 +185,8 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         let units = self.symbols.units.clone();
+        let routines = 0..self.symbols.routines.len() as u32;
+        self.mains = routines.filter(|&routine| is_main(&self.evaluator, routine)).collect();
         // What is called ends before its callers are followed, however long the chain of calls is.
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };
@@ -197,6 +204,10 @@ impl<'a, 's> Lister<'a, 's> {
             let exit = walk(&evaluator, *unit, &mut self);
             if let Some(routine) = unit.routine {
                 self.exits[routine as usize] = Some(exit);
+                if self.mains.contains(&routine) {
+                    // The next cycle begins with the switches as this one leaves them.
+                    self.cycled(exit);
+                }
             }
         }
         self.read_literals();
@@ -251,65 +262,7 @@ impl<'a, 's> Lister<'a, 's> {
 
     /// Replaces "as at the entry" by what the entries are.
     fn settle_modal(&mut self) {
-        let units = &self.symbols.units;
-        let seen = self
-            .modal
-            .iter()
-            .chain(self.sites.iter().map(|(_, site)| &site.modal))
-            .chain(self.exits.iter().flatten())
-            .fold(States::NONE, |all, states| all.or(*states))
-            .entered(States::NONE);
-        let unit_of: HashMap<u32, u32> = units
-            .iter()
-            .enumerate()
-            .filter_map(|(index, unit)| unit.routine.map(|routine| (routine, index as u32)))
-            .collect();
-        let mut called = vec![false; units.len()];
-        for (_, site) in &self.sites {
-            if let Some(&unit) = unit_of.get(&site.routine) {
-                called[unit as usize] = true;
-            }
-        }
-        let mut entries: Vec<States> = units
-            .iter()
-            .zip(&called)
-            .map(|(unit, &called)| {
-                let main = unit.routine.is_none_or(|routine| {
-                    let routine = &self.symbols.routines[routine as usize];
-                    let tree = &self.trees[routine.file as usize];
-                    same_name(tree.text(routine.head.name), b"main")
-                });
-                let trap = unit
-                    .routine
-                    .is_some_and(|routine| self.symbols.routines[routine as usize].head.kind == Syntax::Trap);
-                match (main, called && !self.late_calls && !trap) {
-                    (true, _) => States::START,
-                    (false, true) => States::NONE,
-                    // Nothing in these files calls it: it may start in any state that they can bring about.
-                    (false, false) => States::START.or(seen),
-                }
-            })
-            .collect();
-        // Callers first: then one pass settles what does not call itself.
-        let mut rank = vec![0_u32; units.len()];
-        for (at, &unit) in (0..).zip(&self.symbols.callees_first) {
-            rank[unit as usize] = at;
-        }
-        let mut sites: Vec<&(u32, CallSite)> = self.sites.iter().collect();
-        sites.sort_by_key(|(unit, _)| std::cmp::Reverse(rank[*unit as usize]));
-        loop {
-            let mut changed = false;
-            for (unit, site) in &sites {
-                let Some(&callee) = unit_of.get(&site.routine) else { continue };
-                let arriving = site.modal.entered(entries[*unit as usize]);
-                let joined = entries[callee as usize].or(arriving);
-                changed |= joined != entries[callee as usize];
-                entries[callee as usize] = joined;
-            }
-            if !changed {
-                break;
-            }
-        }
+        let entries = self.entries();
         let motions = self.listing.motions.iter_mut().zip(&self.modal).zip(&self.units);
         for (((motion, modal), unit), displaced) in motions.zip(&self.displaced) {
             let states = modal.entered(entries[*unit as usize]);
@@ -320,6 +273,73 @@ impl<'a, 's> Lister<'a, 's> {
                 let offset = states.switch(Which::ExternalOffset) != Switch::Off;
                 motion.left = left_by_modal(motion, unknown || offset);
             }
+        }
+    }
+
+    /// The switches with which each unit may begin.
+    fn entries(&self) -> Vec<States> {
+        let (units, symbols) = (&self.symbols.units, self.symbols);
+        let unit_of = |routine: u32| symbols.routines[routine as usize].unit;
+        let mut called = vec![false; units.len()];
+        for (unit, site) in &self.sites {
+            // A call of itself is not what begins it.
+            called[unit_of(site.routine) as usize] |= *unit != unit_of(site.routine);
+        }
+        // What runs before a routine that none of the files calls: another routine, or nothing.
+        let before = self.exits.iter().flatten().fold(States::NONE, |all, exit| all.or(*exit));
+        let alone = States::START.or(before.entered(States::NONE));
+        let mut entries: Vec<States> = Vec::with_capacity(units.len());
+        for (unit, &called) in units.iter().zip(&called) {
+            let routine = unit.routine.map(|routine| (routine, &symbols.routines[routine as usize]));
+            entries.push(match routine {
+                None => States::START,
+                Some((routine, _)) if symbols.interrupts[routine as usize] => {
+                    States::START.or(symbols.everything)
+                }
+                Some((routine, _)) if self.mains.contains(&routine) => States::START,
+                // A part of a program may be called from the rest of it.
+                Some((_, scope)) if called && (!self.mains.is_empty() || scope.head.local) => States::NONE,
+                Some(_) => alone,
+            });
+        }
+        // Callers first: then one pass settles what does not call itself.
+        let mut rank = vec![0_u32; units.len()];
+        for (at, &unit) in (0..).zip(&symbols.callees_first) {
+            rank[unit as usize] = at;
+        }
+        let mut sites: Vec<&(u32, CallSite)> = self.sites.iter().collect();
+        sites.sort_by_key(|(unit, _)| std::cmp::Reverse(rank[*unit as usize]));
+        loop {
+            let before = entries.clone();
+            for (unit, site) in &sites {
+                let arriving = site.modal.entered(entries[*unit as usize]);
+                let callee = &mut entries[unit_of(site.routine) as usize];
+                *callee = callee.or(arriving);
+            }
+            let mut outside = States::NONE;
+            for unit in 0..units.len() {
+                let entry = entries[unit];
+                outside = outside.or(self.outside[unit].entered(entry));
+                let arriving = self.late[unit].entered(entry);
+                if arriving != States::NONE {
+                    for &routine in &symbols.late[unit] {
+                        let callee = &mut entries[unit_of(routine) as usize];
+                        *callee = callee.or(arriving);
+                    }
+                }
+            }
+            for routine in symbols.routines.iter().filter(|routine| !routine.head.local) {
+                let callee = &mut entries[routine.unit as usize];
+                *callee = callee.or(outside);
+            }
+            if before != entries {
+                continue;
+            }
+            // What only calls itself, round about, has no beginning yet.
+            if !entries.contains(&States::NONE) {
+                return entries;
+            }
+            entries.iter_mut().filter(|entry| **entry == States::NONE).for_each(|entry| *entry = alone);
         }
     }
 
@@ -495,8 +515,9 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         motion.timed = options.timed;
-        let free = !options.timed && !around.guarded;
-        motion.insertable = free && instruction.between != Between::Nothing;
+        let free = !options.timed && !options.whole && !around.guarded;
+        let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
+        motion.insertable = free && splits;
         motion.straightens = free
             && instruction.kind == MotionKind::Circular
             && instruction.line_form().is_some_and(|line| line.between != Between::Nothing);
@@ -553,6 +574,11 @@ impl<'a, 's> Lister<'a, 's> {
                     _ => {}
                 }
             }
+        } else if let Some(moves) = predefined::displaces(name).filter(|_| !late) {
+            let mut motion = self.motion(unit, node, state, around);
+            motion.instruction = display(name).into();
+            motion.left = Some(moves?);
+            return Some(motion);
         } else if predefined::effect(name).is_none() || late {
             for argument in arguments(tree, node) {
                 let Some(value) = argument.value else { continue };
@@ -582,29 +608,41 @@ impl<'a, 's> Lister<'a, 's> {
         Some(motion)
     }
 
-    /// Whether an argument is a target by its declared type or as a literal; says whether it is one of joints.
+    /// Whether an argument is a target by its type; says whether it is one of joints.
     fn looks_like_target(&self, unit: Unit, value: Child) -> Option<bool> {
+        let tree = &self.trees[unit.file as usize];
+        if let Child::Node(node) = value {
+            let mut inside = expressions(tree, node);
+            match tree.nodes[node as usize].kind {
+                Syntax::Paren => return self.looks_like_target(unit, inside.next()?),
+                Syntax::Aggregate => {
+                    let parts: Vec<Child> = inside.collect();
+                    let fits = |types: &[(&[u8], usize)]| {
+                        parts.len() == types.len()
+                            && parts.iter().zip(types).all(|(&part, of)| self.fits(unit, part, *of))
+                    };
+                    let joints = fits(&[(b"robjoint", 6), (b"extjoint", 6)]);
+                    let pose = fits(&[(b"pos", 3), (b"orient", 4), (b"confdata", 4), (b"extjoint", 6)]);
+                    return (joints || pose).then_some(joints);
+                }
+                _ => {}
+            }
+        }
+        match &*self.evaluator.type_of((unit.file, unit.scope), value)? {
+            b"robtarget" => Some(false),
+            b"jointtarget" => Some(true),
+            _ => None,
+        }
+    }
+
+    /// Whether a value may be of a type that has so many components.
+    fn fits(&self, unit: Unit, value: Child, (type_name, count): (&[u8], usize)) -> bool {
         let tree = &self.trees[unit.file as usize];
         match value {
             Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
-                literal::numbers(tree.node_text(node), literal::ROBTARGET).map(|_| false)
+                expressions(tree, node).count() == count
             }
-            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Function => {
-                let name = tree.text(tree.nodes[node as usize].first);
-                (same_name(name, b"Offs") || same_name(name, b"RelTool")).then_some(false)
-            }
-            Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {
-                let symbol = &self.symbols.symbols[self.symbols.root(tree, unit.scope, value)? as usize];
-                if matches!(&symbol.what, What::Data(data) if data.dimensions.is_some()) {
-                    return None;
-                }
-                match self.symbols.resolved_type(symbol.scope, &symbol.type_name) {
-                    b"robtarget" => Some(false),
-                    b"jointtarget" => Some(true),
-                    _ => None,
-                }
-            }
-            _ => None,
+            _ => self.evaluator.type_of((unit.file, unit.scope), value).is_some_and(|t| t == type_name),
         }
     }
 }
@@ -616,7 +654,6 @@ impl Visitor for Lister<'_, '_> {
         }
         let tree = &self.trees[unit.file as usize];
         let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-        self.late_calls |= late;
         let name = tree.text(tree.nodes[node as usize].first);
         let hidden = self.symbols.hides_instruction && self.symbols.routine(unit.scope, name).is_some();
         let known = if late || hidden { None } else { instruction::find(name) };
@@ -636,13 +673,15 @@ impl Visitor for Lister<'_, '_> {
         if let Some(exit) = self.exits[routine as usize] {
             return exit;
         }
-        let anything = States::ENTRY.or(States::ANY);
+        let found = &self.symbols.routines[routine as usize];
+        // As it begins, or as anything in it or in what it calls may set.
+        let anyhow = States::ENTRY.or(found.reach.sets);
         if self.depth >= CALL_DEPTH {
-            return anything;
+            return anyhow;
         }
-        // While it is being followed, a routine that calls itself may end in any state.
-        self.exits[routine as usize] = Some(anything);
-        let unit = self.symbols.units[self.symbols.routines[routine as usize].unit as usize];
+        // While it is being followed, a routine that calls itself may have ended so.
+        self.exits[routine as usize] = Some(anyhow);
+        let unit = self.symbols.units[found.unit as usize];
         let was = std::mem::replace(&mut self.silent, true);
         self.depth += 1;
         let evaluator = Evaluator::new(self.trees, self.symbols);
@@ -658,6 +697,26 @@ impl Visitor for Lister<'_, '_> {
             self.sites.push((self.unit, site));
         }
     }
+
+    fn called_late(&mut self, modal: States) {
+        if !self.silent {
+            let late = &mut self.late[self.unit as usize];
+            *late = late.or(modal);
+        }
+    }
+
+    fn called_outside(&mut self, modal: States) {
+        if !self.silent {
+            let outside = &mut self.outside[self.unit as usize];
+            *outside = outside.or(modal);
+        }
+    }
+
+    fn cycled(&mut self, modal: States) {
+        for at in 0..self.mains.len() {
+            self.called(CallSite { routine: self.mains[at], modal });
+        }
+    }
 }
 
 /// The optional arguments that decide whether a motion may be changed.
@@ -666,6 +725,9 @@ struct Options {
     corrected: bool,
     synchronised: bool,
     timed: bool,
+    /// Whether something hangs on this one instruction: a process begins or ends with it, or the statements after it run
+    /// while the robot goes to it.
+    whole: bool,
 }
 
 impl Options {
@@ -674,6 +736,7 @@ impl Options {
         self.corrected |= same_name(name, b"Corr") || same_name(name, b"Track");
         self.synchronised |= same_name(name, b"ID");
         self.timed |= same_name(name, b"T") || same_name(name, b"Time");
+        self.whole |= [&b"On"[..], b"Off", b"Conc"].iter().any(|whole| same_name(name, whole));
     }
 }
 

@@ -23,6 +23,16 @@ pub enum Value {
 const NOT_CONNECTED: f64 = 8.9e9;
 
 impl Value {
+    /// How many numbers and texts it holds, counted until they are more than a limit.
+    pub fn size(&self, limit: usize) -> usize {
+        match self {
+            Value::List(list) => list
+                .iter()
+                .fold(0, |sum, value| if sum > limit { sum } else { sum + value.size(limit - sum) }),
+            _ => 1,
+        }
+    }
+
     /// The number.
     pub fn number(&self) -> Result<f64, Reason> {
         match self {

@@ -9,6 +9,17 @@ use crate::math::se3::{Pose, rotation_from_matrix};
 use crate::program::motion::{Frame, Reason, TargetValue};
 use crate::program::rapid::value::{Value, built_in};
 
+/// The type of what a predefined function that gives a target, or a part of one, answers.
+pub(super) fn result_type(name: &[u8]) -> Option<&'static [u8]> {
+    Some(match name {
+        b"offs" | b"reltool" | b"crobt" | b"calcrobt" | b"orobt" | b"mirpos" => b"robtarget",
+        b"cjointt" | b"calcjointt" => b"jointtarget",
+        b"cpos" | b"posevect" => b"pos",
+        b"orientzyx" | b"norient" => b"orient",
+        _ => return None,
+    })
+}
+
 /// A rotation from Euler angles z, y, x (degrees) as `OrientZYX`: about z, the new y, the new x.
 fn orient_zyx(z_deg: f64, y_deg: f64, x_deg: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), z_deg.to_radians())
@@ -59,8 +70,13 @@ fn euler_zyx(q: [f64; 4], axis: usize) -> Result<f64, Reason> {
 /// A predefined function of values.
 pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result<Value, Reason> {
     let number = |index: usize| required.get(index).ok_or(Reason::MissingArgument)?.number();
-    // An unknown offset is another reason than an unknown base.
-    let offset = |value: &Value| value.number().map_err(|_| Reason::RunTimeOffset);
+    // An unknown offset is another reason than an unknown base; a name that another file declares is named as such.
+    let offset = |value: &Value| {
+        value.number().map_err(|reason| match reason {
+            Reason::Undeclared | Reason::Ambiguous => reason,
+            _ => Reason::RunTimeOffset,
+        })
+    };
     let one = |function: fn(f64) -> f64| Ok(Value::Number(function(number(0)?)));
     let vector = |index: usize| -> Result<Vector3<f64>, Reason> {
         Ok(Vector3::from(required.get(index).ok_or(Reason::MissingArgument)?.numbers::<3>()?))

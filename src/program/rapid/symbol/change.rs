@@ -3,17 +3,19 @@
 //! Method: one look at every assignment, call and function of a task. What a routine does with its parameters, and what
 //! it changes outside, is carried along the calls until nothing is added; both only grow. A routine that is declared in
 //! none of the files, and one that is called by a computed name, may change everything that is not its caller's own.
+//! Which routines of the files a computed name may call is told by the text at its beginning and end, and by the number
+//! of arguments.
 
 use std::collections::HashSet;
 use std::ops::Range;
 
 use super::{Symbols, Unit, What};
 use crate::program::motion::Reason;
-use crate::program::rapid::instruction::{self, INSTRUCTIONS, Slot};
-use crate::program::rapid::modal::setting;
+use crate::program::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
+use crate::program::rapid::modal::{States, setting};
 use crate::program::rapid::predefined::{self, Effect};
 use crate::program::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts, token_kind};
-use crate::program::rapid::token::{Token, folded};
+use crate::program::rapid::token::{Token, fold, folded, same_name};
 use crate::program::tree::Child;
 
 /// How a statement changes data.
@@ -25,6 +27,8 @@ pub enum How {
     Part(u32),
     /// It is given to a routine that is declared in none of the files, or called by a computed name.
     HandedOver,
+    /// From here on at any time: the controller keeps it and writes it when something happens.
+    Later,
 }
 
 /// A change of data.
@@ -45,6 +49,10 @@ pub struct Reach {
     pub anything: bool,
     /// Whether it may move the robot.
     pub moves: bool,
+    /// Whether it waits, so that another task may write what tasks share.
+    pub waits: bool,
+    /// The switches that statements in it, or in what it calls, set: at some time, not at its end alone.
+    pub sets: States,
 }
 
 impl Reach {
@@ -80,10 +88,27 @@ struct Found {
     calls: Vec<u32>,
     unknown: bool,
     moves: bool,
+    waits: bool,
     /// Whether data is changed by a name that is computed.
     by_name: bool,
     /// The calls that set a switch or call a routine of the program.
     switches: Vec<u32>,
+    /// What they set by themselves.
+    sets: States,
+    /// The routines that it may call by a computed name.
+    late: Vec<u32>,
+    /// The procedures that it has called while the robot moves.
+    interrupts: Vec<u32>,
+    /// Whether it begins the next cycle.
+    cycles: bool,
+}
+
+impl Found {
+    fn switch(&mut self, node: u32) {
+        if self.switches.last() != Some(&node) {
+            self.switches.push(node);
+        }
+    }
 }
 
 /// A routine that changes more data outside than this may as well change anything.
@@ -117,23 +142,37 @@ impl Symbols {
                 }
             }
         }
+        self.interrupts = self.routines.iter().map(|routine| routine.head.kind == Syntax::Trap).collect();
+        for found in &all {
+            for &routine in &found.interrupts {
+                self.interrupts[routine as usize] = true;
+            }
+            self.everything = self.everything.or(found.sets);
+            self.cycles |= found.cycles;
+        }
         self.settle_reaches(&all);
-        self.settle_volatile(trees);
+        self.settle_volatile(trees, &all);
         let mut called = vec![false; all.len()];
         for &routine in all.iter().flat_map(|found| &found.calls) {
             called[self.routines[routine as usize].unit as usize] = true;
         }
         for (at, found) in all.into_iter().enumerate() {
-            let quiet = found.switches.is_empty();
+            let quiet = match self.units[at].routine {
+                Some(routine) => self.routines[routine as usize].reach.sets == States::NONE,
+                None => found.switches.is_empty(),
+            };
             self.ends.push(if quiet { Ends::AsItBegins } else { Ends::Set { called: called[at] } });
             self.switches.push(found.switches);
+            let sets = found.late.iter().map(|&routine| self.routines[routine as usize].reach.sets);
+            self.late_sets.push(sets.fold(States::NONE, States::or));
+            self.late.push(found.late);
         }
     }
 
     fn gone_through(&self, trees: &[RapidTree<'_>]) -> Vec<Found> {
         let found = |&unit: &Unit| {
-            let tree = &trees[unit.file as usize];
-            self.found(tree, unit, unit.node + 1..unit.node + tree.nodes[unit.node as usize].size)
+            let nodes = unit.node + 1..unit.node + trees[unit.file as usize].nodes[unit.node as usize].size;
+            self.found(trees, unit, nodes)
         };
         self.units.iter().map(found).collect()
     }
@@ -236,7 +275,8 @@ impl Symbols {
     }
 
     /// What the statements of some nodes do by themselves.
-    fn found(&self, tree: &RapidTree<'_>, unit: Unit, nodes: Range<u32>) -> Found {
+    fn found(&self, trees: &[RapidTree<'_>], unit: Unit, nodes: Range<u32>) -> Found {
+        let tree = &trees[unit.file as usize];
         let mut found = Found::default();
         let mut node = nodes.start;
         while node < nodes.end {
@@ -254,33 +294,120 @@ impl Symbols {
                 self.changed_by(tree, unit.scope, node, &mut |change| found.changes.push(change));
             }
             match kind {
-                Syntax::LateCall => (found.unknown, found.moves) = (true, true),
-                Syntax::Call | Syntax::Function => {
-                    let name = tree.text(tree.nodes[node as usize].first);
-                    if kind == Syntax::Call && self.is_motion(unit.scope, name) {
-                        found.moves = true;
-                        node += 1;
-                        continue;
-                    }
-                    let routine = self.routine(unit.scope, name);
-                    if kind == Syntax::Call && (routine.is_some() || setting(tree, node, name).is_some()) {
-                        found.switches.push(node);
-                    }
-                    if let Some(routine) = routine {
-                        found.calls.push(routine);
-                    } else if predefined::effect(name).is_none() {
-                        (found.unknown, found.moves) = (true, true);
-                    } else if name.eq_ignore_ascii_case(b"SetAllDataVal")
-                        || name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none()
-                    {
-                        found.by_name = true;
-                    }
+                Syntax::LateCall => {
+                    let name = parts(tree, node).nth(1);
+                    self.found_late(trees, tree, (node, name), &mut found);
                 }
+                Syntax::Call | Syntax::Function => self.found_call(trees, unit, (node, kind), &mut found),
                 _ => {}
             }
             node += 1;
         }
+        found.late.sort_unstable();
+        found.late.dedup();
         found
+    }
+
+    /// A call or function that does more than move the robot.
+    fn found_call(
+        &self,
+        trees: &[RapidTree<'_>],
+        unit: Unit,
+        (node, kind): (u32, Syntax),
+        found: &mut Found,
+    ) {
+        let tree = &trees[unit.file as usize];
+        let name = tree.text(tree.nodes[node as usize].first);
+        let is_call = kind == Syntax::Call;
+        if let Some((which, on)) = if is_call { setting(tree, node, name) } else { None } {
+            found.switch(node);
+            found.sets = found.sets.or(States::NONE.set(which, on));
+        }
+        if is_call && self.is_motion(unit.scope, name) {
+            found.moves = true;
+            if instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].also == Also::Calls) {
+                let name = arguments(tree, node).filter(|argument| !argument.optional).last();
+                let named = self.named_by(trees, tree, (name.and_then(|name| name.value), 0, false));
+                found.interrupts.extend(named);
+            }
+            return;
+        }
+        match self.routine(unit.scope, name) {
+            Some(routine) => {
+                found.switch(node);
+                found.calls.push(routine);
+            }
+            None if is_call && predefined::calls_by_name(name) => {
+                let name = arguments(tree, node).find(|argument| !argument.optional);
+                self.found_late(trees, tree, (node, name.and_then(|name| name.value)), found);
+            }
+            None if predefined::effect(name).is_none() => (found.unknown, found.moves) = (true, true),
+            None => {
+                found.moves |= predefined::displaces(name).is_some();
+                found.cycles |= predefined::begins_cycle(name);
+                found.waits |= predefined::waits(name);
+                found.by_name |= name.eq_ignore_ascii_case(b"SetAllDataVal")
+                    || name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none();
+            }
+        }
+    }
+
+    /// A call by a computed name.
+    fn found_late(
+        &self,
+        trees: &[RapidTree<'_>],
+        tree: &RapidTree<'_>,
+        (node, name): (u32, Option<Child>),
+        found: &mut Found,
+    ) {
+        (found.unknown, found.moves) = (true, true);
+        found.switch(node);
+        // CallByVar adds a number to the name that it is given.
+        let numbered = tree.nodes[node as usize].kind == Syntax::Call;
+        let given = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let given = if numbered { 0 } else { given };
+        found.late.extend(self.named_by(trees, tree, (name, given, numbered)));
+    }
+
+    /// The procedures of the files that take so many required arguments and may have a name that an expression of text
+    /// tells: wholly, or by how it begins and ends; `numbered` where a number is added to it.
+    fn named_by(
+        &self,
+        trees: &[RapidTree<'_>],
+        tree: &RapidTree<'_>,
+        (name, given, numbered): (Option<Child>, usize, bool),
+    ) -> Vec<u32> {
+        let text = |part: Child| match part {
+            Child::Token(token) if tree.kind(token) == Some(Token::String) => {
+                let text = tree.text(token);
+                text.get(1..text.len() - 1).map(folded)
+            }
+            _ => None,
+        };
+        let (mut begins, mut ends, mut whole) = (None, None, false);
+        match name {
+            Some(Child::Node(node)) if tree.nodes[node as usize].kind == Syntax::Binary => {
+                begins = parts(tree, node).next().and_then(text);
+                ends = parts(tree, node).last().and_then(text).filter(|_| !numbered);
+            }
+            Some(part) => {
+                begins = text(part);
+                whole = begins.is_some() && !numbered;
+            }
+            None => {}
+        }
+        let (begins, ends) = (begins.unwrap_or_default(), ends.unwrap_or_default());
+        let fits = |routine: &super::RoutineScope| {
+            let name = folded(trees[routine.file as usize].text(routine.head.name));
+            let module: Vec<u8> = routine.module.bytes().map(fold).collect();
+            let full = [&module[..], b":", &name[..]].concat();
+            let told = |name: &[u8]| {
+                if whole { *name == begins[..] } else { name.starts_with(&begins) && name.ends_with(&ends) }
+            };
+            let required = routine.head.parameters.iter().filter(|parameter| !parameter.optional).count();
+            routine.head.kind == Syntax::Proc && required == given && (told(&name) || told(&full))
+        };
+        (0..).zip(&self.routines).filter(|(_, routine)| fits(routine)).map(|(at, _)| at).collect()
     }
 
     /// Whether a call by this name is a motion instruction of the table.
@@ -291,7 +418,7 @@ impl Symbols {
     /// Whether a call is a motion instruction that writes no argument: nearly every statement of a long program is one.
     pub fn moves_only(&self, tree: &RapidTree<'_>, scope: u32, node: u32) -> bool {
         let name = tree.text(tree.nodes[node as usize].first);
-        instruction::find(name).is_some_and(|known| !INSTRUCTIONS[known].searches())
+        instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].only_moves())
             && !(self.hides_instruction && self.routine(scope, name).is_some())
     }
 
@@ -301,7 +428,13 @@ impl Symbols {
             let Some(routine) = unit.routine else { continue };
             let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
             let changes = found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
-            let mut reach = Reach { changes, anything: found.unknown, moves: found.moves };
+            let mut reach = Reach {
+                changes,
+                anything: found.unknown,
+                moves: found.moves,
+                waits: found.waits,
+                sets: found.sets,
+            };
             reach.settle();
             self.routines[routine as usize].reach = reach;
         }
@@ -310,18 +443,24 @@ impl Symbols {
             for &unit in &self.callees_first {
                 let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
-                let before = (reach.changes.len(), reach.anything, reach.moves);
+                let before = (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.sets);
+                for &called in &all[unit as usize].late {
+                    reach.sets = reach.sets.or(self.routines[called as usize].reach.sets);
+                }
                 for &called in &all[unit as usize].calls {
                     let other = &self.routines[called as usize].reach;
                     reach.anything |= other.anything;
                     reach.moves |= other.moves;
+                    reach.waits |= other.waits;
+                    reach.sets = reach.sets.or(other.sets);
                     reach.changes.extend_from_slice(&other.changes);
                     if reach.changes.len() > 4 * REACH {
                         reach.settle();
                     }
                 }
                 reach.settle();
-                grown |= before != (reach.changes.len(), reach.anything, reach.moves);
+                grown |=
+                    before != (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.sets);
                 self.routines[routine as usize].reach = reach;
             }
             if !grown {
@@ -330,9 +469,11 @@ impl Symbols {
         }
     }
 
-    /// Data that a trap routine, or an error handler that goes back to the statements, may change at any time.
-    fn settle_volatile(&mut self, trees: &[RapidTree<'_>]) {
-        let mut changes: Vec<u32> = Vec::new();
+    /// Data that a trap routine, an error handler that goes back to the statements, or the controller may change at any
+    /// time.
+    fn settle_volatile(&mut self, trees: &[RapidTree<'_>], all: &[Found]) {
+        let later = all.iter().flat_map(|found| &found.changes).filter(|change| change.how == How::Later);
+        let mut changes: Vec<u32> = later.map(|change| change.symbol).collect();
         let mut anything = false;
         let mut take = |reach: &Reach| {
             changes.extend_from_slice(&reach.changes);
@@ -340,21 +481,19 @@ impl Symbols {
         };
         for unit in &self.units {
             let Some(routine) = unit.routine else { continue };
-            if self.routines[routine as usize].head.kind == Syntax::Trap {
+            if self.interrupts[routine as usize] {
                 take(&self.routines[routine as usize].reach);
                 continue;
             }
             let tree = &trees[unit.file as usize];
             for clause in tree.child_nodes(unit.node) {
                 let end = clause + tree.nodes[clause as usize].size;
-                if tree.nodes[clause as usize].kind != Syntax::ErrorClause
-                    || !(clause..end).any(|node| goes_back(tree, node))
-                {
+                if !resumes(tree, clause) {
                     continue;
                 }
-                let found = self.found(tree, *unit, clause + 1..end);
-                let own = found.changes.iter().map(|change| change.symbol).collect();
-                take(&Reach { changes: own, anything: found.unknown, moves: false });
+                let found = self.found(trees, *unit, clause + 1..end);
+                let changes = found.changes.iter().map(|change| change.symbol).collect();
+                take(&Reach { changes, anything: found.unknown, ..Reach::default() });
                 for called in found.calls {
                     take(&self.routines[called as usize].reach);
                 }
@@ -393,6 +532,10 @@ impl Symbols {
                 let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident));
                 give(name.and_then(|name| self.root(tree, scope, name)), How::Whole);
             }
+            Syntax::Connect => {
+                let name = parts(tree, node).find(|&part| token_kind(tree, part) != Some(Token::Connect));
+                give(name.and_then(|name| self.root(tree, scope, name)), How::Whole);
+            }
             Syntax::Call | Syntax::Function => {
                 let name = tree.text(tree.nodes[node as usize].first);
                 self.changed_by_call(tree, scope, (node, name), &mut give);
@@ -415,8 +558,8 @@ impl Symbols {
     ) {
         let is_call = tree.nodes[node as usize].kind == Syntax::Call;
         let known = if is_call { instruction::find(name).map(|known| &INSTRUCTIONS[known]) } else { None };
-        // Only searches write an argument.
-        if !self.hides_instruction && known.is_some_and(|known| !known.searches()) {
+        // Nearly all motions write none.
+        if !self.hides_instruction && known.is_some_and(Instruction::only_moves) {
             return;
         }
         let root = |argument: &Argument| self.root(tree, scope, argument.value?);
@@ -446,6 +589,12 @@ impl Symbols {
             {
                 give(root(&argument), How::Whole);
             }
+            for argument in arguments(tree, node).filter(|argument| argument.optional) {
+                let returned = |name: u32| tree.text(name).get(..3).is_some_and(|n| same_name(n, b"Ret"));
+                if known.also == Also::Returns && argument.name.is_some_and(returned) {
+                    give(root(&argument), How::Whole);
+                }
+            }
             return;
         }
         match predefined::effect(name) {
@@ -453,7 +602,11 @@ impl Symbols {
                 if name.eq_ignore_ascii_case(b"SetDataVal")
                     && let Some(named) = named(tree, node)
                 {
-                    give(self.find(scope, named), How::Whole);
+                    // With \Block it may be the data of another module or routine.
+                    let key = folded(named);
+                    for found in self.scopes.iter().filter_map(|scope| scope.names.get(&key)) {
+                        give(Some(*found), How::Whole);
+                    }
                 }
             }
             Some(Effect::Writes(written)) => {
@@ -470,7 +623,7 @@ impl Symbols {
                         }
                     };
                     if writes {
-                        give(root(&argument), How::Whole);
+                        give(root(&argument), if written.later { How::Later } else { How::Whole });
                     }
                 }
             }
@@ -518,8 +671,18 @@ fn named<'s>(tree: &RapidTree<'s>, call: u32) -> Option<&'s [u8]> {
     (tree.kind(token) == Some(Token::String)).then(|| &text[1..text.len() - 1])
 }
 
+/// Whether a clause is an error handler that goes back to the statements.
+pub(in crate::program::rapid) fn resumes(tree: &RapidTree<'_>, clause: u32) -> bool {
+    let end = clause + tree.nodes[clause as usize].size;
+    tree.nodes[clause as usize].kind == Syntax::ErrorClause && (clause..end).any(|node| goes_back(tree, node))
+}
+
 /// Whether a statement goes from an error handler back to the statements.
 fn goes_back(tree: &RapidTree<'_>, node: u32) -> bool {
-    tree.nodes[node as usize].kind == Syntax::Leave
-        && matches!(tree.kind(tree.nodes[node as usize].first), Some(Token::Retry | Token::TryNext))
+    let first = tree.nodes[node as usize].first;
+    match tree.nodes[node as usize].kind {
+        Syntax::Leave => matches!(tree.kind(first), Some(Token::Retry | Token::TryNext)),
+        Syntax::Call => predefined::retries(tree.text(first)),
+        _ => false,
+    }
 }

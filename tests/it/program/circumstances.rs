@@ -1,0 +1,532 @@
+//! What holds where a motion runs: switches and data that other ways, other routines or the controller may change.
+
+use truegrind::program::motion::{Reason, TargetValue};
+use truegrind::program::rapid::Task;
+
+const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+const GO: &str = "MoveL p,v100,fine,tool0;\n";
+const SET: &str = "PDispSet [[0,0,10],[1,0,0,0]];\n";
+const LEFT: Option<Reason> = Some(Reason::Displacement);
+
+/// A module with a target `p`, some numbers, and these routines.
+fn module(routines: &str) -> String {
+    format!(
+        "MODULE M\nCONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nVAR num n;\nVAR num m:=1;\n\
+         VAR intnum i;\n{routines}\nENDMODULE\n"
+    )
+}
+
+/// Each motion of a module with these routines: its routine and why it is left.
+fn left(routines: &str) -> Vec<(String, Option<Reason>)> {
+    let source = module(routines);
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let routine = |index: Option<u32>| task.listing.routines[index.unwrap() as usize].name.clone();
+    task.listing.motions.iter().map(|motion| (routine(motion.routine), motion.reason())).collect()
+}
+
+/// Why the motions of one routine are left.
+fn of(name: &str, routines: &str) -> Vec<Option<Reason>> {
+    left(routines).into_iter().filter(|(routine, _)| routine == name).map(|(_, reason)| reason).collect()
+}
+
+/// Whether each motion of main has a known motion before it.
+fn follows(body: &str) -> Vec<bool> {
+    let source = module(&format!("PROC main()\n{body}\nENDPROC"));
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    task.listing.motions.iter().map(|motion| motion.previous.is_some()).collect()
+}
+
+/// The heights of the motions of main above 300 mm, or why they are not known.
+fn heights(body: &str, more: &str) -> Vec<Result<f64, Reason>> {
+    let source = module(&format!("{more}\nPROC main()\n{body}\nENDPROC"));
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let main = task.listing.routines.iter().position(|routine| routine.name == "main").unwrap() as u32;
+    let motions = task.listing.motions.iter().filter(|motion| motion.routine == Some(main));
+    motions
+        .map(|motion| match motion.to().unwrap().value {
+            Ok(TargetValue::Cartesian(target)) => Ok(target.position_mm[2] - 300.0),
+            Ok(TargetValue::Joint(_)) => panic!("{source}"),
+            Err(reason) => Err(reason),
+        })
+        .collect()
+}
+
+#[test]
+fn what_a_computed_name_may_call_begins_with_the_switches_as_they_stand_there() {
+    let one = |call: &str| {
+        let main = format!("PROC main()\nproc1;\n{SET}{call}\nPDispOff;\nENDPROC\n");
+        of("proc1", &format!("{main}PROC proc1()\n{GO}ENDPROC\nPROC other()\n{GO}ENDPROC"))
+    };
+    for call in [
+        "%\"proc\"+ValToStr(1)%;",
+        "%\"proc1\"%;",
+        "%\"PROC1\"%;",
+        "%\"M:proc1\"%;",
+        "%name%;",
+        "CallByVar \"proc\",1;",
+        "CallByVar name,n;",
+        "%name% 5;",
+        "elsewhere;",
+    ] {
+        assert_eq!(one(call), [LEFT], "{call}");
+    }
+    // Not by a name that begins otherwise, where it means a routine that is known.
+    for call in ["%\"oth\"+ValToStr(1)%;", "%\"other\"%;", "CallByVar \"oth\",1;", "TPWrite \"x\";"] {
+        assert_eq!(one(call), [None], "{call}");
+    }
+    // Every switch, not the displacement alone.
+    let switched = |on: &str, off: &str| {
+        let main = format!("PROC main()\nproc1;\n{on}\n%\"proc\"+x%;\n{off}\nENDPROC\n");
+        of("proc1", &format!("{main}PROC proc1()\n{GO}ENDPROC"))
+    };
+    assert_eq!(switched("EOffsSet [1,0,0,0,0,0];", "EOffsOff;"), [LEFT]);
+    assert_eq!(switched("SyncMoveOn s,t;", "SyncMoveOff s;"), [Some(Reason::Synchronised)]);
+    assert_eq!(switched("SoftAct 1,50;", "SoftDeact;"), [Some(Reason::SensorGuided)]);
+    assert_eq!(switched("ConfL\\Off;", "ConfL\\On;"), [None]);
+    // And what it may call may leave them set.
+    let after = |call: &str| {
+        of("main", &format!("PROC main()\n{GO}{call}\n{GO}PDispOff;\nENDPROC\nPROC proc1()\n{SET}ENDPROC"))
+    };
+    assert_eq!(after("%\"proc\"+x%;"), [None, LEFT]);
+    assert_eq!(after("CallByVar \"proc\",n;"), [None, LEFT]);
+    assert_eq!(after("%\"other\"+x%;"), [None, None]);
+}
+
+#[test]
+fn a_trap_routine_may_set_a_switch_before_any_statement() {
+    let main = format!("PROC main()\n{GO}{GO}ENDPROC\n");
+    assert_eq!(of("main", &format!("{main}TRAP t\n{SET}ENDTRAP")), [LEFT, LEFT]);
+    assert_eq!(of("main", &format!("{main}TRAP t\nsets;\nENDTRAP\nPROC sets()\n{SET}ENDPROC")), [LEFT, LEFT]);
+    // One that ends as it begins does not; one that ends a displacement does where there is one.
+    let passes = format!("TRAP t\n{GO}ENDTRAP\n");
+    assert_eq!(of("main", &format!("{main}{passes}")), [None, None]);
+    let ends = "TRAP t\nPDispOff;\nENDTRAP\n";
+    assert_eq!(of("main", &format!("{main}{ends}")), [None, None]);
+    assert_eq!(of("main", &format!("PROC main()\n{SET}{GO}PDispOff;\n{GO}ENDPROC\n{ends}")), [LEFT, None]);
+    // It begins in any state; as does a procedure that is called while the robot moves.
+    let displaced = format!("PROC main()\n{SET}WaitTime 1;\nPDispOff;\nENDPROC\n");
+    assert_eq!(of("t", &format!("{displaced}{passes}")), [LEFT]);
+    let sync = "MoveLSync p,v100,z10,tool0,\"passes\";\n";
+    let passes = format!("PROC passes()\n{GO}ENDPROC");
+    assert_eq!(
+        of("passes", &format!("PROC main()\npasses;\n{SET}{sync}PDispOff;\nENDPROC\n{passes}")),
+        [LEFT]
+    );
+    let sets = format!("PROC main()\n{sync}{GO}ENDPROC\nPROC passes()\n{SET}ENDPROC");
+    assert_eq!(of("main", &sets), [LEFT, LEFT]);
+}
+
+#[test]
+fn the_next_cycle_begins_as_this_one_ends() {
+    let main = |end: &str| of("main", &format!("PROC main()\n{GO}{SET}{GO}{end}\nENDPROC"));
+    assert_eq!(main("PDispOff;"), [None, None]);
+    assert_eq!(main(""), [LEFT, None]);
+    assert_eq!(main("RETURN;\nPDispOff;"), [LEFT, None]);
+    assert_eq!(main("IF di1=1 ExitCycle;\nPDispOff;"), [LEFT, None]);
+    assert_eq!(main("PDispOff;\nIF di1=1 ExitCycle;"), [None, None]);
+    // From a routine that is called, from a trap routine, and through what UNDO sets.
+    let called =
+        format!("PROC main()\n{GO}{SET}leave;\nPDispOff;\nENDPROC\nPROC leave()\nExitCycle;\nENDPROC");
+    assert_eq!(of("main", &called), [LEFT]);
+    let trap = format!("PROC main()\n{GO}{SET}WaitTime 1;\nPDispOff;\nENDPROC\nTRAP t\nExitCycle;\nENDTRAP");
+    assert_eq!(of("main", &trap), [LEFT]);
+    let undo = format!("PROC main()\n{GO}leave;\nENDPROC\nPROC leave()\nExitCycle;\nUNDO\n{SET}ENDPROC");
+    assert_eq!(of("main", &undo), [LEFT]);
+    // Nothing follows it.
+    assert_eq!(main("IF n=1 THEN\nPDispOff;\nExitCycle;\nENDIF\nPDispOff;"), [None, None]);
+    // A variable of main may be as it was; without ExitCycle it has its initial value.
+    let local = |end: &str| {
+        heights(&format!("VAR num k:=1;\nMoveL Offs(p,0,0,k),v100,fine,tool0;\nk:=2;\n{end}"), "")
+    };
+    assert_eq!(local(""), [Ok(1.0)]);
+    assert_eq!(local("IF n=1 ExitCycle;"), [Err(Reason::RunTimeOffset)]);
+}
+
+#[test]
+fn whatever_goes_back_from_an_error_handler_makes_data_and_switches_uncertain() {
+    for back in ["RETRY;", "TRYNEXT;", "StartMoveRetry;", "IF n=1 StartMoveRetry;\nRAISE;"] {
+        let body = format!(
+            "m:=2;\nMoveL Offs(p,0,0,m),v100,fine,tool0;\nWaitTime 1;\nMoveL Offs(p,0,0,m),v100,fine,tool0;\n\
+             ERROR\nm:=3;\n{back}"
+        );
+        assert_eq!(heights(&body, ""), [Err(Reason::RunTimeOffset); 2], "{back}");
+    }
+    let body = "m:=2;\nMoveL Offs(p,0,0,m),v100,fine,tool0;\nERROR\nm:=3;\nRAISE;";
+    assert_eq!(heights(body, ""), [Ok(2.0)]);
+    // What is called may have stopped where a displacement is on, and goes on after its call.
+    let through = |clause: &str| {
+        let main = format!("PROC main()\ncalled;\n{GO}PDispOff;\n{clause}\nENDPROC\n");
+        of("main", &format!("{main}PROC called()\n{SET}{GO}PDispOff;\nENDPROC"))
+    };
+    assert_eq!(through("ERROR\nTRYNEXT;"), [LEFT]);
+    assert_eq!(through("ERROR\nStartMoveRetry;"), [LEFT]);
+    assert_eq!(through("ERROR\nRAISE;"), [None]);
+    assert_eq!(through(""), [None]);
+    // A handler that comes to its end ends the routine as it leaves the switches.
+    let ends = format!("PROC main()\ncalled;\n{GO}ENDPROC\nPROC called()\n{GO}ERROR\n{SET}ENDPROC");
+    assert_eq!(of("main", &ends), [LEFT]);
+}
+
+#[test]
+fn functions_set_switches_like_procedures() {
+    let sets = format!("FUNC num sets()\n{SET}RETURN 1;\nENDFUNC");
+    for statement in
+        ["n:=sets();", "IF sets()=1 n:=1;", "TPWrite \"x\"\\Num:=sets();", "WHILE sets()=2 DO\nENDWHILE"]
+    {
+        let main = format!("PROC main()\n{GO}{statement}\n{GO}PDispOff;\nENDPROC\n");
+        assert_eq!(of("main", &format!("{main}{sets}")), [None, LEFT], "{statement}");
+    }
+    let moves = format!("FUNC num moves()\n{GO}RETURN 1;\nENDFUNC");
+    let main = format!("PROC main()\nn:=moves();\n{SET}n:=moves();\nPDispOff;\nENDPROC\n");
+    assert_eq!(of("moves", &format!("{main}{moves}")), [LEFT]);
+}
+
+#[test]
+fn a_routine_that_nothing_calls_begins_as_others_end() {
+    let weld = format!("PROC weld()\n{GO}ENDPROC\n");
+    let search = |end: &str| format!("PROC search()\n{GO}{SET}{GO}{end}\nENDPROC\n");
+    assert_eq!(of("weld", &format!("{weld}{}", search("PDispOff;"))), [None]);
+    assert_eq!(of("search", &format!("{weld}{}", search("PDispOff;"))), [None, None]);
+    assert_eq!(of("weld", &format!("{weld}{}", search(""))), [LEFT]);
+    // Called from outside too, where main is in none of the files.
+    let calls = "PROC calls()\nweld;\nENDPROC\n";
+    assert_eq!(of("weld", &format!("{weld}{calls}{}", search(""))), [LEFT]);
+    assert_eq!(of("weld", &format!("LOCAL {weld}{calls}{}", search(""))), [LEFT]);
+    let main = "PROC main()\nweld;\nsearch;\nPDispOff;\nENDPROC\n";
+    assert_eq!(of("weld", &format!("{weld}{main}{}", search(""))), [None]);
+}
+
+#[test]
+fn routines_that_call_themselves_change_no_more_than_they_say() {
+    let main = format!("PROC main()\n{GO}a 3;\n{GO}ENDPROC\n");
+    let own = format!("{main}PROC a(num k)\nIF k>0 a k-1;\n{GO}ENDPROC");
+    assert_eq!(left(&own), ["main", "main", "a"].map(|name| (name.to_owned(), None)));
+    let others = format!("{main}PROC a(num k)\nIF k>0 b k-1;\n{GO}ENDPROC\nPROC b(num k)\na k;\n{GO}ENDPROC");
+    assert_eq!(left(&others), ["main", "main", "a", "b"].map(|name| (name.to_owned(), None)));
+    let sets = format!("{main}PROC a(num k)\nIF k>0 a k-1;\n{SET}ENDPROC");
+    assert_eq!(of("main", &sets), [LEFT, LEFT]);
+    // Round about, and called by nothing.
+    let alone = format!("PROC a()\nb;\n{GO}ENDPROC\nPROC b()\na;\n{GO}ENDPROC");
+    assert_eq!(left(&alone), ["a", "b"].map(|name| (name.to_owned(), None)));
+    // Longer chains than are followed.
+    let chain: String = (0..40).map(|k| format!("PROC c{k}()\nc{};\n{GO}ENDPROC\n", k + 1)).collect();
+    let found = left(&format!("PROC main()\nc0;\n{GO}ENDPROC\n{chain}PROC c40()\n{GO}ENDPROC"));
+    assert!(found.len() == 42 && found.iter().all(|(_, reason)| reason.is_none()), "{found:?}");
+}
+
+#[test]
+fn after_what_moves_the_robot_elsewhere_no_motion_is_known_to_end_where_the_next_begins() {
+    let after = |statement: &str| *follows(&format!("{GO}{statement}\n{GO}")).last().unwrap();
+    for statement in
+        ["WaitTime 1;", "StopMove;\nStartMove;", "GripLoad load0;", "STClose gun1,1000,3;", "ConfL\\Off;"]
+    {
+        assert!(after(statement), "{statement}");
+    }
+    for statement in [
+        "EGMRunPose id,EGM_STOP_HOLD\\x;",
+        "EGMRunJoint id,EGM_STOP_HOLD\\J1;",
+        "FCRefStart;\nFCRefStop;",
+        "FCAct tool0;\nFCDeact;",
+        "LoadId TOOL_LOAD_ID,MASS_WITH_AX3,tool0;",
+        "SetLeadThrough\\On;",
+        "StopMove;\nClearPath;\nStartMove;",
+        "StorePath;\nRestoPath;",
+        "StepBwdPath 30,1;",
+        "PathRecMoveBwd;",
+        "IndAMove Station_A,2\\ToAbsNum:=3,20;",
+        "ArcRepL\\Start,layer,v100,seam1,weld1,weave1,z10,tool0;",
+        "ContactL p,v100,tool0;",
+        "SearchL di1,q,p,v100,tool0;",
+        "CSSAct CSS_X;\nCSSDeact;",
+        "unknown;",
+    ] {
+        assert!(!after(statement), "{statement}");
+    }
+    let listed = |statement: &str| of("main", &format!("PROC main()\n{statement}\nENDPROC"));
+    assert_eq!(listed("EGMRunPose id,EGM_STOP_HOLD\\x;"), [Some(Reason::SensorGuided)]);
+    assert_eq!(listed("StepBwdPath 30,1;"), [Some(Reason::NoTarget)]);
+    assert_eq!(listed("IndCMove Station_A,2,20;"), [Some(Reason::NoTarget)]);
+    assert_eq!(listed("ClearPath;"), []);
+    // A motion of its own.
+    assert_eq!(listed("CSSDeactMoveL p,v10,tool0;"), [None]);
+    // Corrections reach the motions with \Corr alone.
+    let corrected = listed("CorrCon c;\nMoveL p,v10,fine,tool0;\nMoveL p,v10,fine,tool0\\Corr;");
+    assert_eq!(corrected, [None, Some(Reason::SensorGuided)]);
+    let soft =
+        listed("CSSAct CSS_X;\nMoveL p,v10,fine,tool0;\nCSSDeactMoveL p,v10,tool0;\nMoveL p,v10,fine,tool0;");
+    assert_eq!(soft, [Some(Reason::SensorGuided), Some(Reason::SensorGuided), None]);
+}
+
+#[test]
+fn targets_of_every_form_are_seen_where_an_instruction_is_not_known() {
+    let data = "CONST robtarget table{2,2}:=[[p,p],[p,p]];\nRECORD part\nrobtarget at;\nnum k;\nENDRECORD\nVAR part a;\n\
+         VAR part many{3};\nALIAS robtarget place;\nVAR place elsewhere;\nVAR jointtarget j;\nVAR pose frame;\n\
+         FUNC robtarget own(num k)\nRETURN p;\nENDFUNC\nFUNC num size(robtarget t)\nRETURN 1;\nENDFUNC";
+    let listed = |argument: &str| {
+        of("main", &format!("{data}\nPROC main()\nGlide {argument},v100,tool0;\nENDPROC")).first().copied()
+    };
+    for argument in [
+        "table{1,2}",
+        "a.at",
+        "many{n}.at",
+        "elsewhere",
+        "j",
+        "own(1)",
+        "(p)",
+        "((p))",
+        "CRobT()",
+        "CJointT()",
+        "ORobT(p)",
+        "MirPos(p,w)",
+        "CalcRobT(j,tool0)",
+        "Offs(p,0,0,n)",
+        "[p.trans,p.rot,p.robconf,p.extax]",
+        "[[1,2,n],p.rot,[0,0,0,0],p.extax]",
+        "[[0,0,0,0,n,0],j.extax]",
+        "\\At:=a.at",
+    ] {
+        assert_eq!(listed(argument), Some(Some(Reason::UnknownInstruction)), "{argument}");
+    }
+    for argument in
+        ["table", "a", "many", "a.k", "p.trans", "frame", "size(p)", "[1,2]", "[[0,0,0],[1,0,0,0]]", "n"]
+    {
+        assert_eq!(listed(argument), None, "{argument}");
+    }
+}
+
+#[test]
+fn what_the_controller_writes_later_is_never_known() {
+    let after = |statement: &str| {
+        heights(&format!("m:=2;\n{statement}\nm:=3;\nMoveL Offs(p,0,0,m),v100,fine,tool0;"), "")
+            .pop()
+            .unwrap()
+    };
+    let left = Err(Reason::RunTimeOffset);
+    assert_eq!(after("IVarValue \"s:\",8,m,i;"), left);
+    assert_eq!(after("SiGetCyclic device,m,40;"), left);
+    assert_eq!(after("IVarValue \"s:\",m,n,i;"), Ok(3.0));
+    // At once, by arguments that are read at a glance.
+    let at_once = |statement: &str| {
+        heights(&format!("m:=2;\n{statement}\nMoveL Offs(p,0,0,m),v100,fine,tool0;"), "").pop().unwrap()
+    };
+    for statement in [
+        "STCalib gun1\\ToolChg\\RetTipWear:=m;",
+        "STClose gun1,1000,3\\RetThickness:=m;",
+        "ok:=STIsClosed(gun1\\RetThickness:=m);",
+        "name:=GetTaskName(\\TaskNo:=m);",
+        "frame:=DefAccFrame(a,b,4,n,m);",
+        "CONNECT m WITH t;",
+        "UnpackRawBytes raw,1,m\\Float4;",
+        "GetDataVal name,m;",
+        "ReadCfgData \"/a\",\"b\",m;",
+        "SocketReceive socket\\Data:=m;",
+        "SetDataVal \"M\",n;",
+    ] {
+        assert_eq!(at_once(statement), left, "{statement}");
+    }
+    for statement in
+        ["STClose gun1,m,3;", "WriteVar \"s:\",8,m;", "WaitTime m;", "SetBrush m;", "CallByVar \"q\",n;"]
+    {
+        let wanted = if statement.starts_with("CallByVar") { left } else { Ok(2.0) };
+        assert_eq!(at_once(statement), wanted, "{statement}");
+    }
+    // Data of another routine or module that has the name.
+    let there = "PROC there()\nVAR num k:=1;\nSetDataVal \"k\"\\Block:=b,n;\nENDPROC";
+    let local = "VAR num k:=1;\nhere:\nMoveL Offs(p,0,0,k),v100,fine,tool0;";
+    assert_eq!(heights(local, there), [left]);
+}
+
+#[test]
+fn a_parameter_by_reference_may_be_other_data_by_another_name() {
+    let twice = |body: &str| {
+        let routine = format!("PROC twice(INOUT num a,INOUT num b,num c)\n{body}\nENDPROC");
+        of("twice", &format!("{routine}\nPROC main()\ntwice m,m,m;\nENDPROC"))
+    };
+    let go = |name: &str| format!("MoveL Offs(p,0,0,{name}),v100,fine,tool0;\n");
+    let left = Some(Reason::RunTimeOffset);
+    assert_eq!(twice(&format!("a:=1;\n{}", go("a"))), [None]);
+    assert_eq!(twice(&format!("a:=1;\nb:=2;\n{}{}", go("a"), go("b"))), [left, None]);
+    assert_eq!(twice(&format!("a:=1;\nm:=2;\n{}{}", go("a"), go("m"))), [left, None]);
+    assert_eq!(twice(&format!("m:=1;\na:=2;\n{}{}", go("a"), go("m"))), [None, left]);
+    assert_eq!(twice(&format!("m:=1;\nIncr a;\n{}", go("m"))), [left]);
+    // One by value is its own.
+    assert_eq!(twice(&format!("c:=1;\nm:=2;\na:=3;\n{}", go("c"))), [None]);
+}
+
+#[test]
+fn functions_that_only_return_an_expression_are_worth_it() {
+    let functions = "FUNC robtarget above(num h\\num more)\nRETURN Offs(p,0,0,h);\nENDFUNC\n\
+        FUNC num double(num x)\nRETURN 2*x;\nENDFUNC\nFUNC num deep(num x)\nRETURN deep(x);\nENDFUNC\n\
+        FUNC num wide(num x)\nRETURN wide(x)+wide(x);\nENDFUNC\n\
+        FUNC num counted(num x)\nn:=n+1;\nRETURN x;\nENDFUNC\nFUNC num given(INOUT num x)\nRETURN x;\nENDFUNC\n\
+        FUNC num read()\nRETURN ReadNum(d);\nENDFUNC\nFUNC num opt(\\num x)\nRETURN x;\nENDFUNC\n\
+        FUNC num held()\nRETURN m;\nENDFUNC\nCONST num table{3,4}:=stop;";
+    let one = |body: &str, target: &str| {
+        heights(&format!("{body}\nMoveL {target},v100,fine,tool0;"), functions).pop().unwrap()
+    };
+    assert_eq!(one("", "above(5)"), Ok(5.0));
+    assert_eq!(one("", "above(h:=7)"), Ok(7.0));
+    assert_eq!(one("", "Offs(p,0,0,double(double(3)))"), Ok(12.0));
+    assert_eq!(one("n:=4;", "above(double(n))"), Ok(8.0));
+    assert_eq!(one("m:=6;", "above(held())"), Ok(6.0));
+    assert_eq!(one("m:=6;\nunknown;", "above(held())"), Err(Reason::RunTimeOffset));
+    assert_eq!(one("n:=ReadNum(d);", "above(n)"), Err(Reason::RunTimeOffset));
+    for number in ["deep(1)", "wide(1)", "counted(1)", "given(m)", "read()", "opt()"] {
+        assert_eq!(one("", &format!("Offs(p,0,0,{number})")), Err(Reason::RunTimeOffset), "{number}");
+    }
+    assert_eq!(one("", "nowhere(5)"), Err(Reason::RunTimeFunction));
+    // Dim, and what counts.
+    assert_eq!(one("", "Offs(p,0,0,Dim(table,1))"), Ok(3.0));
+    assert_eq!(one("", "Offs(p,0,0,Dim(table,2))"), Ok(4.0));
+    assert_eq!(one("", "Offs(p,0,0,Dim(table,3))"), Err(Reason::RunTimeOffset));
+    assert_eq!(one("n:=3;\nIncr n;\nAdd n,2;\nDecr n;", "Offs(p,0,0,n)"), Ok(5.0));
+    assert_eq!(one("Clear n;", "Offs(p,0,0,n)"), Ok(0.0));
+    assert_eq!(one("n:=ReadNum(d);\nIncr n;", "Offs(p,0,0,n)"), Err(Reason::RunTimeOffset));
+    assert_eq!(one("n:=3;\nAdd n,ReadNum(d);", "Offs(p,0,0,n)"), Err(Reason::RunTimeOffset));
+    assert_eq!(
+        one("n:=3;\nFOR k FROM 1 TO 2 DO\nIncr n;\nENDFOR", "Offs(p,0,0,n)"),
+        Err(Reason::RunTimeOffset)
+    );
+}
+
+#[test]
+fn chains_of_constants_end_soon_and_in_little_memory() {
+    let chain = |length: usize, kind: &str, each: &dyn Fn(usize) -> String| {
+        (0..length).map(|k| format!("CONST {kind} a{k}:={};\n", each(k + 1))).collect::<String>()
+    };
+    let sums = chain(20, "num", &|k| format!("a{k}+a{k}")) + "CONST num a20:=0.0001;";
+    let found = heights("MoveL Offs(p,0,0,a0),v100,fine,tool0;", &sums)[0].unwrap();
+    assert!((found - 104.8576).abs() < 1e-9, "{found}");
+    let sums = chain(60, "num", &|k| format!("a{k}+a{k}"));
+    assert!(heights("MoveL Offs(p,0,0,a0),v100,fine,tool0;", &sums)[0].is_err());
+    let lists = chain(60, "robtarget", &|k| format!("[a{k},a{k}]"));
+    assert!(heights("MoveL a0,v100,fine,tool0;", &lists)[0].is_err());
+    let lists = chain(30, "robtarget", &|k| format!("[a{k},a{k}]")) + "CONST num a30:=1;";
+    assert!(heights("MoveL a0,v100,fine,tool0;", &lists)[0].is_err());
+}
+
+#[test]
+fn a_displacement_between_two_programmed_points_is_told() {
+    let source = module(&format!(
+        "CONST robtarget there:=[[510,20,330],[0.70710678118654752,0,0,0.70710678118654752],[0,0,0,0],{EXT}];\n\
+         PROC main()\nPDispOn\\ExeP:=there,p,tool0;\n{GO}PDispOn\\Rot\\ExeP:=there,p,tool0;\n{GO}\
+         MoveL Offs(p,7,0,0),v100,fine,tool0;\nPDispOn\\Rot\\ExeP:=CRobT(),p,tool0;\n{GO}PDispOff;\nENDPROC"
+    ));
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let listing = &task.listing;
+    let found: Vec<_> = listing
+        .motions
+        .iter()
+        .map(|motion| {
+            motion.reason().map_or_else(
+                || {
+                    let object = listing.work_object(motion).unwrap().value.clone().unwrap();
+                    let told = motion.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+                    let pose = object.user_frame.pose() * object.object_frame.pose() * told;
+                    let turn = pose.rotation.angle().to_degrees();
+                    Ok((pose.translation.vector.map(|x| x.round()).into(), turn.round()))
+                },
+                Err,
+            )
+        })
+        .collect();
+    // Without Rot the points alone; with it what carries the one point into the other.
+    let wanted = [
+        Ok(([510.0, 20.0, 330.0], 0.0)),
+        Ok(([510.0, 20.0, 330.0], 90.0)),
+        Ok(([510.0, 27.0, 330.0], 90.0)),
+        Err(Reason::Displacement),
+    ];
+    assert_eq!(found, wanted);
+}
+
+#[test]
+fn the_variable_of_a_loop_is_not_data_of_the_same_name() {
+    let loops = "FOR m FROM 1 TO 3 DO\nWaitTime m;\nENDFOR\n";
+    let go = "MoveL Offs(p,0,0,m),v100,fine,tool0;\n";
+    let left = Some(Reason::RunTimeOffset);
+    let other = format!("PROC other()\n{go}ENDPROC\n");
+    // Assigned in a routine that has a loop with this name.
+    let main = format!("PROC main()\nm:=50;\n{loops}other;\nENDPROC\n");
+    assert_eq!(of("other", &format!("{other}{main}")), [left]);
+    // Within the loop never the data, even where that never changes.
+    for data in ["", "VAR num m:=7;\n", "CONST num m:=7;\n"] {
+        let main = format!("PROC main()\n{data}FOR m FROM 1 TO 3 DO\n{go}ENDFOR\nENDPROC");
+        assert_eq!(of("main", &main), [left], "{data}");
+    }
+    let fixed = "CONST num k:=7;\nPROC main()\nFOR k FROM 1 TO 3 DO\nMoveL Offs(p,0,0,k),v100,fine,tool0;\nENDFOR\nENDPROC\n\
+                 PROC other()\nMoveL Offs(p,0,0,k),v100,fine,tool0;\nENDPROC";
+    assert_eq!(of("main", fixed), [left]);
+    assert_eq!(of("other", fixed), [None]);
+}
+
+#[test]
+fn data_that_tasks_share_is_not_followed_past_a_wait() {
+    let after = |declared: &str, statement: &str| {
+        let body = format!("k:=2;\n{statement}\nMoveL Offs(p,0,0,k),v100,fine,tool0;");
+        heights(&body, &format!("{declared} num k:=1;")).pop().unwrap()
+    };
+    let left = Err(Reason::RunTimeOffset);
+    for wait in
+        ["WaitUntil flag;", "WaitTime 1;", "WaitDI di1,1;", "WaitSyncTask s,t;", "WaitTestAndSet flag;"]
+    {
+        assert_eq!(after("PERS", wait), left, "{wait}");
+        for own in ["LOCAL PERS", "TASK PERS", "VAR"] {
+            assert_eq!(after(own, wait), Ok(2.0), "{own} {wait}");
+        }
+    }
+    assert_eq!(after("PERS", "Set do1;"), Ok(2.0));
+    let waits = "PROC waits()\nWaitUntil flag;\nENDPROC\nPERS";
+    assert_eq!(after(waits, "waits;"), left);
+    let body = "k:=2;\nWHILE n<3 DO\nMoveL Offs(p,0,0,k),v100,fine,tool0;\nWaitTime 1;\nENDWHILE";
+    assert_eq!(heights(body, "PERS num k:=1;"), [left]);
+}
+
+#[test]
+fn nothing_is_put_before_what_hangs_on_its_own_path() {
+    let insertable = |statement: &str| {
+        let source = module(&format!("PROC main()\n{GO}{statement}\nENDPROC"));
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+        task.listing.motions.last().unwrap().insertable
+    };
+    for statement in [
+        "TriggL p,v100,t1\\T2:=t2,fine,tool0;",
+        "TriggJ p,v100,t1,fine,tool0;",
+        "TriggLIOs p,v100\\TriggData1:=tio,fine,tool0;",
+        "STriggL p,v100,t1,fine,tool0;",
+        "CapL p,v100,cd1,weave1,fine,tool0;",
+        "DispL\\On,p,v100,bead1,fine,tool0;",
+        "DispL\\Off,p,v100,bead1,fine,tool0;",
+        "ArcL\\On,p,v100,seam1,weld1,weave1,fine,tool0;",
+        "MoveL\\Conc,p,v100,fine,tool0;",
+        "MoveL p,v100\\T:=3,fine,tool0;",
+        "IF n=1 MoveL p,v100,fine,tool0;",
+    ] {
+        assert!(!insertable(statement), "{statement}");
+    }
+    for statement in [
+        "MoveL p,v100,fine,tool0;",
+        "DispL p,v100,bead1,fine,tool0;",
+        "ArcL p,v100,seam1,weld1,fine,tool0;",
+        "FCPressL p,v20,20,z1,tool0;",
+        "PaintL p,v100,z1,tool0;",
+        "MoveLDO p,v100,fine,tool0,do1,1;",
+    ] {
+        assert!(insertable(statement), "{statement}");
+    }
+}
+
+#[test]
+fn a_name_that_another_file_declares_is_said_to_be_so() {
+    assert_eq!(heights("MoveL Offs(p,0,0,-depth),v100,fine,tool0;", ""), [Err(Reason::Undeclared)]);
+    assert_eq!(heights("MoveL Offs(p,0,0,depth{2}),v100,fine,tool0;", ""), [Err(Reason::Undeclared)]);
+    assert_eq!(
+        heights("n:=ReadNum(d);\nMoveL Offs(p,0,0,n),v100,fine,tool0;", ""),
+        [Err(Reason::RunTimeOffset)]
+    );
+}
