@@ -10,3 +10,4 @@ mod circumstances;
 mod writing;
 mod edits;
 mod nc;
+mod modes;

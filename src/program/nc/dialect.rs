@@ -30,6 +30,11 @@ impl Dialect {
         }
     }
 
+    /// Whether X Y Z are the tip only under tool centre point control.
+    pub fn needs_tip(self) -> bool {
+        matches!(self, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain)
+    }
+
     /// Whether `( … )` is a comment.
     pub fn paren_comments(self) -> bool {
         matches!(self, Dialect::Iso | Dialect::Fanuc | Dialect::LinuxCnc)

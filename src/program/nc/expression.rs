@@ -279,7 +279,7 @@ impl<'r, 's> Reader<'r, 's> {
             Ok(second) => second,
             Err(reason) => return Ok(Err(reason)),
         };
-        Ok(first.and_then(|x| function(&name, x, second)))
+        Ok(first.and_then(|x| function(self.dialect, &name, x, second)))
     }
 
     /// Brackets whose content is not looked at, to the end of the line at most.
@@ -311,8 +311,11 @@ pub fn numbered(letter: u8, number: f64) -> Variable {
     name
 }
 
-/// The value of a number token; a comma is a point.
+/// The value of a number token; a comma is a point, EX of Siemens begins the exponent.
 pub fn literal(text: &[u8]) -> Option<f64> {
+    if let Some(at) = text.windows(2).position(|two| two.eq_ignore_ascii_case(b"EX")) {
+        return number::value(&[&text[..at], b"E", &text[at + 2..]].concat());
+    }
     match text.iter().position(|&byte| byte == b',') {
         Some(comma) => {
             let mut copy = text.to_vec();
@@ -328,7 +331,8 @@ const FUNCTIONS: [&[u8]; 17] = [
     b"LN", b"EXP", b"TRUNC", b"POT", b"SQR",
 ];
 
-fn function(name: &[u8], x: f64, second: Option<f64>) -> Worth {
+fn function(dialect: Dialect, name: &[u8], x: f64, second: Option<f64>) -> Worth {
+    let linux = dialect == Dialect::LinuxCnc;
     let value = match (name, second) {
         (b"SIN", None) => x.to_radians().sin(),
         (b"COS", None) => x.to_radians().cos(),
@@ -340,8 +344,11 @@ fn function(name: &[u8], x: f64, second: Option<f64>) -> Worth {
         (b"SQRT", None) => x.sqrt(),
         (b"ABS", None) => x.abs(),
         (b"ROUND", None) => x.round(),
-        (b"FIX", None) => x.floor(),
-        (b"FUP", None) => x.ceil(),
+        (b"FIX", None) if linux => x.floor(),
+        (b"FUP", None) if linux => x.ceil(),
+        // Fanuc cuts digits off, or goes away from 0.
+        (b"FIX", None) => x.trunc(),
+        (b"FUP", None) => x.signum() * x.abs().ceil(),
         (b"LN", None) => x.ln(),
         (b"EXP", None) => x.exp(),
         (b"TRUNC", None) => x.trunc(),

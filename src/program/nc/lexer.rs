@@ -121,7 +121,7 @@ fn quoted(rest: &[u8], mark: u8) -> usize {
 fn number(rest: &[u8], dialect: Dialect) -> usize {
     let digits = |from: usize| from + rest[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let whole = digits(0);
-    match rest.get(whole) {
+    let mantissa = match rest.get(whole) {
         Some(b'.') => digits(whole + 1),
         Some(b',')
             if dialect == Dialect::Heidenhain && rest.get(whole + 1).is_some_and(u8::is_ascii_digit) =>
@@ -129,7 +129,18 @@ fn number(rest: &[u8], dialect: Dialect) -> usize {
             digits(whole + 1)
         }
         _ => whole,
-    }
+    };
+    mantissa + if dialect == Dialect::Siemens { exponent(&rest[mantissa..]) } else { 0 }
+}
+
+/// The exponent of a Siemens number: EX with a sign or none, and digits.
+fn exponent(rest: &[u8]) -> usize {
+    let Some(after) = rest.get(..2).filter(|two| two.eq_ignore_ascii_case(b"EX")).map(|_| &rest[2..]) else {
+        return 0;
+    };
+    let sign = usize::from(matches!(after.first(), Some(b'+' | b'-')));
+    let digits = after[sign..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    if digits == 0 { 0 } else { 2 + sign + digits }
 }
 
 /// An address or a name.

@@ -62,6 +62,36 @@ pub(super) enum Group {
 
 pub(super) const GROUPS: u32 = 9;
 
+/// What makes coordinates others than those of the work frame; each is ended by words of its own.
+pub(super) mod transforms {
+    /// G16; G110 to G112 of Siemens.
+    pub(crate) const POLAR: u16 = 1;
+    /// G51, cycle 11 and 26.
+    pub(crate) const SCALE: u16 = 1 << 1;
+    /// G51.1, G101, cycle 8.
+    pub(crate) const MIRROR: u16 = 1 << 2;
+    /// G68, cycle 10.
+    pub(crate) const TURN: u16 = 1 << 3;
+    /// G68.2, G254, PLANE, cycle 19.
+    pub(crate) const TILT: u16 = 1 << 4;
+    /// TRANSMIT, TRACYL, TRAANG, G12.1, G7.1.
+    pub(crate) const KINEMATIC: u16 = 1 << 5;
+    /// CYCLE800.
+    pub(crate) const SWIVEL: u16 = 1 << 6;
+    /// SCALE, MIRROR, ROTS and other programmable frames that are no shift and turn.
+    pub(crate) const PROGRAMMABLE: u16 = 1 << 7;
+    /// DIAMON, G7 of LinuxCNC.
+    pub(crate) const DIAMETER: u16 = 1 << 8;
+    /// ORIMKS.
+    pub(crate) const MACHINE_TURN: u16 = 1 << 9;
+    /// TOFRAME, TOROT, PAROT.
+    pub(crate) const TOOL_FRAME: u16 = 1 << 10;
+    /// Frames that a program writes into variables of the control, datum tables.
+    pub(crate) const SYSTEM: u16 = 1 << 11;
+    /// G92 and G52 with rotary axes.
+    pub(crate) const ROTARY: u16 = 1 << 12;
+}
+
 /// The state of a control between two blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct State {
@@ -91,8 +121,12 @@ pub(super) struct State {
     pub(super) frame: String,
     /// TRANS, ROT: a frame within the work frame.
     pub(super) programmable: Option<Pose>,
-    /// Why coordinates are not those of the work frame.
-    pub(super) transform: Option<Reason>,
+    /// What makes coordinates others than those of the work frame: bits of [`transforms`].
+    pub(super) transform: u16,
+    /// Axes that a block may have moved which could not be read: bits 0 to 2 X Y Z, 3 the orientation.
+    pub(super) doubtful: u8,
+    /// What is called after every motion (G66, MCALL, M89).
+    pub(super) calls: Option<Reason>,
     pub(super) radius: bool,
     /// G43.4, TRAORI, M128.
     pub(super) tip: bool,
@@ -133,7 +167,9 @@ impl State {
             shift: [Ok(0.0); 3],
             frame: frame.to_owned(),
             programmable: None,
-            transform: None,
+            transform: 0,
+            doubtful: 0,
+            calls: None,
             radius: false,
             tip: false,
             vector_words: false,
@@ -218,6 +254,8 @@ impl State {
             }
         }
         self.uncertain |= other.uncertain;
+        self.doubtful |= other.doubtful;
+        self.calls = self.calls.or(other.calls);
         let keys: Vec<Variable> = self.variables.keys().chain(other.variables.keys()).cloned().collect();
         for key in keys {
             if self.variables.get(&key) != other.variables.get(&key) {

@@ -94,6 +94,11 @@ impl Task<'_> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
         }
+        // An arc about a centre that stands in another block must begin where it is said to.
+        let next = self.listing.motions.get(change.motion as usize + 1);
+        if next.is_some_and(|next| next.left == Some(Reason::CentreElsewhere)) {
+            return Some(Reason::CentreElsewhere);
+        }
         for new in &change.targets {
             if matches!(new, NewTarget::Joint { .. }) {
                 return Some(Reason::NoJointForm);

@@ -138,6 +138,12 @@ pub(super) struct Lister<'t, 's> {
     /// Whether tools come in with M6.
     changes_tools: bool,
     next_tool: Option<String>,
+    /// Work offsets and tools that the program has set, by name; `None` where the text does not tell to what.
+    set_frames: Vec<(String, Option<Frame>)>,
+    set_tools: Vec<(String, Option<Frame>)>,
+    /// Whether it has set some that the text does not name.
+    sets_frames: bool,
+    sets_tools: bool,
     /// Blocks that jumps go to.
     targets: BTreeSet<u64>,
     /// Whether a jump goes to a computed block.
@@ -178,6 +184,10 @@ struct Said<'s> {
     turns: bool,
     /// Corners that are rounded or cut: `,R5`, `,C2`, RND=, CHF=, CHR=.
     corner: bool,
+    /// Why it does not go, or not only, where its axis words say.
+    odd: Option<Reason>,
+    /// Whether it moves other axes: U, V, W.
+    others: bool,
 }
 
 impl Said<'_> {
@@ -206,6 +216,10 @@ impl<'t, 's> Lister<'t, 's> {
             passed: None,
             changes_tools: false,
             next_tool: None,
+            set_frames: Vec::new(),
+            set_tools: Vec::new(),
+            sets_frames: false,
+            sets_tools: false,
             targets: BTreeSet::new(),
             anywhere: false,
             listing: Listing::default(),
@@ -307,6 +321,10 @@ impl<'t, 's> Lister<'t, 's> {
                 Some(b'Z') => said.axes[2] = at,
                 Some(b'C') if self.dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {}
                 Some(b'C') if index > 0 && said.words[index - 1].name == b"," => said.corner = true,
+                // The angle of the line.
+                Some(b'A') if index > 0 && said.words[index - 1].name == b"," => {
+                    said.odd = Some(Reason::NotFollowed);
+                }
                 Some(letter @ (b'A' | b'B' | b'C')) => said.abc[usize::from(letter - b'A')] = at,
                 Some(letter @ (b'I' | b'J' | b'K')) => said.centre[usize::from(letter - b'I')] = at,
                 Some(b'R') if self.dialect == Dialect::Heidenhain => match word.belongs {
@@ -319,9 +337,24 @@ impl<'t, 's> Lister<'t, 's> {
                 Some(b'P') => said.p = at,
                 Some(b'L') => said.l = at,
                 Some(b'Q') => said.q = at,
+                Some(b'U'..=b'W') => said.others = true,
                 Some(_) => {}
                 None => self.gather_name(said, index),
             }
+        }
+        // X1.2.3, and blanks within a number.
+        let stray = |word: &Word<'_>| word.name.first().is_some_and(|b| b.is_ascii_digit() || *b == b'.');
+        let heidenhain = self.dialect == Dialect::Heidenhain;
+        said.opaque |= !heidenhain && said.moves() && said.words.iter().any(stray);
+        // M118 X1: what follows is no way to go.
+        let limits = said.words.iter().position(|word| {
+            heidenhain
+                && word.address() == Some(b'M')
+                && matches!(self.literal(word), Some(94.0 | 114.0 | 116.0 | 118.0 | 138.0))
+        });
+        if let Some(limits) = limits {
+            let words = said.axes.iter().chain(&said.abc).flatten();
+            said.opaque |= words.copied().any(|at| at > limits);
         }
     }
 
@@ -337,6 +370,34 @@ impl<'t, 's> Lister<'t, 's> {
             (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => said.turns = true,
             (Dialect::Siemens, b"RND" | b"RNDM" | b"CHF" | b"CHR") => said.corner = true,
             (Dialect::Siemens, b"SUPA" | b"G153") => said.machine = true,
+            (Dialect::Siemens, b"AP" | b"RP") => said.odd = Some(Reason::Transformed),
+            (Dialect::Siemens, b"ANG" | b"PO" | b"POS" | b"POSA" | b"POSP") => {
+                said.odd = Some(Reason::NotFollowed);
+            }
+            (Dialect::Siemens, b"MEAS" | b"MEAW" | b"MEASA" | b"MEAWA" | b"MEAC") => {
+                said.odd = Some(Reason::Probe);
+            }
+            // Surface normals, cones, angles to the path.
+            (Dialect::Siemens, [b'A'..=b'C', b'4'..=b'7'] | b"LEAD" | b"TILT" | b"NUT" | b"PHI" | b"PSI")
+                if word.assigned =>
+            {
+                said.odd = Some(Reason::OrientationUnknown);
+            }
+            // An axis of the machine.
+            (Dialect::Siemens, [b'X'..=b'Z' | b'A'..=b'C', b'1']) if word.assigned => {
+                said.odd = Some(Reason::MachineCoordinates);
+            }
+            (Dialect::Siemens | Dialect::Heidenhain, _) => {
+                self.gather_heidenhain(said, index, &name);
+            }
+            // XY5: two axes and one number.
+            (_, name) => said.opaque |= name.iter().all(|byte| b"XYZABCUVW".contains(byte)),
+        }
+    }
+
+    fn gather_heidenhain(&mut self, said: &mut Said<'s>, index: usize, name: &[u8]) {
+        let at = Some(index);
+        match (self.dialect, name) {
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => said.axes[usize::from(letter - b'X')] = at,
             (Dialect::Heidenhain, [b'I', letter @ b'A'..=b'C']) => said.abc[usize::from(letter - b'A')] = at,
             (Dialect::Heidenhain, [b'T', letter @ b'X'..=b'Z']) => {
@@ -429,19 +490,33 @@ impl<'t, 's> Lister<'t, 's> {
             self.forget();
             return;
         }
-        self.assignments(said);
+        // LinuxCNC gives variables their values after the words of the block have been read.
+        let later = if self.dialect == Dialect::LinuxCnc {
+            self.assigned(said)
+        } else {
+            self.assignments(said);
+            Vec::new()
+        };
+        self.words(said);
+        for (name, value) in later {
+            self.assign(name, value);
+        }
+    }
+
+    /// What the words of a block do.
+    fn words(&mut self, said: &Said<'s>) {
         if self.control_flow(said) {
             return;
         }
         for &m in &said.m {
             match m {
-                128 if self.dialect == Dialect::Heidenhain => {
-                    self.state.tip = true;
-                    self.set(Group::Tip);
-                }
-                129 if self.dialect == Dialect::Heidenhain => {
-                    self.state.tip = false;
-                    self.set(Group::Tip);
+                128 if self.dialect == Dialect::Heidenhain => self.tip(true, false),
+                129 if self.dialect == Dialect::Heidenhain => self.tip(false, false),
+                89 if self.dialect == Dialect::Heidenhain => self.state.calls = Some(Reason::Cycle),
+                // What was stored by M70 holds again.
+                72 | 73 if self.dialect == Dialect::LinuxCnc => {
+                    self.forget();
+                    self.state.uncertain = u32::MAX;
                 }
                 _ => {}
             }
@@ -451,7 +526,11 @@ impl<'t, 's> Lister<'t, 's> {
             || self.dialect == Dialect::Siemens && said.g.contains(&1530)
             || self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 91 | 92));
         self.tools_of(said);
-        if self.named_commands(said) || self.modal_codes(said) || self.unmodal_codes(said) {
+        if self.unknown_code(said)
+            || self.named_commands(said)
+            || self.modal_codes(said)
+            || self.unmodal_codes(said)
+        {
             self.ends(said);
             return;
         }
@@ -461,13 +540,23 @@ impl<'t, 's> Lister<'t, 's> {
             let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
             self.state.feed = feed.map(|feed| feed * self.state.unit_mm / 60.0);
         }
-        self.motion(said, machine);
+        let limits = self.dialect == Dialect::Heidenhain
+            && said.words.first().is_some_and(|word| word.address() == Some(b'M'));
+        // M118 X1 Y1 alone goes nowhere.
+        if !limits {
+            self.motion(said, machine);
+        }
         self.ends(said);
     }
 
     /// M2, M17, M30, M99: what comes after belongs to another program. M6 goes to change the tool.
     fn ends(&mut self, said: &Said<'s>) {
-        if said.m.iter().any(|m| matches!(m, 2 | 17 | 30 | 99))
+        let cycle = self.dialect == Dialect::Heidenhain && said.m.contains(&99);
+        if cycle {
+            self.state.calls = None;
+            self.state.lose_position();
+            self.events.push(Event::Lost(POSITION));
+        } else if said.m.iter().any(|m| matches!(m, 2 | 17 | 30 | 99))
             || said.words.iter().any(|word| word.is("RET"))
         {
             self.forget();
@@ -498,6 +587,24 @@ impl<'t, 's> Lister<'t, 's> {
         {
             self.state.tool = name;
             self.set(Group::Tool);
+        }
+        if self.dialect != Dialect::Siemens {
+            return;
+        }
+        // The edge of the tool, and offsets of its length.
+        for word in &said.words {
+            let base = codes::base(&self.state.tool).to_owned();
+            if word.address() == Some(b'D') {
+                self.state.tool = match self.literal(word) {
+                    Some(1.0) => base,
+                    Some(number) => format!("{base} +D{}", number.round()),
+                    None => format!("{base} +D?"),
+                };
+                self.set(Group::Tool);
+            } else if word.is("TOFFL") || word.is("TOFF") {
+                self.state.tool = format!("{base} +TOFF");
+                self.set(Group::Tool);
+            }
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Jumps, loops, subprograms, and the values of variables.
 
 use super::super::dialect::Dialect;
-use super::super::expression::{Variable, numbered};
-use super::super::syntax::Belongs;
+use super::super::expression::{Variable, Worth, numbered};
+use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
 use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
@@ -39,11 +39,50 @@ impl Lister<'_, '_> {
 
     /// Values of variables. One that is assigned only where a condition holds is not known from here on.
     pub(super) fn assignments(&mut self, said: &Said<'_>) {
-        let conditional = said.words.iter().any(|word| word.is("IF"));
         for word in &said.words {
-            if !word.assigned {
-                continue;
+            if let Some((name, value)) = self.assignment(said, word) {
+                self.assign(name, value);
             }
+        }
+    }
+
+    /// The same of all words of a block at once.
+    pub(super) fn assigned(&self, said: &Said<'_>) -> Vec<(Option<Variable>, Worth)> {
+        said.words.iter().filter_map(|word| self.assignment(said, word)).collect()
+    }
+
+    /// A variable gets a value; any of them where it is computed which.
+    pub(super) fn assign(&mut self, name: Option<Variable>, value: Worth) {
+        let number = name.as_ref().map(|name| {
+            name.strip_prefix(b"#").and_then(|digits| std::str::from_utf8(digits).ok()?.parse::<u32>().ok())
+        });
+        // Variables of the control: offsets of the work, shifts, offsets of tools.
+        match number {
+            None | Some(Some(5201..=5206 | 5221..=5399 | 7001..=7999 | 14001..=14999))
+                if self.dialect.paren_comments() =>
+            {
+                self.some_frames_set();
+            }
+            Some(Some(5210..=5219)) => self.state.shift = [Err(Reason::Variable); 3],
+            Some(Some(2001..=2999 | 10001..=13999)) if self.dialect != Dialect::LinuxCnc => {
+                self.some_tools_set();
+            }
+            _ => {}
+        }
+        match name {
+            Some(name) => {
+                self.state.variables.insert(name, value);
+            }
+            None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+        }
+    }
+
+    fn assignment(&self, said: &Said<'_>, word: &Word<'_>) -> Option<(Option<Variable>, Worth)> {
+        if !word.assigned {
+            return None;
+        }
+        let conditional = said.words.iter().any(|word| word.is("IF"));
+        {
             let name: Option<Variable> = match word.name {
                 b"#" => match word.index {
                     Some((first, _)) if self.tree.kind(first) == Some(Token::Name) => {
@@ -62,7 +101,7 @@ impl Lister<'_, '_> {
                 name if name.len() > 1 && word.index.is_none() && self.is_variable(name) => {
                     Some(name.to_ascii_uppercase())
                 }
-                _ => continue,
+                _ => return None,
             };
             let value = match word.belongs {
                 _ if self.actions => Err(Reason::Variable),
@@ -71,13 +110,7 @@ impl Lister<'_, '_> {
                 Belongs::Expression { first, end } => self.evaluated((first, end)),
                 _ => Err(Reason::WrongShape),
             };
-            match name {
-                Some(name) => {
-                    self.state.variables.insert(name, value);
-                }
-                // Any of them.
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
-            }
+            Some((name, value))
         }
     }
 
@@ -123,7 +156,8 @@ impl Lister<'_, '_> {
                 if !self.written.is_empty() {
                     self.forget();
                 }
-                true
+                // Words may stand behind it.
+                said.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
             // A program number stands alone; with words it is a block number.
             (b":", _) if said.words.len() == 1 => {
@@ -156,6 +190,11 @@ impl Lister<'_, '_> {
             (b"CALL" | b"PCALL" | b"EXTCALL" | b"MCALL" | b"EXECSTRING", _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
                 self.subprogram(said, &text);
+                if &*name == b"MCALL" {
+                    // After every motion from here on; alone it ends that.
+                    let words = said.words.iter().filter(|word| word.address() != Some(b'N')).count();
+                    self.state.calls = (words > 1).then_some(Reason::Subprogram);
+                }
                 true
             }
             (_, Some(b'L')) if self.dialect == Dialect::Siemens && first.belongs != Belongs::Nothing => {

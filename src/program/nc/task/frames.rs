@@ -2,7 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::machine::Group;
+use super::super::dialect::Dialect;
+use super::super::machine::{Group, transforms};
 use super::super::orientation::Angles;
 use super::super::setup::held;
 use super::super::syntax::{Belongs, Word};
@@ -32,9 +33,7 @@ impl Lister<'_, '_> {
         if !adds {
             // Whatever is not added replaces all.
             self.state.programmable = None;
-            if self.state.transform == Some(Reason::Transformed) {
-                self.state.transform = None;
-            }
+            self.state.transform &= !transforms::PROGRAMMABLE;
         }
         let values: Result<Vec<Option<f64>>, Reason> = said
             .axes
@@ -45,6 +44,8 @@ impl Lister<'_, '_> {
         let stated = said.moves() || rpl.is_some();
         let pose = match (&*name, values) {
             (_, Err(_)) => None,
+            // Rotary axes are shifted too.
+            _ if said.abc.iter().any(Option::is_some) => None,
             (b"TRANS" | b"ATRANS", Ok(shift)) => {
                 let unit = self.state.unit_mm;
                 let shift = Vector3::from_iterator(shift.iter().map(|value| value.unwrap_or(0.0) * unit));
@@ -71,7 +72,7 @@ impl Lister<'_, '_> {
                 self.state.programmable = Some(self.state.programmable.unwrap_or_else(Pose::identity) * pose);
             }
             None => {
-                self.state.transform = Some(Reason::Transformed);
+                self.state.transform |= transforms::PROGRAMMABLE;
                 self.set(Group::Transform);
             }
         }
@@ -94,11 +95,19 @@ impl Lister<'_, '_> {
                 Some(number @ 5..=99) => format!("G{}", 500 + number),
                 _ => return,
             };
-            self.frames.retain(|(other, _)| *other != name);
-            if let Some(pose) = self.frame_expression(word) {
-                self.frames.push((name, Frame::from_pose(&pose)));
-            }
-            self.frame_index = None;
+            let pose = self.frame_expression(word);
+            self.frame_set(name, pose.map(|pose| Frame::from_pose(&pose)));
+        } else if word.is("$P_PFRAME") {
+            self.state.programmable = self.frame_expression(word);
+            let known = self.state.programmable.is_some();
+            self.set(Group::Frame);
+            self.transform(transforms::PROGRAMMABLE, !known);
+        } else if word.name.len() > 3
+            && word.name[..3].eq_ignore_ascii_case(b"$P_")
+            && word.name.to_ascii_uppercase().windows(2).any(|two| two == b"FR" || two == b"BA")
+        {
+            // Base, channel, system and total frames.
+            self.transform(transforms::SYSTEM, true);
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
             let (Some(number), Some(1)) = (index(0), index(1)) else { return };
             let Ok(value) = self.worth(word).0 else { return };
@@ -111,13 +120,47 @@ impl Lister<'_, '_> {
             let known = self.frames_of_tools(&name);
             let mut frame = known.unwrap_or(Frame::IDENTITY);
             frame.position_mm[axis] = value * self.state.unit_mm;
-            self.tools.retain(|(other, _)| *other != name);
-            self.tools.push((name, frame));
-            self.tool_index.clear();
+            self.tool_set(name, Some(frame));
         }
     }
 
+    /// The program sets a work offset.
+    fn frame_set(&mut self, name: String, frame: Option<Frame>) {
+        if name == self.state.frame {
+            // Where the tool stands has other coordinates now.
+            self.state.lose_position();
+            self.events.push(super::Event::Lost(super::POSITION));
+        }
+        self.set_frames.retain(|(other, _)| *other != name);
+        self.set_frames.push((name, frame));
+        self.frame_index = None;
+    }
+
+    /// The program sets a tool.
+    fn tool_set(&mut self, name: String, frame: Option<Frame>) {
+        self.set_tools.retain(|(other, _)| *other != name);
+        self.set_tools.push((name, frame));
+        self.tool_index.clear();
+    }
+
+    /// The program sets work offsets, which ones the text does not tell.
+    pub(super) fn some_frames_set(&mut self) {
+        self.sets_frames = true;
+        self.frame_index = None;
+        self.state.lose_position();
+        self.events.push(super::Event::Lost(super::POSITION));
+    }
+
+    /// The program sets tools, which ones the text does not tell.
+    pub(super) fn some_tools_set(&mut self) {
+        self.sets_tools = true;
+        self.tool_index.clear();
+    }
+
     fn frames_of_tools(&self, name: &str) -> Option<Frame> {
+        if let Some((_, frame)) = self.set_tools.iter().find(|(other, _)| other == name) {
+            return *frame;
+        }
         self.tools.iter().find(|(other, _)| other == name).map(|(_, frame)| *frame)
     }
 
@@ -169,14 +212,34 @@ impl Lister<'_, '_> {
     /// G10 L2 P1 X… of Fanuc and LinuxCNC.
     pub(super) fn set_offset(&mut self, said: &Said<'_>) {
         let number = |at: Option<usize>| at.and_then(|index| self.literal(&said.words[index]));
-        let (Some(2.0), Some(p)) = (number(said.l), number(said.p)) else { return };
+        let fanuc = matches!(self.dialect, Dialect::Fanuc | Dialect::Iso);
+        let (l, p) = match (number(said.l), number(said.p)) {
+            (Some(l @ (2.0 | 20.0)), Some(p)) => (l, p),
+            (Some(1.0 | 10.0..=13.0), _) => return self.some_tools_set(),
+            (None, Some(_)) if said.l.is_none() && fanuc => return self.some_tools_set(),
+            (None, _) if said.l.is_none() => return,
+            _ => return self.some_frames_set(),
+        };
         let name = match p as u32 {
+            // An offset of all offsets.
+            0 if fanuc => return self.some_frames_set(),
             0 => self.state.frame.clone(),
+            p if l == 20.0 && self.dialect == Dialect::Fanuc => format!("G54.1 P{p}"),
             p @ 1..=6 => format!("G{}", 53 + p),
             p @ 7..=9 => format!("G59.{}", p - 6),
             _ => return,
         };
-        let known = self.frames.iter().find(|(other, _)| *other == name).map(|(_, frame)| *frame);
+        if l == 20.0 || said.abc.iter().any(Option::is_some) {
+            // So that the tool stands at these values; with turned rotary axes.
+            return self.frame_set(name, None);
+        }
+        let known = match self.set_frames.iter().find(|(other, _)| *other == name) {
+            Some((_, frame)) => *frame,
+            None => self
+                .setup
+                .frame(&name)
+                .or_else(|| self.frames.iter().find(|(other, _)| *other == name).map(|(_, frame)| *frame)),
+        };
         let mut frame = known.unwrap_or(Frame::IDENTITY);
         let mut good = said.axes.iter().all(Option::is_some) || known.is_some();
         for (axis, word) in said.axes.iter().enumerate() {
@@ -196,11 +259,7 @@ impl Lister<'_, '_> {
             None if said.radius.is_some() => good = false,
             None => {}
         }
-        self.frames.retain(|(other, _)| *other != name);
-        if good {
-            self.frames.push((name, frame));
-        }
-        self.frame_index = None;
+        self.frame_set(name, good.then_some(frame));
     }
 
     /// The tool that is in.
@@ -209,15 +268,18 @@ impl Lister<'_, '_> {
             return index;
         }
         let name = self.state.tool.clone();
-        let frame = self.setup.tool(&name).or_else(|| {
-            self.tools
-                .iter()
-                .rev()
-                .find(|(other, _)| other.eq_ignore_ascii_case(&name))
-                .map(|(_, frame)| *frame)
-        });
-        let tool =
-            Tool { name: name.clone(), value: frame.map(held).ok_or(Reason::ToolUnknown), place: None };
+        let value = match self.set_tools.iter().find(|(other, _)| other.eq_ignore_ascii_case(&name)) {
+            Some((_, frame)) => frame.ok_or(Reason::ToolAssigned),
+            None if self.sets_tools => Err(Reason::ToolAssigned),
+            None => {
+                let stated = self.setup.tool(&name).or_else(|| {
+                    let mut tools = self.tools.iter().rev();
+                    tools.find(|(other, _)| other.eq_ignore_ascii_case(&name)).map(|(_, frame)| *frame)
+                });
+                stated.ok_or(Reason::ToolUnknown)
+            }
+        };
+        let tool = Tool { name: name.clone(), value: value.map(held), place: None };
         let index = intern(&mut self.listing.tools, tool);
         self.tool_index.insert(name, index);
         index
@@ -232,17 +294,21 @@ impl Lister<'_, '_> {
             return *index;
         }
         let name = self.state.frame.clone();
-        let stated = self.setup.frame(&name).or_else(|| {
-            self.frames
-                .iter()
-                .rev()
-                .find(|(other, _)| other.eq_ignore_ascii_case(&name))
-                .map(|(_, frame)| *frame)
-        });
-        // Without a settable offset Siemens counts from the base.
-        let stated = stated.or_else(|| (name == "G500").then_some(Frame::IDENTITY));
+        let stated = match self.set_frames.iter().find(|(other, _)| other.eq_ignore_ascii_case(&name)) {
+            Some((_, frame)) => frame.ok_or(Reason::WorkObjectAssigned),
+            None if self.sets_frames => Err(Reason::WorkObjectAssigned),
+            None => {
+                let stated = self.setup.frame(&name).or_else(|| {
+                    let mut frames = self.frames.iter().rev();
+                    frames.find(|(other, _)| other.eq_ignore_ascii_case(&name)).map(|(_, frame)| *frame)
+                });
+                // Without a settable offset Siemens counts from the base.
+                let base = (name == "G500").then_some(Frame::IDENTITY);
+                stated.or(base).ok_or(Reason::WorkObjectUnknown)
+            }
+        };
         let within = self.state.programmable.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
-        let value = stated.ok_or(Reason::WorkObjectUnknown).map(|user_frame| WorkObjectValue {
+        let value = stated.map(|user_frame| WorkObjectValue {
             robhold: false,
             fixed: true,
             mechanical_unit: String::new(),

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Worth, literal};
-use super::super::machine::{Group, Mode, Turn};
+use super::super::machine::{Group, Mode, Turn, transforms};
 use super::super::syntax::Word;
 use super::super::token::Token;
 use super::{Event, Lister, Said};
@@ -67,10 +67,7 @@ impl Lister<'_, '_> {
         let second = words.get(1).copied().unwrap_or_default();
         match name {
             b"TOOL" if second == b"CALL" => {
-                if let Some(number) = words.get(2).and_then(|word| literal(word)) {
-                    self.state.tool = format!("T{}", number.round());
-                    self.set(Group::Tool);
-                }
+                self.tool_call(first, &words);
                 self.state.lose_position();
                 self.events.push(Event::Lost(super::POSITION));
             }
@@ -84,6 +81,7 @@ impl Lister<'_, '_> {
                     .get(2)
                     .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
                     .unwrap_or_default();
+                let ends = self.ends_cycle(&words);
                 let sets = matches!(&*number, b"7" | b"8" | b"10" | b"11" | b"19" | b"26" | b"247");
                 match &*number {
                     b"7" => self.datum_shift(&words[3..]),
@@ -91,10 +89,10 @@ impl Lister<'_, '_> {
                         self.state.frame = self.preset(first);
                         self.set(Group::Frame);
                     }
-                    _ if sets => {
-                        self.state.transform = Some(Reason::Transformed);
-                        self.set(Group::Transform);
-                    }
+                    b"8" => self.transform(transforms::MIRROR, !ends),
+                    b"10" => self.transform(transforms::TURN, !ends),
+                    b"11" | b"26" => self.transform(transforms::SCALE, !ends),
+                    b"19" => self.transform(transforms::TILT, !ends),
                     _ => {}
                 }
                 if sets {
@@ -103,20 +101,13 @@ impl Lister<'_, '_> {
                 }
             }
             b"PLANE" => {
-                self.state.transform = (second != b"RESET").then_some(Reason::Transformed);
-                self.set(Group::Transform);
+                self.transform(transforms::TILT, second != b"RESET");
                 self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
                 self.state.lose_position();
                 self.events.push(Event::Unknown);
             }
-            b"FUNCTION" if second == b"TCPM" => {
-                self.state.tip = true;
-                self.set(Group::Tip);
-            }
-            b"FUNCTION" if words.contains(&&b"TCPM"[..]) => {
-                self.state.tip = false;
-                self.set(Group::Tip);
-            }
+            b"FUNCTION" if second == b"TCPM" => self.tip(true, false),
+            b"FUNCTION" if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
             b"TRANS" if second == b"DATUM" => {
                 match words.get(2).copied() {
                     Some(b"RESET") => {
@@ -124,17 +115,19 @@ impl Lister<'_, '_> {
                         self.set(Group::Frame);
                     }
                     Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => {
-                        self.state.transform = Some(Reason::Transformed);
-                        self.set(Group::Transform);
-                    }
+                    _ => self.transform(transforms::SYSTEM, true),
                 }
                 self.state.lose_position();
                 self.events.push(Event::Lost(super::POSITION));
             }
             b"TRANS" => {
-                self.state.transform = Some(Reason::Transformed);
-                self.set(Group::Transform);
+                let which = match second {
+                    b"MIRROR" => transforms::MIRROR,
+                    b"ROTATION" => transforms::TURN,
+                    b"SCALE" => transforms::SCALE,
+                    _ => transforms::SYSTEM,
+                };
+                self.transform(which, words.get(2).copied() != Some(b"RESET"));
             }
             b"LBL" if second != b"0" => self.forget(),
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
@@ -192,9 +185,47 @@ impl Lister<'_, '_> {
                 (shift.norm() > 0.0).then(|| Pose::translation(shift.x, shift.y, shift.z));
             self.set(Group::Frame);
         } else {
-            self.state.transform = Some(Reason::Transformed);
-            self.set(Group::Transform);
+            self.transform(transforms::SYSTEM, true);
         }
+    }
+
+    /// Whether what is left of `CYCL DEF 10.1 ROT+0` ends the cycle.
+    fn ends_cycle(&self, words: &[&[u8]]) -> bool {
+        if !words.get(2).is_some_and(|number| number.ends_with(b".1")) {
+            return false;
+        }
+        let neutral = |word: &&[u8]| {
+            let at = word.iter().position(|byte| !byte.is_ascii_alphabetic()).unwrap_or(word.len());
+            let (name, value) = word.split_at(at);
+            let value = literal(value.strip_prefix(b"+").unwrap_or(value));
+            match name {
+                b"A" | b"B" | b"C" | b"ROT" => value == Some(0.0),
+                b"SCL" => value.is_none_or(|value| value == 1.0),
+                b"" => value == Some(1.0),
+                _ => false,
+            }
+        };
+        words[3..].iter().all(neutral)
+    }
+
+    /// `TOOL CALL 5 Z S1000`, `TOOL CALL "MILL"`, `TOOL CALL Z S2000` (the spindle alone).
+    fn tool_call(&mut self, first: &Word<'_>, words: &[&[u8]]) {
+        let Some(&named) = words.get(2) else { return };
+        let name = if let Some(number) = literal(named) {
+            format!("T{number}")
+        } else if named.starts_with(b"\"") {
+            let text = &self.tree.source()[self.tree.range(first.first, first.end)];
+            let name = text.split(|&byte| byte == b'"').nth(1).unwrap_or_default();
+            String::from_utf8_lossy(name).into_owned()
+        } else if named.starts_with(b"Q") {
+            "T?".to_owned()
+        } else {
+            super::codes::base(&self.state.tool).to_owned()
+        };
+        // Another length than that of its table.
+        let longer = words.iter().any(|word| word.starts_with(b"DL"));
+        self.state.tool = if longer { format!("{name} +DL") } else { name };
+        self.set(Group::Tool);
     }
 
     /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
@@ -224,6 +255,16 @@ impl Lister<'_, '_> {
             .and_then(|token| literal(self.tree.text(token)));
         let Some(number) = number else { return };
         let value: Worth = self.evaluated((equal + 1, word.end));
-        self.state.variables.insert(super::numbered(b'Q', number), value);
+        // QL and QR are sets of their own.
+        let source = &self.tree.source()[self.tree.range(word.first, equal)];
+        let letters = source.iter().rposition(|byte| byte.is_ascii_alphabetic());
+        match letters.map(|at| source[at].to_ascii_uppercase()) {
+            Some(set @ (b'L' | b'R')) => {
+                self.state.variables.insert([b"Q", &super::numbered(set, number)[..]].concat(), value);
+            }
+            _ => {
+                self.state.variables.insert(super::numbered(b'Q', number), value);
+            }
+        }
     }
 }

@@ -121,6 +121,26 @@ impl Lister<'_, '_> {
         let has_centre = said.centre.iter().any(Option::is_some) && !vector_words;
         let circular = matches!(mode, Mode::Circular(_));
         let vector_moves = vector_words && said.centre.iter().any(Option::is_some);
+        if let Some(reason) = said.odd {
+            self.left(said, "path", reason);
+            self.state.lose_position();
+            if reason == Reason::OrientationUnknown {
+                self.state.turn = Turn::Unknown(reason);
+                self.events.push(Event::Unknown);
+            } else {
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            return;
+        }
+        if said.others && !said.moves() && !matches!(mode, Mode::Unset | Mode::Other(_)) {
+            self.left(said, "axis", Reason::ExternalOnly);
+            if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) {
+                // Increments of X, Y and Z on a lathe.
+                self.state.lose_position();
+                self.events.push(Event::Lost(super::POSITION));
+            }
+            return;
+        }
         if !said.moves() && !(circular && (has_centre || said.radius.is_some())) && !vector_moves {
             if said.opaque {
                 self.unread(said);
@@ -204,7 +224,9 @@ impl Lister<'_, '_> {
             let via = middle.and_then(|middle| target(middle, half));
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
-            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
+            // A centre that stands in another block cannot be put into this one.
+            let elsewhere = heidenhain && said.radius.is_none();
+            arc = found.ok().filter(|_| !elsewhere).map(|arc| (arc, positive, self.state.centre_absolute));
         }
         if kind != MotionKind::Unknown {
             motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
@@ -213,6 +235,7 @@ impl Lister<'_, '_> {
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
+        self.doubt(said);
         motion.left = self.left_because(said, mode, machine, &motion);
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
@@ -255,10 +278,33 @@ impl Lister<'_, '_> {
         } else {
             self.state.position = to;
         }
+        if self.state.calls.is_some() {
+            // Wherever what is called now ends.
+            self.state.lose_position();
+            self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
+            self.events.push(Event::Unknown);
+        }
+    }
+
+    /// Which axes a block leaves in doubt, because part of it could not be read; those that one states are known again.
+    fn doubt(&mut self, said: &Said<'_>) {
+        if said.opaque {
+            self.state.doubtful = 15;
+        } else if self.state.absolute {
+            for axis in 0..3 {
+                let plain = said.axes[axis].is_some_and(|at| self.worth(&said.words[at]).1 != Some(true));
+                self.state.doubtful &= !(u8::from(plain) << axis);
+            }
+            let all = |words: &[Option<usize>; 3]| words.iter().all(Option::is_some);
+            if all(&said.abc) || all(&said.rpy) || said.vector.iter().any(Option::is_some) {
+                self.state.doubtful &= 7;
+            }
+        }
     }
 
     /// A block that could not be read whole, without words that move: what it did is not known.
     fn unread(&mut self, said: &Said<'_>) {
+        self.state.doubtful = 15;
         if said.words.iter().any(|word| matches!(word.address(), Some(b'G'))) {
             self.state.lose_position();
             self.events.push(Event::Unknown);
@@ -296,7 +342,8 @@ impl Lister<'_, '_> {
     }
 
     fn arc(&self, said: &Said<'_>, from: [Worth; 3], to: [Worth; 3], positive: bool) -> Result<Arc, Reason> {
-        if said.turns {
+        // P: several turns.
+        if said.turns || self.dialect == Dialect::LinuxCnc && said.p.is_some() {
             return Err(Reason::NotFollowed);
         }
         let (start, end) = (all(from)?, all(to)?);
@@ -361,7 +408,8 @@ impl Lister<'_, '_> {
             Group::Shift,
         ];
         let turns = !matches!(state.turn, Turn::Unknown(Reason::OrientationUnknown));
-        let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
+        let needs_tip = self.dialect.needs_tip();
+        let cycle = self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 89 | 99));
         let frames = || {
             let tool = self.listing.tool(motion).and_then(|tool| tool.value.err());
             tool.or_else(|| {
@@ -382,8 +430,14 @@ impl Lister<'_, '_> {
             || matches!(mode, Mode::Circular(_)) && state.is_uncertain(Group::Plane)
         {
             Some(Reason::UnknownFlow)
-        } else if let Some(reason) = state.transform {
-            Some(reason)
+        } else if cycle {
+            Some(Reason::Cycle)
+        } else if state.transform != 0 {
+            Some(Reason::Transformed)
+        } else if state.calls.is_some() {
+            state.calls
+        } else if state.doubtful != 0 {
+            Some(Reason::Unread)
         } else if state.radius {
             Some(Reason::RadiusCompensation)
         } else if turns && needs_tip && !state.tip {

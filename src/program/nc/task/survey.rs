@@ -75,11 +75,39 @@ impl Lister<'_, '_> {
                 _ => {}
             }
         }
+        self.returns();
         for (group, found) in found.iter().enumerate() {
             match found.len() {
                 0 => {}
                 1 => self.once |= 1 << group,
                 _ => self.several |= 1 << group,
+            }
+        }
+    }
+}
+
+impl Lister<'_, '_> {
+    /// `M99 P100`: goes on at N100.
+    fn returns(&mut self) {
+        let written = self.tree.source().windows(3).any(|three| three.eq_ignore_ascii_case(b"M99"));
+        if self.dialect == Dialect::Heidenhain || !written {
+            return;
+        }
+        for block in self.tree.child_nodes(0) {
+            let words: Vec<_> = self
+                .tree
+                .child_nodes(block)
+                .filter(|&node| self.tree.nodes[node as usize].kind == Syntax::Word)
+                .map(|node| word(self.tree, node))
+                .collect();
+            let value = |letter: u8| {
+                let found = words.iter().find(|word| word.address() == Some(letter))?;
+                self.literal(found)
+            };
+            if value(b'M') == Some(99.0)
+                && let Some(block) = value(b'P')
+            {
+                self.targets.insert(block as u64);
             }
         }
     }
@@ -97,7 +125,10 @@ fn group_of(code: u32, dialect: Dialect) -> Option<(Group, u32)> {
         400..=429 => (Group::Radius, code),
         434 | 435 | 2340 => (Group::Tip, code),
         490 => (Group::Tip, 0),
-        680 | 682 | 683 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
+        680 | 682 | 683 | 684 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
+        71 | 1070 | 121 | 131 | 1000 | 1010 | 2540 | 2550 if dialect != Dialect::Siemens => {
+            (Group::Transform, code)
+        }
         _ => return None,
     })
 }
