@@ -55,7 +55,7 @@ enum Verb {
     Compare(compare::Arguments),
     /// Keep a model accurate as measurements come in.
     Track(track::Arguments),
-    /// A surface to a RAPID program.
+    /// A surface to a grinding program: RAPID, or NC by the ending of the output (.nc, .mpf).
     Path(path::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
     Compensate(compensate::Arguments),

@@ -1,5 +1,6 @@
 //! `truegrind compensate PROGRAM… --model MODEL.toml -o OUT`.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
@@ -191,6 +192,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("-o OUT is missing: a file for one program, a folder for several (or --dry-run)");
     }
     let jobs = programs::jobs(&arguments.programs, arguments.each)?;
+    refuse_one_place_for_two(&jobs)?;
     let mut checked: Vec<&Path> = arguments.outputs.files();
     checked.extend(arguments.diff.as_deref());
     let inputs_of: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
@@ -306,7 +308,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     }
     batch.write()?;
     if let Some(summary) = &summary {
-        outputs.print(summary)?;
+        outputs.print_beside(summary, arguments.output.as_deref() == Some(Path::new("-")))?;
     }
     let would_change = arguments.check && done.changed;
     Ok(if done.clean && !would_change { Ending::Done } else { Ending::Flagged })
@@ -430,19 +432,26 @@ fn rewritten(
     }
     let mut notes = Vec::new();
     if listing.motions.is_empty() {
-        notes.push(format!("{}: no motion in it, nothing to correct", programs.name()));
+        notes.push(match listing.opaque.len() {
+            0 => format!("{}: no motion in it, nothing to correct", programs.name()),
+            unread => {
+                format!("{}: no motion was found; regions that could not be read: {unread}", programs.name())
+            }
+        });
     }
     let names = programs.files.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>();
-    if already(shop, &program, programs, &mut notes)? {
-        return Ok(Done {
-            row: Row::without(names.join(", "), Ended::Already, None),
-            written: Vec::new(),
-            diff: Vec::new(),
-            notes,
-            clean: false,
-            changed: false,
-            json: Vec::new(),
-        });
+    let nothing_left = |notes: Vec<String>| Done {
+        row: Row::without(names.join(", "), Ended::Already, None),
+        written: Vec::new(),
+        diff: Vec::new(),
+        notes,
+        clean: false,
+        changed: false,
+        json: Vec::new(),
+    };
+    let marked = already(shop, &program, programs, &mut notes)?;
+    if marked.iter().all(|marked| *marked) {
+        return Ok(nothing_left(notes));
     }
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
     let mut planned = plan(listing, shop.arm, &shop.cell, &options);
@@ -456,6 +465,19 @@ fn rewritten(
         ..RewriteOptions::default()
     };
     let rewritten = program.rewrite(&planned.changes, &rewrite)?;
+    if marked.contains(&true) {
+        // Modules of one task, some corrected before. What carries no mark has nothing to correct, or was left out then.
+        let open =
+            rewritten.files.iter().zip(&marked).position(|(file, marked)| !marked && !file.edits.is_empty());
+        let Some(open) = open else { return Ok(nothing_left(notes)) };
+        let done = marked.iter().position(|marked| *marked).unwrap_or(0);
+        bail!(
+            "{} is already compensated with this model, {} is not: give the original of {}",
+            names[done],
+            names[open],
+            names[done]
+        );
+    }
     for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
         let row = &mut planned.outcomes[change.motion as usize];
         match outcome {
@@ -498,7 +520,10 @@ fn rewritten(
     let output = targets.iter().flatten().map(|t| t.display().to_string()).collect::<Vec<_>>().join(", ");
     let output = Some(output).filter(|output| !output.is_empty());
     let row = Row::of(names.join(", "), output, ended, &planned, listing.opaque.len());
-    let clean = planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));
+    // Nothing but what cannot be read: nobody has looked at a motion.
+    let unread = listing.motions.is_empty() && !listing.opaque.is_empty();
+    let clean =
+        !unread && planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));
     report(&mut planned, &program, &files)?;
     if shop.ends {
         // To take a million pieces apart just before all memory goes back takes a tenth of the time of the whole.
@@ -524,15 +549,35 @@ fn outputs_of(
     if !several && !output.is_dir() {
         return Ok(vec![Some(output.clone())]);
     }
+    if output == Path::new("-") {
+        bail!("-o -: the standard output takes one program, these are several: name a folder");
+    }
     if output.is_file() {
         bail!("{} is a file, but there are several programs: name a folder", output.display());
     }
-    // Below the folder that was named everything keeps its place.
-    let place = |path: &Path| match &job.under {
-        Some(under) => path.strip_prefix(under).map_or_else(|_| files::name(path).into(), Path::to_path_buf),
-        None => PathBuf::from(files::name(path)),
-    };
-    Ok(programs.files.iter().map(|(path, _)| Some(output.join(place(path)))).collect())
+    Ok(programs.files.iter().map(|(path, _)| Some(output.join(job.place(path)))).collect())
+}
+
+/// No two programs may end in one file: the second would take the place of the first.
+fn refuse_one_place_for_two(jobs: &[Job]) -> anyhow::Result<()> {
+    let mut taken: HashMap<PathBuf, PathBuf> = HashMap::new();
+    for job in jobs {
+        for path in job.files() {
+            let place = job.place(&path);
+            match taken.get(&place) {
+                Some(first) if *first == path => bail!("{} is named twice", path.display()),
+                Some(first) => bail!(
+                    "{} and {} would both be written to {} in the output folder: run them one by one, each into a folder \
+                     of its own",
+                    first.display(),
+                    path.display(),
+                    place.display()
+                ),
+                None => taken.insert(place, path),
+            };
+        }
+    }
+    Ok(())
 }
 
 /// A controller that compensates by itself must not be compensated twice.
@@ -549,17 +594,19 @@ fn refuse_compensating_controller(robot: Option<&str>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the marks of earlier runs mean for this one: true where there is nothing left to do.
+/// What the marks of earlier runs mean for this one: which files are corrected with this model already.
 fn already(
     shop: &Shop<'_>,
     program: &Program<'_>,
     programs: &Programs,
     notes: &mut Vec<String>,
-) -> anyhow::Result<bool> {
-    for (mark, (path, _)) in program.listing().marks.iter().zip(&programs.files) {
+) -> anyhow::Result<Vec<bool>> {
+    let mut marked = vec![false; programs.files.len()];
+    for (index, (mark, (path, _))) in program.listing().marks.iter().zip(&programs.files).enumerate() {
         let Some(mark) = mark else { continue };
         if mark.model == shop.hash {
-            return Ok(true);
+            marked[index] = true;
+            continue;
         }
         if !shop.arguments.again {
             bail!(
@@ -575,7 +622,7 @@ fn already(
             mark.model
         ));
     }
-    Ok(false)
+    Ok(marked)
 }
 
 /// The model `nominal`: the same bytes.

@@ -98,7 +98,7 @@ impl Batch {
 
     /// Writes everything or nothing.
     pub(super) fn write(self) -> anyhow::Result<()> {
-        let mut ready = Vec::new();
+        let (mut ready, mut streams) = (Vec::new(), Vec::new());
         for (path, bytes) in &self.files {
             if path == Path::new("-") {
                 continue;
@@ -106,7 +106,13 @@ impl Batch {
             if self.inputs.iter().any(|input| same(path, input)) {
                 bail!("{} is an input: an input is never overwritten; name another output", path.display());
             }
-            let folder = parent(path);
+            // A link is not ours to replace, nor is a device or a pipe.
+            let path = linked(path);
+            if fs::metadata(&path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+                streams.push((path, bytes));
+                continue;
+            }
+            let folder = parent(&path);
             let failed = || format!("{}: cannot be written; nothing was changed", path.display());
             let mut file = tempfile::NamedTempFile::new_in(&folder).with_context(failed)?;
             file.write_all(bytes).with_context(failed)?;
@@ -117,10 +123,15 @@ impl Batch {
             #[cfg(unix)]
             {
                 use std::os::unix::fs::PermissionsExt;
-                let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
+                let mode = fs::metadata(&path).map_or(0o644, |m| m.permissions().mode());
                 let _ = file.as_file().set_permissions(fs::Permissions::from_mode(mode));
             }
-            file.persist(path).with_context(|| format!("{}: cannot be put in place", path.display()))?;
+            file.persist(&path).with_context(|| format!("{}: cannot be put in place", path.display()))?;
+        }
+        for (path, bytes) in streams {
+            let written =
+                fs::OpenOptions::new().write(true).open(&path).and_then(|mut to| to.write_all(bytes));
+            written.with_context(|| format!("{}: cannot be written", path.display()))?;
         }
         for (path, bytes) in &self.files {
             if path == Path::new("-") {
@@ -128,6 +139,14 @@ impl Batch {
             }
         }
         Ok(())
+    }
+}
+
+/// The file that a link names; any other path as it is.
+fn linked(path: &Path) -> PathBuf {
+    match fs::symlink_metadata(path) {
+        Ok(meta) if meta.is_symlink() => fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()),
+        _ => path.to_path_buf(),
     }
 }
 

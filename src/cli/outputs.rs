@@ -88,8 +88,13 @@ impl Outputs {
 
     /// Prints the summary, to stdout unless a result goes there.
     pub(super) fn print(&self, page: &Document) -> anyhow::Result<()> {
+        self.print_beside(page, false)
+    }
+
+    /// The same; `taken`: a program goes to stdout.
+    pub(super) fn print_beside(&self, page: &Document, taken: bool) -> anyhow::Result<()> {
         let text = format::terminal::document(page, width());
-        if self.takes_stdout() {
+        if taken || self.takes_stdout() {
             eprint!("{text}");
             return Ok(());
         }

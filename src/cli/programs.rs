@@ -30,6 +30,33 @@ pub(super) struct Job {
     pub(super) under: Option<PathBuf>,
 }
 
+impl Job {
+    /// Its files; a task list stands for those that it names.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let list = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgf"));
+        let mut out = Vec::new();
+        for path in &self.paths {
+            match list(path).then(|| files::read(path)) {
+                Some(Ok(bytes)) => {
+                    out.extend(task_list::modules(&bytes).iter().map(|module| inputs::beside(path, module)));
+                }
+                _ => out.push(path.clone()),
+            }
+        }
+        out
+    }
+
+    /// Where a file goes in the folder of outputs: below a folder that was named everything keeps its place.
+    pub(super) fn place(&self, path: &Path) -> PathBuf {
+        match &self.under {
+            Some(under) => {
+                path.strip_prefix(under).map_or_else(|_| files::name(path).into(), Path::to_path_buf)
+            }
+            None => PathBuf::from(files::name(path)),
+        }
+    }
+}
+
 /// The tasks that the command line names. RAPID modules named one by one are one task, unless each shall be its own; a
 /// task list, an NC file and every program of a folder is a task of its own.
 pub(super) fn jobs(paths: &[PathBuf], each: bool) -> anyhow::Result<Vec<Job>> {

@@ -124,8 +124,10 @@ impl Circle {
                 most
             }
         };
-        let corner = |(told, joints): &(Pose, Joints)| extra_of(told, joints, Emit::Targets, to, arms);
-        let extra = corners[1..count].iter().map(corner).collect();
+        let corner = |(k, (told, joints)): (usize, &(Pose, Joints))| {
+            extra_of((told, joints), k as f64 / count as f64, Emit::Targets, path, arms)
+        };
+        let extra = (1..).zip(&corners[1..count]).map(corner).collect();
         most.is_finite().then_some((extra, most + CHORD_MM))
     }
 }

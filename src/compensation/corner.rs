@@ -66,7 +66,12 @@ impl Corner {
             if square < 1e-12 {
                 break;
             }
-            t = (t - off.dot(&first) / square).clamp(0.0, 1.0);
+            let next = (t - off.dot(&first) / square).clamp(0.0, 1.0);
+            let step = (next - t).abs();
+            t = next;
+            if step < 1e-12 {
+                break;
+            }
         }
         let off: Vector3<f64> = point - at(t);
         // Before and behind the corner its tangents are the ways themselves.
@@ -113,17 +118,17 @@ pub(super) fn corner_bend(
         let links = Slack::at(&start, places[0], places[1], &arms.acting);
         return Some(links.most_off(2 * STEPS, &motor, &off));
     }
-    let reached = |t: f64, joints: Option<Joints>| match joints {
-        Some(joints) => off(t, &arms.acting.arm(places[0]).forward(&joints)),
-        None => f64::INFINITY,
-    };
+    let arm = arms.acting.arm(places[0]);
     // The samples that every corner needs, in lanes.
-    let solved = arms.nominal.solve_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let solved = arms.nominal.reach_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
+    let joints: Vec<Joints> =
+        solved.iter().map(|(_, joints)| *joints.as_ref().unwrap_or(&point.joints)).collect();
+    let flanges = arm.forward_many(&joints);
     let first: [f64; FIRST.len()] =
-        std::array::from_fn(|k| reached(FIRST[k], solved[k].as_ref().ok().map(|solution| solution.joints)));
+        std::array::from_fn(|k| if solved[k].1.is_ok() { off(FIRST[k], &flanges[k]) } else { f64::INFINITY });
     let even = |t: f64| match FIRST.iter().position(|first| *first == t) {
         Some(k) => first[k],
-        None => reached(t, motor(t)),
+        None => motor(t).map_or(f64::INFINITY, |joints| off(t, &arm.forward(&joints))),
     };
     Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
 }

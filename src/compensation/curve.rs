@@ -20,7 +20,7 @@ use crate::math::se3::Pose;
 use crate::program::motion::{Motion, Switch};
 
 /// Ends of an arc that are nearer than this make it a whole circle (mm).
-const CLOSED_MM: f64 = 1e-3;
+pub(super) const CLOSED_MM: f64 = 1e-3;
 
 /// An arc from its start over a point to its end, perhaps rising along its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

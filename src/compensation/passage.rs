@@ -77,7 +77,8 @@ fn line(motion: &Motion, path: &Path<'_>, middle_mm: f64, arms: &Arms<'_>, optio
         return out;
     }
     let mut left = bend;
-    if motion.insertable {
+    // Where the wrist is interpolated by itself, a target on the line would say how the tool turns, which nobody did.
+    if motion.insertable && motion.modal.wrist_interpolation != Switch::On {
         (out.before, left) = insertions(path, arms, options);
         out.bend_mm = Some(left);
     }
@@ -101,7 +102,10 @@ fn circle(
     };
     let courses = Some([circle.meant, circle.told]);
     // How the tool turns on the way must be known to be written out.
-    let may = segments && motion.straightens && motion.modal.circle_point_orientation != Switch::Either;
+    let may = segments
+        && motion.straightens
+        && motion.modal.circle_point_orientation != Switch::Either
+        && motion.modal.wrist_interpolation != Switch::On;
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {
         return Passage { bend_mm: Some(left), before, straight: true, flag: None, courses };
     }

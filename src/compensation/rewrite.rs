@@ -13,12 +13,13 @@ use rayon::prelude::*;
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
+use super::curve::{CLOSED_MM, Curve};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
-use super::segment::{Ends, Path, middles_off};
+use super::segment::{Ends, Path, gap, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all, take_room};
 use super::speed::fastest;
 use super::why::Why;
@@ -188,6 +189,8 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     let mut notes = mountings.notes();
     notes.extend(play_note(&arms, &solved));
     notes.extend(load_notes(listing, &arms, options));
+    let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
+    notes.extend(open_notes(listing, &solved, &unchecked));
     let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
     plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
     plan.outcomes.reserve_exact(listing.motions.len());
@@ -220,6 +223,57 @@ fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<String> {
         "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
         plays.join(", ")
     ))
+}
+
+/// What was not looked at, or taken on trust, and where.
+fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(lines) = lines_of(listing, unchecked) {
+        out.push(format!(
+            "{} of the lines and arcs start where the text alone does not tell, or where the program was not corrected: their \
+             ends are right, the path between is not checked ({lines})",
+            unchecked.len()
+        ));
+    }
+    let curve = |m: &u32| {
+        let motion = &listing.motions[*m as usize];
+        motion.left.is_none()
+            && motion.modal.wrist_interpolation == Switch::On
+            && matches!(motion.kind, MotionKind::Linear | MotionKind::Circular)
+    };
+    let wrist: Vec<u32> = (0..listing.motions.len() as u32).filter(curve).collect();
+    if let Some(lines) = lines_of(listing, &wrist) {
+        out.push(format!(
+            "on {} of the lines and arcs the controller turns the wrist joint by joint (SingArea \\Wrist): their paths are \
+             checked as if the tool turned evenly, and no targets are put in ({lines})",
+            wrist.len()
+        ));
+    }
+    if let Some(lines) = lines_of(listing, &solved.guessed) {
+        out.push(format!(
+            "{} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
+             which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})",
+            solved.guessed.len()
+        ));
+    }
+    out
+}
+
+/// The lines of motions, the first few; `None` where there are none.
+fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
+    /// How many lines are named.
+    const NAMED: usize = 8;
+    let mut lines: Vec<String> =
+        motions.iter().map(|m| listing.motions[*m as usize].place.line.to_string()).take(4 * NAMED).collect();
+    lines.dedup();
+    let word = match lines.as_slice() {
+        [] => return None,
+        [_] => "line",
+        _ => "lines",
+    };
+    let more = if lines.len() > NAMED { " and more" } else { "" };
+    lines.truncate(NAMED);
+    Some(format!("{word} {}{more}", lines.join(", ")))
 }
 
 /// What was taken for the load of the arm.
@@ -276,6 +330,8 @@ struct Job<'a> {
 
 /// What became of some motions that follow each other.
 struct Portion {
+    /// Lines and arcs that are written without their path having been checked.
+    unchecked: Vec<u32>,
     changes: Vec<Change>,
     outcomes: Vec<MotionOutcome>,
     points: Vec<PathPoint>,
@@ -329,13 +385,13 @@ pub(super) fn monitored(motion: &Motion) -> Switch {
 
 /// The corrected end of a motion, where its last target was worked out.
 fn ends_of<'a>(
-    motion: &Motion,
+    motion: &'a Motion,
     targets: &[Result<Solved, Why>],
     mountings: &'a Mountings,
 ) -> Option<Ends<'a>> {
     let Some(Ok(to)) = targets.last() else { return None };
-    let stated =
-        motion.to().and_then(|target| target.value.ok()).and_then(|value| value.cartesian().copied());
+    let stated = motion.to().and_then(|target| target.value.as_ref().ok());
+    let cartesian = stated.and_then(TargetValue::cartesian);
     Some(Ends {
         mounted: &mountings.list[to.mounted],
         index: to.mounted,
@@ -344,7 +400,8 @@ fn ends_of<'a>(
         joints: to.after,
         place: to.place,
         before: to.before,
-        conf: stated.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        external: stated.map(TargetValue::external),
     })
 }
 
@@ -352,6 +409,8 @@ struct Worked {
     change: Option<Change>,
     outcome: MotionOutcome,
     point: Option<PathPoint>,
+    /// Its way, where its targets are all corrected.
+    passage: Option<Passage>,
 }
 
 impl<'a> Job<'a> {
@@ -368,14 +427,23 @@ impl<'a> Job<'a> {
             .filter_map(|(_, p)| p.as_ref())
             .collect();
         let mut middles = middles_off(&lines, self.arms, self.options.emit).into_iter();
+        // The way of the motion before, which a corner asks for.
+        let mut last: Option<(u32, Passage)> = None;
         let mut out = Portion {
+            unchecked: Vec::new(),
             changes: Vec::with_capacity(count),
             outcomes: Vec::with_capacity(count),
-            points: Vec::with_capacity(count),
+            points: Vec::with_capacity(if self.options.points { count } else { 0 }),
         };
         for (index, path) in motions.zip(&paths) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
-            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY));
+            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY), last.as_ref());
+            last = worked.passage.map(|passage| (index as u32, passage));
+            let motion = &self.listing.motions[index];
+            let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+            if curve && path.is_none() && worked.change.is_some() {
+                out.unchecked.push(index as u32);
+            }
             out.changes.extend(worked.change);
             out.outcomes.push(worked.outcome);
             out.points.extend(worked.point);
@@ -392,10 +460,9 @@ impl<'a> Job<'a> {
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let targets = self.solved.of(previous);
-        let changes = |target: &Result<Solved, Why>| {
-            target.as_ref().is_ok_and(|solved| forbidden(solved, self.arms, self.options).is_none())
-        };
-        if !may_change(before, self.options) || !targets.iter().all(changes) {
+        let changes =
+            |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+        if !may_change(before, self.options) || !targets.iter().all(changes) || self.no_circle(previous) {
             return None;
         }
         let from = ends_of(before, targets, self.mountings)?;
@@ -404,8 +471,30 @@ impl<'a> Job<'a> {
         (from.index == to.index).then_some(Path { from, to, way })
     }
 
-    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it.
-    fn corner(&self, motion: &Motion, path: Option<&Path<'a>>, passage: &Passage) -> Option<f64> {
+    /// Whether a circular motion has a known start with which its points make no circle. One that closes is another matter:
+    /// its ends say nothing of its plane.
+    fn no_circle(&self, index: usize) -> bool {
+        let motion = &self.listing.motions[index];
+        if motion.kind != MotionKind::Circular {
+            return false;
+        }
+        let Some(previous) = motion.previous else { return false };
+        let Some(Ok(from)) = self.solved.of(previous as usize).last() else { return false };
+        let [Ok(via), Ok(to)] = self.solved.of(index) else { return false };
+        from.mounted == to.mounted
+            && gap(&from.meant.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
+            && Curve::round(from.meant, &via.meant, to.meant, motion).is_none()
+    }
+
+    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
+    /// the motion that was worked out before this one.
+    fn corner(
+        &self,
+        motion: &Motion,
+        path: Option<&Path<'a>>,
+        passage: &Passage,
+        last: Option<&(u32, Passage)>,
+    ) -> Option<f64> {
         let Path { from: point, to, way } = path?;
         passage.courses.as_ref()?;
         let previous = motion.previous? as usize;
@@ -419,21 +508,40 @@ impl<'a> Job<'a> {
                 return None;
             }
         }
+        let places = [point.place, way.at(0.0)];
+        let bend =
+            |way_in: &Passage| corner(point, way_in, passage, zone_mm, places, self.arms, self.options.emit);
+        if let Some((index, way_in)) = last
+            && Some(*index) == motion.previous
+        {
+            return bend(way_in);
+        }
         let path = self.path(previous)?;
         let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
         let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
-        let way_in = Passage::of(before, Some(&path), &good, middle, self.arms, self.options);
-        let places = [point.place, way.at(0.0)];
-        corner(point, &way_in, passage, zone_mm, places, self.arms, self.options.emit)
+        bend(&Passage::of(before, Some(&path), &good, middle, self.arms, self.options))
     }
 
-    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle.
-    fn work(&self, index: usize, path: Option<&Path<'a>>, middle_mm: f64) -> Worked {
-        work(index, self, path, middle_mm)
+    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
+    /// that was worked out before this one.
+    fn work(
+        &self,
+        index: usize,
+        path: Option<&Path<'a>>,
+        middle_mm: f64,
+        last: Option<&(u32, Passage)>,
+    ) -> Worked {
+        work(index, self, path, middle_mm, last)
     }
 }
 
-fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) -> Worked {
+fn work<'a>(
+    index: usize,
+    job: &Job<'a>,
+    path: Option<&Path<'a>>,
+    middle_mm: f64,
+    last: Option<&(u32, Passage)>,
+) -> Worked {
     let Job { listing, solved, arms, options, .. } = *job;
     let motion = &listing.motions[index];
     let mut outcome = MotionOutcome {
@@ -457,7 +565,7 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
             }
             p
         });
-        Worked { change, outcome, point }
+        Worked { change, outcome, point, passage: None }
     };
     if let Some(reason) = motion.left {
         return finish(outcome, Status::Left, Some(Why::Program(reason)), None, None);
@@ -484,14 +592,17 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
     if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
         return finish(outcome, Status::Left, Some(Why::JointTarget), None, point);
     }
-    if let Some(why) = good.iter().find_map(|s| forbidden(s, arms, options)) {
+    if let Some(why) = good.iter().find_map(|s| s.forbidden) {
         return finish(outcome, Status::Refused, Some(why), None, point);
+    }
+    if job.no_circle(index) {
+        return finish(outcome, Status::Refused, Some(Why::NoCircle), None, point);
     }
     // Then the path from the motion before.
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
     (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
     let mut flag = passage.flag;
-    if let Some(corner) = job.corner(motion, path, &passage) {
+    if let Some(corner) = job.corner(motion, path, &passage, last) {
         outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
         if !(corner <= options.tolerance_mm) {
             flag = flag.or(Some(Why::Corner { mm: corner }));
@@ -505,9 +616,9 @@ fn work(index: usize, job: &Job<'_>, path: Option<&Path<'_>>, middle_mm: f64) ->
     };
     let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
     outcome.after_mm = good.last().map(|s| s.deviation_after.norm_mm());
-    let change = Change { motion: index as u32, targets: new_targets, before: passage.before };
+    let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
-    finish(outcome, status, flag, Some(change), point)
+    Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
@@ -515,7 +626,8 @@ pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
     motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }
 
-fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
+/// Why a corrected target must not be written.
+pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
     let shift = (solved.told.translation.vector - solved.meant.translation.vector).norm();
     if !(shift <= options.max_correction_mm) {
         return Some(Why::TooFar { mm: shift });

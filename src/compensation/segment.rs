@@ -29,6 +29,8 @@ pub(super) struct Ends<'a> {
     pub(super) before: Joints,
     /// The configuration that its target states, where the controller checks it.
     pub(super) conf: Option<[i32; 4]>,
+    /// The external axes of its target, where that is known.
+    pub(super) external: Option<&'a [Option<f64>; 6]>,
 }
 
 /// Under which condition the arm goes along a path: from a share of the way on, a place in the list of conditions.
@@ -75,6 +77,18 @@ pub(super) struct Path<'a> {
 }
 
 impl Path<'_> {
+    /// The external axes at a share of the way, on which the controller runs them in proportion; `None` where none moves,
+    /// so that those of the end count.
+    fn external_at(&self, share: f64) -> Option<[Option<f64>; 6]> {
+        let (from, to) = (self.from.external?, self.to.external?);
+        (from != to).then(|| {
+            std::array::from_fn(|axis| match (from[axis], to[axis]) {
+                (Some(from), Some(to)) => Some(from + (to - from) * share),
+                (_, to) => to,
+            })
+        })
+    }
+
     /// The links at its start, where a joint turns on it or the load is another than before.
     pub(super) fn slack<'s>(&self, arms: &'s Arms<'_>) -> Option<Slack<'s>> {
         let changes = self.way.first != self.from.place || !self.way.later.is_empty();
@@ -123,8 +137,7 @@ pub(super) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
                 line.to.mounted.told.flange_for(&between(&line.from.told, &line.to.told, 0.5))
             };
             let flanges: Vec<Pose> = lines.iter().map(told).collect();
-            let solved = arms.nominal.solve_seeded(&flanges, &halfway);
-            solved.into_iter().map(|s| s.ok().map(|s| s.joints)).collect()
+            arms.nominal.reach_seeded(&flanges, &halfway).into_iter().map(|reached| reached.1.ok()).collect()
         }
     };
     let places: Vec<usize> = lines.iter().map(|line| line.way.at(0.5)).collect();
@@ -253,7 +266,9 @@ pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) ->
             }
         }
     }
-    let extra = |stop: &Stopover<'_>| extra_of(&stop.at.told, &stop.at.joints, options.emit, &path.to, arms);
+    let extra = |stop: &Stopover<'_>| {
+        extra_of((&stop.at.told, &stop.at.joints), stop.share, options.emit, path, arms)
+    };
     (best.stops.iter().map(extra).collect(), best.left_mm)
 }
 
@@ -392,9 +407,16 @@ pub(super) fn joint_bend(path: &Path<'_>, arms: &Arms<'_>) -> f64 {
     }
 }
 
-/// A target that the told path needs before the end `to`.
-pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit, to: &Ends<'_>, arms: &Arms<'_>) -> Extra {
+/// A target that the told path needs at a share of the way.
+pub(super) fn extra_of(
+    (told, joints): (&Pose, &Joints),
+    share: f64,
+    emit: Emit,
+    path: &Path<'_>,
+    arms: &Arms<'_>,
+) -> Extra {
     let q = told.rotation.quaternion();
+    let external = path.external_at(share);
     match emit {
         Emit::Targets => Extra {
             kind: MotionKind::Linear,
@@ -402,17 +424,17 @@ pub(super) fn extra_of(told: &Pose, joints: &Joints, emit: Emit, to: &Ends<'_>, 
                 position_mm: told.translation.vector.into(),
                 quaternion: [q.w, q.i, q.j, q.k],
                 // cfx stays where only the quarters are used.
-                conf: to.conf.map(|[_, _, _, cfx]| {
+                conf: path.to.conf.map(|[_, _, _, cfx]| {
                     let here = arms.nominal.configuration(joints);
                     [here.cf1, here.cf4, here.cf6, cfx]
                 }),
             },
-            external: None,
+            external,
         },
         Emit::Joints => Extra {
             kind: MotionKind::AbsoluteJoint,
             target: NewTarget::Joint { robot_deg: std::array::from_fn(|i| joints[i].to_degrees()) },
-            external: None,
+            external,
         },
     }
 }

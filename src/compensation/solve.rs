@@ -17,13 +17,13 @@ use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
 use super::mountings::Mountings;
 use super::payload::Load;
-use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
+use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
 use super::segment::Way;
 use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
 use crate::kinematics::inverse::configuration::Configuration;
 use crate::kinematics::model::Joints;
-use crate::kinematics::region::Outside;
+use crate::kinematics::region::{Nearest, Outside};
 use crate::math::se3::Pose;
 use crate::program::motion::{
     Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
@@ -62,6 +62,8 @@ pub(super) struct Solved {
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
+    /// Why it must not be written.
+    pub(super) forbidden: Option<Why>,
     /// The condition under which the arm comes there.
     pub(super) place: usize,
 }
@@ -74,6 +76,8 @@ pub(super) struct SolvedTargets {
     portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     ways: Vec<Way>,
+    /// Motions of which the configuration is not checked and the start not known.
+    pub(super) guessed: Vec<u32>,
 }
 
 impl SolvedTargets {
@@ -109,6 +113,9 @@ struct Start {
     mounted: usize,
     meant: Pose,
     joints: Joints,
+    conf: Configuration,
+    /// Whether the controller takes the solution next to where the arm stands, which is not known, and there are others.
+    guessed: bool,
 }
 
 /// Works out all targets.
@@ -159,7 +166,8 @@ impl Work<'_> {
                 motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
             };
             let portions = self.portions(arms, &places, &places, None);
-            return SolvedTargets { first: self.first, portions, ways: Vec::new() };
+            let guessed = self.guessed();
+            return SolvedTargets { first: self.first, portions, ways: Vec::new(), guessed };
         }
         let as_is = self.sides(arms, None);
         let before = self.places(arms, &as_is, &load);
@@ -202,7 +210,16 @@ impl Work<'_> {
             Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
         });
         let ways = ways.collect();
-        SolvedTargets { first: self.first, portions, ways }
+        let guessed = self.guessed();
+        SolvedTargets { first: self.first, portions, ways, guessed }
+    }
+
+    /// Motions of which a target was reached by guess.
+    fn guessed(&self) -> Vec<u32> {
+        let guessed = |m: &usize| {
+            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guessed)
+        };
+        (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
     }
 
     /// The targets of the portion that begins with a motion.
@@ -304,21 +321,18 @@ fn starts(
     mountings: &Mountings,
 ) -> Starts {
     let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
-    let mut out: Starts = asked
-        .par_chunks(STRETCH)
-        .flat_map_iter(|asked| {
-            let mut starts = Vec::with_capacity(asked.len());
-            let mut near = None;
-            for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
-                if depends(&run[0]) {
-                    starts.resize(starts.len() + run.len(), Err(Why::JointTarget));
-                } else {
-                    along(run, &mut near, arms, mountings, &mut starts);
-                }
+    // A place holder for those that depend on the motion before.
+    let mut out: Starts = asked.par_iter().map(|_| Err(Why::JointTarget)).collect();
+    out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).for_each(|(mut out, asked)| {
+        let mut near = None;
+        for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
+            let (here, rest) = out.split_at_mut(run.len());
+            out = rest;
+            if !depends(&run[0]) {
+                along(run, &mut near, arms, mountings, here);
             }
-            starts
-        })
-        .collect();
+        }
+    });
     // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
     let mut motion = 0;
     while motion < listing.motions.len() {
@@ -342,9 +356,7 @@ fn starts(
             reached.last().and_then(|start| start.as_ref().ok().map(|s| s.joints))
         });
         let run = first[motion]..first[end];
-        let mut starts = Vec::with_capacity(run.len());
-        along(&asked[run.clone()], &mut near, arms, mountings, &mut starts);
-        out[run].iter_mut().zip(starts).for_each(|(place, start)| *place = start);
+        along(&asked[run.clone()], &mut near, arms, mountings, &mut out[run]);
         motion = end;
     }
     out
@@ -360,7 +372,7 @@ fn along(
     near: &mut Option<Joints>,
     arms: &Arms<'_>,
     mountings: &Mountings,
-    out: &mut Starts,
+    out: &mut [Result<Start, Why>],
 ) {
     let mut at = 0;
     let mut run = RUNS[0];
@@ -370,7 +382,7 @@ fn along(
             Some(last) => {
                 let cartesian: Vec<Told<'_>> =
                     here.iter().map_while(|asked| Told::of(asked, mountings)).collect();
-                let taken = together(&cartesian, last, arms, out);
+                let taken = together(&cartesian, last, arms, &mut out[at..]);
                 at += taken;
                 taken == here.len()
             }
@@ -386,7 +398,7 @@ fn along(
             if let Ok(start) = &start {
                 *near = Some(start.joints);
             }
-            out.push(start);
+            out[at] = start;
             at += 1;
         }
     }
@@ -421,21 +433,19 @@ fn wanted(target: &RobTarget) -> Configuration {
 
 /// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
 /// were, and leaves `last` at the joints of the last of them.
-fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut Starts) -> usize {
+fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
     if told.is_empty() {
         return 0;
     }
     let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
-    let solved = arms.nominal.solve_path(&flanges, last);
-    let joints: Vec<Joints> = solved.iter().map_while(|s| s.as_ref().ok().map(|s| s.joints)).collect();
-    let configurations: Vec<Configuration> = told.iter().map(|t| wanted(t.target)).collect();
-    let fitting = arms.nominal.fitting(&joints, &configurations[..joints.len()]);
     let mut taken = 0;
-    for ((told, joints), fits) in told.iter().zip(joints).zip(fitting) {
-        if !fits && told.monitored != Switch::Off {
+    for (told, reached) in told.iter().zip(arms.nominal.reach_path(&flanges, last)) {
+        let Ok(reached) = reached else { break };
+        if told.monitored != Switch::Off && !reached.fits(&wanted(told.target)) {
             break;
         }
-        out.push(Ok(Start { mounted: told.mounted, meant: told.meant, joints }));
+        let (joints, conf) = (reached.joints, reached.configuration);
+        out[taken] = Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, guessed: false });
         *last = joints;
         taken += 1;
     }
@@ -459,8 +469,11 @@ fn start(
             }
             let meant = t.pose();
             let flange = told.flange_for(&meant);
-            let joints = configured(&arms.nominal, &flange, &t, monitored(asked.motion), near)?;
-            Ok(Start { mounted, meant, joints })
+            let monitored = monitored(asked.motion);
+            let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
+            let conf = arms.nominal.configuration(&joints);
+            let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
+            Ok(Start { mounted, meant, joints, conf, guessed })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -468,7 +481,9 @@ fn start(
             if let Some(joint) = nominal.model.limits.violated(&joints) {
                 return Err(Why::OutsideLimits { joint });
             }
-            Ok(Start { mounted, meant: told.target_of(&nominal.forward(&joints)), joints })
+            let meant = told.target_of(&nominal.forward(&joints));
+            let conf = arms.nominal.configuration(&joints);
+            Ok(Start { mounted, meant, joints, conf, guessed: false })
         }
     }
 }
@@ -500,11 +515,10 @@ fn finish(
     let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
     let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
     let reached_before = acting.forward(&places_before, &before);
-    let conf_before = arms.nominal.configurations(&before);
     // Joints that reach what was meant.
     let solutions = acting.each(&places, |place, items| match items {
-        None => acting.inverse(place).solve_seeded(&flanges, &before),
-        Some(items) => acting.inverse(place).solve_seeded(&picked(&flanges, items), &picked(&before, items)),
+        None => acting.inverse(place).solve_beside(&flanges, &before),
+        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
     });
     let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
     for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
@@ -516,7 +530,6 @@ fn finish(
                 flange: flanges[k],
                 after: solution.joints,
                 singularity: solution.singularity,
-                conf_before: conf_before[k],
                 reached_before: real(start).target_of(&reached_before[k]),
             }),
             Err(error) => out[*index] = Err(Why::of_inverse(error)),
@@ -540,15 +553,15 @@ fn finish(
         })
         .collect();
     let replayed = match options.emit {
-        Emit::Targets => arms.nominal.solve_seeded(&heard, &after),
+        Emit::Targets => arms.nominal.reach_seeded(&heard, &after),
         Emit::Joints => Vec::new(),
     };
     let mut last: Vec<Joints> = Vec::with_capacity(way.len());
     let mut failed: Vec<Option<Why>> = vec![None; way.len()];
     for (k, w) in way.iter().enumerate() {
         last.push(match replayed.get(k) {
-            Some(Ok(solution)) if !joint_form(w) => solution.joints,
-            Some(Err(error)) if !joint_form(w) => {
+            Some((_, Ok(joints))) if !joint_form(w) => *joints,
+            Some((_, Err(error))) if !joint_form(w) => {
                 failed[k] = Some(Why::of_inverse(*error));
                 w.after
             }
@@ -557,7 +570,6 @@ fn finish(
     }
     let places: Vec<usize> = way.iter().map(|w| w.place).collect();
     let reached_after = acting.forward(&places, &last);
-    let conf = arms.nominal.configurations(&after);
     let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
     let sigmas = match arms.knowledge {
         Some(knowledge) => {
@@ -577,7 +589,7 @@ fn finish(
         }
         None => vec![0.0; way.len()],
     };
-    let mut near = 0;
+    let mut near = Nearest::default();
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
             out[w.index] = Err(why);
@@ -587,14 +599,14 @@ fn finish(
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
-        out[w.index] = Ok(Solved {
+        let mut solved = Solved {
             mounted: w.start.mounted,
             meant,
             before: w.start.joints,
             after: w.after,
             told: told[k],
-            conf_before: w.conf_before,
-            conf: conf[k],
+            conf_before: w.start.conf,
+            conf: replayed.get(k).map_or_else(|| arms.nominal.configuration(&w.after), |heard| heard.0),
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
             sigma_mm: sigmas[k].hypot(in_play_mm),
@@ -602,7 +614,10 @@ fn finish(
             place: w.place,
             outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
             singularity: w.singularity,
-        });
+            forbidden: None,
+        };
+        solved.forbidden = forbidden(&solved, arms, options);
+        out[w.index] = Ok(solved);
     }
     out
 }
@@ -615,7 +630,6 @@ struct OnItsWay {
     flange: Pose,
     after: Joints,
     singularity: f64,
-    conf_before: Configuration,
     reached_before: Pose,
 }
 

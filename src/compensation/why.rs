@@ -57,6 +57,8 @@ pub enum Why {
         /// Its speed over its limit, above 1.
         ratio: f64,
     },
+    /// The three points of a circular motion lie on a line, or two of them coincide.
+    NoCircle,
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
     WholeCircle,
     /// A joint stands outside the range in which it was measured.
@@ -107,6 +109,10 @@ impl fmt::Display for Why {
             Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
             Why::NearSingularity => f.write_str("too close to a singularity"),
             Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
+            Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
+            Why::Corner { mm } if !mm.is_finite() => {
+                f.write_str("the arm cannot follow the rounded corner before it: make the zone smaller")
+            }
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
             Why::Corner { mm } => {
                 write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: make the zone smaller")
@@ -122,6 +128,7 @@ impl fmt::Display for Why {
                     joint + 1
                 )
             }
+            Why::NoCircle => f.write_str("its three points lie on a line or coincide: they make no circle"),
             Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
             Why::JointNotMeasured { joint, by_deg } => {
                 write!(

@@ -100,12 +100,12 @@ impl Region {
 
     /// Whether a joint vector (rad) leaves the region: the joint that leaves its range farthest, else coverage.
     pub fn outside(&self, q: &Joints) -> Option<Outside> {
-        self.outside_near(q, &mut 0)
+        self.outside_near(q, &mut Nearest::default())
     }
 
-    /// The same along a path: the sample that was near enough last is asked first, and left in `near` for the next one.
+    /// The same along a path: what was found at the pose before is looked at first, and left in `last` for the next one.
     /// The answer does not depend on it.
-    pub fn outside_near(&self, q: &Joints, near: &mut usize) -> Option<Outside> {
+    pub fn outside_near(&self, q: &Joints, last: &mut Nearest) -> Option<Outside> {
         let degrees: [f64; 6] = std::array::from_fn(|i| q[i].to_degrees());
         let beyond = |i: usize| (self.min_deg[i] - degrees[i]).max(degrees[i] - self.max_deg[i]);
         let worst = (0..6).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b))).unwrap_or(0);
@@ -113,28 +113,53 @@ impl Region {
             return Some(Outside::Joint { joint: worst, by_deg: beyond(worst) });
         }
         let allowed = SPACINGS * self.spacing_deg.max(SLACK_DEG);
-        let close = |sample: &[f64; 6]| square(sample, &degrees) <= allowed * allowed;
-        if self.samples_deg.get(*near).is_some_and(close) {
-            return None;
+        let coverage = |nearest: f64| Some(Outside::Coverage { ratio: nearest.sqrt() / allowed });
+        if let Some(sample) = self.samples_deg.get(last.index) {
+            let here = square(sample, &degrees);
+            if here <= allowed * allowed {
+                return None;
+            }
+            // The others have come nearer by no more than the pose has moved.
+            if here.sqrt() <= last.others - distance(&last.at, &degrees) {
+                return coverage(here);
+            }
         }
-        // The first sample that is near enough settles it. One whose first joints alone are farther away than the nearest
-        // so far, which is the nearest of the pose before to begin with, is passed over.
-        let mut nearest =
-            self.samples_deg.get(*near).map_or(f64::INFINITY, |sample| square(sample, &degrees));
+        // The first sample that is near enough settles it. One whose first joints alone are farther away than the second
+        // nearest so far is passed over.
+        let (mut nearest, mut second) = (f64::INFINITY, f64::INFINITY);
         for (index, sample) in self.samples_deg.iter().enumerate() {
             let part: f64 = sample[..3].iter().zip(&degrees).map(|(a, b)| (a - b) * (a - b)).sum();
-            if part > nearest {
+            if part > second {
                 continue;
             }
             let whole = square(sample, &degrees);
-            if whole < nearest {
-                (nearest, *near) = (whole, index);
-            }
             if whole <= allowed * allowed {
-                *near = index;
+                *last = Nearest { index, at: degrees, others: f64::NEG_INFINITY };
                 return None;
             }
+            if whole < nearest {
+                (nearest, second, last.index) = (whole, nearest, index);
+            } else {
+                second = second.min(whole);
+            }
         }
-        Some(Outside::Coverage { ratio: nearest.sqrt() / allowed })
+        (last.at, last.others) = (degrees, second.sqrt());
+        coverage(nearest)
+    }
+}
+
+/// The sample that was nearest to the pose looked at last.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nearest {
+    index: usize,
+    /// That pose (°).
+    at: [f64; 6],
+    /// No other sample was nearer to it than this (°).
+    others: f64,
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self { index: 0, at: [0.0; 6], others: f64::NEG_INFINITY }
     }
 }

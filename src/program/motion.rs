@@ -123,6 +123,14 @@ impl TargetValue {
         }
     }
 
+    /// The external axes (mm or degrees).
+    pub fn external(&self) -> &[Option<f64>; 6] {
+        match self {
+            TargetValue::Cartesian(target) => &target.external,
+            TargetValue::Joint(target) => &target.external,
+        }
+    }
+
     /// The joint target, where it is one.
     pub fn joint(&self) -> Option<&JointTarget> {
         match self {

@@ -155,7 +155,7 @@ pub fn sum(rows: &[Row]) -> String {
 
 /// What fits a terminal: the sum, and the table.
 pub fn summary(rows: &[Row]) -> Document {
-    let mut page = Document::new(format!("Compensation of {} programs", rows.len()));
+    let mut page = Document::new(title(rows));
     page.push(verdict(rows));
     let mut table = table(rows);
     // In a terminal only columns in which something stands.
@@ -174,7 +174,7 @@ const ROWS: usize = 200;
 
 /// The page.
 pub fn document(rows: &[Row]) -> Document {
-    let mut page = Document::new(format!("Compensation of {} programs", rows.len()));
+    let mut page = Document::new(title(rows));
     page.push(verdict(rows));
     let largest = |value: fn(&Row) -> Option<f64>| rows.iter().filter_map(value).reduce(f64::max);
     let motions: usize = rows.iter().map(|row| row.motions[0]).sum();
@@ -187,6 +187,13 @@ pub fn document(rows: &[Row]) -> Document {
     ]);
     page.push(table(rows).excerpt(ROWS));
     page
+}
+
+fn title(rows: &[Row]) -> String {
+    match rows.len() {
+        1 => "Compensation of 1 program".to_owned(),
+        count => format!("Compensation of {count} programs"),
+    }
 }
 
 fn verdict(rows: &[Row]) -> Verdict {

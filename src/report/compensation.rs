@@ -159,7 +159,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
 /// What fits a terminal: verdict with coverage, reasons, what could not be read, notes on tools and work objects.
 pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Document {
     let mut page = heading(files);
-    page.push(verdict(plan));
+    page.push(verdict(plan, listing));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
         page.push(reasons);
@@ -176,7 +176,7 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
 /// The page, with the deviation of the path where reports are given.
 pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: &[PathReport]) -> Document {
     let mut page = heading(files);
-    page.push(verdict(plan));
+    page.push(verdict(plan, listing));
     page.push(key_figures(plan));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
@@ -273,7 +273,7 @@ fn heading(files: &[ProgramFile]) -> Document {
     page
 }
 
-fn verdict(plan: &Plan) -> Verdict {
+fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
     let written = count(plan, Fate::Changed) + flagged;
     let (status, headline) = match (written, refused + flagged) {
@@ -289,6 +289,12 @@ fn verdict(plan: &Plan) -> Verdict {
              correction"
                 .to_owned(),
         );
+    }
+    if !listing.opaque.is_empty() {
+        reasons.push(format!(
+            "regions that could not be read and stay as they are: {}; a motion in them is not corrected",
+            listing.opaque.len()
+        ));
     }
     let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
     if inserted > 0 {

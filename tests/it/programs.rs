@@ -265,3 +265,132 @@ fn dry_run_check_and_diff_write_no_program() {
     assert!(err.contains("carries no mark"), "{err}");
     assert!(Estimated::from_toml(&text).is_ok());
 }
+
+#[test]
+fn two_programs_never_end_in_one_file() {
+    let dir = workshop();
+    let at = dir.path();
+    for (folder, shift) in [("left", 0.0), ("right", 1.0)] {
+        fs::create_dir(at.join(folder)).unwrap();
+        fs::write(at.join(folder).join("a.mod"), module("A", 5, shift)).unwrap();
+    }
+    let run = |arguments: &[&str]| {
+        let common = ["--model", "model.toml", "-o", "out"];
+        truegrind(at, &[&["compensate"], arguments, &common].concat())
+    };
+    for arguments in [
+        &["left/a.mod", "right/a.mod"][..],
+        &["left/a.mod", "right/a.mod", "--each"],
+        &["left", "right"],
+        &["left", "right/a.mod"],
+    ] {
+        let (code, _, err) = run(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {err}");
+        let both = err.contains("left/a.mod and right/a.mod would")
+            || err.contains("right/a.mod and left/a.mod would");
+        assert!(both && err.contains("both be written to a.mod"), "{err}");
+        assert!(!at.join("out").exists(), "{arguments:?}");
+    }
+    let (code, _, err) = run(&["left/a.mod", "left/a.mod"]);
+    assert_eq!(code, 2);
+    assert!(err.contains("left/a.mod is named twice"), "{err}");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_stay_what_they_are() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::write(at.join("a.mod"), module("A", 5, 0.0)).unwrap();
+    let compensate =
+        |output: &str| truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", output]);
+    assert_eq!(compensate("plain.mod").0, 0);
+    let plain = fs::read(at.join("plain.mod")).unwrap();
+    // The standard output: the program and nothing else.
+    let (code, text, err) = compensate("-");
+    assert_eq!((code, text.as_bytes() == plain), (0, true), "{text}");
+    assert!(err.contains("Compensation of a.mod") && !at.join("-").exists(), "{err}");
+    // A link: the file that it names is written.
+    fs::write(at.join("target.mod"), "old").unwrap();
+    std::os::unix::fs::symlink("target.mod", at.join("link.mod")).unwrap();
+    assert_eq!(compensate("link.mod").0, 0);
+    assert!(fs::symlink_metadata(at.join("link.mod")).unwrap().is_symlink());
+    assert_eq!(fs::read(at.join("target.mod")).unwrap(), plain);
+    // A link to an input is that input.
+    std::os::unix::fs::symlink("a.mod", at.join("input.mod")).unwrap();
+    let (code, _, err) = compensate("input.mod");
+    assert_eq!(code, 2);
+    assert!(err.contains("an input is never overwritten"), "{err}");
+    // A pipe: written into, not replaced.
+    let pipe = at.join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || fs::read(pipe).unwrap()
+    });
+    assert_eq!(compensate("pipe").0, 0);
+    assert_eq!(reader.join().unwrap(), plain);
+    assert!(!fs::metadata(&pipe).unwrap().is_file());
+}
+
+#[test]
+fn a_module_without_the_mark_of_its_task_is_not_called_compensated() {
+    let dir = workshop();
+    let at = dir.path();
+    let target = "[[360,10,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    fs::write(at.join("points.sys"), format!("MODULE points\n  PERS robtarget p1:={target};\nENDMODULE\n"))
+        .unwrap();
+    let main = |name: &str, more: &str| {
+        let text = format!(
+            "MODULE {name}\n  PROC main()\n    ConfL\\Off;\n    MoveL p1,v100,fine,tool0;\n{more}  ENDPROC\nENDMODULE\n"
+        );
+        fs::write(at.join(format!("{name}.mod")), text).unwrap();
+    };
+    main("one", "");
+    main("two", &format!("    MoveL {},v100,fine,tool0;\n", target.replace("360", "370")));
+    let run = |files: &[&str], out: &str| {
+        truegrind(at, &[&["compensate"], files, &["--model", "model.toml", "-o", out]].concat())
+    };
+    let (code, _, err) = run(&["one.mod", "points.sys"], "first");
+    assert_eq!(code, 0, "{err}");
+    // The same task again: points.sys carries the mark, and one.mod has nothing of its own to correct.
+    let (code, text, err) = run(&["first/one.mod", "first/points.sys"], "again");
+    assert_eq!((code, text.contains("already compensated")), (1, true), "{text}{err}");
+    // Another module with the corrected points.
+    let (code, text, err) = run(&["two.mod", "first/points.sys"], "second");
+    assert_eq!(code, 2, "{text}");
+    assert!(err.contains("points.sys is already compensated with this model, two.mod is not"), "{err}");
+    assert!(!at.join("second").exists());
+}
+
+#[test]
+fn what_cannot_be_read_is_not_called_done() {
+    let dir = workshop();
+    let at = dir.path();
+    let run = |name: &str| truegrind(at, &["compensate", name, "--model", "model.toml", "--dry-run"]);
+    let broken = "    MoveL [[360,10,450],[0,0,1,0],v100,fine,tool0;\n";
+    fs::write(at.join("none.mod"), format!("MODULE N\n  PROC main()\n{broken}  ENDPROC\nENDMODULE\n"))
+        .unwrap();
+    let (code, _, err) = run("none.mod");
+    assert_eq!(code, 1, "{err}");
+    assert!(err.contains("no motion was found; regions that could not be read: 1"), "{err}");
+    let some = module("A", 5, 0.0).replace("    ConfL\\Off;\n", &format!("    ConfL\\Off;\n{broken}"));
+    fs::write(at.join("some.mod"), some).unwrap();
+    let (code, text, err) = run("some.mod");
+    assert_eq!(code, 0, "{err}");
+    assert!(text.contains("regions that could not be read and stay as they are: 1;"), "{text}");
+}
+
+#[test]
+fn lines_whose_path_nobody_checked_are_named() {
+    let dir = workshop();
+    let at = dir.path();
+    let text = module("A", 5, 0.0).replace("v100,z1,tool0;\n", "v100,fine,tool0;\n    IF di1=1 Stop;\n");
+    let text = text.replacen("    IF di1=1 Stop;\n", "    IF di1=1 MoveL CRobT(),v100,fine,tool0;\n", 2);
+    fs::write(at.join("a.mod"), text).unwrap();
+    let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
+    assert_eq!(code, 0, "{err}");
+    let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("3 of the lines and arcs start where the text alone does not tell"), "{text}");
+    assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
+}

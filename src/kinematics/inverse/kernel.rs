@@ -8,7 +8,9 @@
 //! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u (rad).
 //! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
 //! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
-//! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`].
+//! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`]. Where only the
+//! joints are asked for ([`Asked::Joints`]), a step shorter than [`SETTLED_RAD`] is the last: by Newton's square law
+//! what it leaves lies below the tolerances, which holds where the slope of the effects is exact, so only without them.
 //! Checked against: [`super::newton`], the forward map.
 
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
@@ -21,6 +23,19 @@ use crate::math::lanes::{SinCos, sin_cos};
 const STEPS: usize = 8;
 /// Longest step of a joint (rad).
 const LONGEST_STEP_RAD: f64 = 0.5;
+
+/// A step of every joint below this leaves half its square, 1.3e-13 rad, and over 3 m of arm 4e-10 mm (rad).
+const SETTLED_RAD: f64 = 5e-7;
+
+/// What is asked of the kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// Joints, residuals and the distance to singularity at the end.
+    Everything,
+    /// Joints alone: `singularity` says by more than 0 that the Jacobian at the end has an inverse, and residuals are
+    /// those before the last step.
+    Joints,
+}
 
 /// What the kernel needs to know of an arm.
 #[derive(Debug, Clone)]
@@ -125,6 +140,17 @@ impl<R: SinCos> Factored<R> {
         [arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]]
     }
 
+    /// Above 0 where both factors have an inverse.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn regular(&self, length: f64) -> R {
+        let mut square = R::splat(0.0);
+        for k in 0..3 {
+            let first = dot(&self.first[k], &self.first[k]) * R::splat(length * length);
+            square += first + dot(&self.last[k], &self.last[k]);
+        }
+        R::splat(1.0) / square.sqrt()
+    }
+
     /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn distance(&self, lever: &[R; 3], length: f64) -> R {
@@ -154,12 +180,16 @@ impl Kernel {
         structure: &Structure,
         goal: &End<R>,
         start: &[R; 6],
+        asked: Asked,
     ) -> Solved<R> {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let goal_wrist = at(&goal.origin, &goal.axes, &self.wrist_mm);
         let goal_flange = at(&goal.origin, &goal.axes, &self.flange_mm);
         let mut mapped = *start;
         let (mut alive, mut steps) = (one, zero);
+        // Rows whose last step was too short for another one, and their margins before it.
+        let (mut settled, mut settled_margins) = (zero, [zero; 3]);
+        let brief = asked == Asked::Joints && arm.model.effects.is_empty();
         let mut first_margins = [zero; 3];
         let mut step = 0;
         loop {
@@ -187,46 +217,59 @@ impl Kernel {
             }
             alive = alive * sensible * (one - converged);
             let factored = Factored::of(&frames, &wrist);
-            if step == STEPS || alive.max_abs() == 0.0 {
+            let mut ends = step == STEPS || alive.max_abs() == 0.0;
+            if !ends {
+                let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
+                let mut carried = [zero; 6];
+                for effect in &arm.model.effects {
+                    effect.carry(&mapped, &delta, &mut carried);
+                }
+                for j in 0..6 {
+                    delta[j] -= carried[j];
+                    alive = alive * delta[j].within(LONGEST_STEP_RAD);
+                }
+                // Rows that stand still must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
+                for j in 0..6 {
+                    mapped[j] += alive * delta[j];
+                }
+                steps += alive;
+                step += 1;
+                if brief {
+                    let mut last = alive;
+                    for j in 0..6 {
+                        last = last * delta[j].within(SETTLED_RAD);
+                    }
+                    alive = alive - last;
+                    ends = alive.max_abs() == 0.0;
+                    if last.max_abs() > 0.0 {
+                        let margins = structure.margins(&frames, &wrist);
+                        for k in 0..3 {
+                            settled_margins[k] += last * margins[k];
+                        }
+                        settled += last;
+                    }
+                }
+            }
+            if ends {
+                let open = one - settled;
+                let mut margins = structure.margins(&frames, &wrist);
+                for k in 0..3 {
+                    margins[k] = open * margins[k] + settled_margins[k];
+                }
                 return Solved {
                     mapped,
                     residual_mm,
                     residual_rad,
                     steps,
-                    converged,
-                    singularity: factored.distance(&minus(&wrist, &flange), self.length_mm),
-                    margins: [first_margins, structure.margins(&frames, &wrist)],
+                    converged: open * converged + settled,
+                    singularity: match asked {
+                        Asked::Everything => factored.distance(&minus(&wrist, &flange), self.length_mm),
+                        Asked::Joints => factored.regular(self.length_mm),
+                    },
+                    margins: [first_margins, margins],
                 };
             }
-            let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
-            let mut carried = [zero; 6];
-            for effect in &arm.model.effects {
-                effect.carry(&mapped, &delta, &mut carried);
-            }
-            for j in 0..6 {
-                delta[j] -= carried[j];
-                alive = alive * delta[j].within(LONGEST_STEP_RAD);
-            }
-            // Rows that stand still must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
-            for j in 0..6 {
-                mapped[j] += alive * delta[j];
-            }
-            steps += alive;
-            step += 1;
         }
-    }
-
-    /// [`Structure::margins`] of joints, for one row or eight in lanes.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn margins<R: SinCos>(
-        &self,
-        arm: &Posed<'_>,
-        structure: &Structure,
-        joints: &[R; 6],
-    ) -> [R; 3] {
-        let frames = self.frames(arm, &arm.mapped(joints));
-        let wrist = at(&frames.origin[6], &[frames.x, frames.y[5], frames.z[6]], &self.wrist_mm);
-        structure.margins(&frames, &wrist)
     }
 
     /// Joint frames for mapped angles.

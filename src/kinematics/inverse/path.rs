@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::configuration::{self, Configuration};
-use super::kernel::Solved;
+use super::kernel::{Asked, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::chain::End;
 use crate::kinematics::model::Joints;
@@ -17,18 +17,57 @@ const STEADY_STRIDE_RAD: f64 = 0.05;
 /// Targets that one thread takes at a time; the results do not depend on it.
 const PORTION: usize = 1024;
 
+/// Joints that reach a target, and what comes with them at no cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reached {
+    /// Controller angles (rad).
+    pub joints: Joints,
+    /// Their configuration.
+    pub configuration: Configuration,
+    /// The signs of [`Branch`] at these joints, as numbers that vanish on the borders.
+    margins: [f64; 3],
+}
+
+impl Reached {
+    /// Whether the joints are of the configuration that was asked for, borders counted to both sides as in
+    /// [`Inverse::solve_configured`].
+    pub fn fits(&self, wanted: &Configuration) -> bool {
+        wanted.fits(&self.joints, &self.margins)
+    }
+}
+
 impl Inverse<'_> {
     /// Joints along a path from `start`: every target on the branch of the one before it, each joint on the turn
     /// nearest to it. A target that fails leaves the path where it was: the next one starts from the last success.
     ///
     /// One thread; the same input gives the same bits.
     pub fn solve_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Solution, InverseError>> {
+        self.along(targets, start, Asked::Everything, |solution, _| solution)
+    }
+
+    /// The joints of [`Inverse::solve_path`], without residuals and distances to singularity: half the work. They may
+    /// differ by 1e-12 rad.
+    pub fn reach_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Reached, InverseError>> {
+        self.along(targets, start, Asked::Joints, |Solution { joints, .. }, margins| Reached {
+            joints,
+            configuration: self.configuration_of(&joints, &margins),
+            margins,
+        })
+    }
+
+    fn along<T>(
+        &self,
+        targets: &[Pose],
+        start: &Joints,
+        asked: Asked,
+        keep: impl Fn(Solution, [f64; 3]) -> T,
+    ) -> Vec<Result<T, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
         let (mut last, mut stride) = (*start, Joints::zeros());
         let mut margins = self.margins(start);
         for block in targets.chunks(WIDTH) {
             let seeds: [Joints; WIDTH] = std::array::from_fn(|k| last + stride * (k + 1) as f64);
-            let solved = self.solve_lanes(block, &seeds);
+            let solved = self.solve_lanes(block, &seeds, asked);
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
                 // The road in lanes is open while strides are short and the branch is kept.
@@ -53,7 +92,7 @@ impl Inverse<'_> {
                     }
                     last = solution.joints;
                 }
-                out.push(result);
+                out.push(result.map(|solution| keep(solution, margins)));
             }
         }
         out
@@ -68,51 +107,66 @@ impl Inverse<'_> {
             .zip(seeds[..count].par_chunks(PORTION))
             .flat_map_iter(|(targets, seeds)| {
                 let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
-                blocks.flat_map(|(targets, seeds)| self.solve_block(targets, seeds))
+                blocks.flat_map(|(targets, seeds)| {
+                    let solved = self.solve_lanes(targets, &padded(seeds), Asked::Everything);
+                    (0..targets.len()).map(move |k| self.judged(&lane(&solved, k), &targets[k], &seeds[k]))
+                })
             })
             .collect()
     }
 
-    /// [`Inverse::configuration`] of many joint vectors.
-    pub fn configurations(&self, joints: &[Joints]) -> Vec<Configuration> {
-        let branches = self.structure.has_branches();
-        let margins = self.margins_of_many(joints);
-        let branch = |m| branches.then(|| Branch::of(m));
-        joints.iter().zip(&margins).map(|(q, m)| configuration::of(branch(m), q)).collect()
-    }
-
-    /// Whether each joint vector is of the configuration that was asked for, borders counted to both sides as in
-    /// [`Inverse::solve_configured`].
-    pub fn fitting(&self, joints: &[Joints], wanted: &[Configuration]) -> Vec<bool> {
-        let margins = self.margins_of_many(joints);
-        joints.iter().zip(&margins).zip(wanted).map(|((q, m), wanted)| wanted.fits(q, m)).collect()
-    }
-
-    fn margins_of_many(&self, joints: &[Joints]) -> Vec<[f64; 3]> {
-        let mut out = Vec::with_capacity(joints.len());
-        for block in joints.chunks(WIDTH) {
-            let angles: [Lanes; 6] =
-                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| block[k.min(block.len() - 1)][i])));
-            let margins = vectorised(
-                #[inline(always)]
-                || self.kernel.margins(&self.arm, &self.structure, &angles),
-            );
-            out.extend((0..block.len()).map(|k| margins.map(|m| m.0[k])));
+    /// The joints of [`Inverse::solve_seeded`], without residuals and distances to singularity: half the work; they may
+    /// differ by 1e-12 rad. Each with the configuration of its seed. One thread.
+    pub fn reach_seeded(
+        &self,
+        targets: &[Pose],
+        seeds: &[Joints],
+    ) -> Vec<(Configuration, Result<Joints, InverseError>)> {
+        let mut out = Vec::with_capacity(targets.len());
+        for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
+            let solved = self.solve_lanes(targets, &padded(seeds), Asked::Joints);
+            for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
+                let row = lane(&solved, k);
+                let solution = self.judged(&row, target, seed);
+                out.push((self.configuration_of(seed, &row.margins[0]), solution.map(|s| s.joints)));
+            }
         }
         out
     }
 
-    fn solve_block<'s>(
-        &'s self,
-        targets: &'s [Pose],
-        seeds: &'s [Joints],
-    ) -> impl Iterator<Item = Result<Solution, InverseError>> + 's {
-        let padded: [Joints; WIDTH] = std::array::from_fn(|k| seeds[k.min(seeds.len() - 1)]);
-        let solved = self.solve_lanes(targets, &padded);
-        targets.iter().enumerate().map(move |(k, target)| match self.accepted(&lane(&solved, k), &seeds[k]) {
+    /// [`Inverse::solve_seeded`] where solution and seed differ alike along the list, as on the path of an estimated arm
+    /// that is seeded with the nominal one's joints: each eight begin by as much beside their seeds as the last one before
+    /// them ended. One thread.
+    pub fn solve_beside(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Solution, InverseError>> {
+        let mut out = Vec::with_capacity(targets.len());
+        let mut beside = Joints::zeros();
+        for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
+            let solved =
+                self.solve_lanes(targets, &padded(seeds).map(|seed| seed + beside), Asked::Everything);
+            for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
+                let result = self.judged(&lane(&solved, k), target, seed);
+                if let Ok(solution) = &result {
+                    beside = solution.joints - seed;
+                }
+                out.push(result);
+            }
+            if beside.amax() >= STEADY_STRIDE_RAD {
+                beside = Joints::zeros();
+            }
+        }
+        out
+    }
+
+    /// The kernel's solution where it counts, the careful one elsewhere.
+    fn judged(&self, row: &Solved<f64>, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
+        match self.accepted(row, seed) {
             Some(solution) => self.check_limits(&solution.joints).map(|()| solution),
-            None => self.solve_near(target, &seeds[k]),
-        })
+            None => self.solve_near(target, seed),
+        }
+    }
+
+    fn configuration_of(&self, joints: &Joints, margins: &[f64; 3]) -> Configuration {
+        configuration::of(self.structure.has_branches().then(|| Branch::of(margins)), joints)
     }
 
     /// The kernel on one target.
@@ -121,11 +175,11 @@ impl Inverse<'_> {
         let t = target.translation.vector;
         let goal = self.place(&[q.x, q.y, q.z, q.w], &[t.x, t.y, t.z]);
         let start = self.arm.mapped(&(*seed).into());
-        self.kernel.solve(&self.arm, &self.structure, &goal, &start)
+        self.kernel.solve(&self.arm, &self.structure, &goal, &start, Asked::Everything)
     }
 
     /// The kernel on up to eight targets; the last one fills the lanes.
-    fn solve_lanes(&self, targets: &[Pose], seeds: &[Joints; WIDTH]) -> Solved<Lanes> {
+    fn solve_lanes(&self, targets: &[Pose], seeds: &[Joints; WIDTH], asked: Asked) -> Solved<Lanes> {
         let zero = Lanes([0.0; WIDTH]);
         let (mut quaternion, mut translation, mut start) = ([zero; 4], [zero; 3], [zero; 6]);
         for k in 0..WIDTH {
@@ -144,7 +198,7 @@ impl Inverse<'_> {
             #[inline(always)]
             || {
                 let goal = self.place(&quaternion, &translation);
-                self.kernel.solve(&self.arm, &self.structure, &goal, &self.arm.mapped(&start))
+                self.kernel.solve(&self.arm, &self.structure, &goal, &self.arm.mapped(&start), asked)
             },
         )
     }
@@ -165,6 +219,11 @@ impl Inverse<'_> {
         ];
         End { axes: columns, origin: *translation }.then(&self.flange_inverse)
     }
+}
+
+/// Eight seeds; the last one fills the lanes.
+fn padded(seeds: &[Joints]) -> [Joints; WIDTH] {
+    std::array::from_fn(|k| seeds[k.min(seeds.len() - 1)])
 }
 
 fn lane(solved: &Solved<Lanes>, k: usize) -> Solved<f64> {

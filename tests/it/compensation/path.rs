@@ -579,3 +579,83 @@ fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
     assert!(most > 1e-3 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
     assert_eq!(planned.outcomes[1].reason, None);
 }
+
+#[test]
+fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
+    let actual = perturbed(11, 1.0);
+    let with = |target: String, a: &str, b: &str| target.replace(EXT, &format!("[{a},{b},9E9,9E9,9E9,9E9]"));
+    let options = Options { tolerance_mm: 0.001, circles: Circles::Segments, ..Options::default() };
+    let source = module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n  MoveC {},{},v100,fine,tool0;\n",
+        with(down(320.0, 30.0, 300.0), "100", "7"),
+        with(down(480.0, 30.0, 300.0), "200", "7"),
+        with(down(420.0, 90.0, 300.0), "9E9", "9E9"),
+        with(down(360.0, 30.0, 300.0), "20", "7"),
+    ));
+    let (planned, text) = rewrite(&source, &known(&actual), &options);
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let places: Vec<(Vector3<f64>, [Option<f64>; 6])> = task
+        .listing
+        .motions
+        .iter()
+        .map(|m| m.to().unwrap().value.unwrap().cartesian().copied().unwrap())
+        .map(|target| (Vector3::from(target.position_mm), target.external))
+        .collect();
+    let [line, arc] = [planned.outcomes[1].inserted, planned.outcomes[2].inserted];
+    assert!(line >= 1 && arc >= 8, "{line} {arc}");
+    for (at, external) in &places[..=line + 1] {
+        let share = (at.x - places[0].0.x) / (places[line + 1].0.x - places[0].0.x);
+        assert!((external[0].unwrap() - 100.0 - 100.0 * share).abs() < 0.1, "{at} {external:?}");
+        assert_eq!(external[1..3], [Some(7.0), None]);
+    }
+    // Half a turn from (480, 30) over (420, 90) to (360, 30).
+    for (at, external) in &places[line + 1..] {
+        let share = (at.y - 30.0).atan2(at.x - 420.0) / PI;
+        assert!((external[0].unwrap() - 200.0 + 180.0 * share).abs() < 2.0, "{at} {external:?}");
+    }
+    // Where none moves, they stay as they are written.
+    let still = source.replace("[200,7", "[100,7").replace("[20,7", "[100,7").replace("[100,7", "[1E2,07.0");
+    let (planned, text) = rewrite(&still, &known(&actual), &options);
+    let inserted: usize = planned.outcomes.iter().map(|outcome| outcome.inserted).sum();
+    assert_eq!(text.matches("[1E2,07.0,9E9").count(), 3 + inserted, "{text}");
+}
+
+#[test]
+fn nothing_is_put_in_where_the_wrist_is_interpolated_by_itself() {
+    let actual = perturbed(11, 1.0);
+    let options = Options { tolerance_mm: 0.001, ..Options::default() };
+    let body = |area: &str| {
+        module(&format!(
+            "  SingArea {area};\n  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n",
+            down(320.0, 30.0, 300.0),
+            down(480.0, 30.0, 300.0)
+        ))
+    };
+    let (off, _) = rewrite(&body("\\Off"), &known(&actual), &options);
+    assert!(off.outcomes[1].inserted > 0);
+    assert!(!off.notes.iter().any(|note| note.contains("SingArea")), "{:?}", off.notes);
+    let (wrist, text) = rewrite(&body("\\Wrist"), &known(&actual), &options);
+    assert_eq!(wrist.outcomes[1].inserted, 0);
+    assert_eq!(text.matches("MoveL").count(), 2);
+    assert!(matches!(wrist.outcomes[1].reason, Some(Why::Bend { mm }) if mm > 0.001));
+    let note = wrist.notes.iter().find(|note| note.contains("SingArea")).unwrap();
+    assert!(note.starts_with("on 2 of the lines and arcs") && note.ends_with("(lines 4, 5)"), "{note}");
+}
+
+#[test]
+fn a_configuration_that_the_text_does_not_tell_is_said_to_be_taken() {
+    let actual = perturbed(11, 0.5);
+    let body = |conf: &str| {
+        module(&format!(
+            "  {conf};\n  MoveJ {},v100,fine,tool0;\n  MoveJ {},v100,fine,tool0;\n",
+            down(320.0, 30.0, 300.0),
+            down(330.0, 30.0, 300.0)
+        ))
+    };
+    let (planned, _) = rewrite(&body("ConfJ\\Off"), &known(&actual), &Options::default());
+    let note = planned.notes.iter().find(|note| note.contains("configuration next to where")).unwrap();
+    // Only the first: the second goes from there.
+    assert!(note.starts_with("1 of the motions") && note.ends_with("(line 4)"), "{note}");
+    let (planned, _) = rewrite(&body("ConfJ\\On"), &known(&actual), &Options::default());
+    assert!(!planned.notes.iter().any(|note| note.contains("configuration next to where")));
+}

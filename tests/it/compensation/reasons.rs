@@ -28,6 +28,7 @@ fn name(why: &Why) -> &'static str {
         Why::Corner { .. } => "corner",
         Why::CircleKept => "circle kept",
         Why::TooFast { .. } => "too fast",
+        Why::NoCircle => "no circle",
         Why::WholeCircle => "whole circle",
         Why::JointNotMeasured { .. } => "joint not measured",
         Why::NotCovered { .. } => "not covered",
@@ -35,7 +36,7 @@ fn name(why: &Why) -> &'static str {
     }
 }
 
-const NAMES: [&str; 17] = [
+const NAMES: [&str; 18] = [
     "program",
     "moving base",
     "joint target",
@@ -49,6 +50,7 @@ const NAMES: [&str; 17] = [
     "corner",
     "circle kept",
     "too fast",
+    "no circle",
     "whole circle",
     "joint not measured",
     "not covered",
