@@ -21,7 +21,7 @@ use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
 use super::segment::{Ends, Path, gap, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all, take_room};
-use super::speed::fastest;
+use super::speed::{Pace, fastest};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::effect::Effect;
@@ -608,7 +608,7 @@ fn work<'a>(
             flag = flag.or(Some(Why::Corner { mm: corner }));
         }
     }
-    let flag = flag.or_else(|| path.and_then(|path| too_fast(motion, listing, path, &passage, arms)));
+    let flag = flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &passage, arms)));
     let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
     let new = |(target, solved): (&MotionTarget, &&Solved)| match target.role {
         Role::Via if passage.straight => NewTarget::Drop,
@@ -651,15 +651,20 @@ pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> 
 
 /// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
 fn too_fast(
+    index: usize,
     motion: &Motion,
     listing: &Listing,
     Path { from, to, .. }: &Path<'_>,
     passage: &Passage,
     arms: &Arms<'_>,
 ) -> Option<Why> {
-    let speed = listing.speed(motion).filter(|_| !motion.timed)?.value.as_ref().ok()?;
+    let pace = if motion.timed {
+        Pace::Duration(*listing.durations_s.get(&(index as u32))?.as_ref().ok()?)
+    } else {
+        Pace::Speed(listing.speed(motion)?.value.as_ref().ok()?)
+    };
     let [_, told] = passage.courses.as_ref()?;
-    let (joint, ratio) = fastest(from, to, told, speed, arms)?;
+    let (joint, ratio) = fastest(from, to, told, &pace, arms)?;
     (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
 }
 

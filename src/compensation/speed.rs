@@ -1,7 +1,7 @@
 //! Whether the joints can follow at the programmed speed.
 //!
 //! Method: the time that the controller gives the motion is that of the slower of position and reorientation at their
-//! programmed speeds; the joints' mean speeds over equal parts of the told course are set against their limits. Ramps
+//! programmed speeds, or what the program states; the joints' mean speeds over equal parts of the told course are set against their limits. Ramps
 //! at the ends are not looked at: a motion that is flagged here is slowed down or stopped by the controller.
 //! Checked against: the analytic joint speed of a circle about axis 1.
 
@@ -10,18 +10,29 @@ use super::rewrite::Arms;
 use super::segment::Ends;
 use crate::program::motion::SpeedValue;
 
+/// What the program says of how fast a motion goes.
+pub(super) enum Pace<'a> {
+    /// Speeds of position and reorientation.
+    Speed(&'a SpeedValue),
+    /// How long it takes (s).
+    Duration(f64),
+}
+
 /// The joint that turns fastest for what it can, with its speed over its limit, on a told course; `None` where the
 /// course or the limits say nothing.
 pub(super) fn fastest(
     from: &Ends<'_>,
     to: &Ends<'_>,
     course: &Curve,
-    speed: &SpeedValue,
+    pace: &Pace<'_>,
     arms: &Arms<'_>,
 ) -> Option<(usize, f64)> {
     let limits = arms.nominal.arm().model.limits.speed_rad_s?;
     let (length_mm, turn_deg) = (course.length_mm(), course.turn_rad().to_degrees());
-    let duration_s = (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s);
+    let duration_s = match pace {
+        Pace::Speed(speed) => (length_mm / speed.tcp_mm_s).max(turn_deg / speed.orientation_deg_s),
+        Pace::Duration(duration_s) => *duration_s,
+    };
     if !(duration_s > 1e-6 && duration_s.is_finite()) {
         return None;
     }

@@ -7,6 +7,7 @@
 //! Units are those of the file's edge: mm, degrees for joint targets, quaternions scalar first and exactly as
 //! written (not normalised; [`RobTarget::pose`] and [`Frame::pose`] normalise).
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -461,6 +462,8 @@ pub struct Listing {
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.
     pub speeds: Vec<Speed>,
+    /// How long motions take (s), where the program says so (`\T`), by motion.
+    pub durations_s: BTreeMap<u32, Result<f64, Reason>>,
     /// Zones that motions use.
     pub zones: Vec<Zone>,
     /// Routines that hold motions.

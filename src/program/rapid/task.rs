@@ -474,13 +474,17 @@ impl<'a, 's> Lister<'a, 's> {
         motion.kind = instruction.kind;
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
         let (mut index, mut work_object, mut has_tool) = (0, None, false);
+        let (mut velocity, mut time) = (None, None);
         let (mut targets, mut to, mut via) = (0, false, instruction.kind != MotionKind::Circular);
         let mut options = Options::default();
         for argument in arguments(tree, node) {
             if argument.optional {
                 options.note(tree, argument);
-                if argument.name.is_some_and(|name| same_name(tree.text(name), b"WObj")) {
-                    work_object = argument.value;
+                match argument.name.map(|name| tree.text(name)) {
+                    Some(name) if same_name(name, b"WObj") => work_object = argument.value,
+                    Some(name) if same_name(name, b"V") => velocity = argument.value,
+                    Some(name) if same_name(name, b"T") => time = argument.value,
+                    _ => {}
                 }
                 continue;
             }
@@ -515,6 +519,13 @@ impl<'a, 's> Lister<'a, 's> {
             }
         }
         motion.timed = options.timed;
+        if let (Some(speed), Some(velocity)) = (motion.speed, velocity) {
+            motion.speed = Some(self.overridden(speed, unit, state, velocity));
+        }
+        if let Some(time) = time {
+            let duration_s = self.evaluated(unit, state, time).number();
+            self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
+        }
         let free = !options.timed && !options.whole && !around.guarded;
         let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
         motion.insertable = free && splits;

@@ -555,6 +555,35 @@ fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
 }
 
 #[test]
+fn the_speed_that_an_option_states_counts() {
+    let line = |speed: &str| {
+        let source = module(&format!(
+            "  ConfL\\Off;\n  MoveL {},v100,fine,tool0;\n  MoveL {},{speed},fine,tool0;\n",
+            down(200.0, -100.0, 400.0),
+            down(200.0, 100.0, 400.0)
+        ));
+        let source = source.replace("MODULE M\n", "MODULE M\n CONST num slow:=100;\n");
+        let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
+        match planned.outcomes[1].reason {
+            Some(Why::TooFast { joint: 0, ratio }) => Some(ratio),
+            None => None,
+            other => panic!("{speed}: {other:?}"),
+        }
+    };
+    let fast = line("[1000,500,1,1]").unwrap();
+    // 200 mm at 1,000 mm/s; the option stands in place of v_tcp, or of both speeds.
+    for speed in ["v100\\V:=1000", "v10\\V:=2*500", "v100\\T:=0.2"] {
+        assert!((line(speed).unwrap() - fast).abs() < 1e-9, "{speed}");
+    }
+    for speed in ["v100", "v1000\\V:=100", "v1000\\V:=slow", "v1000\\T:=2"] {
+        assert_eq!(line(speed), None, "{speed}");
+    }
+    // What is known only at run time is not judged.
+    assert_eq!(line("v1000\\V:=GetSpeed()"), None);
+    assert_eq!(line("v1000\\T:=GetSpeed()"), None);
+}
+
+#[test]
 fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
     let source = module(&format!(
         "  MoveJ {},v100,fine,tool0;\n  MoveJ {},v100,fine,tool0;\n",
@@ -584,7 +613,6 @@ fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
 fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
     let actual = perturbed(11, 1.0);
     let with = |target: String, a: &str, b: &str| target.replace(EXT, &format!("[{a},{b},9E9,9E9,9E9,9E9]"));
-    let options = Options { tolerance_mm: 0.001, circles: Circles::Segments, ..Options::default() };
     let source = module(&format!(
         "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n  MoveC {},{},v100,fine,tool0;\n",
         with(down(320.0, 30.0, 300.0), "100", "7"),
@@ -592,22 +620,27 @@ fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
         with(down(420.0, 90.0, 300.0), "9E9", "9E9"),
         with(down(360.0, 30.0, 300.0), "20", "7"),
     ));
-    let (planned, text) = rewrite(&source, &known(&actual), &options);
-    let task = Task::read(&[("p.mod", text.as_bytes())]);
-    let places: Vec<(Vector3<f64>, [Option<f64>; 6])> = task
-        .listing
-        .motions
-        .iter()
-        .map(|m| m.to().unwrap().value.unwrap().cartesian().copied().unwrap())
-        .map(|target| (Vector3::from(target.position_mm), target.external))
-        .collect();
-    let [line, arc] = [planned.outcomes[1].inserted, planned.outcomes[2].inserted];
-    assert!(line >= 1 && arc >= 8, "{line} {arc}");
+    // What is put in before the line and before the arc, and the places of all ends.
+    let run = |tolerance_mm: f64, source: &str| {
+        let options = Options { tolerance_mm, circles: Circles::Segments, ..Options::default() };
+        let (planned, text) = rewrite(source, &known(&actual), &options);
+        let task = Task::read(&[("p.mod", text.as_bytes())]);
+        let targets = task.listing.motions.iter().map(|m| m.to().unwrap().value.unwrap());
+        let places: Vec<(Vector3<f64>, [Option<f64>; 6])> = targets
+            .map(|value| value.cartesian().copied().unwrap())
+            .map(|target| (Vector3::from(target.position_mm), target.external))
+            .collect();
+        (planned.outcomes[1].inserted, planned.outcomes[2].inserted, places, text)
+    };
+    let (line, _, places, _) = run(0.001, &source);
+    assert!(line >= 1, "{line}");
     for (at, external) in &places[..=line + 1] {
         let share = (at.x - places[0].0.x) / (places[line + 1].0.x - places[0].0.x);
         assert!((external[0].unwrap() - 100.0 - 100.0 * share).abs() < 0.1, "{at} {external:?}");
         assert_eq!(external[1..3], [Some(7.0), None]);
     }
+    let (line, arc, places, _) = run(0.01, &source);
+    assert!(arc >= 8, "{arc}");
     // Half a turn from (480, 30) over (420, 90) to (360, 30).
     for (at, external) in &places[line + 1..] {
         let share = (at.y - 30.0).atan2(at.x - 420.0) / PI;
@@ -615,9 +648,8 @@ fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
     }
     // Where none moves, they stay as they are written.
     let still = source.replace("[200,7", "[100,7").replace("[20,7", "[100,7").replace("[100,7", "[1E2,07.0");
-    let (planned, text) = rewrite(&still, &known(&actual), &options);
-    let inserted: usize = planned.outcomes.iter().map(|outcome| outcome.inserted).sum();
-    assert_eq!(text.matches("[1E2,07.0,9E9").count(), 3 + inserted, "{text}");
+    let (line, arc, _, text) = run(0.01, &still);
+    assert_eq!(text.matches("[1E2,07.0,9E9").count(), 3 + line + arc, "{text}");
 }
 
 #[test]

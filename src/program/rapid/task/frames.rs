@@ -41,6 +41,17 @@ impl<'s> Lister<'_, 's> {
         index
     }
 
+    /// The speed of a motion with the velocity of the TCP that its option states in place of it.
+    pub(super) fn overridden(&mut self, speed: u32, unit: Unit, state: &State, velocity: Child) -> u32 {
+        let mut speed = self.listing.speeds[speed as usize].clone();
+        match (&mut speed.value, self.evaluated(unit, state, velocity).number()) {
+            (Ok(value), Ok(velocity)) => value.tcp_mm_s = velocity,
+            (value, Err(reason)) => *value = Err(reason),
+            (Err(_), Ok(_)) => {}
+        }
+        intern(&mut self.listing.speeds, speed)
+    }
+
     pub(super) fn zone(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
         let text = text_of(&self.trees[unit.file as usize], value);
         if let Some(index) = self.zones.get(unit.scope, text) {
