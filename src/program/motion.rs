@@ -663,6 +663,10 @@ reasons! {
         CentreElsewhere => "the centre of the arc stands in another block (CC)",
         /// NC: part of the block could not be read.
         Unread => "part of the block could not be read",
+        /// NC: a word that is not in the tables, in the block or before it.
+        UnknownWord => "a word that is not known stands here or before: what it does and sets is not known",
+        /// NC: the arc after it stays as it is, and starts here.
+        BeforeLeftArc => "an arc that stays as it is starts where this ends",
     }
 }
 

@@ -10,4 +10,3 @@ mod circumstances;
 mod writing;
 mod edits;
 mod nc;
-mod modes;

@@ -30,21 +30,33 @@ impl Dialect {
         }
     }
 
-    /// Whether X Y Z are the tip only under tool centre point control.
-    pub fn needs_tip(self) -> bool {
-        matches!(self, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain)
-    }
-
     /// Whether `( … )` is a comment.
     pub fn paren_comments(self) -> bool {
         matches!(self, Dialect::Iso | Dialect::Fanuc | Dialect::LinuxCnc)
+    }
+
+    /// The dialect of a file by the ending of its name, where its text says nothing else, and by its signs.
+    pub fn of_named(name: &str, source: &[u8]) -> Dialect {
+        let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
+        let named = match &*ending {
+            "ngc" => Dialect::LinuxCnc,
+            "mpf" | "spf" => Dialect::Siemens,
+            "h" => Dialect::Heidenhain,
+            _ => return Dialect::of(source),
+        };
+        match Dialect::of(source) {
+            Dialect::Iso => named,
+            // Numbered parameters, M98 and program numbers are LinuxCNC's as well.
+            Dialect::Fanuc if named == Dialect::LinuxCnc && !only_fanuc(source) => named,
+            said => said,
+        }
     }
 
     /// The dialect of a file by its signs.
     pub fn of(source: &[u8]) -> Dialect {
         let sample = &source[..source.len().min(1 << 16)];
         let mut fanuc = false;
-        for line in sample.split(|&byte| byte == b'\n') {
+        for line in lines(sample) {
             let line = line.trim_ascii();
             if line.starts_with(b"%_N_") || line.starts_with(b";$PATH") {
                 return Dialect::Siemens;
@@ -65,6 +77,23 @@ impl Dialect {
         }
         if fanuc { Dialect::Fanuc } else { Dialect::Iso }
     }
+}
+
+/// The lines of a text; old tapes end them with CR alone.
+fn lines(sample: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let end = if sample.contains(&b'\n') { b'\n' } else { b'\r' };
+    sample.split(move |&byte| byte == end)
+}
+
+/// Whether a text has signs that only a Fanuc has.
+fn only_fanuc(source: &[u8]) -> bool {
+    const SIGNS: [&str; 6] = ["G43.4", "G43.5", "WHILE[", "G68.2", "G08P1", "G05P10000"];
+    let sample = &source[..source.len().min(1 << 16)];
+    lines(sample).any(|line| {
+        let line = &line[..line.iter().position(|&byte| byte == b';').unwrap_or(line.len())];
+        let code = without_comments(&line.to_ascii_uppercase());
+        SIGNS.iter().any(|sign| contains(&code, sign))
+    })
 }
 
 fn contains(line: &[u8], sign: &str) -> bool {

@@ -125,7 +125,21 @@ impl<'r, 's> Reader<'r, 's> {
             (0, Token::Colon) if self.dialect == Dialect::Siemens => |_, _| Err(Reason::Variable),
             (_, Token::Name) => {
                 let name = self.text().to_ascii_uppercase();
+                let bitwise = matches!(self.dialect, Dialect::Fanuc | Dialect::Iso);
+                let divides = self.dialect == Dialect::Heidenhain;
+                let floors = self.dialect == Dialect::LinuxCnc;
                 let found: fn(f64, f64) -> Worth = match (level, &*name) {
+                    // Bit by bit, and of other priority: known only where they are not asked for.
+                    (0, b"AND" | b"OR" | b"XOR") if bitwise => |_, _| Err(Reason::Variable),
+                    (3, b"DIV") if divides => {
+                        |a, b| if b == 0.0 { Err(Reason::WrongShape) } else { Ok(a / b) }
+                    }
+                    // The sign of a remainder differs between controls.
+                    (3, b"MOD") if !floors => |a, b| match () {
+                        () if b == 0.0 => Err(Reason::WrongShape),
+                        () if a < 0.0 || b < 0.0 => Err(Reason::Variable),
+                        () => Ok(a % b),
+                    },
                     (0, b"AND") => |a, b| Ok(f64::from(u8::from(a != 0.0 && b != 0.0))),
                     (0, b"OR") => |a, b| Ok(f64::from(u8::from(a != 0.0 || b != 0.0))),
                     (0, b"XOR") => |a, b| Ok(f64::from(u8::from((a != 0.0) != (b != 0.0)))),
@@ -203,7 +217,7 @@ impl<'r, 's> Reader<'r, 's> {
                     Token::BracketOpen => self.group(Token::BracketClose)?,
                     _ => return Ok(Err(Reason::Variable)),
                 };
-                Ok(number.and_then(|number| (self.variables)(&numbered(letter, number))))
+                Ok(number.and_then(|number| (self.variables)(&numbered(&[letter], number))))
             }
             Token::Name => self.named(),
             _ => Err(NoExpression),
@@ -238,7 +252,7 @@ impl<'r, 's> Reader<'r, 's> {
                 Ok(name)
             }
             Token::Number | Token::BracketOpen | Token::Hash => {
-                self.nested(Self::primary)?.map(|number| numbered(b'#', number))
+                self.nested(Self::primary)?.map(|number| numbered(b"#", number))
             }
             _ => return Err(NoExpression),
         };
@@ -252,6 +266,14 @@ impl<'r, 's> Reader<'r, 's> {
         let close = match self.peek() {
             Token::BracketOpen => Token::BracketClose,
             Token::ParenOpen => Token::ParenClose,
+            // QL1, QR1: sets of their own.
+            Token::Number if self.dialect == Dialect::Heidenhain && matches!(&*name, b"QL" | b"QR") => {
+                return Ok(self.primary()?.and_then(|number| (self.variables)(&numbered(&name, number))));
+            }
+            // SIN 30: a function takes the operand that follows.
+            _ if self.dialect == Dialect::Heidenhain && FUNCTIONS.contains(&&*name) => {
+                return Ok(self.nested(Self::signed)?.and_then(|x| function(&name, x, None, self.dialect)));
+            }
             _ => return Ok((self.variables)(&name)),
         };
         if !FUNCTIONS.contains(&&*name) {
@@ -279,7 +301,7 @@ impl<'r, 's> Reader<'r, 's> {
             Ok(second) => second,
             Err(reason) => return Ok(Err(reason)),
         };
-        Ok(first.and_then(|x| function(self.dialect, &name, x, second)))
+        Ok(first.and_then(|x| function(&name, x, second, self.dialect)))
     }
 
     /// Brackets whose content is not looked at, to the end of the line at most.
@@ -305,16 +327,18 @@ impl<'r, 's> Reader<'r, 's> {
 }
 
 /// The name of a numbered variable.
-pub fn numbered(letter: u8, number: f64) -> Variable {
-    let mut name = vec![letter];
+pub fn numbered(set: &[u8], number: f64) -> Variable {
+    let mut name = set.to_vec();
     name.extend_from_slice(format!("{}", number.round()).as_bytes());
     name
 }
 
-/// The value of a number token; a comma is a point, EX of Siemens begins the exponent.
+/// The value of a number token; a comma is a point.
 pub fn literal(text: &[u8]) -> Option<f64> {
-    if let Some(at) = text.windows(2).position(|two| two.eq_ignore_ascii_case(b"EX")) {
-        return number::value(&[&text[..at], b"E", &text[at + 2..]].concat());
+    // 1.5EX-3 of Siemens.
+    if let Some(at) = text.iter().position(|byte| byte.eq_ignore_ascii_case(&b'E')) {
+        let exponent: i32 = std::str::from_utf8(text.get(at + 2..)?).ok()?.parse().ok()?;
+        return (exponent.abs() <= 300).then_some(number::value(&text[..at])? * 10_f64.powi(exponent));
     }
     match text.iter().position(|&byte| byte == b',') {
         Some(comma) => {
@@ -326,34 +350,53 @@ pub fn literal(text: &[u8]) -> Option<f64> {
     }
 }
 
-const FUNCTIONS: [&[u8]; 17] = [
+/// Whether a name is one of a function.
+pub fn is_function(name: &[u8]) -> bool {
+    FUNCTIONS.iter().any(|known| name.eq_ignore_ascii_case(known))
+}
+
+const FUNCTIONS: [&[u8]; 22] = [
     b"SIN", b"COS", b"TAN", b"ASIN", b"ACOS", b"ATAN", b"ATAN2", b"SQRT", b"ABS", b"ROUND", b"FIX", b"FUP",
-    b"LN", b"EXP", b"TRUNC", b"POT", b"SQR",
+    b"LN", b"EXP", b"TRUNC", b"POT", b"SQR", b"INT", b"FRAC", b"SGN", b"NEG", b"SQ",
 ];
 
-fn function(dialect: Dialect, name: &[u8], x: f64, second: Option<f64>) -> Worth {
-    let linux = dialect == Dialect::LinuxCnc;
+fn function(name: &[u8], x: f64, second: Option<f64>, dialect: Dialect) -> Worth {
+    // A parameter of a Fanuc says where the range of an angle begins; what plain ISO means is not certain either.
+    let fanuc = matches!(dialect, Dialect::Fanuc | Dialect::Iso);
+    let iso = dialect == Dialect::Iso;
+    let turns = |angle: f64| if fanuc && angle < 0.0 { f64::NAN } else { angle };
     let value = match (name, second) {
         (b"SIN", None) => x.to_radians().sin(),
         (b"COS", None) => x.to_radians().cos(),
         (b"TAN", None) => x.to_radians().tan(),
-        (b"ASIN", None) => x.asin().to_degrees(),
+        (b"ASIN", None) => turns(x.asin().to_degrees()),
         (b"ACOS", None) => x.acos().to_degrees(),
         (b"ATAN", None) => x.atan().to_degrees(),
-        (b"ATAN" | b"ATAN2", Some(y)) => x.atan2(y).to_degrees(),
+        (b"ATAN" | b"ATAN2", Some(y)) => turns(x.atan2(y).to_degrees()),
         (b"SQRT", None) => x.sqrt(),
         (b"ABS", None) => x.abs(),
         (b"ROUND", None) => x.round(),
-        (b"FIX", None) if linux => x.floor(),
-        (b"FUP", None) if linux => x.ceil(),
-        // Fanuc cuts digits off, or goes away from 0.
-        (b"FIX", None) => x.trunc(),
-        (b"FUP", None) => x.signum() * x.abs().ceil(),
+        // LinuxCNC goes down and up, Fanuc towards zero and away from it.
+        (b"FIX" | b"FUP", None) if iso && x < 0.0 && x.fract() != 0.0 => return Err(Reason::Variable),
+        (b"FIX", None) if fanuc => x.trunc(),
+        (b"FUP", None) if fanuc => x.abs().ceil().copysign(x),
+        (b"FIX", None) => x.floor(),
+        (b"FUP", None) => x.ceil(),
+        (b"INT", None) => x.trunc(),
+        (b"FRAC", None) => x.fract(),
+        (b"SGN", None) if x == 0.0 => 0.0,
+        (b"SGN", None) => x.signum(),
+        (b"NEG", None) => -x,
+        (b"SQ", None) => x * x,
         (b"LN", None) => x.ln(),
         (b"EXP", None) => x.exp(),
         (b"TRUNC", None) => x.trunc(),
         (b"POT" | b"SQR", None) => x * x,
         _ => return Err(Reason::WrongShape),
     };
-    if value.is_finite() { Ok(value) } else { Err(Reason::WrongShape) }
+    match value.is_finite() {
+        true => Ok(value),
+        false if fanuc && (name == b"ASIN" || second.is_some()) => Err(Reason::Variable),
+        false => Err(Reason::WrongShape),
+    }
 }

@@ -4,6 +4,7 @@
 //! that begins with `%` is one token.
 
 use super::dialect::Dialect;
+use super::expression::is_function;
 use super::syntax::Syntax;
 use super::token::Token;
 use crate::program::tree::Tree;
@@ -16,13 +17,21 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
         return tree;
     }
     let mut tree = Tree::new(source, source.len() / 2);
+    // Old tapes end their lines with CR alone.
+    let cr = !source.contains(&b'\n');
     let mut at = 0;
     let mut line_begins = true;
     // What stood before in the line: a name in pointed brackets only follows `#` or the O of a subprogram.
     let mut before = Token::LineEnd;
     while at < source.len() {
         let rest = &source[at..];
-        let (kind, length) = token(rest, dialect, line_begins, before);
+        let (kind, length) = match rest[0] {
+            b'\r' if cr => (Token::LineEnd, 1),
+            b'*' if dialect == Dialect::Heidenhain && begins_block(&source[..at]) => {
+                (Token::Comment, to_line_end(rest, cr))
+            }
+            _ => token(rest, dialect, line_begins, before, cr),
+        };
         tree.push(kind, at);
         if kind == Token::LineEnd {
             tree.line_starts(at + length);
@@ -38,7 +47,7 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
 
 /// The first token and its length.
 #[inline]
-fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token) -> (Token, usize) {
+fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bool) -> (Token, usize) {
     let second = rest.get(1).copied().unwrap_or(0);
     let two = |wanted: u8, both: Token, single: Token| if second == wanted { (both, 2) } else { (single, 1) };
     match rest[0] {
@@ -49,10 +58,9 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token) -> (To
         b'0'..=b'9' => (Token::Number, number(rest, dialect)),
         b'.' if second.is_ascii_digit() => (Token::Number, number(rest, dialect)),
         b'A'..=b'Z' | b'a'..=b'z' | b'_' | b'$' => word(rest, dialect),
-        b';' => (Token::Comment, to_line_end(rest)),
-        b'%' if line_begins => (Token::Tape, to_line_end(rest)),
+        b';' => (Token::Comment, to_line_end(rest, cr)),
+        b'%' if line_begins => (Token::Tape, to_line_end(rest, cr)),
         b'(' if dialect.paren_comments() => (Token::Comment, paren_comment(rest)),
-        b'*' if dialect == Dialect::Heidenhain => (Token::Comment, to_line_end(rest)),
         b'"' => (Token::String, quoted(rest, b'"')),
         b'\'' => (Token::String, quoted(rest, b'\'')),
         b'<' if dialect == Dialect::LinuxCnc && matches!(before, Token::Hash | Token::Address) => {
@@ -83,6 +91,12 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token) -> (To
     }
 }
 
+/// Whether nothing but a block number stands before in the line: there a star begins a heading, elsewhere it multiplies.
+fn begins_block(before: &[u8]) -> bool {
+    let last = before.iter().rev().find(|byte| !byte.is_ascii_digit() && !is_space(**byte));
+    last.is_none_or(|byte| matches!(byte, b'\n' | b'\r'))
+}
+
 fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C | 0x1A | 0x00 | 0xA0)
 }
@@ -97,14 +111,21 @@ fn run(rest: &[u8], wanted: impl Fn(u8) -> bool) -> usize {
     rest.iter().take_while(|&&byte| wanted(byte)).count().max(1)
 }
 
-fn to_line_end(rest: &[u8]) -> usize {
-    let end = rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len());
+fn to_line_end(rest: &[u8], cr: bool) -> usize {
+    let last = if cr { b'\r' } else { b'\n' };
+    let end = rest.iter().position(|&byte| byte == last).unwrap_or(rest.len());
     if end > 1 && rest[end - 1] == b'\r' { end - 1 } else { end }
 }
 
 fn paren_comment(rest: &[u8]) -> usize {
     let end = rest.iter().position(|&byte| matches!(byte, b')' | b'\n' | b'\r')).unwrap_or(rest.len());
-    if rest.get(end) == Some(&b')') { end + 1 } else { end }
+    if rest.get(end) != Some(&b')') {
+        return end;
+    }
+    // A bracket within: what closes it too many times to the end of the line belongs to the comment.
+    let more = rest[end..].iter().take_while(|&&byte| matches!(byte, b')' | b' ' | b'\t')).count();
+    let closes = rest[end..end + more].iter().rposition(|&byte| byte == b')').map_or(1, |last| last + 1);
+    if matches!(rest.get(end + more), None | Some(b'\r' | b'\n')) { end + closes } else { end + 1 }
 }
 
 /// A quoted piece to its closing mark, at most to the end of the line.
@@ -121,7 +142,7 @@ fn quoted(rest: &[u8], mark: u8) -> usize {
 fn number(rest: &[u8], dialect: Dialect) -> usize {
     let digits = |from: usize| from + rest[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let whole = digits(0);
-    let mantissa = match rest.get(whole) {
+    let end = match rest.get(whole) {
         Some(b'.') => digits(whole + 1),
         Some(b',')
             if dialect == Dialect::Heidenhain && rest.get(whole + 1).is_some_and(u8::is_ascii_digit) =>
@@ -130,17 +151,16 @@ fn number(rest: &[u8], dialect: Dialect) -> usize {
         }
         _ => whole,
     };
-    mantissa + if dialect == Dialect::Siemens { exponent(&rest[mantissa..]) } else { 0 }
-}
-
-/// The exponent of a Siemens number: EX with a sign or none, and digits.
-fn exponent(rest: &[u8]) -> usize {
-    let Some(after) = rest.get(..2).filter(|two| two.eq_ignore_ascii_case(b"EX")).map(|_| &rest[2..]) else {
-        return 0;
-    };
-    let sign = usize::from(matches!(after.first(), Some(b'+' | b'-')));
-    let digits = after[sign..].iter().take_while(|byte| byte.is_ascii_digit()).count();
-    if digits == 0 { 0 } else { 2 + sign + digits }
+    // 1.5EX-3 of Siemens.
+    if dialect == Dialect::Siemens && rest[end..].len() > 2 && rest[end..end + 2].eq_ignore_ascii_case(b"EX")
+    {
+        let sign = usize::from(matches!(rest[end + 2], b'+' | b'-'));
+        let last = digits(end + 2 + sign);
+        if last > end + 2 + sign {
+            return last;
+        }
+    }
+    end
 }
 
 /// An address or a name.
@@ -148,7 +168,12 @@ fn word(rest: &[u8], dialect: Dialect) -> (Token, usize) {
     let letter = |byte: u8| byte.is_ascii_alphabetic() || matches!(byte, b'_' | b'$');
     let letters = run(rest, letter);
     if dialect != Dialect::Siemens {
-        return if letters == 1 && rest[0].is_ascii_alphabetic() {
+        // XSQRT[16]: an address with a function.
+        let applies = dialect == Dialect::LinuxCnc
+            && letters > 2
+            && !is_function(&rest[..letters])
+            && is_function(&rest[1..letters]);
+        return if (letters == 1 || applies) && rest[0].is_ascii_alphabetic() {
             (Token::Address, 1)
         } else {
             (Token::Name, letters)

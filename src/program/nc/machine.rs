@@ -3,16 +3,19 @@
 use std::collections::BTreeMap;
 
 use super::arc::Plane;
+use super::dialect::Dialect;
 use super::expression::{Variable, Worth};
 use super::orientation::Angles;
 use crate::math::se3::Pose;
-use crate::program::motion::Reason;
+use crate::program::motion::{Frame, Reason};
 
 /// What the last word of the motion group said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mode {
-    /// Nothing yet, or G80.
+    /// Nothing yet, or the aim of a jump.
     Unset,
+    /// What holds is not known, for this reason.
+    Lost(Reason),
     /// G0.
     Rapid,
     /// G1.
@@ -52,44 +55,106 @@ pub(super) enum Group {
     Radius,
     /// G43.4, TRAORI.
     Tip,
-    /// G68, G51, G16 and what turns or scales.
-    Transform,
-    /// T.
+    /// T, H, D and what sets tools.
     Tool,
     /// G92, G52.
     Shift,
+    // What turns, scales or bends coordinates, each a state of its own: the end of one is not the end of another.
+    /// G15, G16.
+    Polar,
+    /// G50, G51; cycle 11.
+    Scale,
+    /// G50.1, G51.1, G100, G101; cycle 8.
+    Mirror,
+    /// G68, G68.2, G69; cycle 10.
+    Rotation,
+    /// G12.1, G13.1: polar interpolation.
+    PolarPath,
+    /// G7.1, G107: a developed cylinder.
+    Cylinder,
+    /// G7, G8, DIAMON: diameters.
+    Diameter,
+    /// TRANSMIT, TRACYL, TRAANG.
+    Kinematic,
+    /// ORIMKS, ORIWKS.
+    OrientationFrame,
+    /// CYCLE800, PLANE, cycle 19, G268.
+    Swivel,
+    /// ROT, SCALE, MIRROR where they are no rigid motion that is known.
+    Programmable,
+    /// TOFRAME, TOROT.
+    ToolFrame,
+    /// PAROT.
+    PartFrame,
+    /// G54.2, G54.4, G254: offsets of the table.
+    Fixture,
+    /// TRANS DATUM TABLE, cycle 7 with a row of the table.
+    Datum,
+    /// Cycle 26: a scale for each axis.
+    AxisScale,
+    /// A, B, C are counted from elsewhere (G92 A0).
+    Rotary,
 }
 
-pub(super) const GROUPS: u32 = 9;
+pub(super) const GROUPS: u32 = Group::Rotary as u32 + 1;
 
-/// What makes coordinates others than those of the work frame; each is ended by words of its own.
-pub(super) mod transforms {
-    /// G16; G110 to G112 of Siemens.
-    pub(crate) const POLAR: u16 = 1;
-    /// G51, cycle 11 and 26.
-    pub(crate) const SCALE: u16 = 1 << 1;
-    /// G51.1, G101, cycle 8.
-    pub(crate) const MIRROR: u16 = 1 << 2;
-    /// G68, cycle 10.
-    pub(crate) const TURN: u16 = 1 << 3;
-    /// G68.2, G254, PLANE, cycle 19.
-    pub(crate) const TILT: u16 = 1 << 4;
-    /// TRANSMIT, TRACYL, TRAANG, G12.1, G7.1.
-    pub(crate) const KINEMATIC: u16 = 1 << 5;
-    /// CYCLE800.
-    pub(crate) const SWIVEL: u16 = 1 << 6;
-    /// SCALE, MIRROR, ROTS and other programmable frames that are no shift and turn.
-    pub(crate) const PROGRAMMABLE: u16 = 1 << 7;
-    /// DIAMON, G7 of LinuxCNC.
-    pub(crate) const DIAMETER: u16 = 1 << 8;
-    /// ORIMKS.
-    pub(crate) const MACHINE_TURN: u16 = 1 << 9;
-    /// TOFRAME, TOROT, PAROT.
-    pub(crate) const TOOL_FRAME: u16 = 1 << 10;
-    /// Frames that a program writes into variables of the control, datum tables.
-    pub(crate) const SYSTEM: u16 = 1 << 11;
-    /// G92 and G52 with rotary axes.
-    pub(crate) const ROTARY: u16 = 1 << 12;
+/// Of all groups, the planes matter for arcs only.
+pub(super) const ALL_BUT_PLANE: u32 = ((1 << GROUPS) - 1) & !(1 << Group::Plane as u32);
+
+/// Frames that the program itself sets, by name; `None` where what it sets is not known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Assigned {
+    pub(super) by_name: BTreeMap<String, Option<Frame>>,
+    /// Whether any other may have been set too.
+    pub(super) all: bool,
+}
+
+impl Assigned {
+    /// What the program has set for a name, if it has or may have.
+    pub(super) fn of(&self, name: &str) -> Option<Option<Frame>> {
+        match self.by_name.get(&name.to_ascii_uppercase()) {
+            Some(frame) => Some(*frame),
+            None => self.all.then_some(None),
+        }
+    }
+
+    pub(super) fn set(&mut self, name: &str, frame: Option<Frame>) {
+        self.by_name.insert(name.to_ascii_uppercase(), frame);
+    }
+
+    /// Any of them may have been set to anything.
+    pub(super) fn lose_all(&mut self) {
+        self.by_name.clear();
+        self.all = true;
+    }
+
+    /// What holds where the way may have gone either way.
+    fn joined(&mut self, other: &Assigned) {
+        let names: Vec<String> = self.by_name.keys().chain(other.by_name.keys()).cloned().collect();
+        for name in names {
+            if self.by_name.get(&name) != other.by_name.get(&name) {
+                self.by_name.insert(name, None);
+            }
+        }
+        self.all |= other.all;
+    }
+
+    /// What holds where the way may have come from anywhere in the file.
+    fn forget(&mut self, any: bool) {
+        self.by_name.values_mut().for_each(|frame| *frame = None);
+        self.all |= any;
+    }
+}
+
+/// Which length the control adds to the spindle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Length {
+    /// That of the tool: nothing says otherwise.
+    OfTool,
+    /// That of an offset number (H).
+    Of(u32),
+    /// None (G49).
+    None,
 }
 
 /// The state of a control between two blocks.
@@ -121,18 +186,35 @@ pub(super) struct State {
     pub(super) frame: String,
     /// TRANS, ROT: a frame within the work frame.
     pub(super) programmable: Option<Pose>,
-    /// What makes coordinates others than those of the work frame: bits of [`transforms`].
-    pub(super) transform: u16,
-    /// Axes that a block may have moved which could not be read: bits 0 to 2 X Y Z, 3 the orientation.
-    pub(super) doubtful: u8,
-    /// What is called after every motion (G66, MCALL, M89).
-    pub(super) calls: Option<Reason>,
+    /// Groups that turn, scale or bend coordinates now, one bit each.
+    pub(super) turned: u32,
     pub(super) radius: bool,
     /// G43.4, TRAORI, M128.
     pub(super) tip: bool,
     /// G43.5: I, J, K are a tool vector.
     pub(super) vector_words: bool,
     pub(super) tool: String,
+    /// A tool that M6 will bring in.
+    pub(super) next_tool: Option<String>,
+    pub(super) length: Length,
+    /// The offset number that belongs to a tool which no T has named.
+    pub(super) own_length: Option<u32>,
+    /// The edge of the tool (Siemens: D).
+    pub(super) edge: u32,
+    /// Work offsets that the program sets.
+    pub(super) frames: Assigned,
+    /// Tools that the program sets.
+    pub(super) tools: Assigned,
+    /// Whether the work offset that holds has been set anew and not yet called (Siemens).
+    pub(super) stale: bool,
+    /// THETA counts from the frame of the tool vector (ORIROTA).
+    pub(super) spin_absolute: bool,
+    /// What runs after each motion (G66, MCALL).
+    pub(super) modal_call: Option<Reason>,
+    /// The motion word before a cycle (G80 of Fanuc goes back to it).
+    pub(super) before_cycle: Mode,
+    /// What M70 has kept.
+    pub(super) kept: Option<Box<State>>,
     /// mm/s.
     pub(super) feed: Worth,
     /// G94.
@@ -145,6 +227,9 @@ pub(super) struct State {
     pub(super) variables: BTreeMap<Variable, Worth>,
     /// Groups whose state is not known, one bit each.
     pub(super) uncertain: u32,
+    /// Groups that a word has set which these readers do not know, and why.
+    pub(super) obscure: u32,
+    pub(super) because: Reason,
     /// The motion before, where no other way leads here.
     pub(super) previous: Option<u32>,
 }
@@ -167,13 +252,22 @@ impl State {
             shift: [Ok(0.0); 3],
             frame: frame.to_owned(),
             programmable: None,
-            transform: 0,
-            doubtful: 0,
-            calls: None,
+            turned: 0,
             radius: false,
             tip: false,
             vector_words: false,
             tool: tool.to_owned(),
+            next_tool: None,
+            length: Length::OfTool,
+            own_length: None,
+            edge: 1,
+            frames: Assigned::default(),
+            tools: Assigned::default(),
+            stale: false,
+            spin_absolute: true,
+            modal_call: None,
+            before_cycle: Mode::Unset,
+            kept: None,
             feed: Err(Reason::Variable),
             feed_per_minute: true,
             exact_stop: false,
@@ -181,15 +275,22 @@ impl State {
             pole: [Err(Reason::PositionUnknown); 2],
             variables: BTreeMap::new(),
             uncertain: 0,
+            obscure: 0,
+            because: Reason::UnknownWord,
             previous: None,
         }
     }
 
     /// A place that can be reached from elsewhere: what the text before says holds no more, but for groups that the
     /// whole file sets to one thing only.
-    pub(super) fn forget(&mut self, constant: u32) {
+    pub(super) fn forget(&mut self, constant: u32, (frames, tools): (bool, bool)) {
         let flow = Err(Reason::UnknownFlow);
-        self.mode = Mode::Unset;
+        self.mode = Mode::Lost(Reason::UnknownFlow);
+        self.before_cycle = self.mode;
+        self.frames.forget(frames);
+        self.tools.forget(tools);
+        self.next_tool = None;
+        self.kept = None;
         self.position = [flow; 3];
         self.turn = Turn::Unknown(Reason::UnknownFlow);
         (self.abc, self.rpy, self.vector, self.spin) = ([flow; 3], [flow; 3], [flow; 3], flow);
@@ -208,12 +309,59 @@ impl State {
         self.previous = None;
     }
 
-    pub(super) fn certain(&mut self, group: Group) {
-        self.uncertain &= !(1 << group as u32);
+    /// After the machine may have turned as well.
+    pub(super) fn lose_orientation(&mut self) {
+        let none = [Err(Reason::OrientationUnknown); 3];
+        (self.abc, self.rpy, self.vector) = (none, none, none);
+        self.turn = Turn::Unknown(Reason::OrientationUnknown);
     }
 
-    pub(super) fn is_uncertain(&self, group: Group) -> bool {
-        self.uncertain & 1 << group as u32 != 0
+    /// After a word that is not known: it may have done and set anything.
+    pub(super) fn lose_everything(&mut self, because: Reason) {
+        self.lose_position();
+        self.lose_orientation();
+        self.mode = Mode::Lost(because);
+        self.before_cycle = self.mode;
+        self.feed = Err(because);
+        self.pole = [Err(because); 2];
+        self.variables.values_mut().for_each(|value| *value = Err(because));
+        self.obscure = (1 << GROUPS) - 1;
+        self.because = because;
+        self.next_tool = None;
+    }
+
+    pub(super) fn certain(&mut self, group: Group) {
+        self.uncertain &= !(1 << group as u32);
+        self.obscure &= !(1 << group as u32);
+    }
+
+    /// Whether a group turns, scales or bends coordinates from here on.
+    pub(super) fn turn_frame(&mut self, group: Group, on: bool) {
+        self.turned = self.turned & !(1 << group as u32) | u32::from(on) << group as u32;
+    }
+
+    /// What the tool is called whose frame the control counts with: H and D of another number, or none, make another of it.
+    pub(super) fn tool_name(&self, dialect: Dialect) -> String {
+        let own = |number: u32| self.own_length == Some(number) || self.tool == format!("T{number}");
+        match (dialect, self.length) {
+            (Dialect::Siemens, _) if self.edge == 1 => self.tool.clone(),
+            (Dialect::Siemens, _) if self.edge == u32::MAX => format!("{} D?", self.tool),
+            (Dialect::Siemens, _) => format!("{} D{}", self.tool, self.edge),
+            (Dialect::Heidenhain, _) | (_, Length::OfTool) => self.tool.clone(),
+            (_, Length::None) if self.tool == "T0" => self.tool.clone(),
+            (_, Length::None) => "G49".to_owned(),
+            (_, Length::Of(number)) if own(number) => self.tool.clone(),
+            (_, Length::Of(u32::MAX)) => "H?".to_owned(),
+            (_, Length::Of(number)) => format!("H{number}"),
+        }
+    }
+
+    /// Why what holds in these groups is not known.
+    pub(super) fn doubt(&self, groups: u32) -> Option<Reason> {
+        if self.obscure & groups != 0 {
+            return Some(self.because);
+        }
+        (self.uncertain & groups != 0).then_some(Reason::UnknownFlow)
     }
 
     /// What holds after a block that may have been skipped.
@@ -236,7 +384,22 @@ impl State {
             self.turn = Turn::Unknown(Reason::UnknownFlow);
         }
         if self.mode != other.mode {
-            self.mode = Mode::Unset;
+            self.mode = Mode::Lost(Reason::UnknownFlow);
+        }
+        if self.before_cycle != other.before_cycle {
+            self.before_cycle = Mode::Lost(Reason::UnknownFlow);
+        }
+        let turned = self.turned ^ other.turned;
+        self.uncertain |= turned;
+        self.turned |= other.turned;
+        self.frames.joined(&other.frames);
+        self.tools.joined(&other.tools);
+        self.stale |= other.stale;
+        self.rpy_stated &= other.rpy_stated;
+        self.spin_absolute &= other.spin_absolute;
+        self.modal_call = self.modal_call.or(other.modal_call);
+        if self.next_tool != other.next_tool {
+            self.next_tool = Some("T?".to_owned());
         }
         for (group, differs) in [
             (Group::Distance, self.absolute != other.absolute),
@@ -245,8 +408,13 @@ impl State {
             (Group::Frame, self.frame != other.frame || self.programmable != other.programmable),
             (Group::Radius, self.radius != other.radius),
             (Group::Tip, self.tip != other.tip || self.vector_words != other.vector_words),
-            (Group::Transform, self.transform != other.transform),
-            (Group::Tool, self.tool != other.tool),
+            (
+                Group::Tool,
+                self.tool != other.tool
+                    || self.length != other.length
+                    || self.own_length != other.own_length
+                    || self.edge != other.edge,
+            ),
             (Group::Shift, self.shift != other.shift),
         ] {
             if differs {
@@ -254,8 +422,15 @@ impl State {
             }
         }
         self.uncertain |= other.uncertain;
-        self.doubtful |= other.doubtful;
-        self.calls = self.calls.or(other.calls);
+        if other.obscure != 0 {
+            (self.obscure, self.because) = (self.obscure | other.obscure, other.because);
+        }
+        if self.kept != other.kept {
+            self.kept = None;
+        }
+        if (self.centre_absolute, self.feed_per_minute) != (other.centre_absolute, other.feed_per_minute) {
+            self.uncertain |= 1 << Group::Plane as u32;
+        }
         let keys: Vec<Variable> = self.variables.keys().chain(other.variables.keys()).cloned().collect();
         for key in keys {
             if self.variables.get(&key) != other.variables.get(&key) {

@@ -1,7 +1,7 @@
 //! Tokens to tree: lines to blocks, blocks to words. Never fails: what cannot be read is opaque to the end of its line.
 
 use super::dialect::Dialect;
-use super::expression::{Reader, Worth};
+use super::expression::{Reader, Worth, is_function};
 use super::lexer::lex;
 use super::syntax::{Belongs, NcTree, Syntax, Word};
 use super::token::Token;
@@ -12,7 +12,8 @@ use crate::program::tree::{Node, Opaque};
 pub fn parse(source: &[u8], dialect: Dialect) -> NcTree<'_> {
     let mut tree = lex(source, dialect);
     let (nodes, opaque) = {
-        let mut parser = Parser { tree: &tree, dialect, at: 0, nodes: Vec::new(), opaque: Vec::new() };
+        let mut parser =
+            Parser { tree: &tree, dialect, at: 0, nodes: Vec::new(), opaque: Vec::new(), free: false };
         parser.file();
         (parser.nodes, parser.opaque)
     };
@@ -26,6 +27,8 @@ struct Parser<'t, 's> {
     at: u32,
     nodes: Vec<Node<Syntax>>,
     opaque: Vec<Opaque>,
+    /// Whether the block has names beside which numbers and brackets stand alone.
+    free: bool,
 }
 
 impl Parser<'_, '_> {
@@ -77,8 +80,24 @@ impl Parser<'_, '_> {
         }
         let mut last = self.at;
         let begins = self.at;
+        let mut free = false;
         while !matches!(self.peek(), Token::LineEnd | Token::End) {
+            if self.peek() == Token::Slash && self.at > begins && self.dialect != Dialect::Heidenhain {
+                // `N10 /X5`: what follows may be skipped.
+                self.nodes[node].kind = Syntax::Skippable;
+                let slash = self.at;
+                self.bump();
+                if self.peek() == Token::Number && self.touches(slash + 1) {
+                    self.bump();
+                }
+                continue;
+            }
             let (word, at) = (self.nodes.len(), self.at);
+            // Numbers, texts and brackets stand alone only beside names: IF, CASE, DEF, o100 call.
+            free |= self.peek() == Token::Name
+                || self.peek() == Token::Address && self.at == begins && self.is_o()
+                || self.peek() == Token::Hash && self.dialect == Dialect::Siemens;
+            self.free = free;
             self.nodes.push(Node { kind: Syntax::Word, size: 1, first: at, end: at });
             match self.word(at == begins) {
                 Some(end) => {
@@ -119,6 +138,7 @@ impl Parser<'_, '_> {
                 self.bump();
                 self.value(token + 1)
             }
+            Token::Name if !self.is_name() => None,
             Token::Name => {
                 let token = self.at;
                 self.bump();
@@ -151,9 +171,9 @@ impl Parser<'_, '_> {
             Token::Comma => {
                 let token = self.at;
                 self.bump();
-                Some(token + 1)
+                (self.free || self.peek() == Token::Address).then_some(token + 1)
             }
-            Token::BracketOpen => self.group(Token::BracketOpen, Token::BracketClose),
+            Token::BracketOpen if self.free => self.group(Token::BracketOpen, Token::BracketClose),
             // G65 <NAME>, M98 <NAME>: a subprogram by its name.
             Token::Less if self.dialect.paren_comments() => {
                 self.bump();
@@ -166,15 +186,58 @@ impl Parser<'_, '_> {
                 Some(end)
             }
             // An expression of a control structure goes on: TO 10, OF 1, REPEAT 3.
-            Token::Number | Token::Minus | Token::String => self.expression(),
+            Token::Number | Token::Minus | Token::String if self.free => self.expression(),
             _ => None,
         }
+    }
+
+    /// Whether the block begins with an O word, whose line has words of its own.
+    fn is_o(&self) -> bool {
+        self.dialect == Dialect::LinuxCnc && matches!(self.tree.text(self.at), b"O" | b"o")
+    }
+
+    /// Whether a name is one that these dialects have; `XY5` is none.
+    fn is_name(&self) -> bool {
+        const WORDS: [&str; 26] = [
+            "IF",
+            "THEN",
+            "ELSE",
+            "ELSEIF",
+            "ENDIF",
+            "WHILE",
+            "ENDWHILE",
+            "DO",
+            "END",
+            "GOTO",
+            "SUB",
+            "ENDSUB",
+            "CALL",
+            "REPEAT",
+            "ENDREPEAT",
+            "RETURN",
+            "BREAK",
+            "CONTINUE",
+            "POPEN",
+            "PCLOS",
+            "DPRNT",
+            "BPRNT",
+            "SETVN",
+            "LT",
+            "GT",
+            "EQ",
+        ];
+        let text = self.tree.text(self.at);
+        !self.dialect.paren_comments()
+            || text.starts_with(b"<")
+            || WORDS.iter().any(|word| text.eq_ignore_ascii_case(word.as_bytes()))
     }
 
     /// Whether a Heidenhain block goes along a path or sets something that these readers follow.
     fn is_path(&self) -> bool {
         let text = self.tree.text(self.at).to_ascii_uppercase();
-        matches!(&*text, b"L" | b"LN" | b"C" | b"CC" | b"CR" | b"CT" | b"M")
+        matches!(&*text, b"L" | b"LN" | b"C" | b"CC" | b"CR" | b"CT" | b"M" | b"R" | b"F")
+            || matches!(&*text, [b'X' | b'Y' | b'Z' | b'A' | b'B' | b'U' | b'V' | b'W'])
+            || matches!(&*text, [b'I', b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W'])
     }
 
     /// What follows an address: a literal, an expression, nothing.
@@ -195,7 +258,9 @@ impl Parser<'_, '_> {
                         Some(end)
                     }
                     Token::Hash | Token::BracketOpen => self.primary(),
-                    Token::Address if self.dialect == Dialect::Heidenhain && self.at_parameter() => {
+                    Token::Address | Token::Name
+                        if self.dialect == Dialect::Heidenhain && self.at_parameter() =>
+                    {
                         self.primary()
                     }
                     // DR+: a bare sign.
@@ -218,7 +283,15 @@ impl Parser<'_, '_> {
                 }
                 Some(end)
             }
-            Token::Address
+            // XSQRT[16].
+            Token::Name
+                if self.dialect == Dialect::LinuxCnc
+                    && is_function(self.tree.text(self.at))
+                    && self.touches(after) =>
+            {
+                self.primary()
+            }
+            Token::Address | Token::Name
                 if self.dialect == Dialect::Heidenhain && self.at_parameter() && self.touches(after) =>
             {
                 self.primary()
@@ -242,7 +315,7 @@ impl Parser<'_, '_> {
     }
 
     fn at_parameter(&self) -> bool {
-        matches!(self.tree.text(self.at), b"Q" | b"q")
+        matches!(&*self.tree.text(self.at).to_ascii_uppercase(), b"Q" | b"QL" | b"QR")
     }
 
     fn named(&mut self, token: u32) -> Option<u32> {

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use nalgebra::UnitQuaternion;
 
 use self::pen::{Pen, differs};
-use self::slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, Slots, VECTOR, said, slots, spaced};
+use self::slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, Slots, VECTOR, said, slots};
 use super::arc::{Arc, Plane};
 use super::dialect::Dialect;
 use super::machine::Turn;
@@ -24,6 +24,9 @@ use super::task::{Event, Task, Written};
 use crate::program::edit::{EditError, Edits};
 use crate::program::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+
+/// How often a rewrite begins anew because an arc does not fit; a file that asks for more is left as it is.
+const ROUNDS: u32 = 32;
 
 /// Ends of a whole circle that are farther apart than this are none (mm).
 const CLOSED_MM: f64 = 1e-3;
@@ -50,13 +53,18 @@ impl Task<'_> {
             }
         }
         let mut edits = vec![Edits::new(); self.trees.len()];
-        if !wanted.is_empty() {
-            let mut follower = Follower { task: self, options, edits: &mut edits, now: Now::default() };
+        let mut rounds = 0;
+        while !wanted.is_empty() {
+            edits.iter_mut().for_each(|edits| *edits = Edits::new());
+            let mut follower =
+                Follower { task: self, options, edits: &mut edits, now: Now::default(), unfit: Vec::new() };
             for event in &self.events {
                 match *event {
+                    Event::Start => follower.now = Now::default(),
                     Event::Unknown => {
-                        let straightened = follower.now.straightened;
-                        follower.now = Now { straightened, ..Now::default() };
+                        // A shift that is set where the tool stands elsewhere stays where it is.
+                        let Now { straightened, moved, .. } = follower.now;
+                        follower.now = Now { straightened, moved, ..Now::default() };
                     }
                     Event::Lost(axes) => follower.now.lose(axes),
                     Event::Shift(stated) => follower.now.shift_at(stated),
@@ -69,6 +77,25 @@ impl Task<'_> {
                         }
                     }
                 }
+            }
+            // An arc that no circle fits stays, and so does the motion that ends where it starts.
+            let mut again = false;
+            for motion in follower.unfit {
+                let before = self.listing.motions[motion as usize].previous.or(motion.checked_sub(1));
+                if let Some(index) = before.and_then(|before| wanted.remove(&before)) {
+                    outcomes[index] = Outcome::Refused(Reason::BeforeLeftArc);
+                    again = true;
+                }
+            }
+            if !again {
+                break;
+            }
+            rounds += 1;
+            if rounds == ROUNDS {
+                for (_, index) in wanted.drain() {
+                    outcomes[index] = Outcome::Refused(Reason::BeforeLeftArc);
+                }
+                edits.iter_mut().for_each(|edits| *edits = Edits::new());
             }
         }
         let mut files = Vec::with_capacity(self.trees.len());
@@ -93,11 +120,6 @@ impl Task<'_> {
     fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
-        }
-        // An arc about a centre that stands in another block must begin where it is said to.
-        let next = self.listing.motions.get(change.motion as usize + 1);
-        if next.is_some_and(|next| next.left == Some(Reason::CentreElsewhere)) {
-            return Some(Reason::CentreElsewhere);
         }
         for new in &change.targets {
             if matches!(new, NewTarget::Joint { .. }) {
@@ -170,6 +192,8 @@ struct Follower<'f, 's> {
     options: &'f RewriteOptions,
     edits: &'f mut Vec<Edits>,
     now: Now,
+    /// Arcs that no circle fits.
+    unfit: Vec<u32>,
 }
 
 impl<'s> Follower<'_, 's> {
@@ -184,6 +208,9 @@ impl<'s> Follower<'_, 's> {
         let straightens = change.is_some_and(Change::straightens);
         self.mode_again(motion, written, straightens);
         let Some(to) = to.filter(|_| !stays) else {
+            if written.restates {
+                self.say_again(motion, written);
+            }
             let file = motion.place.file as usize;
             self.pass(&task.trees[file], task.dialects[file], written);
             return Outcome::Unchanged;
@@ -205,6 +232,7 @@ impl<'s> Follower<'_, 's> {
         {
             arc = self.arc(&aim, start, &old, positive);
             if arc.is_none() {
+                self.unfit.push(index);
                 // No circle goes there: the motion stays.
                 if change.is_some() {
                     outcome = Outcome::Refused(Reason::WrongShape);
@@ -293,6 +321,76 @@ impl<'s> Follower<'_, 's> {
             && self.now.vector.is_none_or(|now| Some(now) == written.start_vector)
     }
 
+    /// What a motion that stays leaves out and the one before it has changed is put in, so that it goes where it always went.
+    fn say_again(&mut self, motion: &Motion, written: &Written) {
+        let task = self.task;
+        let file = motion.place.file as usize;
+        let (tree, dialect) = (&task.trees[file], task.dialects[file]);
+        let slots = slots(tree, dialect, written);
+        if slots.axes.iter().all(Option::is_none) {
+            return;
+        }
+        let mut edits = std::mem::take(&mut self.edits[file]);
+        let mut pen = Pen::new(tree, dialect, &mut edits, &slots, written);
+        let decimals = self.options.position_decimals + u8::from(written.unit_mm != 1.0) * 2;
+        let unit = written.unit_mm;
+        let mut again = [false; 6];
+        let to =
+            motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
+        for axis in 0..3 {
+            let (Some(now), Some(meant)) = (self.now.position[axis], written.start[axis]) else { continue };
+            if now == meant {
+                continue;
+            }
+            if let Some(word) = slots.axes[axis] {
+                // An increment counts from where the tool stands now.
+                let increment = said(tree, dialect, &word).unwrap_or(!written.absolute);
+                if let (true, Some(to)) = (increment, &to) {
+                    let (value, was) =
+                        ((to.position_mm[axis] - now) / unit, (to.position_mm[axis] - meant) / unit);
+                    pen.put(AXES + axis, b"X", value, value, was, decimals);
+                }
+                continue;
+            }
+            let base = if written.absolute {
+                written.shift[axis].unwrap_or(0.0) + self.now.moved[axis]
+            } else {
+                now
+            };
+            let name = [b"X", b"Y", b"Z"][axis];
+            pen.put(AXES + axis, name, (meant - base) / unit, (now - base) / unit, f64::NAN, decimals);
+            again[axis] = true;
+        }
+        let names: Option<[&[u8]; 3]> = match written.turn {
+            Turn::Angles => Some([b"A", b"B", b"C"]),
+            Turn::Rpy => Some([b"A2", b"B2", b"C2"]),
+            _ => None,
+        };
+        for (axis, name) in names.into_iter().flatten().enumerate() {
+            let (Some(now), Some(meant)) = (self.now.angles[axis], written.start_angles[axis]) else {
+                continue;
+            };
+            if slots.angles[axis].is_some() || now == meant {
+                continue;
+            }
+            let base = if written.absolute { 0.0 } else { now };
+            let decimals = self.options.joint_decimals;
+            pen.put(ANGLES + axis, name, meant - base, now - base, f64::NAN, decimals);
+            again[3 + axis] = true;
+        }
+        self.edits[file] = edits;
+        for axis in 0..3 {
+            // Where the block may be skipped it is said again by whatever comes next.
+            let now = motion.conditional.then_some(f64::NAN);
+            if again[axis] {
+                self.now.position[axis] = now;
+            }
+            if again[3 + axis] {
+                self.now.angles[axis] = now;
+            }
+        }
+    }
+
     /// After a motion that stays as it is written: its words say again what the original says, the others hold on.
     fn pass(&mut self, tree: &NcTree<'s>, dialect: Dialect, written: &Written) {
         let slots = slots(tree, dialect, written);
@@ -331,6 +429,9 @@ impl<'s> Follower<'_, 's> {
 
     fn arc(&self, aim: &Aim, start: [Option<f64>; 3], old: &Arc, positive: bool) -> Option<Arc> {
         let start = [start[0]?, start[1]?, start[2]?];
+        if start.iter().any(|x| x.is_nan()) {
+            return None;
+        }
         if old.is_whole() {
             let Plane { a, b, .. } = old.plane;
             let gap = (start[a] - aim.position[a]).hypot(start[b] - aim.position[b]);
@@ -354,16 +455,7 @@ impl<'s> Follower<'_, 's> {
         let file = motion.place.file as usize;
         let (tree, dialect) = (&task.trees[file], task.dialects[file]);
         let mut edits = std::mem::take(&mut self.edits[file]);
-        let mut pen = Pen {
-            tree,
-            dialect,
-            edits: &mut edits,
-            order: slots.order(),
-            end: slots.end,
-            added: Vec::new(),
-            replaced: Outcome::Unchanged,
-            spaced: spaced(tree, slots.last),
-        };
+        let mut pen = Pen::new(tree, dialect, &mut edits, slots, written);
         let unit = written.unit_mm;
         let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
         let start: [Option<f64>; 3] =
@@ -401,7 +493,7 @@ impl<'s> Follower<'_, 's> {
                 let length = (begin[a] - arc.centre_mm[0]).hypot(begin[b] - arc.centre_mm[1]) / unit;
                 let length = if arc.is_long() { -length } else { length };
                 pen.put(RADIUS, b"R", length, length, was.unwrap_or(f64::NAN), decimals);
-            } else {
+            } else if dialect != Dialect::Heidenhain {
                 for (place, axis) in [a, b].into_iter().enumerate() {
                     let word = slots.centre[axis];
                     let increment =
@@ -424,7 +516,7 @@ impl<'s> Follower<'_, 's> {
                 }
             }
         }
-        let replaced = pen.replaced;
+        let replaced = pen.finish();
         self.edits[file] = edits;
         if let Some(to) = to {
             self.arrive(&to, written, Some((reached, told)));
@@ -532,6 +624,7 @@ impl<'s> Follower<'_, 's> {
                 added: Vec::new(),
                 replaced: Outcome::Unchanged,
                 spaced: true,
+                lead: None,
             };
             let unit = written.unit_mm;
             let decimals = self.options.position_decimals + u8::from(unit != 1.0) * 2;
@@ -587,6 +680,7 @@ fn stays_in_place(reason: Reason) -> bool {
             | Reason::ToolUnknown
             | Reason::WorkObjectUnknown
             | Reason::CentreElsewhere
+            | Reason::BeforeLeftArc
     )
 }
 
@@ -619,6 +713,7 @@ fn aim_of(motion: &Motion, change: &Change) -> Option<Aim> {
 /// The line end that a file uses.
 pub(super) fn line_end(source: &[u8]) -> &'static [u8] {
     match source.iter().position(|&byte| byte == b'\n') {
+        None if source.contains(&b'\r') => b"\r",
         Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
         _ => b"\n",
     }

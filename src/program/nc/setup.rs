@@ -37,8 +37,22 @@ impl Setup {
     }
 }
 
-fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
-    list.iter().find(|(other, _)| other.eq_ignore_ascii_case(name)).map(|(_, frame)| *frame)
+/// The last frame of a name: in any case, T08 is T8, `G54.1 P1` is G54.1P1.
+pub(super) fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
+    let name = plain(name);
+    list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
+}
+
+/// A name in upper case without blanks, and its number without leading zeros.
+fn plain(name: &str) -> String {
+    let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
+    match name.strip_prefix('T') {
+        Some(digits) if !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()) => {
+            let number = digits.trim_start_matches('0');
+            format!("T{}", if number.is_empty() { "0" } else { number })
+        }
+        _ => name,
+    }
 }
 
 /// A tool on the flange of which only the frame is known.
@@ -67,13 +81,19 @@ pub(super) fn statement(comment: &[u8]) -> Option<Statement> {
     }
     let text = std::str::from_utf8(text).ok()?;
     let text = text.strip_suffix(')').unwrap_or(text);
-    let mut words = text.splitn(5, ' ').skip(1);
-    let what = words.next()?.to_ascii_lowercase();
-    let name = words.next()?.to_owned();
+    // `frame G54.1 P1 name [[` has a name of two words.
+    let (head, tail) = text.split_at(text.find("[[").unwrap_or(text.len()));
+    let words: Vec<&str> = head.split_ascii_whitespace().skip(1).collect();
+    let what = words.first()?.to_ascii_lowercase();
     if what == "angles" {
-        return Angles::of(&name).map(Statement::Angles);
+        return Angles::of(words.get(1)?).map(Statement::Angles);
     }
-    let frame = frame(words.nth(1)?)?;
+    let name = match words[1..] {
+        [name, _] => name.to_owned(),
+        [name, number, _] => format!("{name} {number}"),
+        _ => return None,
+    };
+    let frame = frame(tail)?;
     match &*what {
         "tool" => Some(Statement::Tool(name, frame)),
         "frame" => Some(Statement::Frame(name, frame)),

@@ -5,9 +5,11 @@
 //! may be skipped leaves known only what it does not change.
 
 mod codes;
+mod doubt;
 mod flow;
 mod frames;
 mod heidenhain;
+mod known;
 mod motion;
 mod names;
 mod survey;
@@ -17,15 +19,16 @@ use std::sync::Arc as Shared;
 
 use super::arc::Arc;
 use super::dialect::Dialect;
-use super::expression::{Reader, Variable, Worth, literal, numbered};
-use super::machine::{Group, State, Turn};
+use super::expression::{Reader, Variable, Worth, literal};
+use super::machine::{Group, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::{parse, word};
 use super::setup::{Setup, Statement, statement};
 use super::syntax::{Belongs, NcTree, Syntax, Word};
 use super::token::Token;
-use crate::program::motion::{Frame, Listing, OpaqueRegion, Place, Reason};
+use crate::program::motion::{Frame, Listing, MotionKind, OpaqueRegion, Place, Reason};
+use crate::program::tree::Node;
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -49,6 +52,8 @@ pub struct Task<'s> {
 /// What a rewrite must know of the order of blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Event {
+    /// A file begins.
+    Start,
     /// A motion of the listing.
     Motion(u32),
     /// These axes are not known from here on: bits 0 to 2 X Y Z, 3 to 5 A B C.
@@ -85,13 +90,39 @@ pub(super) struct Written {
     pub(super) arc: Option<(Arc, bool, bool)>,
     /// Whether a block may stand before it.
     pub(super) insertable: bool,
+    /// Whether words that it leaves out can be said again though it stays.
+    pub(super) restates: bool,
+    /// Whether it is a positioning block of Heidenhain without L.
+    pub(super) paraxial: bool,
+}
+
+impl Task<'_> {
+    /// An arc that stays as it is needs its start: the motion that ends there stays too, back to one that is straight.
+    fn spare_arcs(&mut self) {
+        for index in (0..self.listing.motions.len()).rev() {
+            let motion = &self.listing.motions[index];
+            if motion.kind != MotionKind::Circular || motion.reason().is_none() {
+                continue;
+            }
+            let file = motion.place.file;
+            let before = motion.previous.or((index as u32).checked_sub(1));
+            let Some(before) = before.map(|before| &mut self.listing.motions[before as usize]) else {
+                continue;
+            };
+            if before.place.file == file && before.reason().is_none() {
+                before.left = Some(Reason::BeforeLeftArc);
+            }
+        }
+    }
 }
 
 impl<'s> Task<'s> {
     /// Reads files, given by name and bytes. Never fails: what cannot be read is listed.
     pub fn read(files: &[(&str, &'s [u8])], setup: &Setup) -> Task<'s> {
-        let dialects: Vec<Dialect> =
-            files.iter().map(|(_, bytes)| setup.dialect.unwrap_or_else(|| Dialect::of(bytes))).collect();
+        let dialects: Vec<Dialect> = files
+            .iter()
+            .map(|(name, bytes)| setup.dialect.unwrap_or_else(|| Dialect::of_named(name, bytes)))
+            .collect();
         let trees: Vec<_> = files.iter().zip(&dialects).map(|((_, bytes), &d)| parse(bytes, d)).collect();
         let mut task = Task {
             names: files.iter().map(|(name, _)| (*name).to_owned()).collect(),
@@ -112,6 +143,7 @@ impl<'s> Task<'s> {
             let Lister { listing, events, written, .. } = lister;
             (task.listing, task.events, task.written) = (listing, events, written);
         }
+        task.spare_arcs();
         task
     }
 }
@@ -125,25 +157,34 @@ pub(super) struct Lister<'t, 's> {
     tools: Vec<(String, Frame)>,
     frames: Vec<(String, Frame)>,
     state: State,
-    /// Groups that the file sets to more than one thing.
-    several: u32,
-    /// Groups that the file sets to exactly one thing.
-    once: u32,
-    /// Groups that have been set so far.
-    seen: u32,
+    /// What the file sets; found while it is followed.
+    found: doubt::Found,
+    /// What the whole file sets, where it has been followed before.
+    whole: Option<doubt::Found>,
+    /// Groups that are set before the way can first part.
+    settled: u32,
+    /// Whether the way has parted: jumps, calls, labels.
+    branched: bool,
+    /// Whether the block that is being followed may be skipped.
+    skipping: bool,
+    /// Whether the program has ended (M30): what comes next belongs to another.
+    ended: bool,
     /// Whether synchronised actions may set variables.
     actions: bool,
     /// What held before the subprogram that is being passed.
-    passed: Option<(State, u32)>,
+    passed: Option<State>,
     /// Whether tools come in with M6.
     changes_tools: bool,
-    next_tool: Option<String>,
-    /// Work offsets and tools that the program has set, by name; `None` where the text does not tell to what.
-    set_frames: Vec<(String, Option<Frame>)>,
-    set_tools: Vec<(String, Option<Frame>)>,
-    /// Whether it has set some that the text does not name.
-    sets_frames: bool,
-    sets_tools: bool,
+    /// Whether the program begins again at its end.
+    repeats: bool,
+    /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
+    foreign: bool,
+    /// Contours that cycles of lathes read, from block to block.
+    contours: Vec<(u64, u64)>,
+    /// The block that ends the contour which is being read.
+    contour: Option<u64>,
+    /// Names that the file declares (Siemens).
+    declared: BTreeSet<Vec<u8>>,
     /// Blocks that jumps go to.
     targets: BTreeSet<u64>,
     /// Whether a jump goes to a computed block.
@@ -156,6 +197,9 @@ pub(super) struct Lister<'t, 's> {
     tool_index: HashMap<String, u32>,
     frame_index: Option<(String, Option<crate::math::se3::Pose>, u32)>,
 }
+
+/// How long the lists were before a file.
+struct Lengths([usize; 7]);
 
 /// What a block says, word by word.
 #[derive(Default)]
@@ -175,7 +219,21 @@ struct Said<'s> {
     l: Option<usize>,
     q: Option<usize>,
     feed: Option<usize>,
+    h: Option<usize>,
+    d: Option<usize>,
+    /// U, V, W, E: axes that are not followed.
+    others: bool,
+    /// R0 (false), RL and RR of Heidenhain.
+    compensates: Option<bool>,
+    /// Why the block is left though it moves as its words say: measuring, poles, angles of a contour.
+    aside: Option<Reason>,
+    /// A word that is not known: what it is, and why.
+    unknown: Option<(String, Reason)>,
+    /// A positioning block without L.
+    paraxial: bool,
     opaque: bool,
+    /// The opaque part may hold more than axes.
+    obscure: bool,
     skippable: bool,
     /// G53, SUPA, M91.
     machine: bool,
@@ -184,10 +242,6 @@ struct Said<'s> {
     turns: bool,
     /// Corners that are rounded or cut: `,R5`, `,C2`, RND=, CHF=, CHR=.
     corner: bool,
-    /// Why it does not go, or not only, where its axis words say.
-    odd: Option<Reason>,
-    /// Whether it moves other axes: U, V, W.
-    others: bool,
 }
 
 impl Said<'_> {
@@ -209,17 +263,20 @@ impl<'t, 's> Lister<'t, 's> {
             tools: Vec::new(),
             frames: Vec::new(),
             state,
-            several: 0,
-            once: 0,
-            seen: 0,
+            found: doubt::Found::default(),
+            whole: None,
+            settled: 0,
+            branched: false,
+            skipping: false,
+            ended: false,
             actions: false,
             passed: None,
             changes_tools: false,
-            next_tool: None,
-            set_frames: Vec::new(),
-            set_tools: Vec::new(),
-            sets_frames: false,
-            sets_tools: false,
+            repeats: false,
+            foreign: false,
+            contours: Vec::new(),
+            contour: None,
+            declared: BTreeSet::new(),
             targets: BTreeSet::new(),
             anywhere: false,
             listing: Listing::default(),
@@ -238,7 +295,6 @@ impl<'t, 's> Lister<'t, 's> {
     }
 
     fn file(&mut self) {
-        self.events.push(Event::Unknown);
         self.listing.marks.push(mark::find(self.tree));
         for opaque in &self.tree.opaque {
             self.listing.opaque.push(OpaqueRegion {
@@ -249,11 +305,56 @@ impl<'t, 's> Lister<'t, 's> {
         }
         self.comments();
         self.survey();
+        let lengths = self.lengths();
+        let start = self.state.clone();
+        self.follow();
+        if self.branched {
+            // Now it is known what the whole file sets, which tells what still holds where ways meet.
+            self.back_to(&lengths);
+            self.state = start;
+            self.whole = Some(std::mem::take(&mut self.found));
+            (self.settled, self.branched, self.ended, self.actions) = (0, false, false, false);
+            (self.passed, self.contour) = (None, None);
+            self.follow();
+        }
+    }
+
+    fn follow(&mut self) {
+        self.events.push(Event::Start);
+        if self.repeats() {
+            self.forget();
+        }
         let mut said = Said::default();
         let blocks: Vec<u32> = self.tree.child_nodes(0).collect();
         for block in blocks {
             self.block(block, &mut said);
         }
+    }
+
+    fn lengths(&self) -> Lengths {
+        let listing = &self.listing;
+        Lengths([
+            listing.motions.len(),
+            listing.speeds.len(),
+            listing.zones.len(),
+            listing.tools.len(),
+            listing.work_objects.len(),
+            self.events.len(),
+            self.written.len(),
+        ])
+    }
+
+    fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, written]): &Lengths) {
+        self.listing.motions.truncate(motions);
+        self.listing.speeds.truncate(speeds);
+        self.listing.zones.truncate(zones);
+        self.listing.tools.truncate(tools);
+        self.listing.work_objects.truncate(objects);
+        self.events.truncate(events);
+        self.written.truncate(written);
+        self.speeds.clear();
+        self.tool_index.clear();
+        self.frame_index = None;
     }
 
     /// Frames, tools and conventions that comments state.
@@ -280,9 +381,15 @@ impl<'t, 's> Lister<'t, 's> {
             return;
         }
         let before = self.state.clone();
+        self.skipping = true;
         self.run(said);
+        self.skipping = false;
+        // What ends the program or goes elsewhere does so only where it is not skipped.
+        self.ended = false;
         let after = std::mem::replace(&mut self.state, before);
         self.state = after.joined(&self.state);
+        self.frame_index = None;
+        self.tool_index.clear();
     }
 
     fn gather(&mut self, node: u32, said: &mut Said<'s>) {
@@ -297,65 +404,111 @@ impl<'t, 's> Lister<'t, 's> {
         said.opaque = kind == Syntax::Opaque;
         for child in self.tree.child_nodes(node) {
             if self.tree.nodes[child as usize].kind == Syntax::Opaque {
+                let Node { first, end, .. } = self.tree.nodes[child as usize];
                 said.opaque = true;
+                said.obscure |= self.may_set(first, end);
                 continue;
             }
             let found = word(self.tree, child);
             said.words.push(found);
         }
         for index in 0..said.words.len() {
-            let word = said.words[index];
-            let at = Some(index);
-            match word.address() {
-                Some(b'G') => match self.literal(&word) {
-                    Some(number) => said.g.push(code(number)),
-                    None => said.opaque = true,
-                },
-                Some(b'M') => match self.literal(&word) {
-                    Some(number) => said.m.push(number.round() as u32),
-                    None if self.dialect == Dialect::Siemens => {}
-                    None => said.opaque = true,
-                },
-                Some(b'X') => said.axes[0] = at,
-                Some(b'Y') => said.axes[1] = at,
-                Some(b'Z') => said.axes[2] = at,
-                Some(b'C') if self.dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {}
-                Some(b'C') if index > 0 && said.words[index - 1].name == b"," => said.corner = true,
-                // The angle of the line.
-                Some(b'A') if index > 0 && said.words[index - 1].name == b"," => {
-                    said.odd = Some(Reason::NotFollowed);
-                }
-                Some(letter @ (b'A' | b'B' | b'C')) => said.abc[usize::from(letter - b'A')] = at,
-                Some(letter @ (b'I' | b'J' | b'K')) => said.centre[usize::from(letter - b'I')] = at,
-                Some(b'R') if self.dialect == Dialect::Heidenhain => match word.belongs {
-                    Belongs::Literal { sign: None, .. } => self.state.radius = false,
-                    _ => said.radius = at,
-                },
-                Some(b'R') if index > 0 && said.words[index - 1].name == b"," => said.corner = true,
-                Some(b'R') => said.radius = at,
-                Some(b'F') => said.feed = at,
-                Some(b'P') => said.p = at,
-                Some(b'L') => said.l = at,
-                Some(b'Q') => said.q = at,
-                Some(b'U'..=b'W') => said.others = true,
-                Some(_) => {}
-                None => self.gather_name(said, index),
-            }
+            self.gather_word(said, index);
         }
-        // X1.2.3, and blanks within a number.
-        let stray = |word: &Word<'_>| word.name.first().is_some_and(|b| b.is_ascii_digit() || *b == b'.');
+        let first = said.words.first();
+        said.paraxial = self.dialect == Dialect::Heidenhain
+            && first.is_some_and(|word| is_axis_name(word.name) && word.belongs != Belongs::Nothing);
+        // Two motion words that differ: which of them holds is not certain.
+        let mut modes = said.g.iter().filter(|&&code| matches!(code, 0 | 10 | 20 | 30));
+        if let Some(first) = modes.next()
+            && modes.any(|other| other != first)
+        {
+            said.opaque = true;
+        }
+    }
+
+    /// Whether a part that could not be read may hold more than axis words.
+    fn may_set(&self, first: u32, end: u32) -> bool {
+        (first..end).any(|token| match self.tree.kind(token) {
+            Some(Token::Name) => self.tree.text(token).iter().any(|byte| !is_axis(*byte)),
+            Some(Token::Address) => !is_axis(self.tree.text(token)[0]),
+            Some(Token::Hash | Token::Equal) => true,
+            _ => false,
+        })
+    }
+
+    fn gather_word(&mut self, said: &mut Said<'s>, index: usize) {
+        let word = said.words[index];
+        let at = Some(index);
+        let mut twice = false;
+        let mut put = |slot: &mut Option<usize>| {
+            twice |= slot.is_some();
+            *slot = at;
+        };
         let heidenhain = self.dialect == Dialect::Heidenhain;
-        said.opaque |= !heidenhain && said.moves() && said.words.iter().any(stray);
-        // M118 X1: what follows is no way to go.
-        let limits = said.words.iter().position(|word| {
-            heidenhain
-                && word.address() == Some(b'M')
-                && matches!(self.literal(word), Some(94.0 | 114.0 | 116.0 | 118.0 | 138.0))
-        });
-        if let Some(limits) = limits {
-            let words = said.axes.iter().chain(&said.abc).flatten();
-            said.opaque |= words.copied().any(|at| at > limits);
+        let comma = index > 0 && said.words[index - 1].name == b",";
+        // Conversational: what follows one of these M words are its own values.
+        if heidenhain && word.address() != Some(b'M') && self.is_value_of_m(said, index) {
+            return;
         }
+        match word.address() {
+            Some(b'G') => match self.literal(&word) {
+                Some(number) if number >= 0.0 => said.g.push(code(number)),
+                _ => match self.worth(&word).0 {
+                    Ok(number) if number >= 0.0 => said.g.push(code(number)),
+                    Ok(_) => said.unknown = Some(("G".to_owned(), Reason::UnknownWord)),
+                    Err(_) => said.unknown = Some(("G".to_owned(), Reason::Variable)),
+                },
+            },
+            Some(b'M') => match self.literal(&word) {
+                Some(number) => said.m.push(number.round() as u32),
+                None => said.unknown = Some(("M".to_owned(), Reason::Variable)),
+            },
+            Some(b'X') => put(&mut said.axes[0]),
+            Some(b'Y') => put(&mut said.axes[1]),
+            Some(b'Z') => put(&mut said.axes[2]),
+            Some(b'C') if heidenhain && word.belongs == Belongs::Nothing => {}
+            Some(b'C' | b'R') if comma => said.corner = true,
+            // `,A45.`: the angle of the line.
+            Some(_) if comma => (said.corner, said.aside) = (true, Some(Reason::NotFollowed)),
+            Some(letter @ (b'A' | b'B' | b'C')) => put(&mut said.abc[usize::from(letter - b'A')]),
+            Some(letter @ (b'I' | b'J' | b'K')) => put(&mut said.centre[usize::from(letter - b'I')]),
+            Some(b'R') if heidenhain => match (word.belongs, self.literal(&word)) {
+                (Belongs::Literal { sign: None, .. }, Some(value))
+                    if value == 0.0 || !said.words.first().is_some_and(|word| word.is("CR")) =>
+                {
+                    said.compensates = Some(value != 0.0);
+                }
+                // R+ and R- of a positioning block.
+                (Belongs::Nothing, _) => said.compensates = Some(true),
+                _ => put(&mut said.radius),
+            },
+            Some(b'R') => put(&mut said.radius),
+            Some(b'F') => said.feed = at,
+            Some(b'P') => said.p = at,
+            Some(b'L') => said.l = at,
+            Some(b'Q') => said.q = at,
+            Some(b'H') => said.h = at,
+            Some(b'D') => said.d = at,
+            Some(b'U' | b'V' | b'W') => said.others = true,
+            Some(b'E') if self.dialect != Dialect::Fanuc => said.others = true,
+            Some(_) => {}
+            None => self.gather_name(said, index),
+        }
+        said.opaque |= twice && self.dialect != Dialect::Siemens || twice && word.belongs != Belongs::Nothing;
+    }
+
+    /// Whether a word of a Heidenhain block is a value of an M word before it (M118 X1, M94 C), or of one of unknown kind.
+    fn is_value_of_m(&self, said: &mut Said<'s>, index: usize) -> bool {
+        let before = said.words[..index].iter().rev().find(|word| word.address() == Some(b'M'));
+        let Some(m) = before.and_then(|word| self.literal(word)) else { return false };
+        if m == 91.0 || m == 92.0 || !is_axis_name(said.words[index].name) {
+            return false;
+        }
+        if !matches!(m as u32, 94 | 116 | 118 | 138 | 140) {
+            said.unknown = Some((format!("M{m}"), Reason::UnknownWord));
+        }
+        true
     }
 
     fn gather_name(&mut self, said: &mut Said<'s>, index: usize) {
@@ -368,43 +521,27 @@ impl<'t, 's> Lister<'t, 's> {
             (Dialect::Siemens, b"THETA") => said.spin = at,
             (Dialect::Siemens, b"CR") => said.radius = at,
             (Dialect::Siemens, b"TURN" | b"AR" | b"I1" | b"J1" | b"K1") => said.turns = true,
-            (Dialect::Siemens, b"RND" | b"RNDM" | b"CHF" | b"CHR") => said.corner = true,
+            (Dialect::Siemens, b"RND" | b"CHF" | b"CHR") => said.corner = true,
+            (Dialect::Siemens, b"RNDM") => said.corner = self.worth(&word).0 != Ok(0.0),
             (Dialect::Siemens, b"SUPA" | b"G153") => said.machine = true,
-            (Dialect::Siemens, b"AP" | b"RP") => said.odd = Some(Reason::Transformed),
-            (Dialect::Siemens, b"ANG" | b"PO" | b"POS" | b"POSA" | b"POSP") => {
-                said.odd = Some(Reason::NotFollowed);
-            }
-            (Dialect::Siemens, b"MEAS" | b"MEAW" | b"MEASA" | b"MEAWA" | b"MEAC") => {
-                said.odd = Some(Reason::Probe);
-            }
-            // Surface normals, cones, angles to the path.
-            (Dialect::Siemens, [b'A'..=b'C', b'4'..=b'7'] | b"LEAD" | b"TILT" | b"NUT" | b"PHI" | b"PSI")
-                if word.assigned =>
-            {
-                said.odd = Some(Reason::OrientationUnknown);
-            }
-            // An axis of the machine.
-            (Dialect::Siemens, [b'X'..=b'Z' | b'A'..=b'C', b'1']) if word.assigned => {
-                said.odd = Some(Reason::MachineCoordinates);
-            }
-            (Dialect::Siemens | Dialect::Heidenhain, _) => {
-                self.gather_heidenhain(said, index, &name);
-            }
-            // XY5: two axes and one number.
-            (_, name) => said.opaque |= name.iter().all(|byte| b"XYZABCUVW".contains(byte)),
-        }
-    }
-
-    fn gather_heidenhain(&mut self, said: &mut Said<'s>, index: usize, name: &[u8]) {
-        let at = Some(index);
-        match (self.dialect, name) {
+            (Dialect::Siemens, _) => self.gather_siemens(said, index, &name),
             (Dialect::Heidenhain, [b'I', letter @ b'X'..=b'Z']) => said.axes[usize::from(letter - b'X')] = at,
             (Dialect::Heidenhain, [b'I', letter @ b'A'..=b'C']) => said.abc[usize::from(letter - b'A')] = at,
             (Dialect::Heidenhain, [b'T', letter @ b'X'..=b'Z']) => {
                 said.vector[usize::from(letter - b'X')] = at
             }
+            (Dialect::Heidenhain, [b'I', b'U'..=b'W']) => said.others = true,
             (Dialect::Heidenhain, b"FMAX") => said.rapid = true,
-            (Dialect::Heidenhain, b"RL" | b"RR") => self.state.radius = true,
+            (Dialect::Heidenhain, b"RL" | b"RR") => said.compensates = Some(true),
+            (
+                Dialect::Heidenhain,
+                b"L" | b"LN" | b"CC" | b"CR" | b"CT" | b"DR" | b"NX" | b"NY" | b"NZ" | b"FU" | b"FZ"
+                | b"FAUTO" | b"MB" | b"MAX" | b"TCPM",
+            ) => {}
+            (Dialect::Heidenhain, _) => {
+                let text = String::from_utf8_lossy(&name).into_owned();
+                said.unknown = Some((text, Reason::UnknownWord));
+            }
             _ => {}
         }
     }
@@ -462,23 +599,26 @@ impl<'t, 's> Lister<'t, 's> {
         }
     }
 
-    fn forget(&mut self) {
-        // A group that the file sets to one thing only keeps that once it has been set, and one that it never sets
-        // keeps what the control starts with.
-        let constant = !self.several & (self.seen | !self.once);
-        self.state.forget(constant);
-        self.events.push(Event::Unknown);
-    }
-
-    fn set(&mut self, group: Group) {
-        self.seen |= 1 << group as u32;
-        self.state.certain(group);
-    }
-
     /// What a block does.
     fn run(&mut self, said: &Said<'s>) {
+        if std::mem::take(&mut self.ended) {
+            self.forget();
+        }
         if self.is_reached_by_jumps(said) {
             self.forget();
+            self.state.mode = Mode::Unset;
+        }
+        self.contour_of(said);
+        let values = self.values(said);
+        let before = self.found.forgotten;
+        self.effect(said);
+        self.assign(values, self.found.forgotten != before);
+    }
+
+    fn effect(&mut self, said: &Said<'s>) {
+        if let Some(on) = said.compensates {
+            self.state.radius = on;
+            self.set(Group::Radius, u64::from(on));
         }
         if self.dialect == Dialect::Heidenhain && self.heidenhain(said) {
             return;
@@ -490,47 +630,33 @@ impl<'t, 's> Lister<'t, 's> {
             self.forget();
             return;
         }
-        // LinuxCNC gives variables their values after the words of the block have been read.
-        let later = if self.dialect == Dialect::LinuxCnc {
-            self.assigned(said)
-        } else {
-            self.assignments(said);
-            Vec::new()
-        };
-        self.words(said);
-        for (name, value) in later {
-            self.assign(name, value);
+        if self.foreign {
+            if !said.words.is_empty() {
+                self.deny(said, "?", Reason::UnknownWord);
+            }
+            return;
         }
-    }
-
-    /// What the words of a block do.
-    fn words(&mut self, said: &Said<'s>) {
         if self.control_flow(said) {
             return;
         }
-        for &m in &said.m {
-            match m {
-                128 if self.dialect == Dialect::Heidenhain => self.tip(true, false),
-                129 if self.dialect == Dialect::Heidenhain => self.tip(false, false),
-                89 if self.dialect == Dialect::Heidenhain => self.state.calls = Some(Reason::Cycle),
-                // What was stored by M70 holds again.
-                72 | 73 if self.dialect == Dialect::LinuxCnc => {
-                    self.forget();
-                    self.state.uncertain = u32::MAX;
-                }
-                _ => {}
-            }
+        if let Some((word, reason)) = self.not_known(said) {
+            self.deny(said, &word, reason);
+            self.ends(said);
+            return;
         }
+        if said.opaque && said.obscure {
+            self.deny(said, "?", Reason::Unread);
+            self.ends(said);
+            return;
+        }
+        self.m_words(said);
+        self.tool_words(said);
         let machine = said.machine
             || said.g.contains(&530)
             || self.dialect == Dialect::Siemens && said.g.contains(&1530)
             || self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 91 | 92));
         self.tools_of(said);
-        if self.unknown_code(said)
-            || self.named_commands(said)
-            || self.modal_codes(said)
-            || self.unmodal_codes(said)
-        {
+        if self.named_commands(said) || self.modal_codes(said) || self.unmodal_codes(said) {
             self.ends(said);
             return;
         }
@@ -540,29 +666,41 @@ impl<'t, 's> Lister<'t, 's> {
             let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
             self.state.feed = feed.map(|feed| feed * self.state.unit_mm / 60.0);
         }
-        let limits = self.dialect == Dialect::Heidenhain
-            && said.words.first().is_some_and(|word| word.address() == Some(b'M'));
-        // M118 X1 Y1 alone goes nowhere.
-        if !limits {
-            self.motion(said, machine);
-        }
+        self.motion(said, machine);
         self.ends(said);
     }
 
-    /// M2, M17, M30, M99: what comes after belongs to another program. M6 goes to change the tool.
+    /// M2, M30, M99, M17 of Siemens: what comes after belongs to another program. M6 goes to change the tool.
     fn ends(&mut self, said: &Said<'s>) {
-        let cycle = self.dialect == Dialect::Heidenhain && said.m.contains(&99);
-        if cycle {
-            self.state.calls = None;
-            self.state.lose_position();
-            self.events.push(Event::Lost(POSITION));
-        } else if said.m.iter().any(|m| matches!(m, 2 | 17 | 30 | 99))
-            || said.words.iter().any(|word| word.is("RET"))
-        {
-            self.forget();
+        let end = |m: &u32| match m {
+            2 | 30 => true,
+            17 => self.dialect == Dialect::Siemens,
+            99 => self.dialect != Dialect::Heidenhain,
+            _ => false,
+        };
+        if said.m.iter().any(end) || said.words.iter().any(|word| word.is("RET")) {
+            self.ended = true;
         } else if said.m.contains(&6) {
-            self.state.lose_position();
-            self.events.push(Event::Lost(POSITION));
+            self.lose_all();
+        }
+    }
+
+    /// M words that set something.
+    fn m_words(&mut self, said: &Said<'s>) {
+        let heidenhain = self.dialect == Dialect::Heidenhain;
+        for &m in &said.m {
+            match m {
+                128 | 129 if heidenhain => self.tip(m == 128, false),
+                // These end at the next M99, the others set what is not followed here.
+                89 if heidenhain => self.state.modal_call = Some(Reason::Cycle),
+                70 | 73 if self.dialect == Dialect::LinuxCnc => {
+                    self.state.kept = None;
+                    self.state.kept = Some(Box::new(self.state.clone()));
+                }
+                71 if self.dialect == Dialect::LinuxCnc => self.state.kept = None,
+                72 if self.dialect == Dialect::LinuxCnc => self.restore(),
+                _ => {}
+            }
         }
     }
 
@@ -580,32 +718,32 @@ impl<'t, 's> Lister<'t, 's> {
                 }
                 _ => "T?".to_owned(),
             };
-            self.next_tool = Some(name);
+            self.state.next_tool = Some(name);
         }
         if (said.m.contains(&6) || !self.changes_tools)
-            && let Some(name) = self.next_tool.take()
+            && let Some(name) = self.state.next_tool.take()
         {
-            self.state.tool = name;
-            self.set(Group::Tool);
+            self.change_tool(name);
         }
-        if self.dialect != Dialect::Siemens {
-            return;
+        if self.dialect == Dialect::Siemens
+            && let Some(index) = said.d
+        {
+            let edge = self.literal(&said.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
+            self.tool_is(|state| state.edge = edge);
         }
-        // The edge of the tool, and offsets of its length.
-        for word in &said.words {
-            let base = codes::base(&self.state.tool).to_owned();
-            if word.address() == Some(b'D') {
-                self.state.tool = match self.literal(word) {
-                    Some(1.0) => base,
-                    Some(number) => format!("{base} +D{}", number.round()),
-                    None => format!("{base} +D?"),
-                };
-                self.set(Group::Tool);
-            } else if word.is("TOFFL") || word.is("TOFF") {
-                self.state.tool = format!("{base} +TOFF");
-                self.set(Group::Tool);
-            }
-        }
+    }
+}
+
+/// Whether a letter is that of an axis or of what goes with one.
+fn is_axis(letter: u8) -> bool {
+    b"XYZABCIJKRUVWEF".contains(&letter.to_ascii_uppercase())
+}
+
+/// The name of an axis, with or without the I of an increment.
+fn is_axis_name(name: &[u8]) -> bool {
+    match name {
+        [letter] | [b'I' | b'i', letter] => b"XYZABCUVW".contains(&letter.to_ascii_uppercase()),
+        _ => false,
     }
 }
 

@@ -11,6 +11,8 @@ use truegrind::program::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOpti
 
 use super::samples::{root, told};
 
+mod certain;
+
 const DIALECTS: [Dialect; 5] =
     [Dialect::Iso, Dialect::Fanuc, Dialect::LinuxCnc, Dialect::Siemens, Dialect::Heidenhain];
 

@@ -1,10 +1,11 @@
 //! Writing the words of one block: numbers in place, words that were left out at their place in the order.
 
-use super::slots::ORDER;
+use super::slots::{ORDER, Slots, spaced};
 use crate::program::edit::Edits;
 use crate::program::nc::dialect::Dialect;
 use crate::program::nc::expression::literal;
 use crate::program::nc::syntax::{Belongs, NcTree, Word};
+use crate::program::nc::task::Written;
 use crate::program::nc::token::Token;
 use crate::program::rapid::number;
 use crate::program::rewrite::Outcome;
@@ -26,6 +27,41 @@ pub(super) struct Pen<'p, 's> {
     pub(super) replaced: Outcome,
     /// Whether white space stands between words here.
     pub(super) spaced: bool,
+    /// The token before which L must come where a positioning block of Heidenhain gets words.
+    pub(super) lead: Option<u32>,
+}
+
+impl<'p, 's: 'p> Pen<'p, 's> {
+    /// A pen for a block that there is.
+    pub(super) fn new(
+        tree: &'p NcTree<'s>,
+        dialect: Dialect,
+        edits: &'p mut Edits,
+        slots: &Slots<'s>,
+        written: &Written,
+    ) -> Self {
+        Pen {
+            tree,
+            dialect,
+            edits,
+            order: slots.order(),
+            end: slots.end,
+            added: Vec::new(),
+            replaced: Outcome::Unchanged,
+            spaced: spaced(tree, slots.last),
+            lead: slots.first.filter(|_| written.paraxial).map(|word| word.first),
+        }
+    }
+
+    /// What has become of the block.
+    pub(super) fn finish(mut self) -> Outcome {
+        if let Some(token) = self.lead.take()
+            && self.replaced != Outcome::Unchanged
+        {
+            self.edits.insert(self.tree.start(token), b"L ");
+        }
+        self.replaced
+    }
 }
 
 impl Pen<'_, '_> {
@@ -44,6 +80,10 @@ impl Pen<'_, '_> {
                 if self.spaced {
                     text.push(b' ');
                 }
+                if self.lead == Some(next.first) {
+                    self.lead = None;
+                    text.splice(0..0, *b"L ");
+                }
                 self.edits.insert(self.tree.start(next.first), &text);
             }
             None => {
@@ -58,6 +98,16 @@ impl Pen<'_, '_> {
         }
     }
 
+    /// How many decimals a word can have: a Fanuc takes eight digits.
+    fn fitting(&self, value: f64, decimals: u8) -> u8 {
+        const DIGITS: u8 = 8;
+        if self.dialect != Dialect::Fanuc {
+            return decimals;
+        }
+        let whole = value.abs().max(1.0).log10() as u8 + 1;
+        decimals.min(DIGITS.saturating_sub(whole))
+    }
+
     /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
     /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
     pub(super) fn put(
@@ -69,6 +119,10 @@ impl Pen<'_, '_> {
         was: f64,
         least: u8,
     ) -> f64 {
+        if !value.is_finite() {
+            return keep;
+        }
+        let least = self.fitting(value, least);
         let Some(word) = self.order[place] else {
             if !differs(keep, value, least) {
                 return keep;
@@ -89,7 +143,7 @@ impl Pen<'_, '_> {
                 let text = self.tree.text(token);
                 let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
                 let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
-                let decimals = decimals(text).max(least);
+                let decimals = self.fitting(value, decimals(text).max(least));
                 if !differs(old, value, decimals) {
                     return old;
                 }
@@ -138,6 +192,10 @@ pub(super) fn differs(old: f64, new: f64, decimals: u8) -> bool {
 }
 
 fn decimals(text: &[u8]) -> u8 {
+    // 1.5EX1 of Siemens is written anew without its exponent.
+    if text.iter().any(|byte| byte.eq_ignore_ascii_case(&b'E')) {
+        return 0;
+    }
     let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
     point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
 }

@@ -61,12 +61,22 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
         return slots;
     }
     let (mut place, mut fallback) = (None, (node.end, node.first));
+    let (mut comma, mut after_m) = (false, false);
+    let mut radius_block = false;
     for child in tree.child_nodes(written.node) {
         let word = word(tree, child);
         let name = word.name.to_ascii_uppercase();
+        radius_block |= &*name == b"CR";
         if slots.first.is_none() && &*name != b"N" {
             slots.first = Some(word);
         }
+        // `,A45` is the angle of the line, `M118 X1` a value of the M word.
+        if comma || after_m && dialect == Dialect::Heidenhain && is_axis_name(&name) {
+            comma = false;
+            continue;
+        }
+        comma = &*name == b",";
+        after_m |= &*name == b"M" && !matches!(number_of(tree, &word), Some(91.0 | 92.0));
         let at = |letter: u8, first: u8| usize::from(letter - first);
         let mut says_where = true;
         match &*name {
@@ -97,7 +107,12 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
             b"THETA" => slots.spin = Some(word),
             b"R" if dialect != Dialect::Heidenhain => slots.radius = Some(word),
             b"R" => match word.belongs {
-                Belongs::Literal { sign: None, .. } => says_where = false,
+                Belongs::Literal { sign: None, .. }
+                    if !radius_block || number_of(tree, &word) == Some(0.0) =>
+                {
+                    says_where = false;
+                }
+                Belongs::Nothing => says_where = false,
                 _ => slots.radius = Some(word),
             },
             b"CR" if dialect == Dialect::Siemens => slots.radius = Some(word),
@@ -128,6 +143,18 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
     slots
 }
 
+fn number_of(tree: &NcTree<'_>, word: &Word<'_>) -> Option<f64> {
+    match word.belongs {
+        Belongs::Literal { number, .. } => literal(tree.text(number)),
+        _ => None,
+    }
+}
+
+fn is_axis_name(name: &[u8]) -> bool {
+    matches!(name, [b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
+        || matches!(name, [b'I', b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'])
+}
+
 /// Whether a word says by itself that it is an increment (IC, IX) or not (AC).
 pub(super) fn said(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Option<bool> {
     if dialect == Dialect::Heidenhain {
@@ -146,5 +173,5 @@ pub(super) fn said(tree: &NcTree<'_>, dialect: Dialect, word: &Word<'_>) -> Opti
 
 /// Whether white space stands before the word that begins with this token (or it begins its line).
 pub(super) fn spaced(tree: &NcTree<'_>, token: u32) -> bool {
-    token == 0 || tree.kind(token - 1).is_some_and(Token::is_trivia)
+    token == 0 || tree.kind(token - 1).is_some_and(|kind| kind.is_trivia() || kind == Token::Slash)
 }

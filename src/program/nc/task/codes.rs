@@ -2,9 +2,11 @@
 
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, Mode, Turn, transforms};
-use super::super::syntax::Belongs;
+use super::super::expression::Worth;
+use super::super::machine::{Group, Length, Mode, State};
+use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
+use super::doubt::key;
 use super::names::{HARMLESS, KEYWORDS, is_cycle};
 use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
@@ -31,73 +33,150 @@ impl Lister<'_, '_> {
             }
             let name = word.name.to_ascii_uppercase();
             match &*name {
-                b"TRAORI" => self.tip(true, false),
+                b"TRAORI" => {
+                    self.turn_only(Group::Kinematic, false);
+                    self.tip(true, false);
+                }
                 b"TRAFOOF" => {
+                    self.turn_only(Group::Kinematic, false);
                     self.tip(false, false);
-                    self.state.transform &= !transforms::KINEMATIC;
                 }
-                b"TRANSMIT" | b"TRACYL" | b"TRAANG" => self.transform(transforms::KINEMATIC, true),
-                b"ORIMKS" => {
-                    self.state.transform |= transforms::MACHINE_TURN;
-                    self.set(Group::Transform);
+                b"TRANSMIT" | b"TRACYL" | b"TRAANG" | b"TRACON" => {
+                    self.tip(false, false);
+                    self.turn(Group::Kinematic, true);
                 }
-                b"ORIWKS" => self.state.transform &= !transforms::MACHINE_TURN,
-                b"DIAMON" | b"DIAM90" | b"DIAMOF" => {
-                    self.transform(transforms::DIAMETER, &*name != b"DIAMOF");
+                b"ORIMKS" | b"ORIWKS" => self.turn_only(Group::OrientationFrame, &*name == b"ORIMKS"),
+                b"DIAMON" | b"DIAM90" | b"DIAMOF" | b"DIAMCYCOF" | b"DIAMONA" | b"DIAM90A" | b"DIAMOFA" => {
+                    self.turn_only(Group::Diameter, !matches!(&*name, b"DIAMOF"));
                 }
                 b"TOFRAME" | b"TOFRAMEX" | b"TOFRAMEY" | b"TOFRAMEZ" | b"TOROT" | b"TOROTX" | b"TOROTY"
-                | b"TOROTZ" | b"PAROT" => self.transform(transforms::TOOL_FRAME, true),
-                b"TOROTOF" | b"PAROTOF" => self.transform(transforms::TOOL_FRAME, false),
+                | b"TOROTZ" => self.turn(Group::ToolFrame, true),
+                b"TOROTOF" => self.turn(Group::ToolFrame, false),
+                b"PAROT" => self.turn(Group::PartFrame, true),
+                b"PAROTOF" => self.turn(Group::PartFrame, false),
                 b"ORIRPY" => self.state.rpy_stated = true,
                 b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => self.state.rpy_stated = false,
+                b"ORIROTA" => self.state.spin_absolute = true,
+                b"ORIROTR" | b"ORIROTT" | b"ORIROTC" => {
+                    self.state.spin_absolute = false;
+                    self.state.spin = Err(Reason::OrientationUnknown);
+                }
+                b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.lose_orientation(),
                 b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
                     self.state.mode = Mode::Other(Reason::NotFollowed);
                 }
                 b"CYCLE800" => {
                     let empty = matches!(word.belongs, Belongs::Arguments { first, end } if end == first + 2);
-                    self.transform(transforms::SWIVEL, !empty);
-                    self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
-                    self.events.push(Event::Unknown);
+                    self.turn(Group::Swivel, !empty);
                     done = true;
                 }
+                b"TOFF" | b"FTOCON" | b"FTOCOF" | b"TOFFON" | b"TOFFOF" | b"PUTFTOC" | b"PUTFTOCF"
+                | b"TOWSTD" | b"TOWMCS" | b"TOWWCS" | b"TOWBCS" | b"TOWTCS" | b"TOWKCS" | b"TCOABS"
+                | b"TCOFR" | b"TCOFRX" | b"TCOFRY" | b"TCOFRZ" => self.tool_assigned(),
+                b"GEOAX" | b"PRESETON" | b"PRESETONS" => self.frames_assigned(),
                 _ => match word.belongs {
                     Belongs::Arguments { .. } if HARMLESS.iter().any(|known| word.is(known)) => {}
                     Belongs::Arguments { .. } if is_cycle(&name) => {
                         let text = String::from_utf8_lossy(&name).into_owned();
                         self.left(said, &text, Reason::Cycle);
-                        self.state.lose_position();
-                        self.events.push(Event::Lost(super::POSITION));
+                        self.lose_position();
                         done = true;
                     }
-                    Belongs::Arguments { .. } => {
+                    _ if KEYWORDS.iter().any(|known| word.is(known)) => {}
+                    Belongs::Nothing | Belongs::Arguments { .. } if self.is_call(said, index) => {
                         let text = String::from_utf8_lossy(word.name).into_owned();
                         self.subprogram(said, &text);
                         done = true;
                     }
-                    Belongs::Nothing
-                        if self.is_alone(said) && !KEYWORDS.iter().any(|known| word.is(known)) =>
-                    {
+                    _ => {
                         let text = String::from_utf8_lossy(word.name).into_owned();
-                        self.subprogram(said, &text);
-                        done = true;
+                        self.deny(said, &text, Reason::UnknownWord);
+                        return true;
                     }
-                    _ => {}
                 },
             }
         }
         done
     }
 
-    /// Whether a block has but one word beside its number, and how often it is done (P3).
-    fn is_alone(&self, said: &Said<'_>) -> bool {
-        let aside = |address: Option<u8>| matches!(address, Some(b'N' | b'P'));
-        said.words.iter().filter(|word| !aside(word.address())).count() == 1 && !said.opaque
+    /// Whether a name that is not known calls a subprogram: it stands first, alone or with how often (P).
+    fn is_call(&self, said: &Said<'_>, index: usize) -> bool {
+        !said.opaque
+            && said.words.iter().enumerate().all(|(at, word)| {
+                at == index || matches!(word.address(), Some(b'N' | b'P' | b'M' | b'F' | b'S' | b'T' | b'D'))
+            })
+    }
+
+    /// As [`Self::turn`], where the axes stay where they are and keep their values.
+    fn turn_only(&mut self, group: Group, on: bool) {
+        let was = self.state.turned & 1 << group as u32 != 0;
+        if was == on && self.state.doubt(1 << group as u32).is_none() {
+            self.set(group, u64::from(on));
+        } else {
+            self.turn(group, on);
+        }
+    }
+
+    /// Tool centre point control goes on or off: where it changes, what was the tip is none, or the other way round.
+    pub(super) fn tip(&mut self, on: bool, vector_words: bool) {
+        let changes = self.state.tip != on || self.state.doubt(1 << Group::Tip as u32).is_some();
+        (self.state.tip, self.state.vector_words) = (on, vector_words);
+        self.set(Group::Tip, u64::from(on) + 2 * u64::from(vector_words));
+        if changes {
+            // The axes stay where they are, and so does the way the tool points.
+            self.lose_position();
+        }
+    }
+
+    /// Something of the tool changes: where it stands has other coordinates now.
+    pub(super) fn tool_is(&mut self, change: impl FnOnce(&mut State)) {
+        let before = self.state.tool_name(self.dialect);
+        change(&mut self.state);
+        let after = self.state.tool_name(self.dialect);
+        let doubtful = self.state.doubt(1 << Group::Tool as u32).is_some();
+        self.set(Group::Tool, key(&after));
+        if before != after || doubtful {
+            self.lose_position();
+        }
+    }
+
+    pub(super) fn change_tool(&mut self, name: String) {
+        self.tool_is(|state| {
+            state.tool = name;
+            (state.edge, state.own_length) = (1, None);
+        });
+    }
+
+    /// The tool that is in is changed by the program to what the text does not tell.
+    pub(super) fn tool_assigned(&mut self) {
+        let name = self.state.tool_name(self.dialect);
+        self.state.tools.set(&name, None);
+        self.found.assigns.1 = true;
+        self.tool_index.clear();
+        self.lose_position();
+    }
+
+    /// Every work offset is or may be changed to what the text does not tell.
+    pub(super) fn frames_assigned(&mut self) {
+        self.state.frames.lose_all();
+        self.found.assigns.0 = true;
+        self.frame_index = None;
+        self.lose_all();
+    }
+
+    /// Every tool is or may be changed.
+    pub(super) fn tools_assigned(&mut self) {
+        self.state.tools.lose_all();
+        self.found.assigns.1 = true;
+        self.tool_index.clear();
+        self.lose_position();
     }
 
     /// G words that hold on. True where the block's axis words are no motion.
     pub(super) fn modal_codes(&mut self, said: &Said<'_>) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
         let linux = self.dialect == Dialect::LinuxCnc;
+        let fanuc = self.dialect == Dialect::Fanuc;
         self.state.exact_stop &= self.state.exact_stop_holds;
         for &code in &said.g {
             match code {
@@ -105,104 +184,114 @@ impl Lister<'_, '_> {
                 10 => self.state.mode = Mode::Linear,
                 20 => self.state.mode = Mode::Circular(false),
                 30 => self.state.mode = Mode::Circular(true),
-                50 | 51 if linux => self.state.mode = Mode::Other(Reason::NotFollowed),
-                22 | 23 | 24 | 32 | 33 | 34 | 52 | 53 | 62 | 320 | 330 | 340 | 3310 | 3320 => {
+                50 | 51 if !siemens => {
+                    if linux || !fanuc && said.centre.iter().any(Option::is_some) {
+                        self.state.mode = Mode::Other(Reason::NotFollowed);
+                    } else {
+                        // A switch of the control: axis words only name axes.
+                        return true;
+                    }
+                }
+                22..=24 | 32..=34 | 52 | 53 | 62 | 320 | 330 | 340 | 350 | 3310 | 3320 | 3350 | 3360
+                    if siemens || code != 350 =>
+                {
                     self.state.mode = Mode::Other(Reason::NotFollowed);
                 }
-                70 if linux => self.transform(transforms::DIAMETER, true),
-                80 if linux => self.transform(transforms::DIAMETER, false),
-                // The radius of the cylinder stands as C.
+                630 if siemens => self.state.mode = Mode::Other(Reason::NotFollowed),
+                70 if !siemens && !fanuc => self.turn_only(Group::Diameter, true),
+                80 if linux || !fanuc && said.p.is_none() => self.turn_only(Group::Diameter, false),
                 71 | 1070 if !siemens => {
-                    let c = said.abc[2].and_then(|index| self.literal(&said.words[index]));
-                    self.transform(transforms::KINEMATIC, c != Some(0.0));
+                    let word = said.abc.iter().chain(&said.axes).flatten().next();
+                    let ends = word.is_some_and(|&index| self.literal(&said.words[index]) == Some(0.0));
+                    self.turn(Group::Cylinder, !ends);
                     return true;
                 }
-                121 | 1120 if !siemens => self.transform(transforms::KINEMATIC, true),
-                131 | 1130 if !siemens => self.transform(transforms::KINEMATIC, false),
-                1100..=1120 if siemens => {
-                    self.transform(transforms::POLAR, false);
-                    return true;
-                }
+                121 | 1120 if !siemens => self.turn(Group::PolarPath, true),
+                131 | 1130 if !siemens => self.turn(Group::PolarPath, false),
                 90 => self.state.exact_stop = true,
-                150 | 160 if !siemens => self.transform(transforms::POLAR, code == 160),
+                // Okuma: a work offset by its number.
+                150 | 160 if !siemens && said.h.is_some() => self.work_offset(code, said),
+                150 | 160 if !siemens => self.turn(Group::Polar, code == 160),
                 500 | 510 if !siemens => {
-                    self.transform(transforms::SCALE, code == 510);
+                    self.turn(Group::Scale, code == 510);
                     return true;
                 }
-                // G100 and G101 are Haas's; elsewhere macros have such numbers, and arguments.
-                501 | 511 if !siemens => {
-                    self.transform(transforms::MIRROR, code == 511);
+                501 | 511 | 1000 | 1010 if !siemens => {
+                    self.turn(Group::Mirror, matches!(code, 511 | 1010));
                     return true;
                 }
-                1000 | 1010 if !siemens && !linux && said.axes.iter().any(Option::is_some) => {
-                    self.transform(transforms::MIRROR, code == 1010);
+                680..=689 => {
+                    self.turn(Group::Rotation, true);
                     return true;
                 }
-                680 if !siemens => {
-                    self.transform(transforms::TURN, true);
+                690 => {
+                    self.turn(Group::Rotation, false);
+                }
+                2680 | 2690 if !siemens => {
+                    self.turn(Group::Swivel, code == 2680);
                     return true;
                 }
-                682..=684 if !siemens => {
-                    self.transform(transforms::TILT, true);
+                2540 | 2550 if !siemens => self.turn(Group::Fixture, code == 2540),
+                542 | 544 if !siemens => {
+                    let ends = said.p.is_some_and(|index| self.literal(&said.words[index]) == Some(0.0));
+                    self.turn(Group::Fixture, !ends);
                     return true;
                 }
-                690 if !siemens => self.transform(transforms::TURN | transforms::TILT, false),
-                // Dynamic work offsets of Haas.
-                2540 | 2550 if !siemens => self.transform(transforms::KINEMATIC, code == 2540),
                 170 | 180 | 190 => {
                     self.state.plane = match code {
                         170 => Plane::XY,
                         180 => Plane::ZX,
                         _ => Plane::YZ,
                     };
-                    self.set(Group::Plane);
+                    self.set(Group::Plane, u64::from(code));
                 }
-                200 => self.unit(25.4),
-                210 => self.unit(1.0),
-                // Lathe cycles of Fanuc have the same numbers, and a P.
-                700 | 710 | 720 if linux || self.dialect == Dialect::Fanuc => {
-                    self.cycle(said, code);
-                    return true;
-                }
-                700 | 710 if said.p.is_none() => self.unit(if code == 700 { 25.4 } else { 1.0 }),
+                200 if !siemens => self.unit(25.4),
+                210 if !siemens => self.unit(1.0),
+                700 | 710 if siemens || self.is_unit(said) => self.unit(if code == 700 { 25.4 } else { 1.0 }),
                 7000 if siemens => self.unit(25.4),
                 7100 if siemens => self.unit(1.0),
                 400 => {
                     self.state.radius = false;
-                    self.set(Group::Radius);
+                    self.set(Group::Radius, 0);
                 }
-                // G41.1, G41.2, …: about the tool, in space.
                 410..=429 => {
                     self.state.radius = true;
-                    self.set(Group::Radius);
+                    self.set(Group::Radius, 1);
                 }
-                // G234 is Haas's.
-                434 | 435 | 2340 => self.tip(true, code == 435),
-                490 => self.tip(false, false),
-                // Of the same group.
-                430 | 440 | 431 if !linux && !siemens => self.tip(false, false),
-                431 | 432 if linux => {
-                    // No motion: words of axes are the tool's length.
-                    self.state.tool = format!("{} +{}", base(&self.state.tool), code_name(code));
-                    self.set(Group::Tool);
-                    self.state.lose_position();
-                    self.events.push(Event::Lost(super::POSITION));
-                    return true;
+                // One group on a control: G43, G44, G43.1, G43.4, G43.5, G49. G234 is Haas's.
+                430 | 431 | 432 | 434 | 435 | 440 | 490 | 2340 if !siemens => {
+                    self.tip(matches!(code, 434 | 435 | 2340), code == 435);
+                    if self.length(said, code) {
+                        return true;
+                    }
                 }
                 580 | 590 if siemens => {
-                    // Shifts of single axes within the work frame.
-                    self.transform(transforms::PROGRAMMABLE, true);
+                    self.axial_shift(said, code == 580);
                     return true;
                 }
-                1100..=1290 | 1540 if !siemens && !linux => self.work_offset(code, said),
-                540..=599 | 5000..=5999 => self.work_offset(code, said),
-                600 | 610 => (self.state.exact_stop, self.state.exact_stop_holds) = (true, true),
+                540..=599 | 5000..=5999 | 1540 => self.work_offset(code, said),
+                600 | 610 | 611 | 6010..=6030 => {
+                    (self.state.exact_stop, self.state.exact_stop_holds) = (true, true)
+                }
                 640 | 6410..=6450 => (self.state.exact_stop, self.state.exact_stop_holds) = (false, false),
-                730 | 740 | 760 | 810..=890 if !siemens => self.state.mode = Mode::Other(Reason::Cycle),
-                800 => self.state.mode = Mode::Unset,
+                730..=790 | 810..=899 | 1530 | 1550 | 1610..=1690 | 1740 | 1840
+                    if !siemens && !self.reads_contour(said, code) =>
+                {
+                    if !matches!(self.state.mode, Mode::Other(Reason::Cycle)) {
+                        self.state.before_cycle = self.state.mode;
+                    }
+                    self.state.mode = Mode::Other(Reason::Cycle);
+                }
+                // The motion word of before holds on a Fanuc; LinuxCNC wants a new one.
+                800 if fanuc => {
+                    if self.state.mode == Mode::Other(Reason::Cycle) {
+                        self.state.mode = self.state.before_cycle;
+                    }
+                }
+                800 => self.state.mode = Mode::Lost(Reason::UnknownFlow),
                 900 | 910 => {
                     self.state.absolute = code == 900;
-                    self.set(Group::Distance);
+                    self.set(Group::Distance, u64::from(code));
                 }
                 901 => self.state.centre_absolute = true,
                 911 => self.state.centre_absolute = false,
@@ -216,58 +305,89 @@ impl Lister<'_, '_> {
 
     fn unit(&mut self, mm: f64) {
         self.state.unit_mm = mm;
-        self.set(Group::Unit);
+        self.set(Group::Unit, if mm == 1.0 { 21 } else { 20 });
     }
 
-    /// Tool centre point control goes on or off. Where the tool stands has other coordinates then.
-    pub(super) fn tip(&mut self, on: bool, vector_words: bool) {
-        if self.state.tip != on && self.dialect.needs_tip() {
-            self.state.position = [Err(Reason::PositionUnknown); 3];
-            self.events.push(Event::Lost(super::POSITION));
+    /// Whether G70 or G71 says a unit: on lathes and mills of Fanuc, Haas and LinuxCNC they are cycles, with words of their own.
+    fn is_unit(&self, said: &Said<'_>) -> bool {
+        let bare = |word: &Word<'_>| matches!(word.address(), Some(b'G' | b'N' | b'M' | b'S' | b'T' | b'F'));
+        self.dialect == Dialect::Iso && said.words.iter().all(bare)
+    }
+
+    /// Whether a cycle of a lathe reads a contour from P to Q, or is a pattern of Haas: no motion word that holds on.
+    fn reads_contour(&self, said: &Said<'_>, code: u32) -> bool {
+        matches!(code, 700..=729) || matches!(code, 730 | 740..=769) && said.p.is_some() && said.q.is_some()
+    }
+
+    /// Which length the control adds. True where the axis words of the block are that length.
+    fn length(&mut self, said: &Said<'_>, code: u32) -> bool {
+        let number = said.h.map(|index| self.literal(&said.words[index]));
+        match code {
+            490 => self.tool_is(|state| state.length = Length::None),
+            431 | 432 if self.dialect != Dialect::Fanuc => {
+                self.tool_assigned();
+                return true;
+            }
+            _ => match number {
+                None => self.tool_is(|state| {
+                    if state.length == Length::None {
+                        state.length = Length::OfTool;
+                    }
+                }),
+                Some(Some(number)) => {
+                    let number = number.round() as u32;
+                    // On LinuxCNC they are the numbers of tools, elsewhere those of a list of their own.
+                    let own = self.dialect != Dialect::LinuxCnc;
+                    self.tool_is(|state| {
+                        state.length = Length::Of(number);
+                        if own && state.tool == "T0" && state.own_length.is_none() {
+                            state.own_length = Some(number);
+                        }
+                    });
+                }
+                Some(None) => self.tool_is(|state| state.length = Length::Of(u32::MAX)),
+            },
         }
-        (self.state.tip, self.state.vector_words) = (on, vector_words);
-        self.set(Group::Tip);
-    }
-
-    /// A cycle of the control.
-    fn cycle(&mut self, said: &Said<'_>, code: u32) {
-        self.left(said, &code_name(code), Reason::Cycle);
-        self.state.lose_position();
-        self.events.push(Event::Lost(super::POSITION));
-    }
-
-    /// A G word that is not known, in a block with axis words. It may do anything.
-    pub(super) fn unknown_code(&mut self, said: &Said<'_>) -> bool {
-        let words = said.moves() || said.centre.iter().any(Option::is_some);
-        let dialect = self.dialect;
-        let unknown = |code: &&u32| dialect != Dialect::Heidenhain && !is_known(**code, dialect);
-        let Some(&code) = said.g.iter().find(unknown).filter(|_| words) else { return false };
-        self.left(said, &code_name(code), Reason::UnknownInstruction);
-        self.forget();
-        true
-    }
-
-    pub(super) fn transform(&mut self, which: u16, on: bool) {
-        self.state.transform = self.state.transform & !which | if on { which } else { 0 };
-        self.set(Group::Transform);
-        self.state.lose_position();
-        self.events.push(Event::Lost(super::POSITION));
+        false
     }
 
     fn work_offset(&mut self, code: u32, said: &Said<'_>) {
         let mut name = code_name(code);
-        if (code == 541 || code == 1540)
-            && let Some(number) = said.p.and_then(|index| self.literal(&said.words[index]))
-        {
-            name = format!("{name} P{}", number.round());
+        let number = |at: Option<usize>| at.map(|index| self.literal(&said.words[index]));
+        let number = match code {
+            150 | 160 => number(said.h).map(|number| (" H", number)),
+            541 | 1540 => number(said.p).map(|number| (" P", number)),
+            _ => None,
+        };
+        match number {
+            Some((letter, Some(number))) => name += &format!("{letter}{}", number.round()),
+            Some((letter, None)) => name += &format!("{letter}?"),
+            None => {}
         }
-        if name != self.state.frame {
-            // Where the tool stands has other coordinates now.
-            self.state.lose_position();
-            self.events.push(Event::Lost(super::POSITION));
-        }
+        self.frame_is(name);
+    }
+
+    /// Another work offset holds: where the tool stands has other coordinates now, and turns otherwise where the frames do.
+    pub(super) fn frame_is(&mut self, name: String) {
+        let before = self.frame_value(&self.state.frame.clone());
+        let stale = std::mem::take(&mut self.state.stale);
+        let doubtful = self.state.doubt(1 << Group::Frame as u32).is_some();
+        let changes = name != self.state.frame || stale || doubtful;
+        let after = self.frame_value(&name);
+        self.set(Group::Frame, key(&name));
         self.state.frame = name;
-        self.set(Group::Frame);
+        self.frame_index = None;
+        if !changes {
+            return;
+        }
+        self.lose_position();
+        let alike = match (before, after) {
+            (Ok(a), Ok(b)) => a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9,
+            _ => false,
+        };
+        if !alike || stale || doubtful {
+            self.lose_all();
+        }
     }
 
     /// G words of one block. True where the block's axis words are no motion that is followed.
@@ -275,46 +395,29 @@ impl Lister<'_, '_> {
         let siemens = self.dialect == Dialect::Siemens;
         for &code in &said.g {
             match code {
-                40 | 110 | 220 | 230 | 250 | 260 => return true,
+                40 | 220 | 230 | 250 | 260 | 1030 | 1870 => return true,
+                110 if !siemens => return true,
                 100 if !siemens => {
                     self.set_offset(said);
                     return true;
                 }
-                120 | 130 => {
-                    self.left(said, "G12", Reason::Cycle);
+                // A pole: no motion.
+                1100 | 1110 | 1120 if siemens => return true,
+                120 | 130 | 470 | 1500 => {
+                    self.gone(said, code, Reason::Cycle);
                     return true;
                 }
-                // Stores where the tool stands.
-                281 | 301 if self.dialect == Dialect::LinuxCnc => return true,
-                270 if !siemens => {
-                    self.gone(said, code, Reason::ReferenceReturn);
+                // Contours and patterns, where they are no units.
+                700 | 710 if siemens || self.is_unit(said) => {}
+                700..=769 if !siemens && self.reads_contour(said, code) => {
+                    let name = code_name(code);
+                    self.left(said, &name, Reason::Cycle);
+                    self.lose_all();
                     return true;
                 }
-                350 | 360 | 370 | 1360 if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) => {
-                    // What it finds becomes an offset of the tool or of the work.
-                    self.gone(said, code, Reason::Probe);
-                    self.some_tools_set();
-                    self.some_frames_set();
-                    return true;
-                }
-                470 | 770..=790 | 1500 | 1610..=1690 | 1740 | 1840
-                    if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) && said.moves() =>
-                {
-                    self.cycle(said, code);
-                    return true;
-                }
-                // High speed machining, splines.
-                50 | 51 if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) && said.moves() => {
-                    self.gone(said, code, Reason::NotFollowed);
-                    return true;
-                }
-                331 if !siemens => {
-                    self.gone(said, code, Reason::NotFollowed);
-                    self.state.lose_position();
-                    self.events.push(Event::Lost(super::POSITION));
-                    return true;
-                }
-                280 | 281 | 290 | 300 | 301 => {
+                // LinuxCNC and grbl: where the tool stands is stored.
+                281 | 301 if self.dialect != Dialect::Fanuc && !said.moves() => return true,
+                270 | 280 | 281 | 290 | 300 | 301 => {
                     self.gone(said, code, Reason::ReferenceReturn);
                     return true;
                 }
@@ -322,18 +425,29 @@ impl Lister<'_, '_> {
                     self.gone(said, code, Reason::ReferenceReturn);
                     return true;
                 }
-                310 | 382..=385 => {
+                // Measuring cycles set tools or work offsets.
+                350 | 360 | 370 | 1360 if !siemens => {
                     self.gone(said, code, Reason::Probe);
+                    self.frames_assigned();
+                    self.tools_assigned();
+                    return true;
+                }
+                310..=318 | 382..=385 => {
+                    self.gone(said, code, Reason::Probe);
+                    return true;
+                }
+                331 => {
+                    // The spindle turns back to where it began.
+                    self.gone(said, code, Reason::NotFollowed);
+                    self.state.mode = Mode::Other(Reason::NotFollowed);
                     return true;
                 }
                 1470 | 1480 | 2470 | 2480 | 3470 | 3480 if siemens => {
                     self.gone(said, code, Reason::NotFollowed);
                     return true;
                 }
-                531 => {
-                    self.state.lose_position();
-                    self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
-                    self.events.push(Event::Unknown);
+                531 | 536 => {
+                    self.lose_all();
                     return true;
                 }
                 520 if !siemens => {
@@ -344,31 +458,34 @@ impl Lister<'_, '_> {
                             self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
                         }
                     }
-                    self.set(Group::Shift);
-                    self.turns_rotary(said);
+                    self.rotary(said, |_, value| value == Ok(0.0));
+                    self.set_any(Group::Shift);
                     return true;
                 }
                 650 | 660 | 661 => {
                     self.subprogram(said, if code == 650 { "G65" } else { "G66" });
                     if code != 650 {
-                        self.state.calls = Some(Reason::Subprogram);
+                        self.state.modal_call = Some(Reason::Subprogram);
                     }
                     return true;
                 }
-                670 => self.state.calls = None,
+                670 => self.state.modal_call = None,
                 920 => {
                     self.set_shift(said);
                     return true;
                 }
                 921 | 922 => {
                     self.state.shift = [Ok(0.0); 3];
-                    self.state.transform &= !transforms::ROTARY;
                     self.events.push(Event::NoShift);
-                    self.set(Group::Shift);
+                    self.set_any(Group::Shift);
+                    if self.state.turned & 1 << Group::Rotary as u32 != 0 {
+                        self.turn(Group::Rotary, false);
+                    }
                     return true;
                 }
                 923 => {
                     self.state.shift = [Err(Reason::Variable); 3];
+                    self.doubt(Group::Rotary, Reason::Variable);
                     return true;
                 }
                 _ => {}
@@ -377,8 +494,7 @@ impl Lister<'_, '_> {
         if self.dialect == Dialect::Heidenhain && said.m.contains(&140) {
             // Back along the tool to the end of the range.
             self.left(said, "M140", Reason::ReferenceReturn);
-            self.state.lose_position();
-            self.events.push(Event::Lost(super::POSITION));
+            self.lose_position();
             return true;
         }
         if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso | Dialect::LinuxCnc)
@@ -388,6 +504,22 @@ impl Lister<'_, '_> {
             return true;
         }
         false
+    }
+
+    /// A, B and C are counted from elsewhere, where `same` does not say that nothing changes.
+    fn rotary(&mut self, said: &Said<'_>, same: impl Fn(usize, Worth) -> bool) {
+        let mut any = false;
+        let mut changes = false;
+        for axis in 0..3 {
+            if let Some(index) = said.abc[axis] {
+                any = true;
+                changes |= !same(axis, self.worth(&said.words[index]).0);
+            }
+        }
+        let was = self.state.turned & 1 << Group::Rotary as u32 != 0;
+        if any && (changes || was) {
+            self.turn(Group::Rotary, changes || said.abc.iter().any(Option::is_none));
+        }
     }
 
     /// G92: the place where the tool stands is called this from here on.
@@ -404,17 +536,10 @@ impl Lister<'_, '_> {
                 (Err(reason), _) | (_, Err(reason)) => Err(reason),
             };
         }
-        self.set(Group::Shift);
+        let abc = self.state.abc;
+        self.set_any(Group::Shift);
         self.events.push(Event::Shift(stated));
-        self.turns_rotary(said);
-    }
-
-    /// A shift of rotary axes: what A, B and C say from here on is counted from elsewhere.
-    fn turns_rotary(&mut self, said: &Said<'_>) {
-        if said.abc.iter().any(Option::is_some) {
-            self.state.transform |= transforms::ROTARY;
-            self.set(Group::Transform);
-        }
+        self.rotary(said, |axis, value| value.is_ok() && abc[axis] == value);
     }
 
     /// A motion to where the text does not tell.
@@ -422,13 +547,17 @@ impl Lister<'_, '_> {
         let name = code_name(code);
         self.left(said, &name, reason);
         let none = said.axes.iter().chain(&said.abc).all(Option::is_none);
+        if none {
+            self.lose_all();
+            return;
+        }
         let mut lost = 0;
         for axis in 0..3 {
-            if none || said.axes[axis].is_some() {
+            if said.axes[axis].is_some() {
                 self.state.position[axis] = Err(Reason::PositionUnknown);
                 lost |= 1 << axis;
             }
-            if none || said.abc[axis].is_some() {
+            if said.abc[axis].is_some() {
                 self.state.abc[axis] = Err(Reason::OrientationUnknown);
                 lost |= 8 << axis;
             }
@@ -438,43 +567,8 @@ impl Lister<'_, '_> {
     }
 }
 
-/// The number of a tool without what has become of its length.
-pub(super) fn base(tool: &str) -> &str {
-    tool.split(" +").next().unwrap_or(tool)
-}
-
-/// Whether it is known what a G word does with the axis words of its block; by tenths.
-fn is_known(code: u32, dialect: Dialect) -> bool {
-    const COMMON: &[u32] = &[
-        0, 10, 20, 30, 40, 50, 51, 52, 53, 62, 63, 70, 80, 90, 100, 110, 120, 130, 170, 180, 190, 200, 210,
-        220, 230, 250, 260, 270, 280, 281, 290, 300, 301, 310, 320, 330, 331, 340, 350, 360, 370, 400, 401,
-        430, 431, 432, 434, 435, 440, 490, 520, 530, 531, 600, 610, 611, 620, 630, 640, 650, 660, 661, 670,
-        700, 710, 720, 730, 740, 750, 760, 800, 900, 901, 910, 911, 920, 921, 922, 923, 930, 940, 950, 960,
-        970, 980, 990,
-    ];
-    let common = COMMON.binary_search(&code).is_ok()
-        || matches!(code, 382..=385 | 410..=429 | 540..=599)
-        || matches!(code, 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890);
-    common
-        || match dialect {
-            Dialect::Siemens => {
-                matches!(code, 601 | 602 | 1100..=1120 | 1400..=1430 | 1470 | 1480 | 1530 | 2470 | 2480)
-                    || matches!(code, 2900 | 2910 | 3310 | 3320 | 3350 | 3360 | 3470 | 3480 | 3400 | 3410)
-                    || matches!(code, 4500 | 4510 | 4600..=4620 | 5000..=5999 | 6010..=6030 | 6200 | 6210)
-                    || matches!(code, 6410..=6450 | 7000 | 7100 | 9310 | 9420 | 9520 | 9610..=9730)
-            }
-            Dialect::LinuxCnc => matches!(code, 22 | 32),
-            _ => {
-                matches!(code, 22..=24 | 32..=34 | 71 | 121 | 131 | 150 | 160 | 470 | 500 | 501 | 510 | 511)
-                    || matches!(code, 680 | 682..=684 | 690 | 770..=790 | 1000 | 1010 | 1030 | 1070)
-                    || matches!(code, 1100..=1290 | 1360 | 1430 | 1500 | 1540 | 1610..=1690 | 1740 | 1840)
-                    || matches!(code, 1870 | 2340 | 2540 | 2550)
-            }
-        }
-}
-
 /// A code as a program writes it: G54, G43.4.
-fn code_name(code: u32) -> String {
+pub(super) fn code_name(code: u32) -> String {
     match (code / 10, code % 10) {
         (whole, 0) => format!("G{whole}"),
         (whole, tenth) => format!("G{whole}.{tenth}"),

@@ -2,8 +2,10 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, Worth, numbered};
-use super::super::syntax::{Belongs, Word};
+use super::super::machine::Group;
+use super::super::syntax::Belongs;
 use super::super::token::Token;
+use super::names::{Address, address};
 use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
 
@@ -28,6 +30,22 @@ impl Lister<'_, '_> {
                 .is_some_and(|number| self.anywhere || self.targets.contains(&(number as u64)))
     }
 
+    /// Whether a block stands in the contour that a cycle of a lathe reads.
+    pub(super) fn contour_of(&mut self, said: &Said<'_>) {
+        let number = said.words.iter().take(2).find(|word| word.address() == Some(b'N'));
+        let number = number.and_then(|word| self.literal(word)).map(|number| number as u64);
+        // The block before was the last one.
+        if self.contour == Some(u64::MAX) {
+            self.contour = None;
+        }
+        let Some(number) = number else { return };
+        if self.contour == Some(number) {
+            self.contour = Some(u64::MAX);
+        } else if let Some(&(_, last)) = self.contours.iter().find(|(first, _)| *first == number) {
+            self.contour = Some(if last == number { u64::MAX } else { last });
+        }
+    }
+
     /// Whether a block holds a synchronised action of Siemens.
     pub(super) fn is_action(&self, said: &Said<'_>) -> bool {
         self.dialect == Dialect::Siemens
@@ -37,71 +55,40 @@ impl Lister<'_, '_> {
                 .any(|word| ["WHEN", "WHENEVER", "FROM", "EVERY"].iter().any(|name| word.is(name)))
     }
 
-    /// Values of variables. One that is assigned only where a condition holds is not known from here on.
-    pub(super) fn assignments(&mut self, said: &Said<'_>) {
-        for word in &said.words {
-            if let Some((name, value)) = self.assignment(said, word) {
-                self.assign(name, value);
-            }
-        }
-    }
-
-    /// The same of all words of a block at once.
-    pub(super) fn assigned(&self, said: &Said<'_>) -> Vec<(Option<Variable>, Worth)> {
-        said.words.iter().filter_map(|word| self.assignment(said, word)).collect()
-    }
-
-    /// A variable gets a value; any of them where it is computed which.
-    pub(super) fn assign(&mut self, name: Option<Variable>, value: Worth) {
-        let number = name.as_ref().map(|name| {
-            name.strip_prefix(b"#").and_then(|digits| std::str::from_utf8(digits).ok()?.parse::<u32>().ok())
-        });
-        // Variables of the control: offsets of the work, shifts, offsets of tools.
-        match number {
-            None | Some(Some(5201..=5206 | 5221..=5399 | 7001..=7999 | 14001..=14999))
-                if self.dialect.paren_comments() =>
-            {
-                self.some_frames_set();
-            }
-            Some(Some(5210..=5219)) => self.state.shift = [Err(Reason::Variable); 3],
-            Some(Some(2001..=2999 | 10001..=13999)) if self.dialect != Dialect::LinuxCnc => {
-                self.some_tools_set();
-            }
-            _ => {}
-        }
-        match name {
-            Some(name) => {
-                self.state.variables.insert(name, value);
-            }
-            None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
-        }
-    }
-
-    fn assignment(&self, said: &Said<'_>, word: &Word<'_>) -> Option<(Option<Variable>, Worth)> {
-        if !word.assigned {
-            return None;
-        }
+    /// What a block assigns to variables. One that is assigned only where a condition holds is not known from here on.
+    ///
+    /// LinuxCNC reads the whole line before it assigns; what others do with a value in the line that assigns it is not
+    /// certain, so that it is not known there where the line moves as well.
+    pub(super) fn values(&mut self, said: &Said<'_>) -> Vec<(Option<Variable>, Worth)> {
+        let mut values = Vec::new();
         let conditional = said.words.iter().any(|word| word.is("IF"));
-        {
+        let moves = said.moves() || said.centre.iter().any(Option::is_some) || !said.g.is_empty();
+        for word in &said.words {
+            if !word.assigned {
+                continue;
+            }
             let name: Option<Variable> = match word.name {
                 b"#" => match word.index {
                     Some((first, _)) if self.tree.kind(first) == Some(Token::Name) => {
                         Some(self.tree.text(first).to_ascii_uppercase())
                     }
-                    Some(range) => self.evaluated(range).ok().map(|number| numbered(b'#', number)),
+                    Some(range) => self.evaluated(range).ok().map(|number| {
+                        self.system_parameter(number);
+                        numbered(b"#", number)
+                    }),
                     None => None,
                 },
                 [b'R' | b'r'] => word
                     .index
                     .and_then(|range| self.evaluated(range).ok())
-                    .map(|number| numbered(b'R', number)),
+                    .map(|number| numbered(b"R", number)),
                 [b'R' | b'r', digits @ ..] if !digits.is_empty() && digits.iter().all(u8::is_ascii_digit) => {
                     Some(word.name.to_ascii_uppercase())
                 }
                 name if name.len() > 1 && word.index.is_none() && self.is_variable(name) => {
                     Some(name.to_ascii_uppercase())
                 }
-                _ => return None,
+                _ => continue,
             };
             let value = match word.belongs {
                 _ if self.actions => Err(Reason::Variable),
@@ -110,20 +97,97 @@ impl Lister<'_, '_> {
                 Belongs::Expression { first, end } => self.evaluated((first, end)),
                 _ => Err(Reason::WrongShape),
             };
-            Some((name, value))
+            if name.is_none() && word.name == b"#" {
+                // It may be one that the control itself reads: offsets, tools, settings.
+                self.frames_assigned();
+                self.tools_assigned();
+                self.doubt(Group::Shift, Reason::Variable);
+            }
+            match &name {
+                _ if self.dialect == Dialect::LinuxCnc => {}
+                Some(name) => {
+                    let now = if moves { Err(Reason::Variable) } else { value };
+                    self.state.variables.insert(name.clone(), now);
+                }
+                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+            }
+            values.push((name, value));
+        }
+        values
+    }
+
+    /// After the block its variables have their values, but where the way has parted in it.
+    pub(super) fn assign(&mut self, values: Vec<(Option<Variable>, Worth)>, parted: bool) {
+        for (name, value) in values {
+            match name {
+                Some(name) => {
+                    let value = if parted { Err(Reason::UnknownFlow) } else { value };
+                    self.state.variables.insert(name, value);
+                }
+                // Any of them.
+                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+            }
         }
     }
 
-    /// Whether a name with a value is a variable, not an address of two letters or more.
-    fn is_variable(&self, name: &[u8]) -> bool {
-        const ADDRESSES: [&[u8]; 26] = [
-            b"A2", b"B2", b"C2", b"A3", b"B3", b"C3", b"A4", b"B4", b"C4", b"A5", b"B5", b"C5", b"THETA",
-            b"CR", b"TURN", b"AR", b"AP", b"RP", b"I1", b"J1", b"K1", b"ADIS", b"LEAD", b"TILT", b"RPL",
-            b"SPOS",
-        ];
+    /// `#5221=`: numbers that the control itself reads.
+    fn system_parameter(&mut self, number: f64) {
+        let number = number.round() as i64;
+        let linux = self.dialect == Dialect::LinuxCnc;
+        match number {
+            // Own ones, signals, timers, messages.
+            ..=1199 | 3000..=3004 | 3006..=3012 | 3901 | 3902 => {}
+            5061..=5070 | 5161..=5190 | 1200..=5000 | 5391.. if linux => {}
+            5211..=5219 if linux => self.doubt(Group::Shift, Reason::Variable),
+            5220 if linux => self.doubt(Group::Frame, Reason::Variable),
+            5221..=5340 => self.offset_is(&format!("G{}", 54 + (number - 5221) / 20), None),
+            5341..=5390 if linux => self.offset_is(&format!("G59.{}", (number - 5341) / 20 + 1), None),
+            2500..=2999 | 5201..=5220 | 7001..=7999 | 14001..=19999 | 20001..=29999 => self.frames_assigned(),
+            2001..=2499 | 10001..=13999 => self.tools_assigned(),
+            _ => {
+                self.frames_assigned();
+                self.tools_assigned();
+                self.state.lose_everything(Reason::UnknownWord);
+                self.found.add_all();
+            }
+        }
+    }
+
+    /// Names of Siemens with a value, or alone.
+    pub(super) fn gather_siemens(&self, said: &mut Said<'_>, index: usize, name: &[u8]) {
+        let word = said.words[index];
+        if !word.assigned || name.starts_with(b"$") || self.is_variable(name) {
+            return;
+        }
+        match address(name) {
+            Some(Address::Setting) => {}
+            Some(Address::Aside(reason)) => said.aside = Some(reason),
+            Some(Address::External) => said.others = true,
+            // What it sets is told by the words of the block, in `tool_words`.
+            Some(Address::Tool) => {}
+            // A name of the control or of the machine's axes, or a variable of another file.
+            None => {
+                let text = String::from_utf8_lossy(name).into_owned();
+                said.unknown = Some((text, Reason::UnknownWord));
+            }
+        }
+    }
+
+    /// TOFFL=, TCARR=: the tool is no more what its name says, or is again.
+    pub(super) fn tool_words(&mut self, said: &Said<'_>) {
+        for word in &said.words {
+            let name = word.name.to_ascii_uppercase();
+            if self.dialect == Dialect::Siemens && word.assigned && address(&name) == Some(Address::Tool) {
+                self.tools_assigned();
+            }
+        }
+    }
+
+    /// Whether a name with a value is a variable of the program: one that it declares, or one with the underscore of the
+    /// parameters of cycles.
+    pub(super) fn is_variable(&self, name: &[u8]) -> bool {
         self.dialect == Dialect::Siemens
-            && !ADDRESSES.iter().any(|address| name.eq_ignore_ascii_case(address))
-            && !name.starts_with(b"$")
+            && (name.first() == Some(&b'_') || self.declared.contains(&name.to_ascii_uppercase()))
     }
 
     /// Jumps, loops and subprograms. True where the block does nothing else.
@@ -134,16 +198,20 @@ impl Lister<'_, '_> {
             let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
             match &*keyword {
                 b"CALL" => self.subprogram(said, "O call"),
-                b"IF" => {}
+                b"IF" => self.branched = true,
                 b"SUB" => {
-                    self.passed = Some((self.state.clone(), self.seen));
+                    let passed = self.state.clone();
                     self.forget();
+                    self.passed = Some(passed);
                 }
                 // The way goes past a subprogram; what stands in it holds only where it is called.
                 b"ENDSUB" if self.passed.is_some() => {
-                    if let Some((state, seen)) = self.passed.take() {
-                        (self.state, self.seen) = (state, seen);
+                    if let Some(state) = self.passed.take() {
+                        self.state = state;
                     }
+                    self.ended = false;
+                    self.frame_index = None;
+                    self.tool_index.clear();
                     self.events.push(Event::Unknown);
                 }
                 _ => self.forget(),
@@ -156,7 +224,7 @@ impl Lister<'_, '_> {
                 if !self.written.is_empty() {
                     self.forget();
                 }
-                // Words may stand behind it.
+                // Words may stand on its line.
                 said.words.iter().filter(|word| word.address() != Some(b'N')).count() == 1
             }
             // A program number stands alone; with words it is a block number.
@@ -172,6 +240,7 @@ impl Lister<'_, '_> {
             }
             (b"IF", _) => {
                 // A jump may go away; what stands here holds where it does not.
+                self.branched = true;
                 true
             }
             (
@@ -182,19 +251,25 @@ impl Lister<'_, '_> {
                 self.forget();
                 true
             }
-            _ if name.starts_with(b"GOTO") => true,
+            _ if name.starts_with(b"GOTO") => {
+                self.branched = true;
+                true
+            }
             _ if name.starts_with(b"REPEAT") => {
                 self.subprogram(said, "REPEAT");
                 true
             }
-            (b"CALL" | b"PCALL" | b"EXTCALL" | b"MCALL" | b"EXECSTRING", _) => {
+            (b"MCALL", _) => {
+                let called = said.words.iter().skip_while(|word| !word.is("MCALL")).nth(1);
+                self.state.modal_call = called.map(|word| {
+                    let cycle = super::names::is_cycle(&word.name.to_ascii_uppercase());
+                    if cycle { Reason::Cycle } else { Reason::Subprogram }
+                });
+                true
+            }
+            (b"CALL" | b"PCALL" | b"EXTCALL" | b"EXECSTRING", _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
                 self.subprogram(said, &text);
-                if &*name == b"MCALL" {
-                    // After every motion from here on; alone it ends that.
-                    let words = said.words.iter().filter(|word| word.address() != Some(b'N')).count();
-                    self.state.calls = (words > 1).then_some(Reason::Subprogram);
-                }
                 true
             }
             (_, Some(b'L')) if self.dialect == Dialect::Siemens && first.belongs != Belongs::Nothing => {

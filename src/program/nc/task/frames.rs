@@ -3,9 +3,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, transforms};
+use super::super::machine::{Group, State};
 use super::super::orientation::Angles;
-use super::super::setup::held;
+use super::super::setup::{self, held};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
 use super::{Lister, Said};
@@ -27,14 +27,16 @@ impl Lister<'_, '_> {
         };
         let name = word.name.to_ascii_uppercase();
         let adds = name[0] == b'A';
-        self.set(Group::Frame);
-        self.state.lose_position();
-        self.events.push(super::Event::Lost(super::POSITION));
+        let before = self.state.programmable;
+        let turned = |state: &State| state.turned & 1 << Group::Programmable as u32 != 0;
+        let was = turned(&self.state);
+        self.programmable_is_set();
         if !adds {
-            // Whatever is not added replaces all.
+            // Whatever is not added replaces all of the programmable frame, and nothing else.
             self.state.programmable = None;
-            self.state.transform &= !transforms::PROGRAMMABLE;
+            self.state.turn_frame(Group::Programmable, false);
         }
+        self.lose_position();
         let values: Result<Vec<Option<f64>>, Reason> = said
             .axes
             .iter()
@@ -42,10 +44,11 @@ impl Lister<'_, '_> {
             .collect();
         let rpl = said.words.iter().find(|word| word.is("RPL"));
         let stated = said.moves() || rpl.is_some();
+        // Shifts of rotary axes turn what A, B and C mean.
+        let rotary = said.abc.iter().any(Option::is_some) || said.others;
         let pose = match (&*name, values) {
             (_, Err(_)) => None,
-            // Rotary axes are shifted too.
-            _ if said.abc.iter().any(Option::is_some) => None,
+            _ if rotary => None,
             (b"TRANS" | b"ATRANS", Ok(shift)) => {
                 let unit = self.state.unit_mm;
                 let shift = Vector3::from_iterator(shift.iter().map(|value| value.unwrap_or(0.0) * unit));
@@ -63,7 +66,7 @@ impl Lister<'_, '_> {
                 x.is_finite().then(|| Pose::from_parts(Vector3::zeros().into(), turn))
             }
             // Scaling and mirroring without values end; with values they are no rigid motion.
-            _ if !stated => return true,
+            _ if !stated => Some(Pose::identity()),
             _ => None,
         };
         match pose {
@@ -71,12 +74,39 @@ impl Lister<'_, '_> {
             Some(pose) => {
                 self.state.programmable = Some(self.state.programmable.unwrap_or_else(Pose::identity) * pose);
             }
-            None => {
-                self.state.transform |= transforms::PROGRAMMABLE;
-                self.set(Group::Transform);
-            }
+            None => self.state.turn_frame(Group::Programmable, true),
+        }
+        let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
+        let same = rotation(&before).angle_to(&rotation(&self.state.programmable)) < 1e-9;
+        if !same || was || turned(&self.state) {
+            self.lose_all();
         }
         true
+    }
+
+    /// The programmable frame is set: where ways meet it is known no more.
+    pub(super) fn programmable_is_set(&mut self) {
+        self.set_any(Group::Programmable);
+        self.frame_index = None;
+    }
+
+    /// G58 and G59 of Siemens: shifts within the work offset, no motion.
+    pub(super) fn axial_shift(&mut self, said: &Said<'_>, absolute: bool) {
+        self.programmable_is_set();
+        self.lose_position();
+        let alone = self.state.programmable.is_none() && absolute && said.abc.iter().all(Option::is_none);
+        let mut shift = Vector3::zeros();
+        for axis in 0..3 {
+            let Some(index) = said.axes[axis] else { continue };
+            match self.worth(&said.words[index]).0 {
+                Ok(value) if alone => shift[axis] = value * self.state.unit_mm,
+                _ => return self.turn(Group::Programmable, true),
+            }
+        }
+        if !alone {
+            return self.turn(Group::Programmable, true);
+        }
+        self.state.programmable = Some(Pose::translation(shift.x, shift.y, shift.z));
     }
 
     /// `$P_UIFR[1]=CTRANS(X,1,Y,2):CROT(Z,90)` and `$TC_DP3[1,1]=120`.
@@ -89,79 +119,68 @@ impl Lister<'_, '_> {
                 .collect();
             numbers.get(at).copied()
         };
+        let name = word.name.to_ascii_uppercase();
+        let starts = |list: &[&str]| list.iter().any(|begin| name.starts_with(begin.as_bytes()));
         if word.is("$P_UIFR") {
-            let name = match index(0) {
+            let frame = match index(0) {
+                Some(0) => "G500".to_owned(),
                 Some(number @ 1..=4) => format!("G{}", 53 + number),
                 Some(number @ 5..=99) => format!("G{}", 500 + number),
-                _ => return,
+                _ => return self.frames_assigned(),
             };
-            let pose = self.frame_expression(word);
-            self.frame_set(name, pose.map(|pose| Frame::from_pose(&pose)));
+            let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
+            // The offset that holds goes on as it was until it is called again.
+            self.state.stale |= frame == self.state.frame;
+            self.assign_frame(&frame, pose.map(|pose| Frame::from_pose(&pose)));
         } else if word.is("$P_PFRAME") {
+            self.programmable_is_set();
             self.state.programmable = self.frame_expression(word);
-            let known = self.state.programmable.is_some();
-            self.set(Group::Frame);
-            self.transform(transforms::PROGRAMMABLE, !known);
-        } else if word.name.len() > 3
-            && word.name[..3].eq_ignore_ascii_case(b"$P_")
-            && word.name.to_ascii_uppercase().windows(2).any(|two| two == b"FR" || two == b"BA")
-        {
-            // Base, channel, system and total frames.
-            self.transform(transforms::SYSTEM, true);
+            self.state.turn_frame(Group::Programmable, self.state.programmable.is_none());
+            self.lose_all();
         } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
-            let (Some(number), Some(1)) = (index(0), index(1)) else { return };
-            let Ok(value) = self.worth(word).0 else { return };
-            let name = format!("T{number}");
+            let (Some(number), Some(1)) = (index(0), index(1)) else { return self.tools_assigned() };
+            let tool = format!("T{number}");
             let axis = match word.name[6] {
                 b'3' => 2,
                 b'4' => 1,
                 _ => 0,
             };
-            let known = self.frames_of_tools(&name);
-            let mut frame = known.unwrap_or(Frame::IDENTITY);
-            frame.position_mm[axis] = value * self.state.unit_mm;
-            self.tool_set(name, Some(frame));
+            let frame = self.worth(word).0.ok().map(|value| {
+                let mut frame = self.tool_value(&tool).unwrap_or(Frame::IDENTITY);
+                frame.position_mm[axis] = value * self.state.unit_mm;
+                frame
+            });
+            self.state.tools.set(&tool, frame);
+            self.found.assigns.1 = true;
+            self.tool_index.clear();
+            if self.state.tool == tool {
+                self.lose_position();
+            }
+        } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
+            || starts(&["$A_", "$AC_TIMER", "$AC_MARKER", "$AC_PARAM", "$AC_FIFO", "$TC_MPP", "$TC_TP"])
+        {
+            // Kinds and radii of tools, signals, timers: neither frames nor lengths.
+        } else if starts(&["$TC_"]) {
+            self.tools_assigned();
+        } else if starts(&["$P_"]) {
+            self.frames_assigned();
+        } else {
+            self.state.lose_everything(Reason::UnknownWord);
+            self.found.add_all();
+            self.events.push(super::Event::Unknown);
         }
     }
 
-    /// The program sets a work offset.
-    fn frame_set(&mut self, name: String, frame: Option<Frame>) {
-        if name == self.state.frame {
-            // Where the tool stands has other coordinates now.
-            self.state.lose_position();
-            self.events.push(super::Event::Lost(super::POSITION));
-        }
-        self.set_frames.retain(|(other, _)| *other != name);
-        self.set_frames.push((name, frame));
+    /// Whether a word has one index and no more: `$P_UIFR[1,X,TR]` sets one component.
+    fn is_index_alone(&self, word: &Word<'_>) -> bool {
+        word.index.is_some_and(|(first, end)| (first..end).all(|at| self.tree.kind(at) != Some(Token::Comma)))
+    }
+
+    /// The program gives a work offset a value, or one that is not known.
+    pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
+        self.state.frames.set(name, frame);
+        self.found.assigns.0 = true;
         self.frame_index = None;
-    }
-
-    /// The program sets a tool.
-    fn tool_set(&mut self, name: String, frame: Option<Frame>) {
-        self.set_tools.retain(|(other, _)| *other != name);
-        self.set_tools.push((name, frame));
-        self.tool_index.clear();
-    }
-
-    /// The program sets work offsets, which ones the text does not tell.
-    pub(super) fn some_frames_set(&mut self) {
-        self.sets_frames = true;
-        self.frame_index = None;
-        self.state.lose_position();
-        self.events.push(super::Event::Lost(super::POSITION));
-    }
-
-    /// The program sets tools, which ones the text does not tell.
-    pub(super) fn some_tools_set(&mut self) {
-        self.sets_tools = true;
-        self.tool_index.clear();
-    }
-
-    fn frames_of_tools(&self, name: &str) -> Option<Frame> {
-        if let Some((_, frame)) = self.set_tools.iter().find(|(other, _)| other == name) {
-            return *frame;
-        }
-        self.tools.iter().find(|(other, _)| other == name).map(|(_, frame)| *frame)
     }
 
     /// A chain of CTRANS and CROT with plain numbers.
@@ -209,37 +228,49 @@ impl Lister<'_, '_> {
         Some(pose)
     }
 
-    /// G10 L2 P1 X… of Fanuc and LinuxCNC.
+    /// A number that is written or can be worked out; whole numbers need no point.
+    pub(super) fn number(&self, word: &Word<'_>) -> Option<f64> {
+        self.literal(word).or_else(|| match word.belongs {
+            Belongs::Expression { first, end } => self.evaluated((first, end)).ok(),
+            _ => None,
+        })
+    }
+
+    /// G10: L2 P1 X sets a work offset, L20 one from where the tool stands, others tools and parameters.
     pub(super) fn set_offset(&mut self, said: &Said<'_>) {
-        let number = |at: Option<usize>| at.and_then(|index| self.literal(&said.words[index]));
-        let fanuc = matches!(self.dialect, Dialect::Fanuc | Dialect::Iso);
-        let (l, p) = match (number(said.l), number(said.p)) {
-            (Some(l @ (2.0 | 20.0)), Some(p)) => (l, p),
-            (Some(1.0 | 10.0..=13.0), _) => return self.some_tools_set(),
-            (None, Some(_)) if said.l.is_none() && fanuc => return self.some_tools_set(),
-            (None, _) if said.l.is_none() => return,
-            _ => return self.some_frames_set(),
+        let number = |at: Option<usize>| at.and_then(|index| self.number(&said.words[index]));
+        let linux = self.dialect == Dialect::LinuxCnc;
+        let p = number(said.p);
+        let named = |p: f64| match p as u32 {
+            p @ 1..=6 => Some(format!("G{}", 53 + p)),
+            p @ 7..=9 if linux => Some(format!("G59.{}", p - 6)),
+            _ => None,
         };
-        let name = match p as u32 {
-            // An offset of all offsets.
-            0 if fanuc => return self.some_frames_set(),
-            0 => self.state.frame.clone(),
-            p if l == 20.0 && self.dialect == Dialect::Fanuc => format!("G54.1 P{p}"),
-            p @ 1..=6 => format!("G{}", 53 + p),
-            p @ 7..=9 => format!("G59.{}", p - 6),
-            _ => return,
-        };
-        if l == 20.0 || said.abc.iter().any(Option::is_some) {
-            // So that the tool stands at these values; with turned rotary axes.
-            return self.frame_set(name, None);
+        match number(said.l) {
+            Some(2.0) => {
+                let name = match p {
+                    Some(0.0) if linux => Some(self.state.frame.clone()),
+                    Some(p) => named(p),
+                    None => None,
+                };
+                // The external offset of a Fanuc is added to all.
+                let Some(name) = name else { return self.frames_assigned() };
+                self.state_offset(said, &name);
+            }
+            Some(20.0) => match p.and_then(named).filter(|_| linux) {
+                Some(name) => self.offset_is(&name, None),
+                None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
+                None => self.frames_assigned(),
+            },
+            Some(1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0) => self.tools_assigned(),
+            None if said.p.is_some() && said.l.is_none() => self.tools_assigned(),
+            // Parameters of the control, or what is not known.
+            _ => self.deny(said, "G10", Reason::UnknownWord),
         }
-        let known = match self.set_frames.iter().find(|(other, _)| *other == name) {
-            Some((_, frame)) => *frame,
-            None => self
-                .setup
-                .frame(&name)
-                .or_else(|| self.frames.iter().find(|(other, _)| *other == name).map(|(_, frame)| *frame)),
-        };
+    }
+
+    fn state_offset(&mut self, said: &Said<'_>, name: &str) {
+        let known = self.frame_value(name).ok();
         let mut frame = known.unwrap_or(Frame::IDENTITY);
         let mut good = said.axes.iter().all(Option::is_some) || known.is_some();
         for (axis, word) in said.axes.iter().enumerate() {
@@ -250,36 +281,70 @@ impl Lister<'_, '_> {
                 (Err(_), _) => good = false,
             }
         }
-        match number(said.radius) {
+        // Offsets of rotary axes turn what A, B and C mean.
+        good &= said.abc.iter().flatten().all(|&index| self.number(&said.words[index]) == Some(0.0));
+        good &= self.state.doubt(1 << Group::Distance as u32 | 1 << Group::Unit as u32).is_none();
+        match said.radius.map(|index| self.number(&said.words[index])) {
             // The turn of the work frame about z (LinuxCNC).
-            Some(turn) => {
+            Some(Some(turn)) => {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
                 frame.quaternion = [turn.w, turn.i, turn.j, turn.k];
             }
-            None if said.radius.is_some() => good = false,
+            Some(None) => good = false,
             None => {}
         }
-        self.frame_set(name, good.then_some(frame));
+        self.offset_is(name, good.then_some(frame));
+    }
+
+    /// A work offset gets a value; where it is the one that holds, the tool stands elsewhere in it now.
+    pub(super) fn offset_is(&mut self, name: &str, frame: Option<Frame>) {
+        let before = self.frame_value(name).ok();
+        self.assign_frame(name, frame);
+        let holds = name.eq_ignore_ascii_case(&self.state.frame);
+        if !holds && self.state.doubt(1 << Group::Frame as u32).is_none() {
+            return;
+        }
+        self.lose_position();
+        let alike = matches!((before, frame), (Some(a), Some(b))
+            if a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9);
+        if !alike {
+            self.lose_all();
+        }
+    }
+
+    /// The tool of a name, as the program, the setup or a comment states it.
+    pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
+        match self.state.tools.of(name) {
+            Some(Some(frame)) => Ok(frame),
+            Some(None) => Err(Reason::Assigned),
+            None => {
+                self.setup.tool(name).or_else(|| setup::find(&self.tools, name)).ok_or(Reason::ToolUnknown)
+            }
+        }
+    }
+
+    /// The work offset of a name, as the program, the setup or a comment states it.
+    pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
+        match self.state.frames.of(name) {
+            Some(Some(frame)) => Ok(frame),
+            Some(None) => Err(Reason::Assigned),
+            // Without a settable offset Siemens counts from the base.
+            None => self
+                .setup
+                .frame(name)
+                .or_else(|| setup::find(&self.frames, name))
+                .or_else(|| (name == "G500").then_some(Frame::IDENTITY))
+                .ok_or(Reason::WorkObjectUnknown),
+        }
     }
 
     /// The tool that is in.
     pub(super) fn tool(&mut self) -> u32 {
-        if let Some(&index) = self.tool_index.get(&self.state.tool) {
+        let name = self.state.tool_name(self.dialect);
+        if let Some(&index) = self.tool_index.get(&name) {
             return index;
         }
-        let name = self.state.tool.clone();
-        let value = match self.set_tools.iter().find(|(other, _)| other.eq_ignore_ascii_case(&name)) {
-            Some((_, frame)) => frame.ok_or(Reason::ToolAssigned),
-            None if self.sets_tools => Err(Reason::ToolAssigned),
-            None => {
-                let stated = self.setup.tool(&name).or_else(|| {
-                    let mut tools = self.tools.iter().rev();
-                    tools.find(|(other, _)| other.eq_ignore_ascii_case(&name)).map(|(_, frame)| *frame)
-                });
-                stated.ok_or(Reason::ToolUnknown)
-            }
-        };
-        let tool = Tool { name: name.clone(), value: value.map(held), place: None };
+        let tool = Tool { name: name.clone(), value: self.tool_value(&name).map(held), place: None };
         let index = intern(&mut self.listing.tools, tool);
         self.tool_index.insert(name, index);
         index
@@ -294,19 +359,7 @@ impl Lister<'_, '_> {
             return *index;
         }
         let name = self.state.frame.clone();
-        let stated = match self.set_frames.iter().find(|(other, _)| other.eq_ignore_ascii_case(&name)) {
-            Some((_, frame)) => frame.ok_or(Reason::WorkObjectAssigned),
-            None if self.sets_frames => Err(Reason::WorkObjectAssigned),
-            None => {
-                let stated = self.setup.frame(&name).or_else(|| {
-                    let mut frames = self.frames.iter().rev();
-                    frames.find(|(other, _)| other.eq_ignore_ascii_case(&name)).map(|(_, frame)| *frame)
-                });
-                // Without a settable offset Siemens counts from the base.
-                let base = (name == "G500").then_some(Frame::IDENTITY);
-                stated.or(base).ok_or(Reason::WorkObjectUnknown)
-            }
-        };
+        let stated = if self.state.stale { Err(Reason::Assigned) } else { self.frame_value(&name) };
         let within = self.state.programmable.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
         let value = stated.map(|user_frame| WorkObjectValue {
             robhold: false,

@@ -1,17 +1,17 @@
 //! Heidenhain conversational: blocks that are no words of an address each.
 
 use super::super::dialect::Dialect;
-use super::super::expression::{Worth, literal};
-use super::super::machine::{Group, Mode, Turn, transforms};
-use super::super::syntax::Word;
+use super::super::expression::{Worth, literal, numbered};
+use super::super::machine::{Group, Mode};
+use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
-use super::{Event, Lister, Said};
+use super::{Lister, Said};
 use crate::math::se3::Pose;
 use crate::program::motion::Reason;
 
-impl Lister<'_, '_> {
+impl<'s> Lister<'_, 's> {
     /// What the first word of a block says. True where the block does nothing else.
-    pub(super) fn heidenhain(&mut self, said: &Said<'_>) -> bool {
+    pub(super) fn heidenhain(&mut self, said: &Said<'s>) -> bool {
         debug_assert_eq!(self.dialect, Dialect::Heidenhain);
         let Some(first) = said.words.first() else { return false };
         let name = first.name.to_ascii_uppercase();
@@ -20,6 +20,17 @@ impl Lister<'_, '_> {
                 self.state.mode = Mode::Linear;
                 false
             }
+            // Positioning blocks without L.
+            [b'X' | b'Y' | b'Z' | b'A' | b'B' | b'U' | b'V' | b'W']
+            | [b'I', b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W'] => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            b"C" if first.belongs != Belongs::Nothing => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            b"F" | b"R" => false,
             b"C" | b"CR" => {
                 let direction = said.words.iter().find(|word| word.is("DR"));
                 let negative = direction.is_some_and(|word| {
@@ -51,7 +62,15 @@ impl Lister<'_, '_> {
                 }
                 true
             }
-            b"M" => false,
+            b"M" => {
+                // No motion: axis words are values of the M word.
+                match self.not_known(said) {
+                    Some((word, reason)) => self.deny(said, &word, reason),
+                    None => self.m_words(said),
+                }
+                self.ends(said);
+                true
+            }
             _ => {
                 self.other_block(said, first, &name);
                 true
@@ -67,69 +86,57 @@ impl Lister<'_, '_> {
         let second = words.get(1).copied().unwrap_or_default();
         match name {
             b"TOOL" if second == b"CALL" => {
-                self.tool_call(first, &words);
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
+                self.tool_call(&text);
+                self.lose_all();
             }
+            // A length that the program states.
+            b"TOOL" if second == b"DEF" && words.iter().skip(3).any(|word| word.starts_with(b"L")) => {
+                self.tools_assigned();
+            }
+            b"TOOL" if second == b"DEF" => {}
             b"CYCL" if second == b"CALL" => {
                 self.left(said, "CYCL CALL", Reason::Cycle);
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
+                self.lose_position();
             }
             b"CYCL" => {
                 let number: Vec<u8> = words
                     .get(2)
                     .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
                     .unwrap_or_default();
-                let ends = self.ends_cycle(&words);
-                let sets = matches!(&*number, b"7" | b"8" | b"10" | b"11" | b"19" | b"26" | b"247");
-                match &*number {
-                    b"7" => self.datum_shift(&words[3..]),
-                    b"247" => {
-                        self.state.frame = self.preset(first);
-                        self.set(Group::Frame);
-                    }
-                    b"8" => self.transform(transforms::MIRROR, !ends),
-                    b"10" => self.transform(transforms::TURN, !ends),
-                    b"11" | b"26" => self.transform(transforms::SCALE, !ends),
-                    b"19" => self.transform(transforms::TILT, !ends),
-                    _ => {}
-                }
-                if sets {
-                    self.state.lose_position();
-                    self.events.push(Event::Lost(super::POSITION));
-                }
+                self.cycle_definition(said, first, &number, &words[2..]);
             }
-            b"PLANE" => {
-                self.transform(transforms::TILT, second != b"RESET");
-                self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
-                self.state.lose_position();
-                self.events.push(Event::Unknown);
+            b"PLANE" => self.turn(Group::Swivel, second != b"RESET"),
+            b"FUNCTION" if second == b"TCPM" => {
+                self.tip(true, false);
             }
-            b"FUNCTION" if second == b"TCPM" => self.tip(true, false),
             b"FUNCTION" if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
+            b"FUNCTION" if matches!(second, b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
             b"TRANS" if second == b"DATUM" => {
                 match words.get(2).copied() {
                     Some(b"RESET") => {
+                        self.programmable_is_set();
                         self.state.programmable = None;
-                        self.set(Group::Frame);
+                        self.turn(Group::Datum, false);
                     }
                     Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => self.transform(transforms::SYSTEM, true),
+                    _ => self.turn(Group::Datum, true),
                 }
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
+                self.lose_position();
             }
             b"TRANS" => {
-                let which = match second {
-                    b"MIRROR" => transforms::MIRROR,
-                    b"ROTATION" => transforms::TURN,
-                    b"SCALE" => transforms::SCALE,
-                    _ => transforms::SYSTEM,
-                };
-                self.transform(which, words.get(2).copied() != Some(b"RESET"));
+                let on = words.get(2) != Some(&&b"RESET"[..]);
+                match second {
+                    b"MIRROR" => self.turn(Group::Mirror, on),
+                    b"ROTATION" => self.turn(Group::Rotation, on),
+                    b"SCALE" => self.turn(Group::Scale, on),
+                    _ => self.deny(said, "TRANS", Reason::UnknownWord),
+                }
             }
-            b"LBL" if second != b"0" => self.forget(),
+            b"LBL" if second != b"0" => {
+                self.forget();
+                self.state.mode = Mode::Unset;
+            }
+            b"LBL" => {}
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(said, "CALL");
             }
@@ -137,17 +144,139 @@ impl Lister<'_, '_> {
             | b"FPOL" | b"SPL" => {
                 let text = String::from_utf8_lossy(name).into_owned();
                 self.left(said, &text, Reason::NotFollowed);
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
+                self.lose_position();
             }
             b"TCH" => {
                 self.left(said, "TCH PROBE", Reason::Probe);
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
+                self.lose_position();
             }
             b"FN" | b"Q" | b"QL" | b"QR" => self.parameter(first),
-            b"BEGIN" | b"END" if words.contains(&&b"INCH"[..]) => self.state.unit_mm = 25.4,
-            _ => {}
+            b"BEGIN" | b"END" => {
+                if words.contains(&&b"INCH"[..]) {
+                    self.state.unit_mm = 25.4;
+                }
+            }
+            // Blanks, stops, texts, tables, declarations: nothing that moves.
+            b"BLK" | b"STOP" | b"DECLARE" | b"OPEN" | b"CLOSE" | b"SECTION" | b"SEL" | b"TABDATA"
+            | b"PATTERN" | b"POS" => {}
+            // The rest of a cycle's definition in lines of its own.
+            _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
+            _ => {
+                let text = String::from_utf8_lossy(name).into_owned();
+                self.deny(said, &text, Reason::UnknownWord);
+            }
+        }
+    }
+
+    /// `TOOL CALL 1 Z S1000 DL+0.5`, `TOOL CALL "MILL" Z`, `TOOL CALL Z S500`.
+    fn tool_call(&mut self, text: &[u8]) {
+        let text = String::from_utf8_lossy(text);
+        let rest = text.split_once("CALL").map_or("", |(_, rest)| rest).trim();
+        let (mut name, after) = match rest.strip_prefix('"') {
+            Some(quoted) => {
+                let (name, after) = quoted.split_once('"').unwrap_or((quoted, ""));
+                (name.to_owned(), after)
+            }
+            None => {
+                let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+                match word.bytes().next() {
+                    Some(b'0'..=b'9') => {
+                        let whole = word.bytes().all(|byte| byte.is_ascii_digit());
+                        let number = word.trim_start_matches('0');
+                        let zero = if number.is_empty() { "0" } else { number };
+                        (if whole { format!("T{zero}") } else { format!("T{word}") }, after)
+                    }
+                    // Only speed or axis: the tool stays.
+                    Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (self.state.tool.clone(), rest),
+                    None => (self.state.tool.clone(), rest),
+                    _ => (format!("T {word}"), after),
+                }
+            }
+        };
+        // A tool that is longer than its table says.
+        for word in after.split_whitespace() {
+            let delta = word.strip_prefix("DL");
+            if delta
+                .is_some_and(|delta| literal(delta.trim_start_matches(['+', '-']).as_bytes()) != Some(0.0))
+            {
+                name += &format!(" {word}");
+            }
+        }
+        self.change_tool(name);
+    }
+
+    /// `CYCL DEF 8.1 X`: the number with what stands after the point, and the words from it on.
+    fn cycle_definition(&mut self, said: &Said<'_>, first: &Word<'_>, number: &[u8], words: &[&[u8]]) {
+        let title = words.first().is_some_and(|word| word.ends_with(b".0"));
+        let values = words.get(1..).unwrap_or_default();
+        let zero = |word: &&[u8], letters: usize| {
+            let digits = word.get(letters..).unwrap_or_default();
+            let digits = digits.strip_prefix(b"+").or(digits.strip_prefix(b"-")).unwrap_or(digits);
+            literal(digits)
+        };
+        match number {
+            b"7" => {
+                self.datum_shift(values);
+                self.lose_position();
+            }
+            // A title begins the definition; what it sets stands in the lines after it.
+            b"8" => self.turn(Group::Mirror, title || !values.is_empty()),
+            b"10" => {
+                let ends = values.len() == 1
+                    && values.iter().all(|word| word.starts_with(b"ROT") && zero(word, 3) == Some(0.0));
+                self.turn(Group::Rotation, title || !ends);
+            }
+            b"11" => {
+                let value = match values {
+                    [word] => zero(word, 3),
+                    [_, word] => zero(word, 0),
+                    _ => None,
+                };
+                self.turn(Group::Scale, title || value != Some(1.0));
+            }
+            b"19" => {
+                let ends = values.iter().all(|word| zero(word, 1) == Some(0.0));
+                self.turn(Group::Swivel, title || !ends);
+            }
+            b"26" => {
+                let ends = !values.is_empty() && values.iter().all(|word| zero(word, 1) == Some(1.0));
+                self.turn(Group::AxisScale, title || !ends);
+            }
+            b"247" => self.frame_is(self.preset(first)),
+            b"220" | b"221" => {
+                self.left(said, "CYCL DEF", Reason::Cycle);
+                self.lose_all();
+            }
+            // Definitions that CYCL CALL, M89 and M99 carry out, and settings.
+            b"1"
+            | b"2"
+            | b"3"
+            | b"4"
+            | b"5"
+            | b"6"
+            | b"9"
+            | b"12"
+            | b"13"
+            | b"14"
+            | b"15"
+            | b"16"
+            | b"17"
+            | b"18"
+            | b"20"
+            | b"21"
+            | b"22"
+            | b"23"
+            | b"24"
+            | b"25"
+            | b"27"
+            | b"28"
+            | b"29"
+            | b"30"
+            | b"32"
+            | b"39"
+            | [b'2', b'0', b'0'..=b'9']
+            | [b'2', b'3' | b'4' | b'5' | b'6' | b'7', b'0'..=b'9'] => {}
+            _ => self.deny(said, "CYCL DEF", Reason::UnknownWord),
         }
     }
 
@@ -181,51 +310,13 @@ impl Lister<'_, '_> {
             }
         }
         if good {
+            self.programmable_is_set();
             self.state.programmable =
                 (shift.norm() > 0.0).then(|| Pose::translation(shift.x, shift.y, shift.z));
-            self.set(Group::Frame);
+            self.turn(Group::Datum, false);
         } else {
-            self.transform(transforms::SYSTEM, true);
+            self.turn(Group::Datum, true);
         }
-    }
-
-    /// Whether what is left of `CYCL DEF 10.1 ROT+0` ends the cycle.
-    fn ends_cycle(&self, words: &[&[u8]]) -> bool {
-        if !words.get(2).is_some_and(|number| number.ends_with(b".1")) {
-            return false;
-        }
-        let neutral = |word: &&[u8]| {
-            let at = word.iter().position(|byte| !byte.is_ascii_alphabetic()).unwrap_or(word.len());
-            let (name, value) = word.split_at(at);
-            let value = literal(value.strip_prefix(b"+").unwrap_or(value));
-            match name {
-                b"A" | b"B" | b"C" | b"ROT" => value == Some(0.0),
-                b"SCL" => value.is_none_or(|value| value == 1.0),
-                b"" => value == Some(1.0),
-                _ => false,
-            }
-        };
-        words[3..].iter().all(neutral)
-    }
-
-    /// `TOOL CALL 5 Z S1000`, `TOOL CALL "MILL"`, `TOOL CALL Z S2000` (the spindle alone).
-    fn tool_call(&mut self, first: &Word<'_>, words: &[&[u8]]) {
-        let Some(&named) = words.get(2) else { return };
-        let name = if let Some(number) = literal(named) {
-            format!("T{number}")
-        } else if named.starts_with(b"\"") {
-            let text = &self.tree.source()[self.tree.range(first.first, first.end)];
-            let name = text.split(|&byte| byte == b'"').nth(1).unwrap_or_default();
-            String::from_utf8_lossy(name).into_owned()
-        } else if named.starts_with(b"Q") {
-            "T?".to_owned()
-        } else {
-            super::codes::base(&self.state.tool).to_owned()
-        };
-        // Another length than that of its table.
-        let longer = words.iter().any(|word| word.starts_with(b"DL"));
-        self.state.tool = if longer { format!("{name} +DL") } else { name };
-        self.set(Group::Tool);
     }
 
     /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
@@ -249,22 +340,16 @@ impl Lister<'_, '_> {
     fn parameter(&mut self, word: &Word<'_>) {
         let equal = (word.first..word.end).find(|&token| self.tree.kind(token) == Some(Token::Equal));
         let Some(equal) = equal else { return };
-        let number = (word.first..equal)
-            .rev()
-            .find(|&token| self.tree.kind(token) == Some(Token::Number))
-            .and_then(|token| literal(self.tree.text(token)));
-        let Some(number) = number else { return };
+        let at = (word.first..equal).rev().find(|&token| self.tree.kind(token) == Some(Token::Number));
+        let number = at.and_then(|token| literal(self.tree.text(token)));
+        let (Some(at), Some(number)) = (at, number) else { return };
+        // Q, QL and QR are three sets.
+        let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
         let value: Worth = self.evaluated((equal + 1, word.end));
-        // QL and QR are sets of their own.
-        let source = &self.tree.source()[self.tree.range(word.first, equal)];
-        let letters = source.iter().rposition(|byte| byte.is_ascii_alphabetic());
-        match letters.map(|at| source[at].to_ascii_uppercase()) {
-            Some(set @ (b'L' | b'R')) => {
-                self.state.variables.insert([b"Q", &super::numbered(set, number)[..]].concat(), value);
-            }
-            _ => {
-                self.state.variables.insert(super::numbered(b'Q', number), value);
-            }
+        if matches!(&*set, b"Q" | b"QL" | b"QR") {
+            self.state.variables.insert(numbered(&set, number), value);
+        } else {
+            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc as Shared;
 use super::super::arc::Arc;
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
-use super::super::machine::{Group, Mode, Turn};
+use super::super::machine::{ALL_BUT_PLANE, Group, Mode, Turn};
 use super::{Event, Lister, Said, Written};
 use crate::program::motion::{
     Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed, SpeedValue,
@@ -85,6 +85,8 @@ impl Lister<'_, '_> {
             vector_words: state.vector_words,
             arc,
             insertable: false,
+            paraxial: said.paraxial,
+            restates: false,
         }
     }
 
@@ -121,37 +123,19 @@ impl Lister<'_, '_> {
         let has_centre = said.centre.iter().any(Option::is_some) && !vector_words;
         let circular = matches!(mode, Mode::Circular(_));
         let vector_moves = vector_words && said.centre.iter().any(Option::is_some);
-        if let Some(reason) = said.odd {
-            self.left(said, "path", reason);
-            self.state.lose_position();
-            if reason == Reason::OrientationUnknown {
-                self.state.turn = Turn::Unknown(reason);
-                self.events.push(Event::Unknown);
-            } else {
-                self.events.push(Event::Lost(super::POSITION));
-            }
-            return;
-        }
-        if said.others && !said.moves() && !matches!(mode, Mode::Unset | Mode::Other(_)) {
-            self.left(said, "axis", Reason::ExternalOnly);
-            if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) {
-                // Increments of X, Y and Z on a lathe.
-                self.state.lose_position();
-                self.events.push(Event::Lost(super::POSITION));
-            }
-            return;
-        }
         if !said.moves() && !(circular && (has_centre || said.radius.is_some())) && !vector_moves {
-            if said.opaque {
-                self.unread(said);
-            }
+            self.without_axes(said);
             return;
         }
-        if mode == Mode::Unset {
-            // Axis words without a motion: a control says no, or a word above was not understood.
-            self.left(said, "?", Reason::UnknownInstruction);
-            self.state.lose_position();
-            self.events.push(Event::Unknown);
+        let unknown = match mode {
+            // Axis words without a motion: a control says no.
+            Mode::Unset => Some(Reason::UnknownInstruction),
+            Mode::Lost(reason) => Some(reason),
+            _ => None,
+        };
+        if let Some(reason) = unknown {
+            self.left(said, "?", reason);
+            self.lose_all();
             return;
         }
         let before = self.written_as(said, None);
@@ -176,7 +160,7 @@ impl Lister<'_, '_> {
             Mode::Circular(false) => ("G2", MotionKind::Circular),
             Mode::Circular(true) => ("G3", MotionKind::Circular),
             Mode::Other(Reason::Cycle) => ("cycle", MotionKind::Unknown),
-            Mode::Other(_) | Mode::Unset => ("path", MotionKind::Unknown),
+            Mode::Other(_) | Mode::Unset | Mode::Lost(_) => ("path", MotionKind::Unknown),
         };
         let mut motion = self.listed(said, name, kind);
         let old_rotation = self.state.rotation(self.angles);
@@ -224,9 +208,7 @@ impl Lister<'_, '_> {
             let via = middle.and_then(|middle| target(middle, half));
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
-            // A centre that stands in another block cannot be put into this one.
-            let elsewhere = heidenhain && said.radius.is_none();
-            arc = found.ok().filter(|_| !elsewhere).map(|arc| (arc, positive, self.state.centre_absolute));
+            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
         }
         if kind != MotionKind::Unknown {
             motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
@@ -235,10 +217,10 @@ impl Lister<'_, '_> {
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
         motion.work_object = Some(self.work_object());
-        self.doubt(said);
         motion.left = self.left_because(said, mode, machine, &motion);
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
+            && !said.others
             && !heidenhain
             && !said.skippable
             && !motion.timed
@@ -260,6 +242,7 @@ impl Lister<'_, '_> {
         let written = Written {
             arc,
             insertable,
+            restates: self.restates(said, &motion),
             start_angles,
             turn: after.turn,
             angles: after.angles,
@@ -268,46 +251,90 @@ impl Lister<'_, '_> {
         };
         let index = self.push(motion, written);
         self.state.previous = Some(index);
-        if mode == Mode::Other(Reason::Cycle) || machine {
-            self.state.lose_position();
-            self.events.push(Event::Lost(super::POSITION));
-        } else if matches!(mode, Mode::Other(_)) {
+        self.state.position = to;
+        self.arrived(said, mode, machine);
+    }
+
+    /// What is not where the words of the block say.
+    fn arrived(&mut self, said: &Said<'_>, mode: Mode, machine: bool) {
+        if let Mode::Other(_) = mode {
             // A spline ends at its last point, whatever its way.
-            self.state.position = to;
             self.state.previous = None;
-        } else {
-            self.state.position = to;
         }
-        if self.state.calls.is_some() {
-            // Wherever what is called now ends.
-            self.state.lose_position();
-            self.state.turn = Turn::Unknown(Reason::OrientationUnknown);
+        let call = self.modal_call(said);
+        if call == Some(Reason::Subprogram) {
+            self.forget();
+            self.state.modal_call = call;
+        } else if (machine || said.aside.is_some())
+            && said.abc.iter().chain(&said.rpy).chain(&said.vector).any(Option::is_some)
+        {
+            self.lose_all();
+        } else if mode == Mode::Other(Reason::Cycle) || machine || call.is_some() {
+            self.lose_position();
+        } else if said.aside == Some(Reason::Transformed)
+            || said.opaque
+            || said.aside == Some(Reason::NotFollowed)
+            || said.aside == Some(Reason::Probe)
+            || said.others && self.parallel()
+        {
+            self.lose_position();
+        } else if said.aside.is_some() {
+            self.state.lose_orientation();
             self.events.push(Event::Unknown);
+        }
+        if said.opaque || self.contour.is_some() {
+            self.lose_all();
+        }
+        // Where it is not known what the numbers mean, where they lead is not known either.
+        let meaning = [Group::Distance, Group::Unit, Group::Shift, Group::Diameter, Group::Rotary];
+        if self.state.doubt(meaning.iter().fold(0, |all, &group| all | 1 << group as u32)).is_some() {
+            self.lose_all();
         }
     }
 
-    /// Which axes a block leaves in doubt, because part of it could not be read; those that one states are known again.
-    fn doubt(&mut self, said: &Said<'_>) {
+    /// Whether a straight motion that stays can have the words said again that it leaves out.
+    fn restates(&self, said: &Said<'_>, motion: &Motion) -> bool {
+        let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
+        let plain = straight && !said.opaque && said.aside.is_none() && self.contour.is_none();
+        let settled = !(1 << Group::Radius as u32 | 1 << Group::Tool as u32) & ALL_BUT_PLANE;
+        plain
+            && self.modal_call(said).is_none()
+            && self.state.turned == 0
+            && self.state.doubt(settled).is_none()
+            && match motion.left {
+                None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
+                Some(Reason::NotFollowed) => said.corner,
+                _ => false,
+            }
+    }
+
+    /// Whether U, V and W may be increments of X, Y and Z (lathes).
+    fn parallel(&self) -> bool {
+        matches!(self.dialect, Dialect::Fanuc | Dialect::Iso)
+    }
+
+    /// What runs after this motion: G66, MCALL, M89, or M99 of Heidenhain.
+    fn modal_call(&self, said: &Said<'_>) -> Option<Reason> {
+        let here = self.dialect == Dialect::Heidenhain && said.m.contains(&99);
+        self.state.modal_call.or(here.then_some(Reason::Cycle))
+    }
+
+    /// A block without words of the axes that are followed: it may move others, or what it does could not be read.
+    fn without_axes(&mut self, said: &Said<'_>) {
         if said.opaque {
-            self.state.doubtful = 15;
-        } else if self.state.absolute {
-            for axis in 0..3 {
-                let plain = said.axes[axis].is_some_and(|at| self.worth(&said.words[at]).1 != Some(true));
-                self.state.doubtful &= !(u8::from(plain) << axis);
+            self.left(said, "?", Reason::Unread);
+            self.lose_all();
+        } else if let Some(reason) = said.aside {
+            self.left(said, "path", reason);
+            match reason {
+                Reason::Transformed => self.lose_position(),
+                _ => self.lose_all(),
             }
-            let all = |words: &[Option<usize>; 3]| words.iter().all(Option::is_some);
-            if all(&said.abc) || all(&said.rpy) || said.vector.iter().any(Option::is_some) {
-                self.state.doubtful &= 7;
+        } else if said.others {
+            self.left(said, "axes", Reason::ExternalOnly);
+            if self.parallel() {
+                self.lose_position();
             }
-        }
-    }
-
-    /// A block that could not be read whole, without words that move: what it did is not known.
-    fn unread(&mut self, said: &Said<'_>) {
-        self.state.doubtful = 15;
-        if said.words.iter().any(|word| matches!(word.address(), Some(b'G'))) {
-            self.state.lose_position();
-            self.events.push(Event::Unknown);
         }
     }
 
@@ -337,13 +364,19 @@ impl Lister<'_, '_> {
         }
         if let Some(index) = said.spin {
             spin = self.worth(&said.words[index]).0;
+            if !state.spin_absolute {
+                spin = Err(Reason::OrientationUnknown);
+            }
         }
         (turn, (abc, rpy, vector, spin))
     }
 
     fn arc(&self, said: &Said<'_>, from: [Worth; 3], to: [Worth; 3], positive: bool) -> Result<Arc, Reason> {
-        // P: several turns.
-        if said.turns || self.dialect == Dialect::LinuxCnc && said.p.is_some() {
+        let one = |index: usize| self.literal(&said.words[index]) == Some(1.0);
+        // P: turns of LinuxCNC; Q, L: spirals and cones.
+        let more = self.dialect != Dialect::Siemens
+            && (said.p.is_some_and(|index| !one(index)) || said.q.is_some() || said.l.is_some());
+        if said.turns || more {
             return Err(Reason::NotFollowed);
         }
         let (start, end) = (all(from)?, all(to)?);
@@ -397,25 +430,8 @@ impl Lister<'_, '_> {
 
     fn left_because(&self, said: &Said<'_>, mode: Mode, machine: bool, motion: &Motion) -> Option<Reason> {
         let state = &self.state;
-        let uncertain = [
-            Group::Distance,
-            Group::Unit,
-            Group::Frame,
-            Group::Radius,
-            Group::Tip,
-            Group::Transform,
-            Group::Tool,
-            Group::Shift,
-        ];
         let turns = !matches!(state.turn, Turn::Unknown(Reason::OrientationUnknown));
-        let needs_tip = self.dialect.needs_tip();
-        let cycle = self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 89 | 99));
-        let frames = || {
-            let tool = self.listing.tool(motion).and_then(|tool| tool.value.err());
-            tool.or_else(|| {
-                self.listing.work_object(motion).and_then(|object| object.value.as_ref().err().copied())
-            })
-        };
+        let needs_tip = matches!(self.dialect, Dialect::Fanuc | Dialect::Siemens | Dialect::Heidenhain);
         if said.opaque {
             Some(Reason::Unread)
         } else if said.skippable {
@@ -426,18 +442,18 @@ impl Lister<'_, '_> {
             Some(reason)
         } else if machine {
             Some(Reason::MachineCoordinates)
-        } else if uncertain.iter().any(|&group| state.is_uncertain(group))
-            || matches!(mode, Mode::Circular(_)) && state.is_uncertain(Group::Plane)
-        {
-            Some(Reason::UnknownFlow)
-        } else if cycle {
+        } else if self.contour.is_some() {
             Some(Reason::Cycle)
-        } else if state.transform != 0 {
+        } else if let Some(reason) = said.aside.or(self.modal_call(said)) {
+            Some(reason)
+        } else if let Some(reason) = state.doubt(ALL_BUT_PLANE) {
+            Some(reason)
+        } else if let (Mode::Circular(_), Some(reason)) = (mode, state.doubt(1 << Group::Plane as u32)) {
+            Some(reason)
+        } else if state.turned != 0 {
             Some(Reason::Transformed)
-        } else if state.calls.is_some() {
-            state.calls
-        } else if state.doubtful != 0 {
-            Some(Reason::Unread)
+        } else if said.others && self.parallel() {
+            Some(Reason::UnknownWord)
         } else if state.radius {
             Some(Reason::RadiusCompensation)
         } else if turns && needs_tip && !state.tip {
@@ -448,7 +464,7 @@ impl Lister<'_, '_> {
         {
             Some(Reason::CentreElsewhere)
         } else {
-            frames()
+            self.listing.left_by_frames(motion)
         }
     }
 

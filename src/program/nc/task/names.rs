@@ -1,5 +1,7 @@
 //! Names in Siemens programs that are no subprograms of the user.
 
+use crate::program::motion::Reason;
+
 /// Names of one word in a block that are no subprogram.
 pub(super) const KEYWORDS: &[&str] = &[
     "TRAORI",
@@ -50,14 +52,8 @@ pub(super) const KEYWORDS: &[&str] = &[
     "CUT2DF",
     "CUT3DC",
     "CUT3DF",
-    "DIAMON",
-    "DIAMOF",
-    "DIAM90",
     "WALIMON",
     "WALIMOF",
-    "TOFRAME",
-    "PAROT",
-    "PAROTOF",
     "SUPA",
     "G153",
     "RET",
@@ -103,19 +99,90 @@ pub(super) const KEYWORDS: &[&str] = &[
     "DYNFINISH",
     "G641",
     "ACC",
-    "TCARR",
-    "TCOABS",
-    "TCOFR",
-    "GEOAX",
-    "PRESETON",
     "WAITM",
     "LIMS",
     "SPCON",
     "SPCOF",
     "FZ",
-    "OEMIPO1",
     "ADISPOS",
     "ADIS",
+    "BNAT",
+    "BTAN",
+    "BAUTO",
+    "ENAT",
+    "ETAN",
+    "EAUTO",
+    "CUT3DCC",
+    "CUT3DCCD",
+    "CUT3DFS",
+    "CUT3DFF",
+    "CUTCONON",
+    "CUTCONOF",
+    "DYNPREC",
+    "SOFTA",
+    "BRISKA",
+    "DRIVEA",
+    "FENDNORM",
+    "FRCM",
+    "FIFOCTRL",
+    "FTOCOF",
+    "LFON",
+    "LFOF",
+    "LFTXT",
+    "LFWP",
+    "LFPOS",
+    "LIFTFAST",
+    "ORISON",
+    "ORISOF",
+    "ORICONCCW",
+    "ORICONIO",
+    "ORICONTO",
+    "PDELAYON",
+    "PDELAYOF",
+    "STRINGIS",
+    "SPIF1",
+    "CPROT",
+    "CPROTDEF",
+    "GWPSON",
+    "GWPSOF",
+    "EXECUTE",
+    "BLSYNC",
+    "PREPRO",
+    "ACTBLOCNO",
+    "ICYCON",
+    "ICYCOF",
+    "CLRINT",
+    "ENABLE",
+    "DISABLE",
+    "DEF",
+    "EXTERN",
+    "PROC",
+    "IF",
+    "GOTOF",
+    "GOTOB",
+    "GOTO",
+    "GOTOC",
+    "GOTOS",
+    "FOR",
+    "TO",
+    "WHILE",
+    "UNTIL",
+    "CASE",
+    "OF",
+    "DEFAULT",
+    "REPEATB",
+    "CALL",
+    "REAL",
+    "INT",
+    "BOOL",
+    "CHAR",
+    "STRING",
+    "AXIS",
+    "FRAME",
+    "VAR",
+    "M17",
+    "WORKPIECE",
+    "CFINE",
 ];
 
 /// Names with arguments that move nothing.
@@ -131,14 +198,11 @@ pub(super) const HARMLESS: &[&str] = &[
     "GROUP_BEGIN",
     "GROUP_END",
     "WORKPIECE",
-    "TRAORI",
     "FGROUP",
     "FGREF",
-    "GEOAX",
     "SETINT",
     "CLRM",
     "SETM",
-    "PRESETON",
     "OTOL",
     "CTOL",
     "GETD",
@@ -153,7 +217,6 @@ pub(super) const HARMLESS: &[&str] = &[
     "VELOLIM",
     "ACCLIM",
     "PROC",
-    "TRAFOOF",
     "SPOS",
     "FA",
     "OVR",
@@ -168,6 +231,60 @@ pub(super) const HARMLESS: &[&str] = &[
     "DISPLOF",
     "EXTERN",
 ];
+
+/// Addresses of Siemens with a value that neither move nor change what the values of others mean.
+const SETTINGS: &[&str] = &[
+    "ADIS", "ADISPOS", "ALF", "AR", "ATOL", "CFTOL", "CR", "CTOL", "DISC", "DISCL", "DISR", "DISRP", "FAD",
+    "FB", "FD", "FP", "FPR", "FRC", "FRCM", "FXST", "FXSW", "FZ", "I1", "J1", "K1", "LIMS", "OTOL", "OVR",
+    "OVRA", "OVRRAP", "PL", "PRIO", "PW", "RPL", "SCC", "SD", "SF", "SR", "SRA", "ST", "STA", "STOLF",
+    "THETA", "TURN", "VELOLIM", "ACC", "ACCLIM", "JERKLIM", "FA", "FL", "FGREF", "ID", "IDS", "NAME",
+    "SETINT",
+];
+
+/// What an address of Siemens with a value does, where that is known.
+pub(super) fn address(name: &[u8]) -> Option<Address> {
+    if SETTINGS.iter().any(|known| name == known.as_bytes()) {
+        return Some(Address::Setting);
+    }
+    let numbered = name.len() > 1 && name[1..].iter().all(u8::is_ascii_digit);
+    Some(match name {
+        // S2=, M3=, H1=, F1=: spindles and helping functions.
+        [b'S' | b'M' | b'H' | b'F' | b'R' | b'L' | b'Q', ..] if numbered => Address::Setting,
+        b"MEAS" | b"MEAW" | b"MEASA" | b"MEAWA" | b"MEAC" | b"FXS" => Address::Aside(Reason::Probe),
+        b"ANG" | b"ANG1" | b"ANG2" | b"PO" | b"OSCILL" => Address::Aside(Reason::NotFollowed),
+        b"POS" | b"POSA" | b"POSP" | b"POSM" => Address::Aside(Reason::NotFollowed),
+        b"AP" | b"RP" => Address::Aside(Reason::Transformed),
+        // Orientation by the normal of the surface, cones, courses of angles.
+        [b'A' | b'B' | b'C', b'4'..=b'7']
+        | b"LEAD"
+        | b"TILT"
+        | b"NUT"
+        | b"PHI"
+        | b"PSI"
+        | b"XH"
+        | b"YH"
+        | b"ZH"
+        | b"ORIS" => Address::Aside(Reason::OrientationUnknown),
+        b"SPOS" | b"SPOSA" => Address::External,
+        b"TOFF" | b"TOFFL" | b"TOFFR" | b"TOFFLR" | b"TCARR" | b"CUTMOD" | b"CUTMODK" | b"DL" => {
+            Address::Tool
+        }
+        _ => return None,
+    })
+}
+
+/// What an address of Siemens with a value does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Address {
+    /// Nothing that these readers must follow.
+    Setting,
+    /// The block goes elsewhere than its words say.
+    Aside(Reason),
+    /// Other axes.
+    External,
+    /// The tool.
+    Tool,
+}
 
 /// Cycles of the control.
 pub(super) fn is_cycle(name: &[u8]) -> bool {

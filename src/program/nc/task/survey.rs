@@ -1,20 +1,31 @@
 //! What the whole file sets, and where its jumps go: read once before the blocks are followed.
 
-use std::collections::BTreeSet;
-
 use super::super::dialect::Dialect;
 use super::super::expression::literal;
-use super::super::machine::{GROUPS, Group};
 use super::super::parser::word;
 use super::super::syntax::{Belongs, Syntax};
+use super::super::token::Token;
 use super::{Lister, code};
 
 impl Lister<'_, '_> {
     /// What the whole file sets, and where its jumps go.
     pub(super) fn survey(&mut self) {
-        let mut found: [BTreeSet<u32>; GROUPS as usize] = Default::default();
         let mut jump = false;
+        // `%NAME G71 *`: DIN/ISO of Heidenhain, whose G words have meanings of their own.
+        let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
+        self.foreign = self.dialect.paren_comments()
+            && tape.is_some_and(|token| {
+                let text = self.tree.text(token).to_ascii_uppercase();
+                text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
+            });
+        let mut block = Block::default();
+        let (mut programs, mut back) = (0, false);
         for node in 0..self.tree.nodes.len() as u32 {
+            if matches!(self.tree.nodes[node as usize].kind, Syntax::Block | Syntax::Skippable) {
+                self.survey_block(&block);
+                back |= block.back && block.p.is_none();
+                block = Block::default();
+            }
             if self.tree.nodes[node as usize].kind != Syntax::Word {
                 continue;
             }
@@ -42,21 +53,18 @@ impl Lister<'_, '_> {
                 }
             }
             match (address, number) {
-                (Some(b'G'), Some(number)) => {
-                    let code = code(number);
-                    if matches!(code, 920 | 520) {
-                        found[Group::Shift as usize].extend([0, 1]);
-                    }
-                    if let Some((group, value)) = group_of(code, self.dialect) {
-                        found[group as usize].insert(value);
-                    }
+                (Some(b'G'), Some(number)) => block.cycle |= matches!(code(number), 700..=730),
+                (Some(b'M'), Some(number)) => {
+                    self.changes_tools |= number == 6.0;
+                    block.back |= number == 99.0;
                 }
-                (Some(b'G'), None) => found.iter_mut().for_each(|found| found.extend([0, 1])),
-                (Some(b'M'), Some(number)) => self.changes_tools |= number == 6.0,
-                (Some(b'T'), Some(number)) => {
-                    found[Group::Tool as usize].insert(number as u32);
+                (Some(b'P'), Some(number)) => block.p = Some(number as u64),
+                (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
+                (Some(b'O'), Some(_)) => programs += 1,
+                (None, _) if said.is("DEF") || block.declares => {
+                    block.declares = true;
+                    self.declared.insert(said.name.to_ascii_uppercase());
                 }
-                (Some(b'T'), None) => found[Group::Tool as usize].extend([0, 1]),
                 (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
                     match number {
                         Some(number) => {
@@ -66,69 +74,42 @@ impl Lister<'_, '_> {
                         None => self.anywhere = true,
                     }
                 }
-                (None, _) if said.is("TRAORI") => {
-                    found[Group::Tip as usize].insert(1);
-                }
-                (None, _) if said.is("TRAFOOF") => {
-                    found[Group::Tip as usize].insert(0);
-                }
                 _ => {}
             }
         }
-        self.returns();
-        for (group, found) in found.iter().enumerate() {
-            match found.len() {
-                0 => {}
-                1 => self.once |= 1 << group,
-                _ => self.several |= 1 << group,
-            }
+        self.survey_block(&block);
+        back |= block.back && block.p.is_none();
+        self.repeats = back && programs <= 1;
+    }
+
+    fn survey_block(&mut self, block: &Block) {
+        if block.back
+            && let Some(p) = block.p
+        {
+            self.targets.insert(p);
         }
+        if block.cycle
+            && let (Some(p), Some(q)) = (block.p, block.q)
+        {
+            self.contours.push((p, q));
+        }
+    }
+
+    /// Whether the program begins again at its end (M99 in one that calls nothing).
+    pub(super) fn repeats(&self) -> bool {
+        self.dialect != Dialect::Heidenhain && self.repeats
     }
 }
 
-impl Lister<'_, '_> {
-    /// `M99 P100`: goes on at N100.
-    fn returns(&mut self) {
-        let written = self.tree.source().windows(3).any(|three| three.eq_ignore_ascii_case(b"M99"));
-        if self.dialect == Dialect::Heidenhain || !written {
-            return;
-        }
-        for block in self.tree.child_nodes(0) {
-            let words: Vec<_> = self
-                .tree
-                .child_nodes(block)
-                .filter(|&node| self.tree.nodes[node as usize].kind == Syntax::Word)
-                .map(|node| word(self.tree, node))
-                .collect();
-            let value = |letter: u8| {
-                let found = words.iter().find(|word| word.address() == Some(letter))?;
-                self.literal(found)
-            };
-            if value(b'M') == Some(99.0)
-                && let Some(block) = value(b'P')
-            {
-                self.targets.insert(block as u64);
-            }
-        }
-    }
-}
-
-/// The group that a code sets, and to what, for the survey.
-fn group_of(code: u32, dialect: Dialect) -> Option<(Group, u32)> {
-    Some(match code {
-        900 | 910 => (Group::Distance, code),
-        200 | 700 | 7000 => (Group::Unit, 20),
-        210 | 710 | 7100 => (Group::Unit, 21),
-        170 | 180 | 190 => (Group::Plane, code),
-        540..=599 => (Group::Frame, code),
-        5000..=5999 if dialect == Dialect::Siemens => (Group::Frame, code),
-        400..=429 => (Group::Radius, code),
-        434 | 435 | 2340 => (Group::Tip, code),
-        490 => (Group::Tip, 0),
-        680 | 682 | 683 | 684 | 690 | 510 | 511 | 500 | 501 | 150 | 160 => (Group::Transform, code),
-        71 | 1070 | 121 | 131 | 1000 | 1010 | 2540 | 2550 if dialect != Dialect::Siemens => {
-            (Group::Transform, code)
-        }
-        _ => return None,
-    })
+/// What a block says that the survey looks at.
+#[derive(Default)]
+struct Block {
+    /// M99.
+    back: bool,
+    /// G70 to G73.
+    cycle: bool,
+    /// DEF.
+    declares: bool,
+    p: Option<u64>,
+    q: Option<u64>,
 }

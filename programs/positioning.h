@@ -1,0 +1,44 @@
+0 BEGIN PGM POSITIONING MM
+; Shows: Heidenhain conversational: blocks without L, tools by name, three sets of parameters, what ends which transformation.
+; truegrind angles wpr
+; truegrind tool T1 tGrind [[0,0,150],[1,0,0,0]]
+; truegrind tool MILL_D10 tMill [[0,0,90],[1,0,0,0]]
+; truegrind frame G54 preset [[500,0,200],[1,0,0,0]]
+1 TOOL CALL 1 Z S1000
+2 M128
+3 L X+10 Y+0 Z+20 A+180 B+0 C+0 R0 F3000
+4 X+20
+5 L Y+5
+6 QL1 = 5
+7 Q1 = 20
+8 QL1 = 7
+9 L X+Q1 Y+0
+10 L X+QL1
+11 Q3 = SIN 30 * 10
+12 L X+Q3
+13 M118 X1 Y1
+14 L X+23
+15 CR X30 Y10 R20 DR-
+16 L X20 Y0 Z20
+17 CYCL DEF 8.0 MIRROR IMAGE
+18 CYCL DEF 8.1 X
+19 PLANE RESET STAY
+20 L X+20 Y+0 Z+20 A+180 B+0 C+0
+21 CYCL DEF 8.0 MIRROR IMAGE
+22 CYCL DEF 8.1
+23 CYCL DEF 19.0 WORKING PLANE
+24 CYCL DEF 19.1 A+0 B+0 C+0
+25 L X+20 Y+0 Z+20 A+180 B+0 C+0
+26 L X+20 Y+0 FMAX M99
+27 TOOL CALL "MILL_D10" Z S2000
+28 L X+20 Y+0 Z+20 A+180 B+0 C+0
+29 TOOL CALL 1 Z S1000 DL+5
+30 L X+20 Y+0 Z+20 A+180 B+0 C+0
+31 TOOL CALL 1 Z S1000
+32 L X+20 Y+0 Z+20 A+180 B+0 C+0 RL
+/33 L X+25 R0
+34 L X+30
+35 L X+31 Y+0 Z+20 A+180 B+0 C+0 R0
+36 PRESET SELECT #3
+37 L X+5 Y+0 Z+0 F600
+38 END PGM POSITIONING MM
