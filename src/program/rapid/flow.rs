@@ -454,13 +454,13 @@ impl Walk<'_, '_, '_> {
         let clauses: Vec<u32> =
             clauses.filter(|&clause| tree.nodes[clause as usize].kind == Syntax::ErrorClause).collect();
         let handled = clauses.into_iter().fold(States::NONE, |all, clause| all.or(self.settings(clause)));
-        let interrupts = &self.evaluator.symbols.interrupts;
+        let symbols = self.evaluator.symbols;
         // One trap routine waits for the other.
-        if self.unit.routine.is_some_and(|routine| interrupts[routine as usize]) {
+        if self.unit.routine.is_some_and(|routine| symbols.interrupts[routine as usize]) {
             return handled;
         }
-        let traps = (0..).zip(interrupts).filter(|&(_, &interrupts)| interrupts);
-        traps.fold(handled, |all, (routine, _)| all.or(self.visitor.exit_of(routine).entered(States::NONE)))
+        let left = |all: States, routine: &u32| all.or(self.visitor.exit_of(*routine).entered(States::NONE));
+        symbols.interrupting.iter().fold(handled, left)
     }
 
     /// Everything that statements under a node may set.

@@ -1,8 +1,11 @@
 //! The comment line that says that a file was compensated.
 //!
-//! `! truegrind 0.1.0 model 3f9a…`, on a line of its own after the line of the first MODULE.
+//! `! truegrind 0.1.0 model 3f9a…`, on a line of its own after the head of each MODULE in which something changed: a
+//! controller keeps the modules of a file apart.
 
-use super::syntax::{RapidTree, Syntax};
+use std::ops::Range;
+
+use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
 use super::token::Token;
 use crate::program::motion::Mark;
 
@@ -44,12 +47,34 @@ pub fn text(mark: &Mark) -> String {
     format!("! truegrind {} model {}", mark.version, mark.model)
 }
 
-/// The byte after the line of the first MODULE, where the mark goes; `None` in a fragment.
-pub fn place(tree: &RapidTree<'_>) -> Option<usize> {
-    let module = tree.child_nodes(0).find(|&node| tree.nodes[node as usize].kind == Syntax::Module)?;
-    let start = tree.start(tree.nodes[module as usize].first);
-    let line = tree.source()[start..].iter().position(|&byte| byte == b'\n')?;
-    Some(start + line + 1)
+/// The token of the mark among some tokens.
+pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
+    let comment = |&token: &u32| tree.kind(token) == Some(Token::Comment);
+    tokens.into_iter().filter(comment).find(|&token| read(tree.text(token)).is_some())
+}
+
+/// The modules of a file; a fragment has none.
+pub fn modules(tree: &RapidTree<'_>) -> Vec<u32> {
+    tree.child_nodes(0).filter(|&node| tree.nodes[node as usize].kind == Syntax::Module).collect()
+}
+
+/// Where the mark of a module goes, and whether a line begins there: after the line on which its head ends, or, where it
+/// has no other line, behind its head.
+pub fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
+    let node = tree.nodes[module as usize];
+    let mut head = node.first + 1;
+    for part in parts(tree, module).skip(1) {
+        match (node_kind(tree, part), token_kind(tree, part)) {
+            (Some(Syntax::Attributes), _) | (_, Some(Token::Ident)) => head = tokens_of(tree, part).1,
+            _ => break,
+        }
+    }
+    let span = tree.range(node.first, node.end);
+    let behind = tree.range(node.first, head).end;
+    match tree.source()[behind..span.end].iter().position(|&byte| byte == b'\n') {
+        Some(line) => (behind + line + 1, true),
+        None => (behind, false),
+    }
 }
 
 /// The line end that a file uses.

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::instruction::{self, Between, INSTRUCTIONS, Instruction};
 use super::mark;
 use super::print::{self, Fresh};
+use super::syntax::RapidTree;
 use super::task::Task;
 use super::token::{Token, folded, keyword, same_name};
 use crate::program::edit::{EditError, Edits};
@@ -37,17 +38,9 @@ impl Task<'_> {
         for (edits, tree) in rewriter.edits.into_iter().zip(&self.trees) {
             let mut file = FileEdits { edits, unmarked: false };
             if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
-                let comment = mark::text(mark);
                 // Before the others, so that the list stays in order.
-                let mut marked = Edits::new();
-                if let Some(old) = mark::token(tree) {
-                    marked.replace(tree.range(old, old + 1), comment.as_bytes());
-                } else if let Some(place) = mark::place(tree) {
-                    let line = [comment.as_bytes(), mark::line_end(tree.source())].concat();
-                    marked.insert(place, &line);
-                } else {
-                    file.unmarked = true;
-                }
+                let mut marked = marks(tree, &file.edits, mark::text(mark).as_bytes());
+                file.unmarked = marked.is_empty();
                 marked.append(std::mem::take(&mut file.edits));
                 file.edits = marked;
             }
@@ -56,6 +49,40 @@ impl Task<'_> {
         }
         Ok(Rewritten { files, outcomes })
     }
+}
+
+/// The marks of the modules in which something changed.
+fn marks(tree: &RapidTree<'_>, edits: &Edits, comment: &[u8]) -> Edits {
+    let modules = mark::modules(tree);
+    let mut changed = vec![modules.len() == 1; modules.len()];
+    if modules.len() > 1 {
+        let spans: Vec<_> = modules.iter().map(|&module| tree.node_span(module).range()).collect();
+        for (range, _) in edits.iter() {
+            let at = spans.partition_point(|span| span.start <= range.start);
+            if at > 0 && range.start < spans[at - 1].end {
+                changed[at - 1] = true;
+            }
+        }
+    }
+    let mut marks = Edits::new();
+    let replace = |marks: &mut Edits, old: u32| marks.replace(tree.range(old, old + 1), comment);
+    for (&module, _) in modules.iter().zip(&changed).filter(|&(_, &changed)| changed) {
+        let node = tree.nodes[module as usize];
+        let tokens = if modules.len() == 1 { 0..tree.len() as u32 } else { node.first..node.end };
+        let (place, begins_line) = mark::place(tree, module);
+        let end = mark::line_end(tree.source());
+        match mark::token_in(tree, tokens) {
+            Some(old) => replace(&mut marks, old),
+            None if begins_line => marks.insert(place, &[comment, end].concat()),
+            None => marks.insert(place, &[end, comment, end].concat()),
+        }
+    }
+    if marks.is_empty()
+        && let Some(old) = mark::token(tree)
+    {
+        replace(&mut marks, old);
+    }
+    marks
 }
 
 /// One wish for a declared target: which change, which motion and target, which value.

@@ -157,6 +157,8 @@ pub struct Symbols {
     pub late_sets: Vec<States>,
     /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
     pub interrupts: Vec<bool>,
+    /// Those that may.
+    pub interrupting: Vec<u32>,
     /// What any statement sets.
     pub everything: States,
     /// Whether the next cycle may begin in the middle of this one.

@@ -267,6 +267,36 @@ fn a_changed_file_is_marked_once_and_an_unchanged_one_not() {
     assert_eq!(rewritten.files[0].edits.len(), 1);
 }
 
+#[test]
+fn each_changed_module_is_marked_behind_its_head() {
+    let mark = Mark { version: "0.1.0".into(), model: "abc".into() };
+    let options = RewriteOptions { mark: Some(mark.clone()), ..RewriteOptions::default() };
+    let go = format!("PROC a() MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}],v100,fine,tool0; ENDPROC");
+    let written = |source: &str, motion: u32| {
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        assert!(task.listing.opaque.is_empty(), "{:?}", task.listing.opaque);
+        let rewritten = task.rewrite(&[change(motion, at(501.0, 0.0, 300.0))], &options).unwrap();
+        assert!(!rewritten.files[0].unmarked);
+        let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();
+        let again = Task::read(&[("m.mod", text.as_bytes())]);
+        assert_eq!(again.listing.marks, [Some(mark.clone())], "{text}");
+        assert!(again.listing.opaque.is_empty(), "{text}");
+        text
+    };
+    let line = "! truegrind 0.1.0 model abc\n";
+    // All on one line.
+    let text = written(&format!("MODULE M {go} ENDMODULE"), 0);
+    assert!(text.starts_with(&format!("MODULE M\n{line} PROC a()")), "{text}");
+    // Attributes on lines of their own.
+    let text = written(&format!("MODULE M(SYSMODULE,\n NOVIEW)\n{go}\nENDMODULE\n"), 0);
+    assert!(text.starts_with(&format!("MODULE M(SYSMODULE,\n NOVIEW)\n{line}PROC a()")), "{text}");
+    // The second of three.
+    let three = ["A", "B", "C"].map(|name| format!("MODULE {name}\n{go}\nENDMODULE\n")).concat();
+    let text = written(&three, 1);
+    assert_eq!(text.matches("! truegrind").count(), 1);
+    assert!(text.contains(&format!("MODULE B\n{line}PROC a()")), "{text}");
+}
+
 /// Every motion of every sample is moved by its own amount and read back: values within rounding, everything that was
 /// not moved as before, and what could not be changed refused with the reason that the listing gives.
 #[test]

@@ -150,6 +150,8 @@ impl Symbols {
             self.everything = self.everything.or(found.sets);
             self.cycles |= found.cycles;
         }
+        let interrupting = (0..).zip(&self.interrupts).filter(|&(_, &interrupts)| interrupts);
+        self.interrupting = interrupting.map(|(routine, _)| routine).collect();
         self.settle_reaches(&all);
         self.settle_volatile(trees, &all);
         let mut called = vec![false; all.len()];
