@@ -481,7 +481,10 @@ fn rewritten(
     for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
         let row = &mut planned.outcomes[change.motion as usize];
         match outcome {
-            Outcome::Unchanged if row.status == Status::Changed => row.status = Status::Left,
+            Outcome::Unchanged if row.status == Status::Changed => {
+                row.status = Status::Left;
+                row.reason = Some(truegrind::compensation::why::Why::Same);
+            }
             Outcome::Refused(reason) => {
                 row.status = Status::Refused;
                 row.reason = Some(truegrind::compensation::why::Why::Program(*reason));

@@ -17,6 +17,8 @@ pub enum Why {
     },
     /// A joint target states joints, not a pose; rewritten only when asked.
     JointTarget,
+    /// The new numbers are the old ones, to the decimals that are written; said once the program is rewritten.
+    Same,
     /// No joints reach the target.
     Inverse(InverseError),
     /// A joint would leave its range.
@@ -95,6 +97,7 @@ impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Why::Program(reason) => reason.fmt(f),
+            Why::Same => f.write_str("its numbers are right to the last decimal that is written"),
             Why::JointTarget => {
                 f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
             }

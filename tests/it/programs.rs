@@ -394,3 +394,27 @@ fn lines_whose_path_nobody_checked_are_named() {
     assert!(words.contains("3 of the lines and arcs start where the text alone does not tell"), "{text}");
     assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
 }
+
+#[test]
+fn a_motion_that_is_right_already_is_left_for_that_reason() {
+    let dir = workshop();
+    let at = dir.path();
+    // An arm that is not off at all.
+    fs::write(at.join("a.mod"), module("A", 3, 0.0)).unwrap();
+    let model = fs::read_to_string(at.join("model.toml")).unwrap();
+    let mut exact = Estimated::from_toml(&model).unwrap();
+    exact.model = exact.nominal.clone();
+    // Measured everywhere.
+    (exact.region.min_deg, exact.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    (exact.region.spacing_deg, exact.region.sigma_mm) = (1e6, 1e3);
+    fs::write(at.join("exact.toml"), exact.to_toml().unwrap()).unwrap();
+    let (code, text, err) =
+        truegrind(at, &["compensate", "a.mod", "--model", "exact.toml", "--dry-run", "--json"]);
+    assert!(code == 0 || code == 1, "{err}");
+    let motions = json(&text)["programs"][0]["motions"].as_array().unwrap().clone();
+    assert_eq!(motions.len(), 3);
+    for motion in &motions {
+        assert_eq!(motion["status"], "left", "{motion}");
+        assert_eq!(motion["reason"], "its numbers are right to the last decimal that is written", "{motion}");
+    }
+}

@@ -126,6 +126,14 @@ impl Users {
     }
 }
 
+/// The name of an argument, `Name :=`, right before its value.
+fn named_before(source: &[u8], value: usize) -> Option<std::ops::Range<usize>> {
+    let assign = source[..value].trim_ascii_end().strip_suffix(b":=")?.trim_ascii_end();
+    let letters =
+        assign.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
+    (letters > 0).then_some(assign.len() - letters..assign.len())
+}
+
 struct Rewriter<'r, 's> {
     task: &'r Task<'s>,
     options: &'r RewriteOptions,
@@ -334,8 +342,12 @@ impl<'r, 's> Rewriter<'r, 's> {
             return;
         };
         let start = motion.statement.start as usize;
-        self.edits[motion.place.file as usize]
-            .replace(start..start + motion.instruction.len(), name.as_bytes());
+        let source = self.task.trees[motion.place.file as usize].source();
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace(start..start + motion.instruction.len(), name.as_bytes());
+        if let Some(argument) = named_before(source, span.start as usize) {
+            edits.replace(argument, b"ToJointPos");
+        }
         self.inline(motion, span, old, fresh);
     }
 

@@ -172,6 +172,34 @@ fn a_linear_motion_can_be_told_in_joints() {
 }
 
 #[test]
+fn a_named_argument_takes_its_name_in_the_joint_form() {
+    let line = |name: &str, value: &str| format!("  {name} := {value},v100,z5,tool0;\n");
+    let value = "[[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let joints = NewTarget::Joint { robot_deg: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+    let (text, rewritten) = rewrite(&module("", &line("MoveJ ToPoint", value)), &[change(0, joints)]);
+    assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
+    let told =
+        "[[1.000000,2.000000,3.000000,4.000000,5.000000,6.000000],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]";
+    assert_eq!(text, module("", &line("MoveAbsJ ToJointPos", told)));
+}
+
+#[test]
+fn instructions_that_set_a_signal_have_no_joint_form() {
+    for name in ["MoveLDO", "MoveJDO", "MoveLAO", "MoveJAO", "MoveLGO", "MoveJGO"] {
+        let signal = if name.ends_with("GO") { "go1\\Value:=1" } else { "do1,1" };
+        let target = format!("[[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}]");
+        let source = module("", &format!("  {name} {target},v100,z5,tool0,{signal};\n"));
+        let joints = NewTarget::Joint { robot_deg: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+        let (text, rewritten) = rewrite(&source, &[change(0, joints)]);
+        assert_eq!(
+            (rewritten.outcomes, text),
+            (vec![Outcome::Refused(Reason::NoJointForm)], source),
+            "{name}"
+        );
+    }
+}
+
+#[test]
 fn extra_motions_take_over_speed_tool_and_process() {
     let extra = Extra { kind: MotionKind::Linear, target: at(450.0, 0.0, 300.0), external: None };
     let cases = [

@@ -103,7 +103,7 @@ impl<'s> Lister<'_, 's> {
                     .get(2)
                     .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
                     .unwrap_or_default();
-                self.cycle_definition(said, first, &number, &words[2..]);
+                self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
             }
             b"PLANE" => self.turn(Group::Swivel, second != b"RESET"),
             b"FUNCTION" if second == b"TCPM" => {

@@ -371,3 +371,24 @@ fn what_is_left_goes_where_it_always_went() {
     assert!(String::from_utf8_lossy(&text).contains("A180.12346 "), "{}", String::from_utf8_lossy(&text));
     assert_eq!(Reason::BeforeLeftArc.text(), "an arc that stays as it is starts where this ends");
 }
+
+#[test]
+fn a_cycle_whose_line_breaks_off_is_no_panic() {
+    for line in [
+        "CYCL",
+        "CYCL DEF",
+        "CYCL CALL",
+        "TOOL",
+        "TOOL CALL",
+        "TOOL DEF",
+        "PLANE",
+        "FUNCTION",
+        "TRANS",
+        "TRANS DATUM",
+    ] {
+        let source = format!("BEGIN PGM P MM\n{line}\nL X+1 Y+2 Z+3\nEND PGM P MM\n");
+        let setup = Setup { dialect: Some(Dialect::Heidenhain), ..Setup::default() };
+        let task = Task::read(&[("p.h", source.as_bytes())], &setup);
+        assert!(task.listing.motions.iter().all(|motion| motion.reason().is_some()), "{line}");
+    }
+}
