@@ -3,6 +3,7 @@
 //! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
+//! - [`untouched`]: the plan that changes nothing, for the nominal arm.
 //! - [`curve`]: the way from target to target as the controller interpolates it; [`corner`]: how it rounds a point.
 //! - [`verify`]: runs a program on an arm; [`precision`]: what single precision makes of its numbers.
 //! - [`deviation`]: the points of a path and how far an arm is off at each, before and after.
@@ -13,6 +14,7 @@ pub mod mounting;
 pub mod payload;
 pub mod why;
 pub mod rewrite;
+pub mod untouched;
 mod circumstance;
 mod course;
 mod solve;

@@ -12,10 +12,12 @@ use truegrind::compensation::deviation::{After, PathReport, Status};
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::precision::single_precision;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan, plan};
+use truegrind::compensation::untouched::untouched;
+use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::diff::unified;
-use truegrind::program::motion::Mark;
+use truegrind::program::motion::{Mark, Reason};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::{Language, Program};
 use truegrind::program::rewrite::{Outcome, RewriteOptions};
@@ -26,7 +28,7 @@ use truegrind::surface::SurfaceFile;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::outputs::{Outputs, say};
-use super::programs::{self, Job, Programs};
+use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
 use super::{Common, Ending, inputs, on_threads};
 
@@ -109,9 +111,8 @@ pub(super) struct Arguments {
     /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
-    /// Every module is a program of its own, not one task together with the others.
-    #[arg(long)]
-    each: bool,
+    #[command(flatten)]
+    grouping: Grouping,
     /// An estimated arm, or the word `nominal`, with which no byte changes.
     #[arg(long)]
     model: String,
@@ -159,15 +160,22 @@ pub(super) struct Arguments {
 /// What all programs of a run share.
 struct Shop<'a> {
     arguments: &'a Arguments,
-    hash: &'a str,
-    model: &'a str,
-    arm: &'a Estimated,
+    /// What is corrected for; absent where the model is nominal: everything is listed, and no byte changes.
+    corrector: Option<Corrector<'a>>,
     cell: Cell,
     surface: Option<SurfaceFile>,
     setup: Setup,
     options: Options,
     /// Whether the process ends with this program.
     ends: bool,
+}
+
+/// The estimated arm, as it was named.
+#[derive(Clone, Copy)]
+struct Corrector<'a> {
+    hash: &'a str,
+    model: &'a str,
+    arm: &'a Estimated,
 }
 
 /// A program, rewritten.
@@ -182,6 +190,8 @@ struct Done {
     clean: bool,
     /// Whether any byte changes.
     changed: bool,
+    /// Motions that are left because what they use is declared in none of the files.
+    undeclared: usize,
     /// Entries of the contract.
     json: Vec<serde_json::Value>,
 }
@@ -191,7 +201,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if !dry && arguments.output.is_none() {
         bail!("-o OUT is missing: a file for one program, a folder for several (or --dry-run)");
     }
-    let jobs = programs::jobs(&arguments.programs, arguments.each)?;
+    let jobs = programs::jobs(&arguments.programs, arguments.grouping)?;
     refuse_one_place_for_two(&jobs)?;
     let mut checked: Vec<&Path> = arguments.outputs.files();
     checked.extend(arguments.diff.as_deref());
@@ -207,11 +217,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let model = inputs::model(&arguments.model)?;
     refuse_compensating_controller(arguments.robot.as_deref())?;
     let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
-    let NamedModel::Estimated { hash, arm, name, .. } = &model else {
-        return unchanged(arguments, &jobs);
+    let corrector = match &model {
+        NamedModel::Nominal => None,
+        NamedModel::Estimated { hash, arm, name } => {
+            debug_assert_eq!(nominal, arm.nominal);
+            Some(Corrector { hash, model: name, arm })
+        }
     };
-    debug_assert_eq!(nominal, arm.nominal);
-    let (cell, surface, condition) = arguments.cell.read(Some(arm.as_ref()))?;
+    if corrector.is_none() && arguments.outputs.rrd.is_some() {
+        bail!("--rrd: the nominal arm has no deviation to show: give an estimated arm");
+    }
+    let (cell, surface, condition) = arguments.cell.read(corrector.map(|c| c.arm))?;
     let options = Options {
         emit: match arguments.emit {
             EmitArgument::Targets => Emit::Targets,
@@ -229,8 +245,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ..Options::default()
     };
     let setup = programs::setup(&cell, arguments.robot.as_deref().or(Some(robot.as_str())));
-    let ends = matches!(jobs.as_slice(), [job] if job.under.is_none());
-    let shop = Shop { arguments, hash, model: name, arm, cell, surface, setup, options, ends };
+    let ends = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
+    let shop = Shop { arguments, corrector, cell, surface, setup, options, ends };
+    if corrector.is_none() {
+        let text = "model nominal: nothing to correct, every byte stays\n";
+        if arguments.outputs.takes_stdout() || arguments.output.as_deref() == Some(Path::new("-")) {
+            eprint!("{text}");
+        } else {
+            say(text)?;
+        }
+    }
     match jobs.as_slice() {
         [job] if ends => one(&shop, job),
         jobs => many(&shop, jobs),
@@ -257,12 +281,12 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         summary = Some(view::summary(planned, listing, files));
         let report = PathReport {
             program: programs.name(),
-            model: shop.model.to_owned(),
+            model: shop.corrector.map_or("nominal", |c| c.model).to_owned(),
             after: After::PredictedRemainder,
             points: std::mem::take(&mut planned.points),
-            held_out_mm: Some(shop.arm.geometry.held_out.rmse),
+            held_out_mm: shop.corrector.map(|c| c.arm.geometry.held_out.rmse),
         };
-        let reports = std::slice::from_ref(&report);
+        let reports = if shop.corrector.is_some() { std::slice::from_ref(&report) } else { &[] };
         outputs.add_made(
             &mut batch,
             || view::document(planned, listing, files, reports),
@@ -270,10 +294,10 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
             || view::json(planned, listing, files),
         )?;
         #[cfg(feature = "visual")]
-        if let Some(path) = &outputs.rrd {
+        if let (Some(path), Some(corrector)) = (&outputs.rrd, shop.corrector) {
             let bytes = super::view::path(
                 &report.program,
-                &shop.arm.model,
+                &corrector.arm.model,
                 "estimated arm",
                 shop.options.condition,
                 reports,
@@ -297,15 +321,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     if let Some(path) = &arguments.diff {
         batch.add(path, done.diff);
     }
-    for (path, bytes) in done.written {
-        batch.add(path, bytes);
-    }
-    if programs.files.len() > 1
-        && !(arguments.dry_run || arguments.check)
-        && let Some(folder) = &arguments.output
-    {
-        files::make_folder(folder)?;
-    }
+    add_made(&mut batch, done.written, programs.files.len() > 1)?;
     batch.write()?;
     if let Some(summary) = &summary {
         outputs.print_beside(summary, arguments.output.as_deref() == Some(Path::new("-")))?;
@@ -344,6 +360,13 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
             eprintln!("note: {}: {note}", done.row.file);
         }
     }
+    let undeclared: usize = done.iter().map(|done| done.undeclared).sum();
+    if undeclared > 0 && jobs.iter().any(|job| job.under.is_some() && job.paths.len() == 1) {
+        eprintln!(
+            "note: {undeclared} motions use tools, work objects or targets that their own file does not declare: where the \
+             modules of a folder run together, --together reads them as one task"
+        );
+    }
     let clean = done.iter().all(|done| done.clean);
     let changed = done.iter().any(|done| done.changed);
     let (mut rows, mut programs, mut diff) = (Vec::new(), Vec::new(), Vec::new());
@@ -371,14 +394,14 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
 }
 
 fn failed(job: &Job, error: &str) -> Done {
-    let file = job.paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
     Done {
-        row: Row::without(file, Ended::Failed, Some(error.to_owned())),
+        row: Row::without(job.name(), Ended::Failed, Some(error.to_owned())),
         written: Vec::new(),
         diff: Vec::new(),
         notes: Vec::new(),
         clean: false,
         changed: false,
+        undeclared: 0,
         json: Vec::new(),
     }
 }
@@ -399,15 +422,24 @@ fn file_to_file(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Done> {
     };
     let mut done = rewritten(shop, &programs, &targets, || (), &mut report)?;
     done.json = entries;
+    if job.under.is_some() && job.paths.len() > 1 {
+        done.row.file = job.name();
+    }
     let mut batch = Batch::sparing(programs.files.iter().map(|(path, _)| path));
-    for (path, bytes) in std::mem::take(&mut done.written) {
-        if let Some(folder) = path.parent() {
+    add_made(&mut batch, std::mem::take(&mut done.written), true)?;
+    batch.write()?;
+    Ok(done)
+}
+
+/// Adds the programs that were rewritten; `folders`: theirs are made where they are not there yet.
+fn add_made(batch: &mut Batch, written: Vec<(PathBuf, Vec<u8>)>, folders: bool) -> anyhow::Result<()> {
+    for (path, bytes) in written {
+        if folders && let Some(folder) = path.parent() {
             files::make_folder(folder)?;
         }
         batch.add(path, bytes);
     }
-    batch.write()?;
-    Ok(done)
+    Ok(())
 }
 
 type Report<'r> = &'r mut dyn FnMut(&mut Plan, &Program<'_>, &[ProgramFile]) -> anyhow::Result<()>;
@@ -423,7 +455,7 @@ fn rewritten(
     let program = programs.task(&shop.setup);
     let listing = program.listing();
     let known = programs.files.iter().any(|(path, _)| Language::by_name(&files::name(path)).is_some());
-    if listing.motions.is_empty() && !known {
+    if listing.motions.is_empty() && !known && shop.corrector.is_some() {
         bail!(
             "{}: no motion was found, and the ending of the name says nothing: expected RAPID (.mod, .prg, .sys, .pgf) or NC \
              code (.nc, .mpf, .h and the like)",
@@ -447,6 +479,7 @@ fn rewritten(
         notes,
         clean: false,
         changed: false,
+        undeclared: 0,
         json: Vec::new(),
     };
     let marked = already(shop, &program, programs, &mut notes)?;
@@ -454,14 +487,19 @@ fn rewritten(
         return Ok(nothing_left(notes));
     }
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
-    let mut planned = plan(listing, shop.arm, &shop.cell, &options);
+    let mut planned = match shop.corrector {
+        Some(corrector) => plan(listing, corrector.arm, &shop.cell, &options),
+        None => untouched(listing, &options),
+    };
     if program.language() == Language::Rapid
         && let Some(off) = single_precision(&planned.changes)
     {
         planned.notes.push(off.text());
     }
     let rewrite = RewriteOptions {
-        mark: Some(Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: shop.hash.to_owned() }),
+        mark: shop
+            .corrector
+            .map(|c| Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: c.hash.to_owned() }),
         ..RewriteOptions::default()
     };
     let rewritten = program.rewrite(&planned.changes, &rewrite)?;
@@ -483,11 +521,11 @@ fn rewritten(
         match outcome {
             Outcome::Unchanged if row.status == Status::Changed => {
                 row.status = Status::Left;
-                row.reason = Some(truegrind::compensation::why::Why::Same);
+                row.reason = Some(Why::Same);
             }
             Outcome::Refused(reason) => {
                 row.status = Status::Refused;
-                row.reason = Some(truegrind::compensation::why::Why::Program(*reason));
+                row.reason = Some(Why::Program(*reason));
                 row.after_mm = row.before_mm;
             }
             _ => {}
@@ -523,8 +561,11 @@ fn rewritten(
     let output = targets.iter().flatten().map(|t| t.display().to_string()).collect::<Vec<_>>().join(", ");
     let output = Some(output).filter(|output| !output.is_empty());
     let row = Row::of(names.join(", "), output, ended, &planned, listing.opaque.len());
+    let undeclared = [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(Why::Program);
+    let undeclared =
+        planned.outcomes.iter().filter(|o| o.reason.is_some_and(|why| undeclared.contains(&why))).count();
     // Nothing but what cannot be read: nobody has looked at a motion.
-    let unread = listing.motions.is_empty() && !listing.opaque.is_empty();
+    let unread = listing.motions.is_empty() && !listing.opaque.is_empty() && shop.corrector.is_some();
     let clean =
         !unread && planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));
     report(&mut planned, &program, &files)?;
@@ -532,7 +573,7 @@ fn rewritten(
         // To take a million pieces apart just before all memory goes back takes a tenth of the time of the whole.
         std::mem::forget((program, planned, rewritten));
     }
-    Ok(Done { row, written, diff, notes, clean, changed, json: Vec::new() })
+    Ok(Done { row, written, diff, notes, clean, changed, undeclared, json: Vec::new() })
 }
 
 /// Where each file of a program goes.
@@ -605,9 +646,10 @@ fn already(
     notes: &mut Vec<String>,
 ) -> anyhow::Result<Vec<bool>> {
     let mut marked = vec![false; programs.files.len()];
+    let Some(corrector) = shop.corrector else { return Ok(marked) };
     for (index, (mark, (path, _))) in program.listing().marks.iter().zip(&programs.files).enumerate() {
         let Some(mark) = mark else { continue };
-        if mark.model == shop.hash {
+        if mark.model == corrector.hash {
             marked[index] = true;
             continue;
         }
@@ -626,26 +668,6 @@ fn already(
         ));
     }
     Ok(marked)
-}
-
-/// The model `nominal`: the same bytes.
-fn unchanged(arguments: &Arguments, jobs: &[Job]) -> anyhow::Result<Ending> {
-    let several = jobs.len() > 1 || jobs.iter().any(|job| job.under.is_some());
-    for job in jobs {
-        let programs = Programs::read(&job.paths)?;
-        let mut batch = Batch::sparing(programs.files.iter().map(|(p, _)| p));
-        let targets = outputs_of(arguments, job, &programs, several)?;
-        for ((_, bytes), target) in programs.files.iter().zip(targets) {
-            let Some(target) = target else { continue };
-            if several && let Some(folder) = target.parent() {
-                files::make_folder(folder)?;
-            }
-            batch.add(target, bytes.clone());
-        }
-        batch.write()?;
-    }
-    say("model nominal: nothing to correct, every byte stays\n")?;
-    Ok(Ending::Done)
 }
 
 /// Deviations along the normal of the surface that is ground.

@@ -21,7 +21,7 @@ use super::compensate::CellArguments;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
-use super::programs::{self, Job, Programs};
+use super::programs::{self, Grouping, Job, Programs};
 use super::{Common, Ending, inputs, on_threads};
 
 /// Arguments of `deviation`.
@@ -30,6 +30,8 @@ pub(super) struct Arguments {
     /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
     programs: Vec<PathBuf>,
+    #[command(flatten)]
+    grouping: Grouping,
     /// Estimated arms; one row each. With --actual the word `nominal` is enough.
     #[arg(long, required = true, num_args = 1..)]
     model: Vec<String>,
@@ -62,7 +64,7 @@ struct Runner {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let jobs = programs::jobs(&arguments.programs, false)?;
+    let jobs = programs::jobs(&arguments.programs, arguments.grouping)?;
     let several = jobs.len() > 1;
     if several && !arguments.intended.is_empty() {
         bail!("--intended states what one program meant: name one program, not {}", jobs.len());
@@ -99,8 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             // A bad one among many is listed, and the others go on.
             Err(error) if several => {
                 failed += 1;
-                let paths: Vec<String> = job.paths.iter().map(|path| path.display().to_string()).collect();
-                eprintln!("failed: {}: {error:#}", paths.join(", "));
+                eprintln!("failed: {}: {error:#}", job.name());
             }
             Err(error) => return Err(error),
         }
@@ -148,8 +149,8 @@ impl Shop<'_> {
         let original = self.originals.map(|original| original.task(self.setup));
         let name = match &job.under {
             // Below a folder the same name may be there more than once.
-            Some(under) => job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string(),
-            None => programs.name(),
+            Some(under) if job.paths.len() == 1 => job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string(),
+            _ => programs.name(),
         };
         // The first program is the one that states what was meant.
         let cell = self.arguments;

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::outputs::say;
+use pending::Pending;
+
+mod pending;
 
 /// The bytes of a file.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
@@ -58,8 +61,8 @@ pub(super) fn name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Files to be written together: collected first, then each written to a temporary file beside its place, synced,
-/// and only when all are on disk renamed into place.
+/// Files to be written together: collected first, then each written to the disk beside its place, synced, and only when
+/// all are there put in place.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     files: Vec<(PathBuf, Vec<u8>)>,
@@ -114,19 +117,12 @@ impl Batch {
             }
             let folder = parent(&path);
             let failed = || format!("{}: cannot be written; nothing was changed", path.display());
-            let mut file = tempfile::NamedTempFile::new_in(&folder).with_context(failed)?;
-            file.write_all(bytes).with_context(failed)?;
-            file.as_file().sync_all().with_context(failed)?;
-            ready.push((file, path));
+            ready.push(Pending::write(path.clone(), &folder, bytes).with_context(failed)?);
         }
-        for (file, path) in ready {
-            #[cfg(unix)]
-            {
-                use std::os::unix::fs::PermissionsExt;
-                let mode = fs::metadata(&path).map_or(0o644, |m| m.permissions().mode());
-                let _ = file.as_file().set_permissions(fs::Permissions::from_mode(mode));
-            }
-            file.persist(&path).with_context(|| format!("{}: cannot be put in place", path.display()))?;
+        for file in ready {
+            let place = file.place().to_path_buf();
+            file.put(permissions(&place))
+                .with_context(|| format!("{}: cannot be put in place", place.display()))?;
         }
         for (path, bytes) in streams {
             let written =
@@ -140,6 +136,19 @@ impl Batch {
         }
         Ok(())
     }
+}
+
+/// What the file shall allow: what the one in its place allows.
+#[cfg(unix)]
+fn permissions(place: &Path) -> Option<fs::Permissions> {
+    use std::os::unix::fs::PermissionsExt;
+    let mode = fs::metadata(place).map_or(0o644, |meta| meta.permissions().mode());
+    Some(fs::Permissions::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn permissions(_: &Path) -> Option<fs::Permissions> {
+    None
 }
 
 /// The file that a link names; any other path as it is.

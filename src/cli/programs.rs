@@ -1,9 +1,10 @@
 //! Programs as the command line names them: modules of one task, task lists, NC files, folders.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, bail};
+use clap::Args;
 use truegrind::compensation::cell::{Cell, CellFrame};
 use truegrind::program::motion::Frame;
 use truegrind::program::nc::orientation::Angles;
@@ -21,6 +22,17 @@ pub(super) struct Programs {
     pub(super) files: Vec<(PathBuf, Vec<u8>)>,
 }
 
+/// Which modules are read as one task.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct Grouping {
+    /// Every module is a program of its own, not one task together with the others that are named.
+    #[arg(long, conflicts_with = "together")]
+    each: bool,
+    /// All RAPID modules below a folder are one task, as in a controller's backup; without it each is a program of its own.
+    #[arg(long)]
+    together: bool,
+}
+
 /// Where the files of one task are, before they are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Job {
@@ -31,46 +43,84 @@ pub(super) struct Job {
 }
 
 impl Job {
+    /// Its files, or the folder where it is one task.
+    pub(super) fn name(&self) -> String {
+        match &self.under {
+            Some(under) if self.paths.len() > 1 => under.display().to_string(),
+            _ => self.paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "),
+        }
+    }
+
     /// Its files; a task list stands for those that it names.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        let list = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgf"));
         let mut out = Vec::new();
         for path in &self.paths {
-            match list(path).then(|| files::read(path)) {
-                Some(Ok(bytes)) => {
-                    out.extend(task_list::modules(&bytes).iter().map(|module| inputs::beside(path, module)));
-                }
+            match is_list(path).then(|| files::read(path)) {
+                Some(Ok(bytes)) => out.extend(listed(path, &bytes)),
                 _ => out.push(path.clone()),
             }
         }
         out
     }
 
-    /// Where a file goes in the folder of outputs: below a folder that was named everything keeps its place.
+    /// Where a file goes in the folder of outputs: below a folder that was named, or beside a task list, everything keeps
+    /// its place.
     pub(super) fn place(&self, path: &Path) -> PathBuf {
-        match &self.under {
-            Some(under) => {
-                path.strip_prefix(under).map_or_else(|_| files::name(path).into(), Path::to_path_buf)
-            }
-            None => PathBuf::from(files::name(path)),
-        }
+        let beside_list = || self.paths.iter().filter(|path| is_list(path)).filter_map(|list| list.parent());
+        let below = self.under.as_deref().into_iter().chain(beside_list());
+        let place = below.filter_map(|under| path.strip_prefix(under).ok()).find(|place| {
+            place.components().all(|part| matches!(part, Component::Normal(_)))
+        });
+        place.map_or_else(|| files::name(path).into(), Path::to_path_buf)
     }
+}
+
+/// Whether a file is a task list.
+fn is_list(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pgf"))
+}
+
+/// The modules of a task list, where they are.
+fn listed(list: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    task_list::modules(bytes).iter().map(|module| on_disk(folder, module)).collect()
+}
+
+/// A file that a controller's list names: its paths have backslashes, and it takes no notice of case. Where there is no
+/// such file, the name as it was written.
+fn on_disk(folder: &Path, name: &str) -> PathBuf {
+    let literal = folder.join(name);
+    if literal.exists() {
+        return literal;
+    }
+    let mut place = folder.to_path_buf();
+    for part in name.split(['\\', '/']).filter(|part| !part.is_empty() && *part != ".") {
+        let next = place.join(part);
+        let open = if place.as_os_str().is_empty() { Path::new(".") } else { place.as_path() };
+        let alike = || {
+            let entries = std::fs::read_dir(open).ok()?;
+            let mut names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+            let same = names.find(|name| name.to_lowercase() == part.to_lowercase())?;
+            Some(place.join(same))
+        };
+        place = if next.exists() { next } else { alike().unwrap_or(next) };
+    }
+    if place.is_file() { place } else { literal }
 }
 
 /// The tasks that the command line names. RAPID modules named one by one are one task, unless each shall be its own; a
 /// task list, an NC file and every program of a folder is a task of its own.
-pub(super) fn jobs(paths: &[PathBuf], each: bool) -> anyhow::Result<Vec<Job>> {
+pub(super) fn jobs(paths: &[PathBuf], Grouping { each, together: as_one }: Grouping) -> anyhow::Result<Vec<Job>> {
     let mut jobs = Vec::new();
     let mut together = Vec::new();
     for path in paths {
         if path.is_dir() {
-            in_folder(path, &mut jobs)?;
+            in_folder(path, as_one, &mut jobs)?;
             continue;
         }
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         let name = files::name(path);
         let alone = each
-            || ending.as_deref() == Some("pgf")
+            || is_list(path)
             || Language::by_name(&name).unwrap_or_else(|| {
                 // An ending that says nothing: the file itself does.
                 Language::of(&name, &files::read(path).unwrap_or_default())
@@ -92,8 +142,9 @@ pub(super) fn jobs(paths: &[PathBuf], each: bool) -> anyhow::Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// Every program below a folder, in the order of names. What a task list names is not taken again on its own.
-fn in_folder(folder: &Path, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
+/// Every program below a folder, in the order of names. What a task list names is not taken again on its own; `as_one`:
+/// all RAPID modules are one task, and lists say nothing new.
+fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_path_buf()];
     while let Some(next) = open.pop() {
@@ -102,30 +153,37 @@ fn in_folder(folder: &Path, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
         for entry in entries {
             let entry = entry.with_context(|| format!("{}: cannot be read", next.display()))?;
             let (path, kind) = (entry.path(), entry.file_type());
-            // Links are not followed: they could lead round in a circle.
-            match kind {
-                Ok(kind) if kind.is_dir() => open.push(path),
-                Ok(kind) if kind.is_file() && Language::by_name(&files::name(&path)).is_some() => {
-                    found.push(path)
-                }
-                _ => {}
+            let Ok(kind) = kind else { continue };
+            // Links to folders are not followed: they could lead round in a circle.
+            if kind.is_dir() {
+                open.push(path);
+            } else if path.is_file() && Language::by_name(&files::name(&path)).is_some() {
+                found.push(path);
+            } else if kind.is_symlink() && path.is_dir() {
+                eprintln!("note: {}: a link to a folder is not followed; name the folder", path.display());
             }
         }
     }
     found.sort();
-    let mut listed: BTreeSet<PathBuf> = BTreeSet::new();
-    for path in &found {
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pgf"))
-            && let Ok(bytes) = files::read(path)
-        {
-            listed.extend(task_list::modules(&bytes).iter().map(|module| inputs::beside(path, module)));
-        }
-    }
     let under = Some(folder.to_path_buf());
+    if as_one {
+        let (modules, others): (Vec<_>, Vec<_>) = found
+            .into_iter()
+            .filter(|path| !is_list(path))
+            .partition(|path| Language::by_name(&files::name(path)) == Some(Language::Rapid));
+        if !modules.is_empty() {
+            jobs.push(Job { paths: modules, under: under.clone() });
+        }
+        found = others;
+    }
+    let mut listed_there: BTreeSet<PathBuf> = BTreeSet::new();
+    for path in found.iter().filter(|path| is_list(path)) {
+        listed_there.extend(files::read(path).iter().flat_map(|bytes| listed(path, bytes)));
+    }
     jobs.extend(
         found
             .into_iter()
-            .filter(|path| !listed.contains(path))
+            .filter(|path| !listed_there.contains(path))
             .map(|path| Job { paths: vec![path], under: under.clone() }),
     );
     Ok(())
@@ -137,10 +195,10 @@ impl Programs {
         let mut files = Vec::new();
         for path in paths {
             let bytes = files::read(path)?;
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgf")) {
-                for module in task_list::modules(&bytes) {
-                    let place = inputs::beside(path, &module);
-                    files.push((place.clone(), files::read(&place)?));
+            if is_list(path) {
+                for place in listed(path, &bytes) {
+                    let module = files::read(&place).with_context(|| format!("named in {}", path.display()))?;
+                    files.push((place, module));
                 }
             } else {
                 files.push((path.clone(), bytes));

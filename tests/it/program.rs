@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod tree;
+mod grammar;
 mod samples;
 mod rewriting;
 mod evaluation;

@@ -229,6 +229,128 @@ fn a_folder_is_done_in_parallel_past_what_cannot_be_done() {
     assert!(err.contains("failed: in/f.pgf") && err.contains("failed: in/g.nc"), "{err}");
 }
 
+/// Motions by line: status and reason.
+fn motions(contract: &serde_json::Value, program: usize) -> Vec<(u64, String, String)> {
+    let motions = contract["programs"][program]["motions"].as_array().unwrap();
+    let text = |value: &serde_json::Value| value.as_str().unwrap_or("-").to_owned();
+    motions.iter().map(|m| (m["line"].as_u64().unwrap(), text(&m["status"]), text(&m["reason"]))).collect()
+}
+
+#[test]
+fn modules_of_a_folder_are_one_task_when_asked() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("backup/SYSMOD")).unwrap();
+    fs::create_dir_all(at.join("backup/PROGMOD")).unwrap();
+    let data = "MODULE Data(SYSMODULE)\n  PERS tooldata tWheel:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];\n\
+                ENDMODULE\n";
+    fs::write(at.join("backup/SYSMOD/Data.sys"), data).unwrap();
+    let work = module("Work", 5, 0.0).replace(",450]", ",350]").replace("tool0", "tWheel");
+    fs::write(at.join("backup/PROGMOD/Work.mod"), &work).unwrap();
+    let run = |more: &[&str]| {
+        let arguments = ["compensate", "backup", "--model", "model.toml", "--json", "all.json"];
+        truegrind(at, &[&arguments, more].concat())
+    };
+    let contract = || json(&fs::read_to_string(at.join("all.json")).unwrap());
+    // Each by itself: the tool is not there, and the way out is named.
+    let (code, text, err) = run(&["-o", "alone"]);
+    assert_eq!(code, 0, "{text}\n{err}");
+    assert!(err.contains("5 motions") && err.contains("--together"), "{err}");
+    assert_eq!(fs::read_to_string(at.join("alone/PROGMOD/Work.mod")).unwrap(), work);
+    // Together they are one task; every file keeps its place.
+    let (code, text, err) = run(&["-o", "out", "--together"]);
+    assert!(code == 0 || code == 1, "{text}\n{err}");
+    assert!(!err.contains("--together"), "{err}");
+    let found = motions(&contract(), 0);
+    assert_eq!(found.len(), 5);
+    assert!(found.iter().all(|(_, status, _)| status == "changed" || status == "flagged"), "{found:?}");
+    assert_eq!(fs::read_to_string(at.join("out/SYSMOD/Data.sys")).unwrap(), data);
+    assert_ne!(fs::read_to_string(at.join("out/PROGMOD/Work.mod")).unwrap(), work);
+    // A task list as a Windows controller writes it says the same.
+    let list = "<Program>\n<Module>progmod\\WORK.mod</Module><Module>SYSMOD\\Data.sys</Module></Program>";
+    fs::write(at.join("backup/task.pgf"), list).unwrap();
+    let (code, text, err) =
+        truegrind(at, &["compensate", "backup/task.pgf", "--model", "model.toml", "-o", "listed"]);
+    assert!(code == 0 || code == 1, "{text}\n{err}");
+    for file in ["PROGMOD/Work.mod", "SYSMOD/Data.sys"] {
+        let [a, b] = ["out", "listed"].map(|out| fs::read(at.join(out).join(file)).unwrap());
+        assert_eq!(a, b, "{file}");
+    }
+    // In a folder the list stands for its modules, and with --together nothing is taken twice.
+    let (_, text, err) = run(&["-o", "again"]);
+    assert!(text.contains("1 program") && !err.contains("--together"), "{text}\n{err}");
+    let (_, _, err) = run(&["-o", "whole", "--together"]);
+    assert_eq!(fs::read(at.join("whole/PROGMOD/Work.mod")).unwrap(), fs::read(at.join("out/PROGMOD/Work.mod")).unwrap(), "{err}");
+    let (code, text, err) = truegrind(
+        at,
+        &["deviation", "backup", "--together", "--model", "model.toml", "--csv", "points.csv"],
+    );
+    assert_eq!(code, 0, "{text}\n{err}");
+    assert_eq!(fs::read_to_string(at.join("points.csv")).unwrap().lines().count(), 6);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_to_files_of_a_folder_are_programs_too() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in")).unwrap();
+    fs::write(at.join("real.mod"), module("A", 2, 0.0)).unwrap();
+    std::os::unix::fs::symlink("../real.mod", at.join("in/a.mod")).unwrap();
+    std::os::unix::fs::symlink("..", at.join("in/up")).unwrap();
+    let (code, _, err) = truegrind(at, &["compensate", "in", "--model", "model.toml", "-o", "out"]);
+    assert!(code == 0 || code == 1, "{err}");
+    assert!(err.contains("in/up: a link to a folder is not followed"), "{err}");
+    assert!(fs::read_to_string(at.join("out/a.mod")).unwrap().contains("truegrind"));
+    assert_eq!(fs::read_to_string(at.join("real.mod")).unwrap(), module("A", 2, 0.0));
+}
+
+#[test]
+fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in")).unwrap();
+    let text = "MODULE A\r\n  VAR robtarget here;\r\n  PROC main()\r\n    MoveL [[350,0,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\r\n    \
+                here:=CRobT();\r\n    MoveL here,v100,z1,tool0;\r\n    MoveL [[350,0,450],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tMine;\r\n    \
+                MoveAbsJ [[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\r\n  ENDPROC\r\nENDMODULE";
+    fs::write(at.join("in/a.mod"), text).unwrap();
+    fs::write(at.join("in/b.pgf"), "<Program><Module>nowhere.mod</Module></Program>").unwrap();
+    fs::write(at.join("in/c.mod"), module("C", 2, 0.0)).unwrap();
+    let nominal = ["--model", "nominal", "--robot", "abb-irb-120"];
+    let one = ["compensate", "in/a.mod", "-o", "a.mod", "--json", "a.json", "--html", "a.html", "--diff", "a.diff"];
+    let (code, out, err) = truegrind(at, &[&one, &nominal[..]].concat());
+    assert_eq!(code, 0, "{out}\n{err}");
+    assert_eq!(fs::read_to_string(at.join("a.mod")).unwrap(), text);
+    assert_eq!(fs::read_to_string(at.join("a.diff")).unwrap(), "");
+    let found = motions(&json(&fs::read_to_string(at.join("a.json")).unwrap()), 0);
+    let lines: Vec<u64> = found.iter().map(|(line, ..)| *line).collect();
+    assert_eq!(lines, [4, 6, 7, 8]);
+    assert!(found.iter().all(|(_, status, _)| status == "left"), "{found:?}");
+    let says = [
+        "its numbers are right to the last decimal",
+        "known only at run time",
+        "declared in none of the given files",
+        "joint target",
+    ];
+    // The reasons are those that an estimated arm gives, but for what it corrects.
+    let (_, _, err) = truegrind(at, &["compensate", "in/a.mod", "--model", "model.toml", "--dry-run", "--json", "real.json"]);
+    let real = motions(&json(&fs::read_to_string(at.join("real.json")).expect(&err)), 0);
+    for (((_, _, reason), (_, status, why)), says) in found.iter().zip(&real).zip(says) {
+        assert!(reason.contains(says), "{reason}: {says}");
+        assert!(status != "left" || reason == why, "{reason}: {why}");
+    }
+    // A bad one among many does not keep the others from being written.
+    let many = ["compensate", "in", "-o", "out", "--csv", "rows.csv"];
+    let (code, out, err) = truegrind(at, &[&many, &nominal[..]].concat());
+    assert_eq!(code, 1, "{out}\n{err}");
+    assert!(out.contains("nowhere.mod") && out.contains("1 failed"), "{out}");
+    for file in ["a.mod", "c.mod"] {
+        let [a, b] = ["in", "out"].map(|folder| fs::read(at.join(folder).join(file)).unwrap());
+        assert_eq!(a, b, "{file}");
+    }
+    assert_eq!(fs::read_to_string(at.join("rows.csv")).unwrap().lines().count(), 4);
+}
+
 #[test]
 fn dry_run_check_and_diff_write_no_program() {
     let dir = workshop();
