@@ -149,7 +149,9 @@ impl Shop<'_> {
         let original = self.originals.map(|original| original.task(self.setup));
         let name = match &job.under {
             // Below a folder the same name may be there more than once.
-            Some(under) if job.paths.len() == 1 => job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string(),
+            Some(under) if job.paths.len() == 1 => {
+                job.paths[0].strip_prefix(under).unwrap_or(&job.paths[0]).display().to_string()
+            }
             _ => programs.name(),
         };
         // The first program is the one that states what was meant.

@@ -68,9 +68,9 @@ impl Job {
     pub(super) fn place(&self, path: &Path) -> PathBuf {
         let beside_list = || self.paths.iter().filter(|path| is_list(path)).filter_map(|list| list.parent());
         let below = self.under.as_deref().into_iter().chain(beside_list());
-        let place = below.filter_map(|under| path.strip_prefix(under).ok()).find(|place| {
-            place.components().all(|part| matches!(part, Component::Normal(_)))
-        });
+        let place = below
+            .filter_map(|under| path.strip_prefix(under).ok())
+            .find(|place| place.components().all(|part| matches!(part, Component::Normal(_))));
         place.map_or_else(|| files::name(path).into(), Path::to_path_buf)
     }
 }
@@ -110,7 +110,10 @@ fn on_disk(folder: &Path, name: &str) -> PathBuf {
 
 /// The tasks that the command line names. RAPID modules named one by one are one task, unless each shall be its own; a
 /// task list, an NC file and every program of a folder is a task of its own.
-pub(super) fn jobs(paths: &[PathBuf], Grouping { each, together: as_one }: Grouping) -> anyhow::Result<Vec<Job>> {
+pub(super) fn jobs(
+    paths: &[PathBuf],
+    Grouping { each, together: as_one }: Grouping,
+) -> anyhow::Result<Vec<Job>> {
     let mut jobs = Vec::new();
     let mut together = Vec::new();
     for path in paths {
@@ -197,7 +200,8 @@ impl Programs {
             let bytes = files::read(path)?;
             if is_list(path) {
                 for place in listed(path, &bytes) {
-                    let module = files::read(&place).with_context(|| format!("named in {}", path.display()))?;
+                    let module =
+                        files::read(&place).with_context(|| format!("named in {}", path.display()))?;
                     files.push((place, module));
                 }
             } else {

@@ -126,15 +126,16 @@ pub(super) fn corner_bend(
     let flanges = arm.forward_many(&joints);
     let first: [f64; FIRST.len()] =
         std::array::from_fn(|k| if solved[k].1.is_ok() { off(FIRST[k], &flanges[k]) } else { f64::INFINITY });
-    let even = |t: f64| match FIRST.iter().position(|first| *first == t) {
+    let even = |t: f64| match FIRST.iter().position(|first| (*first - t).abs() < 1e-9) {
         Some(k) => first[k],
         None => motor(t).map_or(f64::INFINITY, |joints| off(t, &arm.forward(&joints))),
     };
     Some(largest_from([even(0.0), even(1.0)], PIECES, &even))
 }
 
-/// Equal pieces of a corner that are halved until their chords tell enough.
-const PIECES: usize = 4;
+/// Equal pieces of a corner that are halved until their chords tell enough: so many that what is asked for first fills
+/// the lanes once.
+const PIECES: usize = 3;
 
 /// The ends, the pieces' ends and their middles: what [`largest_from`] asks for first.
-const FIRST: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+const FIRST: [f64; 2 * PIECES + 1] = [0.0, 1.0 / 6.0, 2.0 / 6.0, 0.5, 4.0 / 6.0, 5.0 / 6.0, 1.0];

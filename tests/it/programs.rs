@@ -280,11 +280,13 @@ fn modules_of_a_folder_are_one_task_when_asked() {
     let (_, text, err) = run(&["-o", "again"]);
     assert!(text.contains("1 program") && !err.contains("--together"), "{text}\n{err}");
     let (_, _, err) = run(&["-o", "whole", "--together"]);
-    assert_eq!(fs::read(at.join("whole/PROGMOD/Work.mod")).unwrap(), fs::read(at.join("out/PROGMOD/Work.mod")).unwrap(), "{err}");
-    let (code, text, err) = truegrind(
-        at,
-        &["deviation", "backup", "--together", "--model", "model.toml", "--csv", "points.csv"],
+    assert_eq!(
+        fs::read(at.join("whole/PROGMOD/Work.mod")).unwrap(),
+        fs::read(at.join("out/PROGMOD/Work.mod")).unwrap(),
+        "{err}"
     );
+    let (code, text, err) =
+        truegrind(at, &["deviation", "backup", "--together", "--model", "model.toml", "--csv", "points.csv"]);
     assert_eq!(code, 0, "{text}\n{err}");
     assert_eq!(fs::read_to_string(at.join("points.csv")).unwrap().lines().count(), 6);
 }
@@ -317,7 +319,8 @@ fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
     fs::write(at.join("in/b.pgf"), "<Program><Module>nowhere.mod</Module></Program>").unwrap();
     fs::write(at.join("in/c.mod"), module("C", 2, 0.0)).unwrap();
     let nominal = ["--model", "nominal", "--robot", "abb-irb-120"];
-    let one = ["compensate", "in/a.mod", "-o", "a.mod", "--json", "a.json", "--html", "a.html", "--diff", "a.diff"];
+    let one =
+        ["compensate", "in/a.mod", "-o", "a.mod", "--json", "a.json", "--html", "a.html", "--diff", "a.diff"];
     let (code, out, err) = truegrind(at, &[&one, &nominal[..]].concat());
     assert_eq!(code, 0, "{out}\n{err}");
     assert_eq!(fs::read_to_string(at.join("a.mod")).unwrap(), text);
@@ -333,7 +336,10 @@ fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
         "joint target",
     ];
     // The reasons are those that an estimated arm gives, but for what it corrects.
-    let (_, _, err) = truegrind(at, &["compensate", "in/a.mod", "--model", "model.toml", "--dry-run", "--json", "real.json"]);
+    let (_, _, err) = truegrind(
+        at,
+        &["compensate", "in/a.mod", "--model", "model.toml", "--dry-run", "--json", "real.json"],
+    );
     let real = motions(&json(&fs::read_to_string(at.join("real.json")).expect(&err)), 0);
     for (((_, _, reason), (_, status, why)), says) in found.iter().zip(&real).zip(says) {
         assert!(reason.contains(says), "{reason}: {says}");

@@ -16,15 +16,25 @@ pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
 
 /// The token of the mark.
 pub fn token(tree: &RapidTree<'_>) -> Option<u32> {
+    token_in(tree, 0..tree.len() as u32)
+}
+
+/// The token of the mark among some tokens.
+pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
     // Long stretches hold no comment: that is told without looking at each token by itself.
     const STRETCH: usize = 4096;
-    let comment = |kind: &&Token| **kind == Token::Comment;
-    let stretches = tree.kinds().chunks(STRETCH).enumerate();
-    let mut with_comments = stretches.filter(|(_, kinds)| kinds.iter().filter(comment).count() > 0);
-    with_comments.find_map(|(stretch, kinds)| {
-        let tokens = (stretch * STRETCH..).zip(kinds).filter(|(_, kind)| comment(kind));
-        let mut tokens = tokens.map(|(token, _)| token as u32);
-        tokens.find(|&token| read(tree.text(token)).is_some())
+    let is_comment = |kind: &Token| *kind == Token::Comment;
+    let holds_comment = |kinds: &[Token]| kinds.iter().fold(false, |any, kind| any | is_comment(kind));
+    let first = tokens.start as usize;
+    let stretches = tree.kinds()[first..tokens.end as usize].chunks(STRETCH);
+    let mut stretches = (first..).step_by(STRETCH).zip(stretches);
+    stretches.find_map(|(first, kinds)| {
+        if !holds_comment(kinds) {
+            return None;
+        }
+        let comments = (first..).zip(kinds).filter(|(_, kind)| is_comment(kind));
+        let mut comments = comments.map(|(token, _)| token as u32);
+        comments.find(|&token| read(tree.text(token)).is_some())
     })
 }
 
@@ -45,12 +55,6 @@ pub fn read(comment: &[u8]) -> Option<Mark> {
 /// The comment of a mark.
 pub fn text(mark: &Mark) -> String {
     format!("! truegrind {} model {}", mark.version, mark.model)
-}
-
-/// The token of the mark among some tokens.
-pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
-    let comment = |&token: &u32| tree.kind(token) == Some(Token::Comment);
-    tokens.into_iter().filter(comment).find(|&token| read(tree.text(token)).is_some())
 }
 
 /// The modules of a file; a fragment has none.

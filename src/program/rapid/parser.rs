@@ -2,26 +2,61 @@
 //!
 //! Blocks stand on an explicit stack, so that nesting costs no machine stack; expressions recurse to a stated depth.
 //! What cannot be read becomes one `Opaque` node that ends at the next `;`, block keyword or, where only a `;` is
-//! missing, line; reading then goes on. Chains of one operator are one flat node.
+//! missing, line; reading then goes on. Chains of one operator are one flat node. Of a large file the statements of later
+//! parts are read ahead, on other threads.
 
+mod ahead;
 mod declaration;
 mod expression;
+
+use rayon::prelude::*;
 
 use super::lexer::lex;
 use super::syntax::Syntax;
 use super::token::{Token, same_name};
 use crate::program::motion::OpaqueReason;
 use crate::program::tree::{Node, Opaque, Tree};
+use ahead::Ahead;
 
 /// How deeply blocks may nest.
 const BLOCK_DEPTH: usize = 100;
 
+/// A part of a file that is worth a thread of its own (tokens).
+const PART: usize = 1 << 18;
+
 /// Reads one file. Never fails; see [`Tree::opaque`] for what could not be read.
 pub fn parse(source: &[u8]) -> Tree<'_, Token, Syntax> {
-    let mut tree = lex(source);
+    let tree = lex(source);
+    let parts = (tree.len() / PART).min(rayon::current_num_threads());
+    nodes_of(tree, parts)
+}
+
+/// The same with a stated number of parts that are read side by side: the tree does not depend on it.
+pub fn parse_in_parts(source: &[u8], parts: usize) -> Tree<'_, Token, Syntax> {
+    nodes_of(lex(source), parts)
+}
+
+fn nodes_of(mut tree: Tree<'_, Token, Syntax>, parts: usize) -> Tree<'_, Token, Syntax> {
     let (nodes, opaque) = {
+        let cuts = ahead::cuts(&tree, parts);
         let mut parser = Parser::new(&tree);
-        parser.file();
+        parser.begin();
+        if let Some(&first) = cuts.first() {
+            let ends = cuts[1..].iter().copied().chain([u32::MAX]);
+            let ranges: Vec<_> = cuts.iter().copied().zip(ends).collect();
+            let ((), ahead) = rayon::join(
+                || parser.items(first),
+                || -> Vec<_> {
+                    ranges.into_par_iter().map(|(from, to)| Ahead::read(&tree, from, to)).collect()
+                },
+            );
+            for ahead in ahead {
+                parser.items(ahead.from);
+                parser.take(&ahead);
+            }
+        }
+        parser.items(u32::MAX);
+        parser.finish();
         (parser.nodes, parser.opaque)
     };
     (tree.nodes, tree.opaque) = (nodes, opaque);
@@ -221,16 +256,23 @@ impl<'t, 's> Parser<'t, 's> {
 
     // ---- file and blocks ----
 
-    fn file(&mut self) {
+    fn begin(&mut self) {
         self.at = 0;
         self.open_block(Syntax::File);
         self.skip_trivia();
         if self.kinds == [Token::Unknown] {
             self.recover(1, 0, OpaqueReason::Binary);
         }
-        while self.peek() != Token::End {
+    }
+
+    /// Items to the end of the file, or until one begins at or after a token.
+    fn items(&mut self, until: u32) {
+        while self.at < until && self.peek() != Token::End {
             self.item();
         }
+    }
+
+    fn finish(&mut self) {
         self.close_above(0);
         self.close_block();
         self.nodes[0].end = self.kinds.len() as u32;

@@ -1,6 +1,7 @@
 //! From files to the listing: every motion with its targets, speed, zone, tool and work object.
 
 mod frames;
+mod literals;
 mod uses;
 
 use std::collections::HashMap;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::evaluate::{Context, Evaluator, Known, Source};
+use super::evaluate::{Context, Evaluator, Source};
 use super::flow::{CallSite, State, Surroundings, Visitor, is_main, walk};
 use super::instruction::{self, Also, Between, INSTRUCTIONS, Instruction, Slot};
 use super::mark;
@@ -17,12 +18,13 @@ use super::parser::parse;
 use super::predefined;
 use super::symbol::{Ends, Symbols, Unit, What};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
-use super::token::{Token, display, folded, same_name};
+use super::token::{display, folded, same_name};
 use crate::program::motion::{
     Declaration, Listing, Motion, MotionKind, MotionTarget, OpaqueRegion, Origin, Place, Reason, Role,
     Routine, Switch,
 };
 use crate::program::tree::Child;
+use literals::Literals;
 
 /// The RAPID modules of one task, read together.
 #[derive(Debug)]
@@ -53,10 +55,27 @@ impl<'s> Task<'s> {
     pub fn read(files: &[(&str, &'s [u8])]) -> Task<'s> {
         let trees: Vec<_> = files.par_iter().map(|(_, bytes)| parse(bytes)).collect();
         let symbols = Box::new(Symbols::gather(&trees));
-        let (listing, statements) = Lister::new(&trees, &symbols).listing();
+        let (listing, statements) = listing(&trees, &symbols);
         let names = files.iter().map(|(name, _)| (*name).to_owned()).collect();
         Task { names, trees, symbols, listing, statements }
     }
+}
+
+/// What the files tell the robot to do, and the statement of each motion.
+fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<Statement>) {
+    let mut lister = Lister::new(trees, symbols);
+    // The statements in their order on one thread, what does not depend on it on the others.
+    let (mut lister, literals) = rayon::join(
+        || {
+            lister.walk_units();
+            lister
+        },
+        || Literals::of(trees, symbols),
+    );
+    lister.put_literals(&literals);
+    lister.settle_modal();
+    lister.other_uses();
+    (lister.listing, lister.statements)
 }
 
 /// What is looked up by name again and again.
@@ -126,12 +145,14 @@ struct Literal {
     /// Its place among the targets of the motion.
     target: u32,
     role: Role,
-    unit: Unit,
+    file: u32,
+    /// The instruction.
+    call: u32,
     node: u32,
     joints: bool,
 }
 
-/// Motions whose literals one thread reads at a time.
+/// Motions that one thread takes at a time.
 const PORTION: usize = 1024;
 
 /// How deeply exits of routines are followed through calls; beyond, anything that they set may be set.
@@ -173,7 +194,8 @@ impl<'a, 's> Lister<'a, 's> {
         Place { file, line, column }
     }
 
-    fn listing(mut self) -> (Listing, Vec<Statement>) {
+    /// Follows the statements of every unit.
+    fn walk_units(&mut self) {
         for (file, tree) in self.trees.iter().enumerate() {
             self.listing.marks.push(mark::find(tree));
             for opaque in &tree.opaque {
@@ -201,7 +223,7 @@ impl<'a, 's> Lister<'a, 's> {
         for (index, unit) in units.iter().enumerate() {
             self.unit = index as u32;
             let evaluator = Evaluator::new(self.trees, self.symbols);
-            let exit = walk(&evaluator, *unit, &mut self);
+            let exit = walk(&evaluator, *unit, self);
             if let Some(routine) = unit.routine {
                 self.exits[routine as usize] = Some(exit);
                 if self.mains.contains(&routine) {
@@ -210,52 +232,28 @@ impl<'a, 's> Lister<'a, 's> {
                 }
             }
         }
-        self.read_literals();
-        self.settle_modal();
-        self.other_uses();
-        (self.listing, self.statements)
     }
 
     /// The values of the targets that stand in the instructions as numbers.
-    fn read_literals(&mut self) {
+    fn put_literals(&mut self, read: &Literals) {
         let (trees, symbols, literals) = (self.trees, self.symbols, &self.literals);
         self.listing.motions.par_chunks_mut(PORTION).enumerate().for_each(|(portion, motions)| {
             let first = (portion * PORTION) as u32;
-            let evaluator = Evaluator::new(trees, symbols);
-            let nothing = Known::new();
             let begin = literals.partition_point(|literal| literal.motion < first);
             let end = first + motions.len() as u32;
             let here = literals[begin..].iter().take_while(|literal| literal.motion < end);
             for literal in here {
-                let Literal { role, unit, node, joints, .. } = *literal;
-                let context = Context::new(unit.file, unit.scope, &nothing);
-                let (value, source) = evaluator.target(context, Child::Node(node), joints);
-                let origin = match source {
-                    Source::Inline => Origin::Inline,
-                    Source::Computed => Origin::Computed,
-                    _ => Origin::Unknown,
-                };
-                let argument = trees[unit.file as usize].node_span(node);
+                let Literal { role, file, call, node, joints, .. } = *literal;
+                let found = read.get(file, call, node, joints);
+                let (value, origin) = found
+                    .unwrap_or_else(|| literals::value(&Evaluator::new(trees, symbols), file, node, joints));
+                let argument = trees[file as usize].node_span(node);
                 let targets = &mut motions[(literal.motion - first) as usize].targets;
+                // A hundred thousand motions: no room for targets that never come.
+                targets.reserve_exact(1);
                 targets.insert(literal.target as usize, MotionTarget { role, value, origin, argument });
             }
         });
-    }
-
-    /// Whether an argument is an aggregate of nothing but numbers.
-    fn literal(&self, unit: Unit, argument: Child) -> Option<u32> {
-        let Child::Node(node) = argument else { return None };
-        let tree = &self.trees[unit.file as usize];
-        let found = tree.nodes[node as usize];
-        let plain = |kind: &Token| {
-            kind.is_trivia()
-                || matches!(
-                    kind,
-                    Token::Number | Token::Comma | Token::BracketOpen | Token::BracketClose | Token::Minus
-                )
-        };
-        let tokens = &tree.kinds()[found.first as usize..found.end as usize];
-        (found.kind == Syntax::Aggregate && tokens.iter().all(plain)).then_some(node)
     }
 
     // ---- switches ----
@@ -415,21 +413,20 @@ impl<'a, 's> Lister<'a, 's> {
         MotionTarget { role, value, origin, argument: tree.span(first, end) }
     }
 
-    /// A target of the next motion, the one after `before` others; one that stands there as numbers is read later.
+    /// A target of the next motion, the one after `before` others; one that stands there as numbers is put in later.
     fn take(
         &mut self,
         motion: &mut Motion,
-        (unit, state): (Unit, &State),
+        (unit, call, state): (Unit, u32, &State),
         argument: Child,
         joints: bool,
         (role, before): (Role, u32),
     ) {
-        match self.literal(unit, argument) {
+        match literals::plain(&self.trees[unit.file as usize], argument) {
             Some(node) => {
-                // A hundred thousand motions: no room for targets that never come.
-                motion.targets.reserve_exact(1);
                 let motion = self.listing.motions.len() as u32;
-                self.literals.push(Literal { motion, target: before, role, unit, node, joints });
+                let file = unit.file;
+                self.literals.push(Literal { motion, target: before, role, file, call, node, joints });
             }
             None => {
                 motion.targets.reserve_exact(1);
@@ -502,11 +499,11 @@ impl<'a, 's> Lister<'a, 's> {
             match slot {
                 Some(Slot::To) => {
                     let joints = instruction.takes_joints();
-                    self.take(&mut motion, (unit, state), value, joints, (Role::To, targets));
+                    self.take(&mut motion, (unit, node, state), value, joints, (Role::To, targets));
                     (targets, to) = (targets + 1, true);
                 }
                 Some(Slot::Via) => {
-                    self.take(&mut motion, (unit, state), value, false, (Role::Via, targets));
+                    self.take(&mut motion, (unit, node, state), value, false, (Role::Via, targets));
                     (targets, via) = (targets + 1, true);
                 }
                 Some(Slot::Speed) => motion.speed = Some(self.speed(unit, state, value)),

@@ -4,7 +4,7 @@
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use truegrind::program::rapid::parser::parse;
+use truegrind::program::rapid::parser::{parse, parse_in_parts};
 
 /// Writes one program.
 struct Writer {
@@ -80,8 +80,32 @@ impl Writer {
 
     fn name(&mut self) {
         let names = [
-            "p10", "Target_10", "x", "nCount", "tool0", "wobj0", "v100", "fine", "reg1", "Grind", "a_b_c", "Stop", "Offs",
-            "task", "TASK1", "switch", "VERSION", "E1", "d2", "e", "Ende", "TO_", "IFx", "ORx", "Xor1", "DIVx",
+            "p10",
+            "Target_10",
+            "x",
+            "nCount",
+            "tool0",
+            "wobj0",
+            "v100",
+            "fine",
+            "reg1",
+            "Grind",
+            "a_b_c",
+            "Stop",
+            "Offs",
+            "task",
+            "TASK1",
+            "switch",
+            "VERSION",
+            "E1",
+            "d2",
+            "e",
+            "Ende",
+            "TO_",
+            "IFx",
+            "ORx",
+            "Xor1",
+            "DIVx",
         ];
         if self.chance(5) {
             // Latin-1 letters.
@@ -95,7 +119,20 @@ impl Writer {
 
     fn number(&mut self) {
         let numbers = [
-            "0", "12", "12.", ".5", "1.5E-3", "2E6", "9E+09", "9e9", "0x1F", "0B101", "0o17", "0d12", "3.14159265", "1E9",
+            "0",
+            "12",
+            "12.",
+            ".5",
+            "1.5E-3",
+            "2E6",
+            "9E+09",
+            "9e9",
+            "0x1F",
+            "0B101",
+            "0o17",
+            "0d12",
+            "3.14159265",
+            "1E9",
         ];
         let number = self.pick(&numbers);
         self.word(number);
@@ -406,7 +443,8 @@ impl Writer {
                 _ => {}
             }
         }
-        let kind = if in_routine { self.pick(&["VAR", "CONST"]) } else { self.pick(&["VAR", "CONST", "PERS"]) };
+        let kind =
+            if in_routine { self.pick(&["VAR", "CONST"]) } else { self.pick(&["VAR", "CONST", "PERS"]) };
         self.keyword(kind);
         self.name();
         self.name();
@@ -585,6 +623,37 @@ fn whatever_the_grammar_allows_is_read() {
             let at = tree.start(opaque.at);
             let around = &source[at.saturating_sub(120)..(at + 60).min(source.len())];
             panic!("seed {seed}, {:?} at byte {at}: {}", opaque.reason, String::from_utf8_lossy(around));
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_read_in_parts_has_the_same_tree() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    for seed in 0..600 {
+        let mut source = Writer::new(seed).file();
+        // Most of them broken somewhere.
+        for _ in 0..random.random_range(0..4) {
+            if source.is_empty() {
+                break;
+            }
+            let at = random.random_range(0..source.len());
+            let end = (at + random.random_range(1..30)).min(source.len());
+            match random.random_range(0..3) {
+                0 => drop(source.drain(at..end)),
+                1 => {
+                    let piece = source[at..end].to_vec();
+                    let to = random.random_range(0..source.len());
+                    drop(source.splice(to..to, piece));
+                }
+                _ => drop(source.splice(at..at, *b" ENDIF ")),
+            }
+        }
+        let whole = parse_in_parts(&source, 1);
+        for parts in [2, 3, 7, 30] {
+            let other = parse_in_parts(&source, parts);
+            assert_eq!(other.nodes, whole.nodes, "seed {seed}, {parts} parts");
+            assert_eq!(other.opaque, whole.opaque, "seed {seed}, {parts} parts");
         }
     }
 }

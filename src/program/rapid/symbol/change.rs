@@ -9,6 +9,8 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::{Symbols, Unit, What};
 use crate::program::motion::Reason;
 use crate::program::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
@@ -104,12 +106,33 @@ struct Found {
 }
 
 impl Found {
+    /// This, and what the next nodes of the same unit do.
+    fn and(mut self, next: Found) -> Found {
+        self.changes.extend(next.changes);
+        self.calls.extend(next.calls);
+        self.switches.extend(next.switches);
+        self.interrupts.extend(next.interrupts);
+        self.late.extend(next.late);
+        self.late.sort_unstable();
+        self.late.dedup();
+        self.unknown |= next.unknown;
+        self.moves |= next.moves;
+        self.waits |= next.waits;
+        self.by_name |= next.by_name;
+        self.cycles |= next.cycles;
+        self.sets = self.sets.or(next.sets);
+        self
+    }
+
     fn switch(&mut self, node: u32) {
         if self.switches.last() != Some(&node) {
             self.switches.push(node);
         }
     }
 }
+
+/// Nodes that one thread goes through at a time.
+const PORTION: u32 = 1 << 16;
 
 /// A routine that changes more data outside than this may as well change anything.
 const REACH: usize = 1024;
@@ -174,7 +197,19 @@ impl Symbols {
     fn gone_through(&self, trees: &[RapidTree<'_>]) -> Vec<Found> {
         let found = |&unit: &Unit| {
             let nodes = unit.node + 1..unit.node + trees[unit.file as usize].nodes[unit.node as usize].size;
-            self.found(trees, unit, nodes)
+            // The parts of a long routine side by side; outside routines whole ones are passed over.
+            let parts =
+                if unit.routine.is_some() { nodes.len().div_ceil(PORTION as usize).max(1) } else { 1 };
+            if parts == 1 {
+                return self.found(trees, unit, nodes);
+            }
+            let part = |index: usize| {
+                let first = nodes.start + index as u32 * PORTION;
+                self.found(trees, unit, first..(first + PORTION).min(nodes.end))
+            };
+            let mut parts: Vec<Found> = (0..parts).into_par_iter().map(part).collect();
+            let rest = parts.split_off(1);
+            rest.into_iter().fold(parts.swap_remove(0), Found::and)
         };
         self.units.iter().map(found).collect()
     }
