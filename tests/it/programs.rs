@@ -332,7 +332,7 @@ fn the_nominal_arm_lists_every_motion_and_changes_no_byte() {
     let says = [
         "its numbers are right to the last decimal",
         "known only at run time",
-        "declared in none of the given files",
+        "the value of the tool is not known",
         "joint target",
     ];
     // The reasons are those that an estimated arm gives, but for what it corrects.

@@ -436,15 +436,17 @@ impl Writer {
     // ---- declarations ----
 
     fn data(&mut self, in_routine: bool) {
-        if !in_routine {
-            match self.random.random_range(0..4) {
-                0 => self.keyword("LOCAL"),
-                1 => self.keyword("TASK"),
-                _ => {}
-            }
+        let shared = if in_routine { 2 } else { self.random.random_range(0..4) };
+        match shared {
+            0 => self.keyword("LOCAL"),
+            1 => self.keyword("TASK"),
+            _ => {}
         }
-        let kind =
-            if in_routine { self.pick(&["VAR", "CONST"]) } else { self.pick(&["VAR", "CONST", "PERS"]) };
+        let kind = match (in_routine, shared) {
+            (true, _) => self.pick(&["VAR", "CONST"]),
+            (_, 1) => self.pick(&["VAR", "PERS"]),
+            _ => self.pick(&["VAR", "CONST", "PERS"]),
+        };
         self.keyword(kind);
         self.name();
         self.name();
