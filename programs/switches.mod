@@ -1,4 +1,4 @@
-! Shows: what acts in execution order across routines: displacement, offsets, configuration monitoring, MultiMove, correction.
+! Shows: what acts in execution order across routines: displacement, offsets, configuration monitoring, MultiMove, correction, axes apart.
 MODULE Switches
   CONST robtarget p:=[[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
   PERS pose measured;
@@ -26,6 +26,12 @@ MODULE Switches
     PDispOn\Rot,p,tool0;
     MoveL p,v100,fine,tool0;
     PDispOff;
+    SingArea\LockAxis4;
+    MoveL p,v100,fine,tool0;
+    SingArea\Off;
+    IndCMove ROB_1,6,-90;
+    MoveL p,v100,fine,tool0;
+    IndReset ROB_1,6;
     MoveL p,v100,fine,tool0; ConfL\On; SingArea\Off;
   ENDPROC
   PROC displaced()

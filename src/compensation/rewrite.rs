@@ -580,8 +580,10 @@ fn work<'a>(
         }
         _ => None,
     };
-    // First what forbids a change, of any target of the motion.
-    if let Some(why) = targets.iter().find_map(|t| t.as_ref().err().copied()) {
+    // First what forbids a change, of any target of the motion: what the text does not tell before what no arm reaches.
+    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
+    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
+    if let Some(why) = unknown.or_else(|| errors().next()) {
         let status = if matches!(why, Why::Program(_)) { Status::Left } else { Status::Refused };
         return finish(outcome, status, Some(why), None, point);
     }

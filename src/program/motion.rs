@@ -355,6 +355,8 @@ pub struct Modal {
     pub synchronised: Switch,
     /// Whether sensors or forces move the path (soft servo).
     pub sensor_guided: Switch,
+    /// Whether an axis stands where no target says (independent mode, SingArea \LockAxis4).
+    pub axis_apart: Switch,
 }
 
 impl Modal {
@@ -367,6 +369,7 @@ impl Modal {
         circle_point_orientation: Switch::Off,
         synchronised: Switch::Off,
         sensor_guided: Switch::Off,
+        axis_apart: Switch::Off,
     };
 }
 
@@ -590,7 +593,9 @@ reasons! {
         /// The robot moves in step with another.
         Synchronised => "moves in step with another robot (\\ID, SyncMoveOn)",
         /// Sensors correct the path.
-        SensorGuided => "a sensor corrects the path (\\Corr, CorrCon, EGM, soft servo)",
+        SensorGuided => "a sensor corrects the path (\\Corr, CorrCon, EGM, soft servo), or may do so",
+        /// An axis is in independent mode or locked: its place does not follow from the target.
+        AxisApart => "an axis stands, or may stand, where no target says (independent mode, SingArea \\LockAxis4)",
         /// The work object is moved by an external axis or a conveyor.
         MovingWorkObject => "the work object is moved by an external axis",
         /// The tool's value is not known.

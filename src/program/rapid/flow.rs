@@ -472,8 +472,8 @@ impl Walk<'_, '_, '_> {
         for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
             let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-            if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
-                out = out.or(States::NONE.set(which, on));
+            if let Some(sets) = (!late).then(|| setting(tree, node, name)).flatten() {
+                out = out.or(sets);
             } else if let Some(routine) = (!late).then(|| symbols.routine(self.unit.scope, name)).flatten() {
                 out = out.or(self.visitor.exit_of(routine));
                 if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
@@ -521,11 +521,11 @@ impl Walk<'_, '_, '_> {
         if predefined::waits(name) {
             self.forget_shared(&mut state);
         }
-        if let Some((which, on)) = (!late).then(|| setting(tree, node, name)).flatten() {
-            state.modal = state.modal.set(which, on);
+        if let Some(sets) = (!late).then(|| setting(tree, node, name)).flatten() {
+            state.modal = state.modal.then(sets);
             // One that also moves.
             state.previous = motion.or(state.previous);
-            if which == Which::Displacement {
+            if !sets.leaves(Which::Displacement) {
                 let value = self.displaced(node, &state, name);
                 state.known.insert(DISPLACEMENT, value);
             }

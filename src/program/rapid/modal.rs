@@ -17,6 +17,7 @@
 use super::syntax::{RapidTree, arguments};
 use super::token::same_name;
 use crate::program::motion::{Modal, Switch};
+use crate::program::tree::Child;
 
 /// The sets of states of all switches: three bits each, off, on, as at the entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,9 +43,13 @@ pub enum Which {
     Synchronised,
     /// SoftAct, SoftDeact; CSSAct, CSSDeact, CSSDeactMoveL.
     Soft,
+    /// SingArea \LockAxis4.
+    Locked,
+    /// IndAMove, IndCMove, IndDMove, IndRMove, IndReset of a robot: a mechanical unit that is named as ABB names them.
+    Independent,
 }
 
-const COUNT: u32 = 8;
+const COUNT: u32 = 10;
 const OFF: u32 = 1;
 const ON: u32 = 2;
 const ENTRY: u32 = 4;
@@ -78,6 +83,12 @@ impl States {
     pub fn set(self, which: Which, on: bool) -> States {
         let shift = 3 * which as u32;
         States(self.0 & !(7 << shift) | if on { ON } else { OFF } << shift)
+    }
+
+    /// With what `other` says of a switch in place of what was said of it.
+    pub fn then(self, other: States) -> States {
+        let said = (0..COUNT).map(|index| 7 << (3 * index)).filter(|bits| other.0 & bits != 0);
+        States(said.fold(self.0, |all, bits| all & !bits) | other.0)
     }
 
     /// With "as at the entry" replaced by what the entry is.
@@ -132,13 +143,14 @@ impl States {
             synchronised: self.switch(Which::Synchronised),
             // Corrections (CorrCon) reach the motions with \Corr alone.
             sensor_guided: self.switch(Which::Soft),
+            axis_apart: both(self.switch(Which::Locked), self.switch(Which::Independent)),
         }
     }
 }
 
-/// What an instruction sets.
-pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, bool)> {
-    if !matches!(name.first().map(|byte| byte | 32), Some(b'c' | b'p' | b'e' | b's')) {
+/// What an instruction sets; nothing is said of the other switches.
+pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<States> {
+    if !matches!(name.first().map(|byte| byte | 32), Some(b'c' | b'p' | b'e' | b's' | b'i')) {
         return None;
     }
     let is = |text: &str| same_name(text.as_bytes(), name);
@@ -147,7 +159,7 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
             .filter_map(|argument| argument.name)
             .any(|token| wanted.iter().any(|wanted| same_name(wanted.as_bytes(), tree.text(token))))
     };
-    Some(if is("ConfL") {
+    let (which, on) = if is("ConfL") {
         (Which::ConfLinear, !option(&["Off"]))
     } else if is("ConfJ") {
         (Which::ConfJoint, !option(&["Off"]))
@@ -160,7 +172,9 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
     } else if is("EOffsOff") {
         (Which::ExternalOffset, false)
     } else if is("SingArea") {
-        (Which::Wrist, option(&["Wrist", "LockAxis4"]))
+        let locked = option(&["LockAxis4"]);
+        let wrist = States::NONE.set(Which::Wrist, locked || option(&["Wrist"]));
+        return Some(wrist.set(Which::Locked, locked));
     } else if is("CirPathMode") {
         (Which::CirclePoint, option(&["CirPointOri"]))
     } else if is("SyncMoveOn") {
@@ -171,7 +185,19 @@ pub fn setting(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> Option<(Which, b
         (Which::Soft, true)
     } else if is("SoftDeact") || is("CSSDeact") || is("CSSDeactMoveL") || is("SCSSDeactMoveL") {
         (Which::Soft, false)
+    } else if ["IndAMove", "IndCMove", "IndDMove", "IndRMove"].into_iter().any(is) {
+        (Which::Independent, robot(tree, call).then_some(true)?)
+    } else if is("IndReset") {
+        (Which::Independent, robot(tree, call).then_some(false)?)
     } else {
         return None;
-    })
+    };
+    Some(States::NONE.set(which, on))
+}
+
+/// Whether the first argument of a call is the name of a robot among mechanical units: ROB_1, IRB and so on.
+fn robot(tree: &RapidTree<'_>, call: u32) -> bool {
+    let unit = arguments(tree, call).next().and_then(|argument| argument.value);
+    let Some(Child::Token(token)) = unit else { return false };
+    tree.text(token).get(..3).is_some_and(|name| same_name(name, b"ROB") || same_name(name, b"IRB"))
 }

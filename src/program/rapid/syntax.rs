@@ -354,8 +354,7 @@ pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
             }
             (Child::Node(list), _) => match tree.nodes[list as usize].kind {
                 Syntax::Parameters => {
-                    let nodes = tree.child_nodes(list);
-                    head.parameters = nodes.filter_map(|node| parameter(tree, node)).collect();
+                    head.parameters = parameters(tree, list);
                 }
                 _ => break,
             },
@@ -363,6 +362,23 @@ pub fn routine_head(tree: &RapidTree<'_>, node: u32) -> Option<RoutineHead> {
         }
     }
     named.then_some(head)
+}
+
+/// The parameters of a list. `\a | b` are two of which a call gives one or none: what stands behind `|` is optional too.
+fn parameters(tree: &RapidTree<'_>, list: u32) -> Vec<Parameter> {
+    let mut out = Vec::new();
+    let mut alternative = false;
+    for part in parts(tree, list) {
+        match part {
+            Child::Token(token) => alternative = tree.kind(token) == Some(Token::Pipe),
+            Child::Node(node) => {
+                let found = parameter(tree, node);
+                out.extend(found.map(|found| Parameter { optional: found.optional || alternative, ..found }));
+                alternative = false;
+            }
+        }
+    }
+    out
 }
 
 fn parameter(tree: &RapidTree<'_>, node: u32) -> Option<Parameter> {

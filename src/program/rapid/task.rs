@@ -528,7 +528,10 @@ impl<'a, 's> Lister<'a, 's> {
         motion.insertable = free && splits;
         motion.straightens = free
             && instruction.kind == MotionKind::Circular
-            && instruction.line_form().is_some_and(|line| line.between != Between::Nothing);
+            // What is triggered at a distance along the movement would be triggered along its last piece.
+            && instruction
+                .line_form()
+                .is_some_and(|line| line.between != Between::Nothing && line.also != Also::Triggers);
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
@@ -753,6 +756,8 @@ fn left_by_modal(motion: &Motion, displaced: bool) -> Option<Reason> {
         Some(Reason::Synchronised)
     } else if motion.modal.sensor_guided != Switch::Off {
         Some(Reason::SensorGuided)
+    } else if motion.modal.axis_apart != Switch::Off {
+        Some(Reason::AxisApart)
     } else if displaced && motion.kind != MotionKind::AbsoluteJoint {
         Some(Reason::Displacement)
     } else {

@@ -530,3 +530,84 @@ fn a_name_that_another_file_declares_is_said_to_be_so() {
         [Err(Reason::RunTimeOffset)]
     );
 }
+
+#[test]
+fn alternatives_are_optional_so_what_stands_behind_them_comes_by_its_place() {
+    let run = |parameters: &str, call: &str| {
+        let source = module(&format!(
+            "VAR robtarget v:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nPROC main()\n{call}\nMoveL v,v100,fine,tool0;\nENDPROC\n\
+             PROC here({parameters})\nq:=CRobT();\nENDPROC"
+        ));
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+        task.listing.motions.last().unwrap().reason()
+    };
+    for parameters in [
+        "\\switch up|switch down,INOUT robtarget q",
+        "\\switch up | switch down | num by, VAR robtarget q",
+        "\\switch up|\\switch down\\num n,INOUT robtarget q",
+        "\\num n|num m INOUT robtarget q",
+        "INOUT robtarget q\\switch up|switch down",
+    ] {
+        for call in ["here v;", "here\\up,v;", "here q:=v;"] {
+            if parameters.contains("m INOUT") && call != "here q:=v;" {
+                // Without a comma this is one parameter of three names, which is not read.
+                continue;
+            }
+            assert_eq!(run(parameters, call), Some(Reason::Assigned), "{parameters}: {call}");
+        }
+    }
+    // And a target that such a routine takes is seen.
+    let taken = |parameters: &str| {
+        left(&format!("PROC main()\nmv p;\nmv\\a,p;\nENDPROC\nPROC mv({parameters})\nENDPROC"))
+    };
+    let both = vec![("main".to_owned(), Some(Reason::OwnRoutine)); 2];
+    assert_eq!(taken("\\switch a|switch b,robtarget q"), both);
+    assert_eq!(taken("\\switch a,robtarget q"), both);
+}
+
+#[test]
+fn an_axis_that_does_not_follow_the_targets_leaves_them() {
+    let apart = Some(Reason::AxisApart);
+    let main = |body: &str| of("main", &format!("PROC main()\n{body}ENDPROC"));
+    assert_eq!(main(&format!("SingArea\\LockAxis4;\n{GO}SingArea\\Wrist;\n{GO}")), [apart, None]);
+    assert_eq!(main(&format!("SingArea\\LockAxis4;\n{GO}SingArea\\Off;\n{GO}")), [apart, None]);
+    let moves = main(&format!("{GO}IndCMove ROB_1,6,-100;\n{GO}IndReset ROB_1,6\\RefNum:=0\\Short;\n{GO}"));
+    assert_eq!(moves.first(), Some(&None));
+    assert_eq!(moves[moves.len() - 2..], [apart, None]);
+    // A positioner's axis is no axis of the robot.
+    assert_eq!(main(&format!("IndCMove STN_1,1,-100;\n{GO}")).last(), Some(&None));
+    // Where it may be so, too, and in routines that are called there.
+    let maybe = main(&format!("IF n=1 SingArea\\LockAxis4;\n{GO}"));
+    assert_eq!(maybe, [apart]);
+    let called = format!(
+        "PROC main()\nIndAMove ROB_1,6\\ToAbsNum:=90,20;\ngo;\nIndReset ROB_1,6;\nENDPROC\nPROC go()\n{GO}ENDPROC"
+    );
+    assert_eq!(of("go", &called), [apart]);
+}
+
+#[test]
+fn data_that_is_written_all_at_once_is_of_the_type_that_is_stated() {
+    let tool = "PERS tooldata t:=[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];\nVAR string s;\n\
+                VAR tooldata other;\nALIAS tooldata wheel;\n";
+    let run = |call: &str| {
+        let of = of("main", &format!("{tool}PROC main()\n{call}\nMoveL p,v100,fine,t;\nENDPROC"));
+        assert_eq!(of.len(), 1, "{call}");
+        of[0]
+    };
+    assert_eq!(run("SetAllDataVal \"robtarget\"\\Object:=\"v.*\",p;"), None);
+    let any = ["\"ToolData\"", "\"wheel\"", "s"].map(|name| format!("SetAllDataVal {name},other;"));
+    for call in any.iter().map(String::as_str).chain(["SetDataVal s,other;"]) {
+        assert_eq!(run(call), Some(Reason::ToolAssigned), "{call}");
+    }
+}
+
+#[test]
+fn a_circle_with_triggers_along_it_is_not_cut() {
+    let source = module(&format!(
+        "PROC main()\nMoveC p,p,v100,fine,tool0;\nTriggC p,p,v100,i,fine,tool0;\nMoveCDO p,p,v100,fine,tool0,d,1;\nENDPROC"
+    ));
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    let cut: Vec<bool> = task.listing.motions.iter().map(|motion| motion.straightens).collect();
+    assert_eq!(cut, [true, false, true]);
+}

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Symbols, Unit, What};
+use super::{Symbol, Symbols, Unit, What};
 use crate::program::motion::Reason;
 use crate::program::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
 use crate::program::rapid::modal::{States, setting};
@@ -91,8 +91,8 @@ struct Found {
     unknown: bool,
     moves: bool,
     waits: bool,
-    /// Whether data is changed by a name that is computed.
-    by_name: bool,
+    /// Of which types data is changed by a name that is computed; `None` for any type.
+    by_name: Vec<Option<Vec<u8>>>,
     /// The calls that set a switch or call a routine of the program.
     switches: Vec<u32>,
     /// What they set by themselves.
@@ -118,7 +118,7 @@ impl Found {
         self.unknown |= next.unknown;
         self.moves |= next.moves;
         self.waits |= next.waits;
-        self.by_name |= next.by_name;
+        self.by_name.extend(next.by_name);
         self.cycles |= next.cycles;
         self.sets = self.sets.or(next.sets);
         self
@@ -157,12 +157,17 @@ impl Symbols {
                 self.note(&trees[unit.file as usize], change);
             }
         }
-        if all.iter().any(|found| found.by_name) {
-            // SetDataVal with a computed name may mean any data.
-            for symbol in &mut self.symbols {
-                if matches!(symbol.what, What::Data(_)) && !symbol.is_constant() {
-                    (symbol.assigned, symbol.whole) = (true, true);
-                }
+        let by_name: Vec<&Option<Vec<u8>>> = all.iter().flat_map(|found| &found.by_name).collect();
+        if !by_name.is_empty() {
+            // SetDataVal with a computed name may mean any data, SetAllDataVal any of the type that it states.
+            let meant = |symbol: &Symbol| {
+                let written = self.resolved_type(symbol.scope, &symbol.type_name);
+                let data = matches!(symbol.what, What::Data(_)) && !symbol.is_constant();
+                data && by_name.iter().any(|wanted| wanted.as_deref().is_none_or(|wanted| wanted == written))
+            };
+            let meant: Vec<bool> = self.symbols.iter().map(meant).collect();
+            for (symbol, _) in self.symbols.iter_mut().zip(meant).filter(|(_, meant)| *meant) {
+                (symbol.assigned, symbol.whole) = (true, true);
             }
         }
         self.interrupts = self.routines.iter().map(|routine| routine.head.kind == Syntax::Trap).collect();
@@ -356,9 +361,9 @@ impl Symbols {
         let tree = &trees[unit.file as usize];
         let name = tree.text(tree.nodes[node as usize].first);
         let is_call = kind == Syntax::Call;
-        if let Some((which, on)) = if is_call { setting(tree, node, name) } else { None } {
+        if let Some(sets) = if is_call { setting(tree, node, name) } else { None } {
             found.switch(node);
-            found.sets = found.sets.or(States::NONE.set(which, on));
+            found.sets = found.sets.or(sets);
         }
         if is_call && self.is_motion(unit.scope, name) {
             found.moves = true;
@@ -383,10 +388,17 @@ impl Symbols {
                 found.moves |= predefined::displaces(name).is_some();
                 found.cycles |= predefined::begins_cycle(name);
                 found.waits |= predefined::waits(name);
-                found.by_name |= name.eq_ignore_ascii_case(b"SetAllDataVal")
-                    || name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none();
+                if name.eq_ignore_ascii_case(b"SetAllDataVal") {
+                    found.by_name.push(named(tree, node).map(|name| self.type_named(unit.scope, name)));
+                } else if name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none() {
+                    found.by_name.push(None);
+                }
             }
         }
+    }
+
+    fn type_named(&self, scope: u32, name: &[u8]) -> Vec<u8> {
+        self.resolved_type(scope, &folded(name)).to_vec()
     }
 
     /// A call by a computed name.
