@@ -99,9 +99,9 @@ fn on_disk(folder: &Path, name: &str) -> PathBuf {
         let open = if place.as_os_str().is_empty() { Path::new(".") } else { place.as_path() };
         let alike = || {
             let entries = std::fs::read_dir(open).ok()?;
-            let mut names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-            let same = names.find(|name| name.to_lowercase() == part.to_lowercase())?;
-            Some(place.join(same))
+            let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+            let same = names.filter(|name| name.to_lowercase() == part.to_lowercase());
+            Some(place.join(same.min()?))
         };
         place = if next.exists() { next } else { alike().unwrap_or(next) };
     }

@@ -35,7 +35,13 @@ pub fn numbers(text: &[u8], shape: &[usize]) -> Option<Numbers> {
 /// Where the first numbers of a literal stand whose values are known: [`numbers`] without reading them again. `shape` are
 /// the groups that they fill.
 pub fn places(text: &[u8], shape: &[usize], values: &[f64]) -> Option<Numbers> {
-    let passed = |number| Some((lexer::number(unsigned(number).0).ok()?.0, 0.0));
+    let passed = |number| {
+        let rest = unsigned(number).0;
+        match number::plain(rest) {
+            Some((_, length)) => Some((&rest[length..], 0.0)),
+            None => Some((lexer::number(rest).ok()?.0, 0.0)),
+        }
+    };
     let (mut found, count, _) = groups(text, shape, passed)?;
     found.values.get_mut(..values.len())?.copy_from_slice(values);
     (count == values.len()).then_some(found)
@@ -100,6 +106,9 @@ fn symbol(wanted: u8) -> impl Fn(&[u8]) -> Rest<'_, ()> {
 #[inline]
 fn signed(input: &[u8]) -> Rest<'_, f64> {
     let (rest, negative) = unsigned(input);
+    if let Some((value, length)) = number::plain(rest) {
+        return Ok((&rest[length..], if negative { -value } else { value }));
+    }
     let (rest, text) = lexer::number(rest)?;
     let value = number::value(text).ok_or(nom::Err::Error(()))?;
     Ok((rest, if negative { -value } else { value }))

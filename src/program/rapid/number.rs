@@ -59,6 +59,33 @@ pub fn value(text: &[u8]) -> Option<f64> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
+/// The value and the length of a number at the beginning of a text, in one pass, where it is a plain one: digits with or
+/// without a point, or "not connected". `None` says nothing.
+#[inline]
+pub fn plain(text: &[u8]) -> Option<(f64, usize)> {
+    let (mut mantissa, mut index, mut point) = (0_u64, 0, None);
+    while let Some(&byte) = text.get(index) {
+        match byte {
+            b'0'..=b'9' => mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0')),
+            b'.' if point.is_none() => point = Some(index + 1),
+            b'E' if mantissa == 9 && index == 1 && text.get(2..5) == Some(b"+09") => {
+                return (!text.get(5).is_some_and(u8::is_ascii_digit)).then_some((9e9, 5));
+            }
+            // An exponent or a radix, or letters that do not belong here.
+            byte if byte.is_ascii_alphabetic() => return None,
+            _ => break,
+        }
+        index += 1;
+    }
+    let digits = index - usize::from(point.is_some());
+    if digits == 0 || digits > 15 {
+        return None;
+    }
+    // Exact in one division (Clinger 1990, the fast path).
+    let decimals = point.map_or(0, |point| index - point);
+    Some((mantissa as f64 / TEN[decimals], index))
+}
+
 /// A signed whole number; far beyond the range of a double it stays there.
 #[inline]
 fn written_exponent(text: &[u8]) -> Option<i32> {

@@ -1,9 +1,12 @@
 //! What targets, tools and work objects are worth.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use truegrind::program::motion::{Frame, Reason, RobTarget, TargetValue};
 use truegrind::program::rapid::Task;
-use truegrind::program::rapid::number;
+use truegrind::program::rapid::{lexer, number};
 
 const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
@@ -178,6 +181,26 @@ fn tools_work_objects_speeds_and_zones_are_told() {
     let zone = listing.zone(motion).unwrap().value.unwrap();
     assert!(!zone.fine && zone.tcp_mm == 20.0 && zone.orientation_deg == 3.0);
     assert_eq!(motion.reason(), None);
+}
+
+#[test]
+fn a_number_read_in_one_pass_is_the_same_number() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let bytes = b"0123456789019.E+-9ex,]_ ";
+    let mut told = 0;
+    for index in 0..200_000 {
+        let mut text: Vec<u8> =
+            (0..random.random_range(1..12)).map(|_| *bytes.choose(&mut random).unwrap()).collect();
+        if index % 4 == 0 {
+            text.splice(0..0, *b"9E+09");
+        }
+        if let Some((value, length)) = number::plain(&text) {
+            let (rest, number) = lexer::number(&text).unwrap();
+            assert_eq!((number.len(), number::value(number)), (length, Some(value)), "{text:?} {rest:?}");
+            told += 1;
+        }
+    }
+    assert!(told > 50_000, "{told}");
 }
 
 #[test]
