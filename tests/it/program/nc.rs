@@ -12,6 +12,11 @@ use truegrind::program::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOpti
 use super::samples::{root, told};
 
 mod certain;
+mod blocks;
+mod frames;
+mod m_words;
+mod stays;
+mod subprograms;
 
 const DIALECTS: [Dialect; 5] =
     [Dialect::Iso, Dialect::Fanuc, Dialect::LinuxCnc, Dialect::Siemens, Dialect::Heidenhain];
