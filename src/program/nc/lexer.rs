@@ -3,7 +3,7 @@
 //! Every byte ends up in exactly one token, whatever the file holds. A comment in parentheses ends at its line; a line
 //! that begins with `%` is one token.
 
-use super::dialect::Dialect;
+use super::dialect::{Dialect, is_okuma};
 use super::expression::is_function;
 use super::syntax::Syntax;
 use super::token::Token;
@@ -76,6 +76,9 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         0xEF if rest.starts_with(b"\xEF\xBB\xBF") => (Token::Space, 3),
         b'0'..=b'9' => (Token::Number, number(rest, dialect)),
         b'.' if second.is_ascii_digit() => (Token::Number, number(rest, dialect)),
+        b'$' if line_begins && dialect.paren_comments() && is_okuma(&rest[..to_line_end(rest, cr)]) => {
+            (Token::Tape, to_line_end(rest, cr))
+        }
         b'A'..=b'Z' | b'a'..=b'z' | b'_' | b'$' => word(rest, dialect),
         b';' => (Token::Comment, to_line_end(rest, cr)),
         b'%' if line_begins => (Token::Tape, to_line_end(rest, cr)),

@@ -534,10 +534,10 @@ impl Lister<'_, '_> {
             self.lose_position();
             return true;
         }
-        if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso | Dialect::LinuxCnc)
-            && said.m.iter().any(|m| matches!(m, 97 | 98 | 198))
+        if self.dialect.paren_comments()
+            && let Some(m) = said.m.iter().find(|m| matches!(m, 97 | 98 | 198))
         {
-            self.subprogram(said, "M98");
+            self.subprogram(said, &format!("M{m}"));
             return true;
         }
         false

@@ -63,14 +63,14 @@ impl Lister<'_, '_> {
         said.words.iter().any(switch).then(|| (format!("M{m} E3"), Reason::UnknownWord))
     }
 
-    /// Whether the axis words of a block may be values of its M word: it stands first, and is none that every control has.
+    /// Whether the axis words of a block may be values of its M word: it stands first, and is none of machine tools.
     fn takes_axes(&self, said: &Said<'_>, m: u32) -> bool {
         let first = said.words.iter().find(|word| word.address() != Some(b'N'));
         (said.moves() || said.others)
             && said.g.is_empty()
             && first
                 .is_some_and(|word| word.address() == Some(b'M') && self.literal(word) == Some(f64::from(m)))
-            && !matches!(m, 0..=9 | 13 | 14 | 19 | 30 | 48 | 49 | 60 | 97..=99 | 198)
+            && !matches!(m, 0..=91 | 97..=99 | 198)
     }
 
     /// M words that set something at the begin of their block.

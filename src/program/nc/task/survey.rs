@@ -11,12 +11,13 @@ impl Lister<'_, '_> {
     /// What the whole file sets, and where its jumps go.
     pub(super) fn survey(&mut self) {
         let mut jump = false;
-        // `%NAME G71 *`: DIN/ISO of Heidenhain, whose G words have meanings of their own.
+        // `%NAME G71 *`: DIN/ISO of Heidenhain, `$NAME.MIN%`: Okuma, whose G words have meanings of their own.
         let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
         self.foreign = self.dialect.paren_comments()
             && tape.is_some_and(|token| {
                 let text = self.tree.text(token).to_ascii_uppercase();
-                text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
+                text[0] == b'$'
+                    || text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
             });
         let tape_says = |text: &[u8]| {
             let text = text.to_ascii_uppercase();
@@ -92,7 +93,7 @@ impl Lister<'_, '_> {
                 // What the caller hands over has names too.
                 (None, _) if said.is("PROC") => {
                     block.declares = true;
-                    self.called |= self.dialect == Dialect::Siemens;
+                    self.called |= self.dialect == Dialect::Siemens && !subs.outside;
                 }
                 (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
                     for at in said.first..said.end {

@@ -103,3 +103,15 @@ fn a_star_ends_a_block_of_a_tape_whose_lines_end_with_cr() {
     assert!(task.listing.opaque.is_empty());
     assert_eq!(task.listing.motions.iter().filter(|motion| motion.reason().is_none()).count(), 3);
 }
+
+#[test]
+fn a_file_of_another_control_is_read_and_left() {
+    let source =
+        b"$TEST.MIN%\nO1000\n(ROUGH)\nVC1=10\nG15 H1\nG90 G21\nT1 M6\nG0 X10. Y0. Z50. A180. B0. C90.\nM02\n";
+    let task = Task::read(&[("a.min", source)], &Setup::default());
+    assert_eq!(task.dialects, [Iso]);
+    assert!(task.listing.motions.iter().all(|motion| motion.reason().is_some()));
+    let last = task.listing.motions.iter().find(|motion| motion.place.line == 8).unwrap();
+    assert_eq!(last.reason(), left(UnknownWord));
+    assert!(task.listing.opaque.iter().all(|opaque| opaque.place.line == 4), "{:?}", task.listing.opaque);
+}
