@@ -75,7 +75,7 @@ impl Task<'_> {
                     }
                     Event::Lost(axes) => follower.now.lose(axes),
                     Event::Shift(stated) => follower.now.shift_at(stated),
-                    Event::NoShift => follower.now.moved = [0.0; 3],
+                    Event::Placed(axes) => follower.now.place(axes),
                     Event::Motion(motion) => {
                         let index = wanted.get(&motion).copied();
                         let outcome = follower.motion(motion, index.map(|index| &changes[index]));
@@ -148,7 +148,7 @@ impl Task<'_> {
             if self.listing.motions[before as usize].place.file != motion.place.file {
                 continue;
             }
-            if needs == Needs::Tangent {
+            if needs == Needs::Tangent || self.listing.motions[before as usize].conditional {
                 directed.insert(before);
             }
             match wanted.get(&before).copied() {
@@ -220,6 +220,12 @@ impl Now {
             if axes & 8 << axis != 0 {
                 self.angles[axis] = None;
             }
+        }
+    }
+
+    fn place(&mut self, axes: [bool; 3]) {
+        for (moved, _) in self.moved.iter_mut().zip(axes).filter(|(_, placed)| *placed) {
+            *moved = 0.0;
         }
     }
 
@@ -397,20 +403,25 @@ impl<'s> Follower<'_, 's> {
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
         for axis in 0..3 {
-            let (Some(now), Some(meant)) = (self.now.position[axis], written.start[axis]) else { continue };
-            if now == meant {
-                continue;
-            }
+            let stands = self.now.position[axis].zip(written.start[axis]);
             if let Some(word) = slots.axes[axis] {
-                // An increment counts from where the tool stands now.
-                let increment = said(tree, dialect, &word).unwrap_or(!written.absolute);
-                if let (true, Some(to)) = (increment, &to) {
-                    let (value, was) =
-                        ((to.position_mm[axis] - now) / unit, (to.position_mm[axis] - meant) / unit);
+                let Some(to) = to.map(|to| to.position_mm[axis]) else { continue };
+                // An increment counts from where the tool stands now, a value from a shift that may have moved with it.
+                let (base, old) = match (said(tree, dialect, &word).unwrap_or(!written.absolute), stands) {
+                    (true, Some((now, meant))) => (now, meant),
+                    (true, None) => continue,
+                    (false, _) => {
+                        let shift = written.shift[axis].unwrap_or(0.0);
+                        (shift + self.now.moved[axis], shift)
+                    }
+                };
+                if base != old {
+                    let (value, was) = ((to - base) / unit, (to - old) / unit);
                     pen.put(AXES + axis, b"X", value, value, was, decimals);
                 }
                 continue;
             }
+            let Some((now, meant)) = stands.filter(|(now, meant)| now != meant) else { continue };
             let base = if written.absolute {
                 written.shift[axis].unwrap_or(0.0) + self.now.moved[axis]
             } else {

@@ -63,8 +63,8 @@ pub(super) enum Event {
     Unknown,
     /// The place where the tool stands gets these values (G92).
     Shift([Option<f64>; 3]),
-    /// The shift ends.
-    NoShift,
+    /// The shift of these axes ends, or is said whole: wherever the tool stands.
+    Placed([bool; 3]),
 }
 
 /// How a motion is written.
@@ -130,7 +130,8 @@ impl Task<'_> {
             if before.kind != MotionKind::Circular && before.reason().is_none() {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
-            if needs == Needs::Tangent {
+            // Where the block before may be skipped, the one before that ends here too.
+            if needs == Needs::Tangent || before.conditional {
                 let written = &mut self.written[at as usize];
                 written.needs = written.needs.max(Needs::Start);
             }

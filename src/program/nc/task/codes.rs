@@ -388,7 +388,7 @@ impl Lister<'_, '_> {
     fn p_belongs_elsewhere(&self, said: &Said<'_>) -> bool {
         matches!(self.dialect, Dialect::Siemens | Dialect::LinuxCnc)
             || said.m.iter().any(|m| matches!(m, 46 | 62..=68 | 96..=99 | 198))
-            || said.g.iter().any(|g| matches!(g, 20 | 30 | 40 | 50..=52 | 80 | 100 | 510 | 650..=661 | 680..=689 | 700..=769 | 810..=899))
+            || said.g.iter().any(|g| matches!(g, 20 | 30 | 40 | 50..=52 | 80 | 100 | 510 | 470 | 650..=661 | 680..=689 | 700..=769 | 810..=899 | 1500))
     }
 
     /// Another work offset holds: where the tool stands has other coordinates now, and turns otherwise where the frames do.
@@ -489,6 +489,7 @@ impl Lister<'_, '_> {
                             self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
                         }
                     }
+                    self.events.push(Event::Placed(said.axes.map(|axis| axis.is_some())));
                     self.rotary(said, |_, value| value == Ok(0.0));
                     self.set_any(Group::Shift);
                     return true;
@@ -513,7 +514,7 @@ impl Lister<'_, '_> {
                 921 | 922 => {
                     self.state.shift = [Ok(0.0); 3];
                     self.state.preset = false;
-                    self.events.push(Event::NoShift);
+                    self.events.push(Event::Placed([true; 3]));
                     self.set_any(Group::Shift);
                     if self.state.turned & 1 << Group::Rotary as u32 != 0 {
                         self.turn(Group::Rotary, false);

@@ -324,13 +324,16 @@ impl Lister<'_, '_> {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
         let plain = straight && !said.opaque && said.aside.is_none() && self.contour.is_none();
         let settled = !(1 << Group::Radius as u32 | 1 << Group::Tool as u32) & ALL_BUT_PLANE;
+        // A cycle runs where the words of the block say.
+        let call = self.modal_call(said);
         plain
-            && self.modal_call(said).is_none()
+            && call.is_none_or(|call| call == Reason::Cycle)
             && self.state.turned == 0
             && self.state.doubt(settled).is_none()
             && match motion.left {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
                 Some(Reason::NotFollowed) => said.corner,
+                Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
     }

@@ -58,7 +58,7 @@ fn what_turns_axes_is_listed() {
         Heidenhain,
         &[
             (&format!("{tilt}\nPLANE RESET TURN FMAX\n{l}"), &[left(Cycle), left(Cycle), None]),
-            (&format!("PLANE RESET MOVE ABST10 F500\nL X+10"), &[left(Cycle), left(PositionUnknown)]),
+            ("PLANE RESET MOVE ABST10 F500\nL X+10", &[left(Cycle), left(PositionUnknown)]),
             ("PLANE RESET STAY\nL X+10", &[None]),
         ],
     );
