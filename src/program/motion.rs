@@ -672,6 +672,8 @@ reasons! {
         UnknownWord => "a word that is not known stands here or before: what it does and sets is not known",
         /// NC: the arc after it stays as it is, and starts here.
         BeforeLeftArc => "an arc that stays as it is starts where this ends",
+        /// NC: a path that is neither line nor arc stays as it is, and starts here.
+        BeforeLeftPath => "a path that stays as it is starts where this ends, or goes on in its direction",
     }
 }
 

@@ -58,6 +58,9 @@ impl Dialect {
         let mut fanuc = false;
         for line in lines(sample) {
             let line = line.trim_ascii();
+            if is_okuma(line) {
+                return Dialect::Iso;
+            }
             if line.starts_with(b"%_N_") || line.starts_with(b";$PATH") {
                 return Dialect::Siemens;
             }
@@ -131,6 +134,11 @@ fn last_is_name(before: &[u8]) -> bool {
         .take_while(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'$'))
         .collect();
     name.iter().filter(|byte| byte.is_ascii_alphabetic()).count() >= 2
+}
+
+/// `$NAME.MIN%`, the head of a file of Okuma's.
+pub(super) fn is_okuma(line: &[u8]) -> bool {
+    line.starts_with(b"$") && line.trim_ascii_end().ends_with(b"%")
 }
 
 fn siemens(code: &[u8]) -> bool {

@@ -3,7 +3,7 @@
 //! Every byte ends up in exactly one token, whatever the file holds. A comment in parentheses ends at its line; a line
 //! that begins with `%` is one token.
 
-use super::dialect::Dialect;
+use super::dialect::{Dialect, is_okuma};
 use super::expression::is_function;
 use super::syntax::Syntax;
 use super::token::Token;
@@ -23,14 +23,33 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
     let mut line_begins = true;
     // What stood before in the line: a name in pointed brackets only follows `#` or the O of a subprogram.
     let mut before = Token::LineEnd;
+    // Whether the line before is a comment that goes on (Heidenhain).
+    let mut goes_on = false;
     while at < source.len() {
         let rest = &source[at..];
         let (kind, length) = match rest[0] {
+            // A block number begins a block of its own.
+            byte if goes_on
+                && !is_space(byte)
+                && !byte.is_ascii_digit()
+                && !matches!(byte, b'\r' | b'\n') =>
+            {
+                (Token::Comment, to_line_end(rest, cr))
+            }
             b'\r' if cr => (Token::LineEnd, 1),
             b'*' if dialect == Dialect::Heidenhain && begins_block(&source[..at]) => {
                 (Token::Comment, to_line_end(rest, cr))
             }
             _ => token(rest, dialect, line_begins, before, cr),
+        };
+        goes_on = match kind {
+            Token::Comment => {
+                dialect == Dialect::Heidenhain
+                    && rest[..length].trim_ascii_end().ends_with(b"~")
+                    && (goes_on || is_numbered_comment(&source[..at]))
+            }
+            Token::LineEnd => goes_on && before == Token::Comment,
+            _ => goes_on && kind == Token::Space,
         };
         tree.push(kind, at);
         if kind == Token::LineEnd {
@@ -57,6 +76,9 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         0xEF if rest.starts_with(b"\xEF\xBB\xBF") => (Token::Space, 3),
         b'0'..=b'9' => (Token::Number, number(rest, dialect)),
         b'.' if second.is_ascii_digit() => (Token::Number, number(rest, dialect)),
+        b'$' if line_begins && dialect.paren_comments() && is_okuma(&rest[..to_line_end(rest, cr)]) => {
+            (Token::Tape, to_line_end(rest, cr))
+        }
         b'A'..=b'Z' | b'a'..=b'z' | b'_' | b'$' => word(rest, dialect),
         b';' => (Token::Comment, to_line_end(rest, cr)),
         b'%' if line_begins => (Token::Tape, to_line_end(rest, cr)),
@@ -73,7 +95,7 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         b'+' => (Token::Plus, 1),
         b'-' => (Token::Minus, 1),
         // The end of a block on old tapes.
-        b'*' if dialect.paren_comments() && ends_line(&rest[1..]) => (Token::Comment, 1),
+        b'*' if dialect.paren_comments() && ends_line(&rest[1..], cr) => (Token::Comment, 1),
         b'*' => two(b'*', Token::Power, Token::Star),
         b'/' => (Token::Slash, 1),
         b'=' => two(b'=', Token::EqualEqual, Token::Equal),
@@ -97,14 +119,24 @@ fn begins_block(before: &[u8]) -> bool {
     last.is_none_or(|byte| matches!(byte, b'\n' | b'\r'))
 }
 
+/// Whether a comment that begins after these bytes is a block of its own, with a number, and no part of a block that goes on:
+/// only then the lines after a `~` belong to it.
+fn is_numbered_comment(before: &[u8]) -> bool {
+    let line = before.iter().rposition(|&byte| matches!(byte, b'\n' | b'\r')).map_or(0, |at| at + 1);
+    let number = before[line..].trim_ascii();
+    !number.is_empty()
+        && number.iter().all(u8::is_ascii_digit)
+        && !before[..line].trim_ascii_end().ends_with(b"~")
+}
+
 fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C | 0x1A | 0x00 | 0xA0)
 }
 
 /// Whether nothing but white space follows on the line.
-fn ends_line(rest: &[u8]) -> bool {
-    let next = rest.iter().find(|&&byte| !matches!(byte, b' ' | b'\t' | b'\r'));
-    next.is_none_or(|&byte| byte == b'\n')
+fn ends_line(rest: &[u8], cr: bool) -> bool {
+    let next = rest.iter().find(|&&byte| !matches!(byte, b' ' | b'\t') && (cr || byte != b'\r'));
+    next.is_none_or(|&byte| byte == b'\n' || byte == b'\r')
 }
 
 fn run(rest: &[u8], wanted: impl Fn(u8) -> bool) -> usize {

@@ -161,6 +161,8 @@ pub(super) enum Length {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct State {
     pub(super) mode: Mode,
+    /// Whether a path that is not followed goes on in the direction of the motion before.
+    pub(super) tangent: bool,
     pub(super) absolute: bool,
     /// mm per unit: 1 or 25.4.
     pub(super) unit_mm: f64,
@@ -182,6 +184,8 @@ pub(super) struct State {
     pub(super) rpy_stated: bool,
     /// G92, G52: what is added to programmed values (mm).
     pub(super) shift: [Worth; 3],
+    /// Whether G92 has a part in it.
+    pub(super) preset: bool,
     /// G54, G500, …
     pub(super) frame: String,
     /// TRANS, ROT: a frame within the work frame.
@@ -238,6 +242,7 @@ impl State {
     pub(super) fn start(frame: &str, tool: &str) -> State {
         State {
             mode: Mode::Unset,
+            tangent: true,
             absolute: true,
             unit_mm: 1.0,
             plane: Plane::XY,
@@ -250,6 +255,7 @@ impl State {
             spin: Ok(0.0),
             rpy_stated: false,
             shift: [Ok(0.0); 3],
+            preset: false,
             frame: frame.to_owned(),
             programmable: None,
             turned: 0,
@@ -395,6 +401,8 @@ impl State {
         self.frames.joined(&other.frames);
         self.tools.joined(&other.tools);
         self.stale |= other.stale;
+        self.tangent |= other.tangent;
+        self.preset |= other.preset;
         self.rpy_stated &= other.rpy_stated;
         self.spin_absolute &= other.spin_absolute;
         self.modal_call = self.modal_call.or(other.modal_call);

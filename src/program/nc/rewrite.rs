@@ -20,7 +20,7 @@ use super::machine::Turn;
 use super::mark;
 use super::orientation::{Angles, vector_and_spin};
 use super::syntax::{Belongs, NcTree, Word};
-use super::task::{Event, Task, Written};
+use super::task::{Event, Needs, Task, Written};
 use crate::program::edit::{EditError, Edits};
 use crate::program::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
@@ -75,7 +75,7 @@ impl Task<'_> {
                     }
                     Event::Lost(axes) => follower.now.lose(axes),
                     Event::Shift(stated) => follower.now.shift_at(stated),
-                    Event::NoShift => follower.now.moved = [0.0; 3],
+                    Event::Placed(axes) => follower.now.place(axes),
                     Event::Motion(motion) => {
                         let index = wanted.get(&motion).copied();
                         let outcome = follower.motion(motion, index.map(|index| &changes[index]));
@@ -125,7 +125,7 @@ impl Task<'_> {
         Ok(Rewritten { files, outcomes })
     }
 
-    /// An arc that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
+    /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
     /// last of them ends where it always did. Hands back the latter.
     fn fixed_ends(
         &self,
@@ -135,23 +135,33 @@ impl Task<'_> {
     ) -> BTreeSet<u32> {
         let mut fixed = BTreeSet::new();
         let mut refused = BTreeSet::new();
+        // Motions whose start stays because what comes after them goes on in their direction.
+        let mut directed = BTreeSet::new();
         for index in (1..self.listing.motions.len() as u32).rev() {
             let motion = &self.listing.motions[index as usize];
             let stays = motion.reason().is_some() || refused.contains(&index);
-            if motion.kind != MotionKind::Circular || !stays {
-                continue;
-            }
+            let needs = match self.needs(index as usize, stays) {
+                Needs::Nothing if !directed.contains(&index) => continue,
+                needs => needs,
+            };
             let before = motion.previous.unwrap_or(index - 1);
             if self.listing.motions[before as usize].place.file != motion.place.file {
                 continue;
             }
+            if needs == Needs::Tangent || self.listing.motions[before as usize].conditional {
+                directed.insert(before);
+            }
             match wanted.get(&before).copied() {
-                Some(change) if changes[change].straightens() => {
+                Some(change) if changes[change].straightens() && needs != Needs::Tangent => {
                     fixed.insert(before);
                 }
                 Some(change) => {
                     wanted.remove(&before);
-                    outcomes[change] = Outcome::Refused(Reason::BeforeLeftArc);
+                    let arc = motion.kind == MotionKind::Circular;
+                    outcomes[change] = Outcome::Refused(match arc {
+                        true => Reason::BeforeLeftArc,
+                        false => Reason::BeforeLeftPath,
+                    });
                     refused.insert(before);
                 }
                 None => {}
@@ -210,6 +220,12 @@ impl Now {
             if axes & 8 << axis != 0 {
                 self.angles[axis] = None;
             }
+        }
+    }
+
+    fn place(&mut self, axes: [bool; 3]) {
+        for (moved, _) in self.moved.iter_mut().zip(axes).filter(|(_, placed)| *placed) {
+            *moved = 0.0;
         }
     }
 
@@ -387,20 +403,25 @@ impl<'s> Follower<'_, 's> {
         let to =
             motion.to().and_then(|target| target.value.ok().and_then(|value| value.cartesian().copied()));
         for axis in 0..3 {
-            let (Some(now), Some(meant)) = (self.now.position[axis], written.start[axis]) else { continue };
-            if now == meant {
-                continue;
-            }
+            let stands = self.now.position[axis].zip(written.start[axis]);
             if let Some(word) = slots.axes[axis] {
-                // An increment counts from where the tool stands now.
-                let increment = said(tree, dialect, &word).unwrap_or(!written.absolute);
-                if let (true, Some(to)) = (increment, &to) {
-                    let (value, was) =
-                        ((to.position_mm[axis] - now) / unit, (to.position_mm[axis] - meant) / unit);
+                let Some(to) = to.map(|to| to.position_mm[axis]) else { continue };
+                // An increment counts from where the tool stands now, a value from a shift that may have moved with it.
+                let (base, old) = match (said(tree, dialect, &word).unwrap_or(!written.absolute), stands) {
+                    (true, Some((now, meant))) => (now, meant),
+                    (true, None) => continue,
+                    (false, _) => {
+                        let shift = written.shift[axis].unwrap_or(0.0);
+                        (shift + self.now.moved[axis], shift)
+                    }
+                };
+                if base != old {
+                    let (value, was) = ((to - base) / unit, (to - old) / unit);
                     pen.put(AXES + axis, b"X", value, value, was, decimals);
                 }
                 continue;
             }
+            let Some((now, meant)) = stands.filter(|(now, meant)| now != meant) else { continue };
             let base = if written.absolute {
                 written.shift[axis].unwrap_or(0.0) + self.now.moved[axis]
             } else {
@@ -427,6 +448,7 @@ impl<'s> Follower<'_, 's> {
             pen.put(ANGLES + axis, name, meant - base, now - base, f64::NAN, decimals);
             again[3 + axis] = true;
         }
+        self.vector_again(&mut pen, written, &slots, motion.conditional);
         self.edits[file] = edits;
         for axis in 0..3 {
             // Where the block may be skipped it is said again by whatever comes next.
@@ -438,6 +460,38 @@ impl<'s> Follower<'_, 's> {
                 self.now.angles[axis] = now;
             }
         }
+    }
+
+    /// The same for a tool vector and the turn about it.
+    fn vector_again(
+        &mut self,
+        pen: &mut Pen<'_, 's>,
+        written: &Written,
+        slots: &Slots<'s>,
+        conditional: bool,
+    ) {
+        let (Turn::Vector, Some((now, now_spin)), Some((meant, meant_spin))) =
+            (written.turn, self.now.vector, written.start_vector)
+        else {
+            return;
+        };
+        // Only LN of Heidenhain takes a vector.
+        let takes = pen.dialect != Dialect::Heidenhain || slots.first.is_some_and(|word| word.is("LN"));
+        let stated = slots.vector.iter().any(Option::is_some);
+        if !takes || (now, now_spin) == (meant, meant_spin) {
+            return;
+        }
+        if !stated && now != meant {
+            let names = vector_names(pen.dialect, written);
+            for axis in 0..3 {
+                let decimals = self.options.quaternion_decimals;
+                pen.put(VECTOR + axis, names[axis], meant[axis], f64::NAN, f64::NAN, decimals);
+            }
+        }
+        if pen.dialect == Dialect::Siemens && slots.spin.is_none() && now_spin != meant_spin {
+            pen.put(SPIN, b"THETA", meant_spin, f64::NAN, f64::NAN, self.options.joint_decimals);
+        }
+        self.now.vector = conditional.then_some(([f64::NAN; 3], f64::NAN));
     }
 
     /// After a motion that stays as it is written: its words say again what the original says, the others hold on.
@@ -452,7 +506,15 @@ impl<'s> Follower<'_, 's> {
             }
         }
         if slots.vector.iter().any(Option::is_some) {
-            self.now.vector = None;
+            // A turn about the vector that is not said holds on.
+            self.now.vector = match (self.now.vector, written.start_vector, written.vector) {
+                (Some((_, now)), Some((_, meant)), Some((vector, _)))
+                    if slots.spin.is_none() && now != meant =>
+                {
+                    Some((vector, now))
+                }
+                _ => None,
+            };
         }
     }
 
@@ -621,11 +683,7 @@ impl<'s> Follower<'_, 's> {
                     None => (meant, meant_spin),
                 };
                 let decimals = self.options.quaternion_decimals;
-                let names: [&[u8]; 3] = match (pen.dialect, written.vector_words) {
-                    (_, true) => [b"I", b"J", b"K"],
-                    (Dialect::Heidenhain, _) => [b"TX", b"TY", b"TZ"],
-                    _ => [b"A3", b"B3", b"C3"],
-                };
+                let names = vector_names(pen.dialect, written);
                 let before = self.now.vector.or(written.start_vector);
                 let stated = slots.vector.iter().any(Option::is_some);
                 let holds =
@@ -715,6 +773,15 @@ enum Told {
     Vector([f64; 3], f64),
 }
 
+/// The words of a tool vector.
+fn vector_names(dialect: Dialect, written: &Written) -> [&'static [u8]; 3] {
+    match (dialect, written.vector_words) {
+        (_, true) => [b"I", b"J", b"K"],
+        (Dialect::Heidenhain, _) => [b"TX", b"TY", b"TZ"],
+        _ => [b"A3", b"B3", b"C3"],
+    }
+}
+
 fn all(values: [Option<f64>; 3]) -> Option<[f64; 3]> {
     Some([values[0]?, values[1]?, values[2]?])
 }
@@ -730,6 +797,7 @@ fn stays_in_place(reason: Reason) -> bool {
             | Reason::WorkObjectUnknown
             | Reason::CentreElsewhere
             | Reason::BeforeLeftArc
+            | Reason::BeforeLeftPath
     )
 }
 

@@ -10,6 +10,7 @@ mod flow;
 mod frames;
 mod heidenhain;
 mod known;
+mod m_words;
 mod motion;
 mod names;
 mod survey;
@@ -62,8 +63,8 @@ pub(super) enum Event {
     Unknown,
     /// The place where the tool stands gets these values (G92).
     Shift([Option<f64>; 3]),
-    /// The shift ends.
-    NoShift,
+    /// The shift of these axes ends, or is said whole: wherever the tool stands.
+    Placed([bool; 3]),
 }
 
 /// How a motion is written.
@@ -94,26 +95,58 @@ pub(super) struct Written {
     pub(super) restates: bool,
     /// Whether it is a positioning block of Heidenhain without L.
     pub(super) paraxial: bool,
+    /// What its way hangs on where it stays as it is.
+    pub(super) needs: Needs,
+}
+
+/// What the way of a motion that stays hangs on, beside its own words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Needs {
+    /// Nothing: a straight one only begins elsewhere.
+    Nothing,
+    /// Where it starts.
+    Start,
+    /// Where it starts, and in which direction the motion before comes there.
+    Tangent,
 }
 
 impl Task<'_> {
-    /// An arc that stays as it is needs its start: the straight motion that ends there stays too. Where an arc ends there it is
-    /// the rewrite that sees to it, because that arc may become straight.
+    /// An arc or another path that stays as it is needs its start: the straight motion that ends there stays too, and where it
+    /// goes on in the direction of that, so does the start of that. Where an arc ends there it is the rewrite that sees to it,
+    /// because that arc may become straight.
     fn spare_arcs(&mut self) {
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
-            if motion.kind != MotionKind::Circular || motion.reason().is_none() {
+            let needs = self.needs(index, motion.reason().is_some());
+            if needs == Needs::Nothing {
                 continue;
             }
-            let file = motion.place.file;
-            let before = motion.previous.or((index as u32).checked_sub(1));
-            let Some(before) = before.map(|before| &mut self.listing.motions[before as usize]) else {
+            let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
+            let Some(at) = motion.previous.or((index as u32).checked_sub(1)) else { continue };
+            let before = &mut self.listing.motions[at as usize];
+            if before.place.file != file {
                 continue;
-            };
-            let straight = before.kind != MotionKind::Circular;
-            if before.place.file == file && straight && before.reason().is_none() {
-                before.left = Some(Reason::BeforeLeftArc);
             }
+            if before.kind != MotionKind::Circular && before.reason().is_none() {
+                before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
+            }
+            // Where the block before may be skipped, the one before that ends here too.
+            if needs == Needs::Tangent || before.conditional {
+                let written = &mut self.written[at as usize];
+                written.needs = written.needs.max(Needs::Start);
+            }
+        }
+    }
+}
+
+impl Task<'_> {
+    /// What the way of a motion hangs on, where it stays or does not.
+    pub(super) fn needs(&self, motion: usize, stays: bool) -> Needs {
+        let needs = self.written[motion].needs;
+        match self.listing.motions[motion].kind {
+            _ if !stays => Needs::Nothing,
+            MotionKind::Circular => needs.max(Needs::Start),
+            _ => needs,
         }
     }
 }
@@ -137,6 +170,8 @@ impl<'s> Task<'s> {
         };
         for file in 0..files.len() {
             let mut lister = Lister::new(&task.trees[file], file as u32, task.dialects[file], setup);
+            // Siemens: a subprogram by the ending of its name.
+            lister.called = task.names[file].to_ascii_lowercase().ends_with(".spf");
             lister.listing = std::mem::take(&mut task.listing);
             lister.events = std::mem::take(&mut task.events);
             lister.written = std::mem::take(&mut task.written);
@@ -177,10 +212,14 @@ pub(super) struct Lister<'t, 's> {
     passed: Option<State>,
     /// Whether tools come in with M6.
     changes_tools: bool,
+    /// Whether a cycle that is called may be a program (cycle 12 of Heidenhain).
+    calls_program: bool,
     /// Whether a block has words of NC and no others.
     speaks: bool,
     /// Whether the program begins again at its end.
     repeats: bool,
+    /// Whether the file is a subprogram and no more: what holds at its begin is its caller's.
+    called: bool,
     /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
     foreign: bool,
     /// Contours that cycles of lathes read, from block to block.
@@ -189,6 +228,8 @@ pub(super) struct Lister<'t, 's> {
     contour: Option<u64>,
     /// Names that the file declares (Siemens).
     declared: BTreeSet<Vec<u8>>,
+    /// Those of them that hold whole numbers only.
+    whole_numbers: BTreeSet<Vec<u8>>,
     /// Blocks that jumps go to.
     targets: BTreeSet<u64>,
     /// Whether a jump goes to a computed block.
@@ -276,12 +317,15 @@ impl<'t, 's> Lister<'t, 's> {
             actions: false,
             passed: None,
             changes_tools: false,
+            calls_program: false,
             speaks: false,
             repeats: false,
+            called: false,
             foreign: false,
             contours: Vec::new(),
             contour: None,
             declared: BTreeSet::new(),
+            whole_numbers: BTreeSet::new(),
             targets: BTreeSet::new(),
             anywhere: false,
             listing: Listing::default(),
@@ -332,7 +376,9 @@ impl<'t, 's> Lister<'t, 's> {
 
     fn follow(&mut self) {
         self.events.push(Event::Start);
-        if self.repeats() {
+        if self.called {
+            self.enter();
+        } else if self.repeats() {
             self.forget();
         }
         let mut said = Said::default();
@@ -427,6 +473,7 @@ impl<'t, 's> Lister<'t, 's> {
         for index in 0..said.words.len() {
             self.gather_word(said, index);
         }
+        self.values_of_m(said);
         let first = said.words.first();
         said.paraxial = self.dialect == Dialect::Heidenhain
             && first.is_some_and(|word| is_axis_name(word.name) && word.belongs != Belongs::Nothing);
@@ -474,6 +521,8 @@ impl<'t, 's> Lister<'t, 's> {
             },
             Some(b'M') => match self.literal(&word) {
                 Some(number) => said.m.push(number.round() as u32),
+                // A path block may end with M alone.
+                None if heidenhain && word.belongs == Belongs::Nothing => {}
                 None => said.unknown = Some(("M".to_owned(), Reason::Variable)),
             },
             Some(b'X') => put(&mut said.axes[0]),
@@ -684,37 +733,23 @@ impl<'t, 's> Lister<'t, 's> {
 
     /// M2, M30, M99, M17 of Siemens: what comes after belongs to another program. M6 goes to change the tool.
     fn ends(&mut self, said: &Said<'s>) {
+        let dialect = self.dialect;
         let end = |m: &u32| match m {
             2 | 30 => true,
-            17 => self.dialect == Dialect::Siemens,
-            99 => self.dialect != Dialect::Heidenhain,
+            17 => dialect == Dialect::Siemens,
+            99 => dialect != Dialect::Heidenhain,
             _ => false,
         };
-        // M99 P100 jumps, perhaps over what comes next.
-        self.branched |= said.m.contains(&99);
+        // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
+        self.branched |= said.m.iter().any(|m| matches!(m, 46 | 96 | 99));
+        if self.dialect == Dialect::Heidenhain && said.m.contains(&129) {
+            // It acts at the end of its block.
+            self.tip(false, false);
+        }
         if said.m.iter().any(end) || said.words.iter().any(|word| word.is("RET")) {
             self.ended = true;
         } else if said.m.contains(&6) {
             self.lose_all();
-        }
-    }
-
-    /// M words that set something.
-    fn m_words(&mut self, said: &Said<'s>) {
-        let heidenhain = self.dialect == Dialect::Heidenhain;
-        for &m in &said.m {
-            match m {
-                128 | 129 if heidenhain => self.tip(m == 128, false),
-                // These end at the next M99, the others set what is not followed here.
-                89 if heidenhain => self.state.modal_call = Some(Reason::Cycle),
-                70 | 73 if self.dialect == Dialect::LinuxCnc => {
-                    self.state.kept = None;
-                    self.state.kept = Some(Box::new(self.state.clone()));
-                }
-                71 if self.dialect == Dialect::LinuxCnc => self.state.kept = None,
-                72 if self.dialect == Dialect::LinuxCnc => self.restore(),
-                _ => {}
-            }
         }
     }
 
@@ -734,7 +769,13 @@ impl<'t, 's> Lister<'t, 's> {
             };
             self.state.next_tool = Some(name);
         }
-        if (said.m.contains(&6) || !self.changes_tools)
+        // LinuxCNC: M61 says which tool is in; T alone only makes one ready, whatever else the file has.
+        let linux = self.dialect == Dialect::LinuxCnc;
+        if linux && said.m.contains(&61) {
+            let number = said.q.and_then(|index| self.literal(&said.words[index]));
+            self.change_tool(number.map_or("T?".to_owned(), |number| format!("T{}", number.round())));
+        }
+        if (said.m.contains(&6) || !self.changes_tools && !linux)
             && let Some(name) = self.state.next_tool.take()
         {
             self.change_tool(name);

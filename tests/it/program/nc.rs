@@ -12,6 +12,11 @@ use truegrind::program::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOpti
 use super::samples::{root, told};
 
 mod certain;
+mod blocks;
+mod frames;
+mod m_words;
+mod stays;
+mod subprograms;
 
 const DIALECTS: [Dialect; 5] =
     [Dialect::Iso, Dialect::Fanuc, Dialect::LinuxCnc, Dialect::Siemens, Dialect::Heidenhain];
@@ -123,12 +128,14 @@ proptest! {
     }
 
     #[test]
-    fn any_order_of_words_comes_back(words in proptest::collection::vec(0_usize..64, 0..80), dialect in 0_usize..5) {
+    fn any_order_of_words_comes_back(words in proptest::collection::vec(0_usize..84, 0..80), dialect in 0_usize..5) {
         let pieces = ["G0", "G1", "G2", "G3", "G91", "G90", "G92", "G53", "G54", "G41", "G40", "G43.4", "G43.5", "G68", "G28",
             "X1.", "Y-2.5", "Z.5", "A180.", "B0", "C-.5", "I5.", "J-5.", "K1", "R10.", "F600", "X#1", "#1=2", "#1=[#2*3]",
             "X[1+2]", "X=IC(5)", "A3=0.1", "B3=0", "C3=1", "THETA=5", "R1=5", "X=R1", "TRAORI", "TRANS", "ROT", "M30", "M98",
             "P5", "\n", "\n", "\n", "/", "N10", "(c)", "; c\n", "%\n", "[", "]", "(", ")", "=", "O5", "GOTO", "L", "L X+1 Y+2",
-            "CC X+1 Y+1", "C X+3 Y+1 DR+", "Q1 = +5", "LBL 1"];
+            "CC X+1 Y+1", "C X+3 Y+1 DR+", "Q1 = +5", "LBL 1",
+            "M99", "M97", "M19", "M129", "M205", "M17", "CIP", "CT", "RND=2", "PLANE RESET TURN", "FN 25: PRESET = X/+0/+1", "CP IPA+90 DR+",
+            "5 ;c~\n", "LN X+1 TX+0 TY+0 TZ+1", "DEF INT R=1", "G52", "G92.1", "G69", "G80", "$A%\n"];
         let text: String = words.iter().map(|&word| format!("{} ", pieces[word])).collect();
         check(text.as_bytes(), DIALECTS[dialect]);
     }

@@ -64,9 +64,13 @@ impl Lister<'_, '_> {
                 b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.lose_orientation(),
                 b"CIP" | b"CT" | b"BSPLINE" | b"ASPLINE" | b"CSPLINE" | b"POLY" | b"INVCW" | b"INVCCW" => {
                     self.state.mode = Mode::Other(Reason::NotFollowed);
+                    self.state.tangent = !matches!(&*name, b"CIP" | b"POLY" | b"INVCW" | b"INVCCW");
                 }
                 b"CYCLE800" => {
                     let empty = matches!(word.belongs, Belongs::Arguments { first, end } if end == first + 2);
+                    if !empty {
+                        self.left(said, "CYCLE800", Reason::Cycle);
+                    }
                     self.turn(Group::Swivel, !empty);
                     done = true;
                 }
@@ -181,6 +185,14 @@ impl Lister<'_, '_> {
         let linux = self.dialect == Dialect::LinuxCnc;
         let fanuc = self.dialect == Dialect::Fanuc;
         self.state.exact_stop &= self.state.exact_stop_holds;
+        // Of the paths with a number only the cubic spline goes on in the direction of the one before.
+        if said
+            .g
+            .iter()
+            .any(|code| matches!(code, 22..=24 | 32..=34 | 50..=53 | 62 | 320..=350 | 630 | 3310..=3360))
+        {
+            self.state.tangent = said.g.contains(&50);
+        }
         for &code in &said.g {
             match code {
                 0 => self.state.mode = Mode::Rapid,
@@ -240,14 +252,9 @@ impl Lister<'_, '_> {
                     self.turn(Group::Fixture, !ends);
                     return true;
                 }
-                170 | 180 | 190 => {
-                    self.state.plane = match code {
-                        170 => Plane::XY,
-                        180 => Plane::ZX,
-                        _ => Plane::YZ,
-                    };
-                    self.set(Group::Plane, u64::from(code));
-                }
+                170 => self.plane_is(Plane::XY, code),
+                180 => self.plane_is(Plane::ZX, code),
+                190 => self.plane_is(Plane::YZ, code),
                 200 if !siemens => self.unit(25.4),
                 210 if !siemens => self.unit(1.0),
                 700 | 710 if siemens || self.is_unit(said) => self.unit(if code == 700 { 25.4 } else { 1.0 }),
@@ -285,6 +292,8 @@ impl Lister<'_, '_> {
                     }
                     self.state.mode = Mode::Other(Reason::Cycle);
                 }
+                // Beside a motion word it only ends the cycle.
+                800 if said.g.iter().any(|code| matches!(code, 0 | 10 | 20 | 30)) => {}
                 // The motion word of before holds on a Fanuc; LinuxCNC wants a new one.
                 800 if fanuc && self.state.mode != Mode::Other(Reason::Cycle) => {}
                 800 if fanuc => self.state.mode = self.state.before_cycle,
@@ -301,6 +310,12 @@ impl Lister<'_, '_> {
             }
         }
         false
+    }
+
+    /// The plane of arcs.
+    pub(super) fn plane_is(&mut self, plane: Plane, code: u32) {
+        self.state.plane = plane;
+        self.set(Group::Plane, u64::from(code));
     }
 
     fn unit(&mut self, mm: f64) {
@@ -357,6 +372,8 @@ impl Lister<'_, '_> {
         let number = match code {
             150 | 160 => number(said.h).map(|number| (" H", number)),
             541 | 1540 => number(said.p).map(|number| (" P", number)),
+            // On some controls that is G54.1 P, on others P means nothing: a name of its own, which only the setup can know.
+            540 if !self.p_belongs_elsewhere(said) => number(said.p).map(|number| (" P", number)),
             _ => None,
         };
         match number {
@@ -365,6 +382,13 @@ impl Lister<'_, '_> {
             None => {}
         }
         self.frame_is(name);
+    }
+
+    /// Whether P of a block is a value of another word than its work offset: a call, a dwell, a cycle.
+    fn p_belongs_elsewhere(&self, said: &Said<'_>) -> bool {
+        matches!(self.dialect, Dialect::Siemens | Dialect::LinuxCnc)
+            || said.m.iter().any(|m| matches!(m, 46 | 62..=68 | 96..=99 | 198))
+            || said.g.iter().any(|g| matches!(g, 20 | 30 | 40 | 50..=52 | 80 | 100 | 510 | 470 | 650..=661 | 680..=689 | 700..=769 | 810..=899 | 1500))
     }
 
     /// Another work offset holds: where the tool stands has other coordinates now, and turns otherwise where the frames do.
@@ -447,7 +471,14 @@ impl Lister<'_, '_> {
                     return true;
                 }
                 531 | 536 => {
+                    // The axes turn into the tilted plane.
+                    self.left(said, &code_name(code), Reason::Cycle);
                     self.lose_all();
+                    return true;
+                }
+                // Within what G92 has shifted, or in its place: the controls differ.
+                520 if self.state.preset && self.dialect != Dialect::LinuxCnc => {
+                    self.shift_is_lost();
                     return true;
                 }
                 520 if !siemens => {
@@ -458,6 +489,7 @@ impl Lister<'_, '_> {
                             self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
                         }
                     }
+                    self.events.push(Event::Placed(said.axes.map(|axis| axis.is_some())));
                     self.rotary(said, |_, value| value == Ok(0.0));
                     self.set_any(Group::Shift);
                     return true;
@@ -474,9 +506,15 @@ impl Lister<'_, '_> {
                     self.set_shift(said);
                     return true;
                 }
+                // Fanuc ends the shift of the axes that are named, LinuxCNC all.
+                921 if !self.ends_all(said) => {
+                    self.shift_is_lost();
+                    return true;
+                }
                 921 | 922 => {
                     self.state.shift = [Ok(0.0); 3];
-                    self.events.push(Event::NoShift);
+                    self.state.preset = false;
+                    self.events.push(Event::Placed([true; 3]));
                     self.set_any(Group::Shift);
                     if self.state.turned & 1 << Group::Rotary as u32 != 0 {
                         self.turn(Group::Rotary, false);
@@ -497,13 +535,31 @@ impl Lister<'_, '_> {
             self.lose_position();
             return true;
         }
-        if matches!(self.dialect, Dialect::Fanuc | Dialect::Iso | Dialect::LinuxCnc)
-            && said.m.iter().any(|m| matches!(m, 97 | 98 | 198))
+        if self.dialect.paren_comments()
+            && let Some(m) = said.m.iter().find(|m| matches!(m, 97 | 98 | 198))
         {
-            self.subprogram(said, "M98");
+            self.subprogram(said, &format!("M{m}"));
             return true;
         }
         false
+    }
+
+    /// G92.1: whether every shift ends by it, or there is none.
+    fn ends_all(&self, said: &Said<'_>) -> bool {
+        let rotary = self.state.turned & 1 << Group::Rotary as u32 != 0;
+        let none = self.state.shift == [Ok(0.0); 3]
+            && !rotary
+            && self.state.doubt(1 << Group::Shift as u32 | 1 << Group::Rotary as u32).is_none();
+        let named =
+            said.axes.iter().all(Option::is_some) && (!rotary || said.abc.iter().all(Option::is_some));
+        self.dialect == Dialect::LinuxCnc || self.dialect == Dialect::Iso && !said.moves() || none || named
+    }
+
+    /// What is added to programmed values is not known until it ends.
+    fn shift_is_lost(&mut self) {
+        self.state.shift = [Err(Reason::Displacement); 3];
+        self.set_any(Group::Shift);
+        self.lose_all();
     }
 
     /// A, B and C are counted from elsewhere, where `same` does not say that nothing changes.
@@ -537,6 +593,7 @@ impl Lister<'_, '_> {
             };
         }
         let abc = self.state.abc;
+        self.state.preset = true;
         self.set_any(Group::Shift);
         self.events.push(Event::Shift(stated));
         self.rotary(said, |axis, value| value.is_ok() && abc[axis] == value);

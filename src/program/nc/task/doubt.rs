@@ -74,8 +74,12 @@ impl Lister<'_, '_> {
         self.state.certain(group);
     }
 
-    /// A group that turns, scales or bends coordinates begins or ends.
+    /// A group that turns, scales or bends coordinates begins or ends. What ends where nothing is on changes nothing.
     pub(super) fn turn(&mut self, group: Group, on: bool) {
+        let bit = 1 << group as u32;
+        if !on && self.state.turned & bit == 0 && self.state.doubt(bit).is_none() {
+            return self.set(group, 0);
+        }
         self.state.turn_frame(group, on);
         self.set(group, u64::from(on));
         match group {
@@ -103,13 +107,25 @@ impl Lister<'_, '_> {
                     _ if group == Group::Tool as usize => key("T0"),
                     _ => 0,
                 };
-                let held = whole.value[group].is_none_or(|value| value == start || self.settled & bit != 0);
+                let settled = self.settled & bit != 0;
+                let held = match whole.value[group] {
+                    // What the file never sets is the caller's where it has one.
+                    None => !self.called,
+                    Some(value) => settled || value == start && !self.called,
+                };
                 if held && whole.several & bit == 0 {
                     constant |= bit;
                 }
             }
         }
         self.state.forget(constant, assigns);
+        self.events.push(Event::Unknown);
+    }
+
+    /// The begin of a file that others call: everything is as they have left it.
+    pub(super) fn enter(&mut self) {
+        self.state.forget(0, (false, false));
+        self.state.next_tool = Some("T?".to_owned());
         self.events.push(Event::Unknown);
     }
 
@@ -149,8 +165,10 @@ impl Lister<'_, '_> {
         if let Some((word, reason)) = &said.unknown {
             return Some((word.clone(), *reason));
         }
-        let code = said.g.iter().find(|&&code| !super::known::is_g(code, self.dialect, self.says(said)))?;
-        Some((super::codes::code_name(*code), Reason::UnknownWord))
+        match said.g.iter().find(|&&code| !super::known::is_g(code, self.dialect, self.says(said))) {
+            Some(code) => Some((super::codes::code_name(*code), Reason::UnknownWord)),
+            None => self.m_not_known(said),
+        }
     }
 
     /// What kinds of word a block has, for codes that mean different things with and without.

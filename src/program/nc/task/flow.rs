@@ -97,6 +97,12 @@ impl Lister<'_, '_> {
                 Belongs::Expression { first, end } => self.evaluated((first, end)),
                 _ => Err(Reason::WrongShape),
             };
+            let value = match &name {
+                // An INT rounds what it is given; in which direction is left to the control.
+                Some(name) if self.whole_numbers.contains(name) => value
+                    .and_then(|value| if value.fract() == 0.0 { Ok(value) } else { Err(Reason::Variable) }),
+                _ => value,
+            };
             if name.is_none() && word.name == b"#" {
                 // It may be one that the control itself reads: offsets, tools, settings.
                 self.frames_assigned();

@@ -145,9 +145,11 @@ impl Lister<'_, '_> {
                 b'4' => 1,
                 _ => 0,
             };
-            let frame = self.worth(word).0.ok().map(|value| {
+            // Under G70 the data of the control stay in its own unit, under G700 they do not.
+            let value = self.worth(word).0.ok().filter(|_| self.counts_in_mm());
+            let frame = value.map(|value| {
                 let mut frame = self.tool_value(&tool).unwrap_or(Frame::IDENTITY);
-                frame.position_mm[axis] = value * self.state.unit_mm;
+                frame.position_mm[axis] = value;
                 frame
             });
             self.state.tools.set(&tool, frame);
@@ -171,6 +173,11 @@ impl Lister<'_, '_> {
         }
     }
 
+    /// Whether lengths are certainly mm here.
+    fn counts_in_mm(&self) -> bool {
+        self.state.unit_mm == 1.0 && self.state.doubt(1 << Group::Unit as u32).is_none()
+    }
+
     /// Whether a word has one index and no more: `$P_UIFR[1,X,TR]` sets one component.
     fn is_index_alone(&self, word: &Word<'_>) -> bool {
         word.index.is_some_and(|(first, end)| (first..end).all(|at| self.tree.kind(at) != Some(Token::Comma)))
@@ -186,6 +193,9 @@ impl Lister<'_, '_> {
     /// A chain of CTRANS and CROT with plain numbers.
     fn frame_expression(&self, word: &Word<'_>) -> Option<Pose> {
         let Belongs::Expression { first, end } = word.belongs else { return None };
+        if !self.counts_in_mm() {
+            return None;
+        }
         let mut pose = Pose::identity();
         let (mut kind, mut values, mut axis, mut negative) = (None, [0.0; 3], None, false);
         for token in first..end {
@@ -215,10 +225,7 @@ impl Lister<'_, '_> {
                 Token::ParenClose => {
                     let [x, y, z] = values;
                     pose *= match kind.take()? {
-                        false => Pose::from_parts(
-                            (Vector3::new(x, y, z) * self.state.unit_mm).into(),
-                            UnitQuaternion::identity(),
-                        ),
+                        false => Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::identity()),
                         true => Pose::from_parts(Vector3::zeros().into(), Angles::Wpr.rotation([x, y, z])),
                     };
                 }
@@ -273,17 +280,22 @@ impl Lister<'_, '_> {
         let known = self.frame_value(name).ok();
         let mut frame = known.unwrap_or(Frame::IDENTITY);
         let mut good = said.axes.iter().all(Option::is_some) || known.is_some();
+        // LinuxCNC takes the values as they are in G91 too, Fanuc and Haas add them; which of them a plain file is for is
+        // not known.
+        let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
+        good &= absolute || self.dialect != Dialect::Iso;
         for (axis, word) in said.axes.iter().enumerate() {
             let Some(index) = word else { continue };
             match self.worth(&said.words[*index]) {
-                (Ok(value), _) if self.state.absolute => frame.position_mm[axis] = value * self.state.unit_mm,
+                (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.unit_mm,
                 (Ok(value), _) => frame.position_mm[axis] += value * self.state.unit_mm,
                 (Err(_), _) => good = false,
             }
         }
         // Offsets of rotary axes turn what A, B and C mean.
         good &= said.abc.iter().flatten().all(|&index| self.number(&said.words[index]) == Some(0.0));
-        good &= self.state.doubt(1 << Group::Distance as u32 | 1 << Group::Unit as u32).is_none();
+        let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { 1 << Group::Distance as u32 };
+        good &= self.state.doubt(distance | 1 << Group::Unit as u32).is_none();
         match said.radius.map(|index| self.number(&said.words[index])) {
             // The turn of the work frame about z (LinuxCNC).
             Some(Some(turn)) => {

@@ -1,11 +1,12 @@
 //! Heidenhain conversational: blocks that are no words of an address each.
 
+use super::super::arc::Plane;
 use super::super::dialect::Dialect;
 use super::super::expression::{Worth, literal, numbered};
 use super::super::machine::{Group, Mode};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
-use super::{Lister, Said};
+use super::{Lister, Needs, Said};
 use crate::math::se3::Pose;
 use crate::program::motion::Reason;
 
@@ -40,10 +41,12 @@ impl<'s> Lister<'_, 's> {
                     Some(_) => Mode::Circular(!negative),
                     None => Mode::Other(Reason::NotFollowed),
                 };
+                self.state.tangent = false;
                 false
             }
             b"CT" => {
                 self.state.mode = Mode::Other(Reason::NotFollowed);
+                self.state.tangent = true;
                 false
             }
             b"CC" => {
@@ -66,7 +69,10 @@ impl<'s> Lister<'_, 's> {
                 // No motion: axis words are values of the M word.
                 match self.not_known(said) {
                     Some((word, reason)) => self.deny(said, &word, reason),
-                    None => self.m_words(said),
+                    None => {
+                        self.m_words(said);
+                        self.calls_cycle(said);
+                    }
                 }
                 self.ends(said);
                 true
@@ -95,8 +101,7 @@ impl<'s> Lister<'_, 's> {
             }
             b"TOOL" if second == b"DEF" => {}
             b"CYCL" if second == b"CALL" => {
-                self.left(said, "CYCL CALL", Reason::Cycle);
-                self.lose_position();
+                self.cycle_call(said, "CYCL CALL");
             }
             b"CYCL" => {
                 let number: Vec<u8> = words
@@ -105,7 +110,17 @@ impl<'s> Lister<'_, 's> {
                     .unwrap_or_default();
                 self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
             }
-            b"PLANE" => self.turn(Group::Swivel, second != b"RESET"),
+            b"PLANE" => {
+                // TURN moves the rotary axes to the plane, MOVE the others as well.
+                let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
+                if moves {
+                    self.left(said, "PLANE", Reason::Cycle);
+                }
+                self.turn(Group::Swivel, second != b"RESET");
+                if moves {
+                    self.lose_all();
+                }
+            }
             b"FUNCTION" if second == b"TCPM" => {
                 self.tip(true, false);
             }
@@ -143,7 +158,13 @@ impl<'s> Lister<'_, 's> {
             b"APPR" | b"DEP" | b"RND" | b"CHF" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT"
             | b"FPOL" | b"SPL" => {
                 let text = String::from_utf8_lossy(name).into_owned();
-                self.left(said, &text, Reason::NotFollowed);
+                let needs = match name {
+                    // Round or cut the corner that their neighbours make.
+                    b"RND" | b"CHF" | b"FPOL" => Needs::Nothing,
+                    b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
+                    _ => Needs::Tangent,
+                };
+                self.left_path(said, &text, needs);
                 self.lose_position();
             }
             b"TCH" => {
@@ -151,6 +172,12 @@ impl<'s> Lister<'_, 's> {
                 self.lose_position();
             }
             b"FN" | b"Q" | b"QL" | b"QR" => {
+                // FN 25 sets a datum, FN 17 any data of the control.
+                match number_of_function(&text) {
+                    Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
+                    Some(25) => return self.frames_assigned(),
+                    _ => {}
+                }
                 // FN 9 to FN 12 jump: what is set from here on may be passed over.
                 self.branched |= words.contains(&&b"GOTO"[..]);
                 self.parameter(first);
@@ -197,6 +224,13 @@ impl<'s> Lister<'_, 's> {
                 }
             }
         };
+        // The working plane goes with the axis of the tool.
+        match after.split_whitespace().next() {
+            Some("X") => self.plane_is(Plane::YZ, 190),
+            Some("Y") => self.plane_is(Plane::ZX, 180),
+            Some("Z") => self.plane_is(Plane::XY, 170),
+            _ => {}
+        }
         // A tool that is longer than its table says.
         for word in after.split_whitespace() {
             let delta = word.strip_prefix("DL");
@@ -246,11 +280,16 @@ impl<'s> Lister<'_, 's> {
                 let ends = !values.is_empty() && values.iter().all(|word| zero(word, 1) == Some(1.0));
                 self.turn(Group::AxisScale, title || !ends);
             }
-            b"247" => self.frame_is(self.preset(first)),
+            b"247" => {
+                self.frame_is(self.preset(first));
+                self.shift_may_end();
+            }
             b"220" | b"221" => {
                 self.left(said, "CYCL DEF", Reason::Cycle);
                 self.lose_all();
             }
+            // A program takes the place of the cycle.
+            b"12" => self.calls_program = true,
             // Definitions that CYCL CALL, M89 and M99 carry out, and settings.
             b"1"
             | b"2"
@@ -259,7 +298,6 @@ impl<'s> Lister<'_, 's> {
             | b"5"
             | b"6"
             | b"9"
-            | b"12"
             | b"13"
             | b"14"
             | b"15"
@@ -284,12 +322,25 @@ impl<'s> Lister<'_, 's> {
         }
     }
 
+    /// A preset ends the shift within the one before on some controls, and not on others.
+    fn shift_may_end(&mut self) {
+        if self.state.programmable.take().is_some() {
+            self.frame_index = None;
+            self.doubt(Group::Datum, Reason::Displacement);
+        }
+    }
+
     /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs; a
     /// row of the datum table is not known here.
     fn datum_shift(&mut self, words: &[&[u8]]) {
         let known = self.state.programmable.unwrap_or_else(Pose::identity);
         let mut shift = known.translation.vector;
         let mut good = known.rotation.angle() == 0.0;
+        // Axes that are not named, or by an increment, keep what is not known.
+        let mut open = match self.state.doubt(1 << Group::Datum as u32) {
+            Some(_) => [true; 3],
+            None => [false; 3],
+        };
         for word in words {
             let (axis, increment) = match *word {
                 [b'I', axis @ b'X'..=b'Z', ..] => (axis, true),
@@ -307,13 +358,20 @@ impl<'s> Lister<'_, 's> {
             };
             match value {
                 Some(value) => {
+                    open[usize::from(axis - b'X')] &= increment;
                     let entry = &mut shift[usize::from(axis - b'X')];
                     *entry = value * self.state.unit_mm + if increment { *entry } else { 0.0 };
                 }
                 None => good = false,
             }
         }
-        if good {
+        let title =
+            words.first().is_none_or(|word| word.len() > 3 && word.iter().all(u8::is_ascii_alphabetic));
+        if title {
+            // What it sets stands in the lines after it.
+            return;
+        }
+        if good && open == [false; 3] {
             self.programmable_is_set();
             self.state.programmable =
                 (shift.norm() > 0.0).then(|| Pose::translation(shift.x, shift.y, shift.z));
@@ -356,4 +414,11 @@ impl<'s> Lister<'_, 's> {
             self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
         }
     }
+}
+
+/// The number of a function: `FN 17: SYSWRITE`, `FN17:`.
+fn number_of_function(text: &[u8]) -> Option<u32> {
+    let digits = text.strip_prefix(b"FN")?.trim_ascii_start();
+    let end = digits.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(digits.len());
+    std::str::from_utf8(&digits[..end]).ok()?.parse().ok()
 }

@@ -2,11 +2,11 @@
 
 use std::sync::Arc as Shared;
 
-use super::super::arc::Arc;
+use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
 use super::super::machine::{ALL_BUT_PLANE, Group, Mode, Turn};
-use super::{Event, Lister, Said, Written};
+use super::{Event, Lister, Needs, Said, Written};
 use crate::program::motion::{
     Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed, SpeedValue,
     Switch, TargetValue, Zone, ZoneValue,
@@ -64,6 +64,24 @@ impl Lister<'_, '_> {
         self.state.previous = None;
     }
 
+    /// A path of its own kind that is listed and left.
+    pub(super) fn left_path(&mut self, said: &Said<'_>, name: &str, needs: Needs) {
+        self.left(said, name, Reason::NotFollowed);
+        if let Some(written) = self.written.last_mut() {
+            written.needs = needs;
+        }
+    }
+
+    /// What the way of a block hangs on where it is no line and no arc, or a line that its words say by an angle.
+    fn needs_of(&self, said: &Said<'_>, mode: Mode) -> Needs {
+        match mode {
+            Mode::Other(Reason::NotFollowed) if self.state.tangent => Needs::Tangent,
+            Mode::Other(Reason::NotFollowed) => Needs::Start,
+            _ if said.aside == Some(Reason::NotFollowed) => Needs::Start,
+            _ => Needs::Nothing,
+        }
+    }
+
     fn written_as(&self, said: &Said<'_>, arc: Option<(Arc, bool, bool)>) -> Written {
         let state = &self.state;
         let angles = if state.turn == Turn::Rpy { &state.rpy } else { &state.abc };
@@ -87,6 +105,7 @@ impl Lister<'_, '_> {
             insertable: false,
             paraxial: said.paraxial,
             restates: false,
+            needs: Needs::Nothing,
         }
     }
 
@@ -250,6 +269,7 @@ impl Lister<'_, '_> {
             arc,
             insertable,
             restates: self.restates(said, &motion),
+            needs: self.needs_of(said, mode),
             start_angles,
             turn: after.turn,
             angles: after.angles,
@@ -269,9 +289,10 @@ impl Lister<'_, '_> {
             self.state.previous = None;
         }
         let call = self.modal_call(said);
-        if call == Some(Reason::Subprogram) {
+        if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.calls_program {
+            let held = self.state.modal_call;
             self.forget();
-            self.state.modal_call = call;
+            self.state.modal_call = held;
         } else if (machine || said.aside.is_some())
             && said.abc.iter().chain(&said.rpy).chain(&said.vector).any(Option::is_some)
         {
@@ -303,13 +324,16 @@ impl Lister<'_, '_> {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
         let plain = straight && !said.opaque && said.aside.is_none() && self.contour.is_none();
         let settled = !(1 << Group::Radius as u32 | 1 << Group::Tool as u32) & ALL_BUT_PLANE;
+        // A cycle runs where the words of the block say.
+        let call = self.modal_call(said);
         plain
-            && self.modal_call(said).is_none()
+            && call.is_none_or(|call| call == Reason::Cycle)
             && self.state.turned == 0
             && self.state.doubt(settled).is_none()
             && match motion.left {
                 None | Some(Reason::Skippable | Reason::UnknownFlow | Reason::UnknownWord) => true,
                 Some(Reason::NotFollowed) => said.corner,
+                Some(Reason::Cycle) => call.is_some(),
                 _ => false,
             }
     }
@@ -327,6 +351,9 @@ impl Lister<'_, '_> {
 
     /// A block without words of the axes that are followed: it may move others, or what it does could not be read.
     fn without_axes(&mut self, said: &Said<'_>) {
+        if !said.opaque && self.calls_cycle(said) {
+            return;
+        }
         if said.opaque {
             self.left(said, "?", Reason::Unread);
             self.lose_all();
@@ -388,6 +415,9 @@ impl Lister<'_, '_> {
         let (start, end) = (all(from)?, all(to)?);
         let plane = self.state.plane;
         let unit = self.state.unit_mm;
+        if self.dialect == Dialect::Heidenhain && plane != Plane::XY {
+            return Err(Reason::Transformed);
+        }
         if self.dialect == Dialect::Heidenhain && said.radius.is_none() {
             let centre = [self.state.pole[0]?, self.state.pole[1]?];
             return Arc::about(plane, start, end, centre, positive).ok_or(Reason::WrongShape);
@@ -460,6 +490,12 @@ impl Lister<'_, '_> {
             Some(Reason::Transformed)
         } else if said.others && self.parallel() {
             Some(Reason::UnknownWord)
+        } else if self.dialect == Dialect::Heidenhain
+            && matches!(mode, Mode::Circular(_))
+            && state.plane != Plane::XY
+        {
+            // The working plane goes with the axis of the tool.
+            Some(Reason::Transformed)
         } else if state.radius {
             Some(Reason::RadiusCompensation)
         } else if turns && needs_tip && !state.tip {

@@ -11,20 +11,31 @@ impl Lister<'_, '_> {
     /// What the whole file sets, and where its jumps go.
     pub(super) fn survey(&mut self) {
         let mut jump = false;
-        // `%NAME G71 *`: DIN/ISO of Heidenhain, whose G words have meanings of their own.
+        // `%NAME G71 *`: DIN/ISO of Heidenhain, `$NAME.MIN%`: Okuma, whose G words have meanings of their own.
         let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
         self.foreign = self.dialect.paren_comments()
             && tape.is_some_and(|token| {
                 let text = self.tree.text(token).to_ascii_uppercase();
-                text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
+                text[0] == b'$'
+                    || text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
             });
+        let tape_says = |text: &[u8]| {
+            let text = text.to_ascii_uppercase();
+            text.windows(4).any(|part| part == b"_SPF")
+        };
+        self.called &= self.dialect == Dialect::Siemens;
+        self.called |=
+            self.dialect == Dialect::Siemens && tape.is_some_and(|token| tape_says(self.tree.text(token)));
         let mut block = Block::default();
         let (mut programs, mut back) = (0, false);
+        let mut subs = Subs::default();
         for node in 0..self.tree.nodes.len() as u32 {
-            if matches!(self.tree.nodes[node as usize].kind, Syntax::Block | Syntax::Skippable) {
+            let kind = self.tree.nodes[node as usize].kind;
+            if matches!(kind, Syntax::Block | Syntax::Skippable) {
                 self.survey_block(&block);
+                subs.add(&block);
                 back |= block.back && block.p.is_none();
-                block = Block::default();
+                block = Block { skippable: kind == Syntax::Skippable, ..Block::default() };
             }
             if self.tree.nodes[node as usize].kind != Syntax::Word {
                 continue;
@@ -35,6 +46,16 @@ impl Lister<'_, '_> {
                 _ => None,
             };
             let address = said.address();
+            block.does |= matches!(
+                address,
+                Some(
+                    b'G' | b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W' | b'T' | b'F' | b'S'
+                )
+            );
+            block.sub |= said.is("SUB");
+            block.endsub |= said.is("ENDSUB");
+            block.does |= said.is("CALL");
+            block.returns |= said.is("RET");
             if jump {
                 // GOTO N100: the block number stands in a word of its own.
                 jump = false;
@@ -56,20 +77,34 @@ impl Lister<'_, '_> {
                 (Some(b'G'), Some(number)) => block.cycle |= matches!(code(number), 700..=730),
                 (Some(b'M'), Some(number)) => {
                     self.changes_tools |= number == 6.0;
+                    block.ends |= number == 2.0 || number == 30.0;
+                    block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
                     block.back |= number == 99.0;
+                    // Haas: to a block of the same program. Fanuc and Mitsubishi begin a subprogram at a block, which may be here.
+                    block.jumps |= matches!(number as u32, 46 | 96 | 97);
+                    block.calls |= matches!(number as u32, 98 | 198);
                 }
                 (Some(b'P'), Some(number)) => block.p = Some(number as u64),
                 (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
+                (Some(b'H'), Some(number)) => block.h = Some(number as u64),
+                (Some(b'P'), None) => block.computed.0 |= said.belongs != Belongs::Nothing,
+                (Some(b'Q' | b'H'), None) => block.computed.1 |= said.belongs != Belongs::Nothing,
                 (Some(b'O'), Some(_)) => programs += 1,
                 // What the caller hands over has names too.
-                (None, _) if said.is("PROC") => block.declares = true,
+                (None, _) if said.is("PROC") => {
+                    block.declares = true;
+                    self.called |= self.dialect == Dialect::Siemens && !subs.outside;
+                }
                 (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
-                    let names = (said.first..said.end).filter(|&at| self.tree.kind(at) == Some(Token::Name));
-                    self.declared.extend(names.map(|at| self.tree.text(at).to_ascii_uppercase()));
+                    for at in said.first..said.end {
+                        if self.tree.kind(at) == Some(Token::Name) {
+                            self.declare(&mut block, self.tree.text(at));
+                        }
+                    }
                 }
                 (None, _) if said.is("DEF") || block.declares => {
                     block.declares = true;
-                    self.declared.insert(said.name.to_ascii_uppercase());
+                    self.declare(&mut block, said.name);
                 }
                 (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
                     match number {
@@ -84,16 +119,41 @@ impl Lister<'_, '_> {
             }
         }
         self.survey_block(&block);
+        subs.add(&block);
         back |= block.back && block.p.is_none();
         self.repeats = back && programs <= 1;
+        self.called |= match self.dialect {
+            Dialect::Heidenhain => false,
+            Dialect::LinuxCnc => subs.returns == Some(true) || subs.has && !subs.outside,
+            _ => subs.returns == Some(true),
+        };
+    }
+
+    /// A name of a declaration: a type, or what is of that type.
+    fn declare(&mut self, block: &mut Block, name: &[u8]) {
+        let name = name.to_ascii_uppercase();
+        match &*name {
+            b"INT" | b"BOOL" | b"CHAR" => block.whole = true,
+            b"REAL" | b"STRING" | b"AXIS" | b"FRAME" => block.whole = false,
+            _ if block.whole => {
+                self.whole_numbers.insert(name.clone());
+            }
+            _ => {}
+        }
+        self.declared.insert(name);
     }
 
     fn survey_block(&mut self, block: &Block) {
-        if block.back
-            && let Some(p) = block.p
-        {
-            self.targets.insert(p);
+        if self.dialect == Dialect::Heidenhain {
+            return;
         }
+        if block.back || block.jumps {
+            self.targets.extend(block.p);
+        }
+        if block.calls {
+            self.targets.extend([block.q, block.h].into_iter().flatten());
+        }
+        self.anywhere |= block.computed.0 && (block.back || block.jumps) || block.computed.1 && block.calls;
         if block.cycle
             && let (Some(p), Some(q)) = (block.p, block.q)
         {
@@ -112,10 +172,59 @@ impl Lister<'_, '_> {
 struct Block {
     /// M99.
     back: bool,
+    /// M46, M96, M97.
+    jumps: bool,
+    /// M98.
+    calls: bool,
     /// G70 to G73.
     cycle: bool,
     /// DEF.
     declares: bool,
+    /// INT, BOOL or CHAR.
+    whole: bool,
+    /// The block may be skipped.
+    skippable: bool,
+    /// M2, M30.
+    ends: bool,
+    /// M17, RET.
+    returns: bool,
+    /// O sub, O endsub.
+    sub: bool,
+    endsub: bool,
+    /// Words that set or move something.
+    does: bool,
     p: Option<u64>,
     q: Option<u64>,
+    h: Option<u64>,
+    /// Whether P, and Q or H, are worked out while the program runs.
+    computed: (bool, bool),
+}
+
+/// Whether a file is a subprogram and no more.
+#[derive(Default)]
+struct Subs {
+    /// Whether its first end goes back to a caller.
+    returns: Option<bool>,
+    /// Whether it has O sub.
+    has: bool,
+    /// Whether anything is done outside of these.
+    outside: bool,
+    within: bool,
+}
+
+impl Subs {
+    fn add(&mut self, block: &Block) {
+        self.has |= block.sub;
+        self.within |= block.sub;
+        self.outside |= block.does && !self.within;
+        self.within &= !block.endsub;
+        if block.skippable || self.returns.is_some() {
+            return;
+        }
+        if block.ends {
+            self.returns = Some(false);
+        } else if block.returns || block.back && block.p.is_none() && !block.computed.0 {
+            self.returns = Some(true);
+        }
+    }
 }

@@ -9,10 +9,10 @@ use truegrind::program::rewrite::{Outcome, RewriteOptions};
 
 use super::{change_of, ends, moved, rewrite_as};
 
-const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G55 v [[500,0,0],[0.7071068,0,0,0.7071068]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
+pub(super) const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G55 v [[500,0,0],[0.7071068,0,0,0.7071068]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
 
 /// What begins a program so that its first motion is certain.
-fn begin(dialect: Dialect) -> &'static str {
+pub(super) fn begin(dialect: Dialect) -> &'static str {
     match dialect {
         Fanuc => "G90 G21 G17 G54\nG43.4 H1\nG1 X1. Y2. Z3. A180. B0. C0. F600.\n",
         Iso | LinuxCnc => "G90 G21 G17 G54\nG1 X1 Y2 Z3 A180 B0 C0 F600\n",
@@ -22,30 +22,30 @@ fn begin(dialect: Dialect) -> &'static str {
 }
 
 /// The motions after the first one: `None` where they would be changed.
-fn reasons(dialect: Dialect, body: &str) -> Vec<Option<Reason>> {
+pub(super) fn reasons(dialect: Dialect, body: &str) -> Vec<Option<Reason>> {
     let source = format!("{HEAD}{}{body}\n", begin(dialect));
     let setup = Setup { dialect: Some(dialect), ..Setup::default() };
     let task = Task::read(&[("x", source.as_bytes())], &setup);
     let found: Vec<_> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
     // An arc that stays keeps the first motion where it was.
-    assert!(matches!(found[0], None | Some(BeforeLeftArc)), "{body}: {found:?}");
+    assert!(matches!(found[0], None | Some(BeforeLeftArc | BeforeLeftPath)), "{body}: {found:?}");
     found[1..].to_vec()
 }
 
-fn check(dialect: Dialect, cases: &[(&str, &[Option<Reason>])]) {
+pub(super) fn check(dialect: Dialect, cases: &[(&str, &[Option<Reason>])]) {
     for (body, expected) in cases {
         assert_eq!(reasons(dialect, body), *expected, "{dialect:?}: {body}");
     }
 }
 
-fn left(reason: Reason) -> Option<Reason> {
+pub(super) fn left(reason: Reason) -> Option<Reason> {
     Some(reason)
 }
 
 /// A block that states everything.
-const F: &str = "G1 X5. Y5. Z5. A180. B0. C0.";
-const G: &str = "G1 X5 Y5 Z5 A180 B0 C0";
-const S: &str = "G1 X5 Y5 Z5 A=180 B=0 C=0";
+pub(super) const F: &str = "G1 X5. Y5. Z5. A180. B0. C0.";
+pub(super) const G: &str = "G1 X5 Y5 Z5 A180 B0 C0";
+pub(super) const S: &str = "G1 X5 Y5 Z5 A=180 B=0 C=0";
 
 #[test]
 fn words_that_are_not_known_are_never_passed_over() {
@@ -91,7 +91,10 @@ fn states_end_with_their_own_word() {
         &[
             (&format!("MIRROR X0\nORIWKS\n{S}\nMIRROR\n{S}"), &[t, None]),
             (&format!("SCALE X2\nTRAFOOF\nTRAORI\n{S}\nSCALE\n{S}"), &[t, None]),
-            (&format!("CYCLE800(1,\"TC\",0,57,0,0,0)\nTRANS X10\nORIWKS\n{S}\nCYCLE800()\n{S}"), &[t, None]),
+            (
+                &format!("CYCLE800(1,\"TC\",0,57,0,0,0)\nTRANS X10\nORIWKS\n{S}\nCYCLE800()\n{S}"),
+                &[left(Cycle), t, None],
+            ),
             (&format!("DIAMON\n{S}\nDIAMOF\n{S}"), &[t, None]),
             (&format!("TOFRAME\nTRANS\n{S}\nTOROTOF\n{S}"), &[t, None]),
             (&format!("PAROT\n{S}\nPAROTOF\n{S}"), &[t, None]),
