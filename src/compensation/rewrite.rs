@@ -355,8 +355,13 @@ pub(super) fn configured(
     match nominal.solve_configured(flange, &wanted, near) {
         Ok(solution) => Ok(solution.joints),
         // Some arms do not use cfx: the quarter turns alone may still single out one solution.
-        Err(error @ InverseError::OtherConfiguration { .. }) => {
+        Err(error @ InverseError::OtherConfiguration { nearest, .. }) => {
             let all = nominal.all(flange);
+            // Where no configuration reaches it, none was asked for in vain: what forbids the nearest is the reason.
+            if all.is_empty() {
+                let other = nominal.solve_configured(flange, &nearest, near).err();
+                return Err(Why::of_inverse(other.unwrap_or(error)));
+            }
             let mut fitting = all.iter().filter(|s| wanted.overshoot_rad(&s.joints) <= 1e-6);
             match (fitting.next(), fitting.next(), monitored) {
                 (Some(only), None, _) => Ok(only.joints),

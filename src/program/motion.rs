@@ -642,6 +642,8 @@ reasons! {
         Variable => "a variable whose value is known only at run time",
         /// NC: a number without a point, which may count increments.
         AmbiguousNumber => "a number without decimal point: mm or increments, by a parameter of the control",
+        /// NC: axis words, and no motion before.
+        NoMotionCode => "no motion code (G0, G1 and so on) is stated before it: what it does is set in the control",
         /// NC: the place can be reached by a jump.
         UnknownFlow => "reached by a jump, call or loop: what holds here is known only at run time",
         /// NC: the block has a slash.

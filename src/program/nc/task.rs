@@ -667,7 +667,7 @@ impl<'t, 's> Lister<'t, 's> {
         }
         if self.is_reached_by_jumps(said) {
             self.forget();
-            self.state.mode = Mode::Unset;
+            self.state.mode = Mode::Lost(Reason::UnknownFlow);
         }
         self.contour_of(said);
         let values = self.values(said);

@@ -241,3 +241,18 @@ fn an_axis_that_carries_the_base_refuses_its_motions() {
         "{notes:?}"
     );
 }
+
+#[test]
+fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_nearest() {
+    for conf in ["ConfL\\Off;", "ConfL\\On;"] {
+        // A tool that points up at this height turns joint 5 too far.
+        let source = format!(
+            "MODULE M\nPROC main()\n{conf}\nMoveL [[350,0,450],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n\
+             ENDPROC\nENDMODULE\n"
+        );
+        let planned = planned(source.as_bytes(), &known(), &Cell::default(), &Options::default());
+        let outcome = &planned.outcomes[0];
+        assert_eq!(outcome.status, Status::Refused);
+        assert!(matches!(outcome.reason, Some(Why::OutsideLimits { .. })), "{conf} {:?}", outcome.reason);
+    }
+}

@@ -380,7 +380,7 @@ fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
 fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
     let body = "G90 G1 X1 Y2 Z3 A0 B0 C0\nN10 X2\nG1 X2 Y2 Z2 A0 B0 C0\nIF [#1 GT 5] GOTO 10\nX3\n";
     let found = ends(body, Dialect::LinuxCnc);
-    assert_eq!(found[1], Err(Reason::UnknownInstruction), "the motion word is forgotten at a jump's aim");
+    assert_eq!(found[1], Err(Reason::UnknownFlow), "the motion word is forgotten at a jump's aim");
     assert_eq!(found[2], Ok([2.0, 2.0, 2.0]));
     assert_eq!(found[3], Ok([3.0, 2.0, 2.0]));
     // With both G90 and G91 in the file what the numbers mean is not known.

@@ -149,7 +149,7 @@ impl<'s> Lister<'_, 's> {
             }
             b"LBL" if second != b"0" => {
                 self.forget();
-                self.state.mode = Mode::Unset;
+                self.state.mode = Mode::Lost(Reason::UnknownFlow);
             }
             b"LBL" => {}
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {

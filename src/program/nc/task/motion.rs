@@ -151,8 +151,7 @@ impl Lister<'_, '_> {
             return;
         }
         let unknown = match mode {
-            // Axis words without a motion: a control says no.
-            Mode::Unset => Some(Reason::UnknownInstruction),
+            Mode::Unset => Some(Reason::NoMotionCode),
             Mode::Lost(reason) => Some(reason),
             _ => None,
         };
