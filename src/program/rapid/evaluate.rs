@@ -77,6 +77,12 @@ pub enum Source {
     Unknown,
 }
 
+/// The place of an element by its index, from 1: the controller counts in single precision.
+pub(super) fn index_of(position: f64) -> Option<usize> {
+    let index = f64::from(position as f32).round();
+    (index >= 1.0).then(|| index as usize - 1)
+}
+
 /// Evaluates expressions of one task.
 #[derive(Debug)]
 pub struct Evaluator<'a, 's> {
@@ -236,9 +242,8 @@ impl<'a, 's> Evaluator<'a, 's> {
         let mut at = data.value.ok_or(Reason::Uninitialised)?;
         let tree = self.tree(symbol.file);
         for position in expressions(self.tree(context.file), index) {
-            let position = match self.value(context, position).number() {
-                Ok(position) => position.round(),
-                Err(_) => return Err(Reason::RunTimeIndex),
+            let Ok(position) = self.value(context, position).number() else {
+                return Err(Reason::RunTimeIndex);
             };
             let Child::Node(list) = at else { return Err(Reason::WrongShape) };
             if tree.nodes[list as usize].kind != Syntax::Aggregate {
@@ -246,10 +251,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             }
             let mut cache = self.elements.borrow_mut();
             let items = cache.entry((symbol.file, list)).or_insert_with(|| expressions(tree, list).collect());
-            if position < 1.0 {
-                return Err(Reason::IndexOutOfRange);
-            }
-            at = *items.get(position as usize - 1).ok_or(Reason::IndexOutOfRange)?;
+            at = *index_of(position).and_then(|at| items.get(at)).ok_or(Reason::IndexOutOfRange)?;
         }
         Ok((symbol.file, at))
     }
@@ -465,10 +467,10 @@ impl<'a, 's> Evaluator<'a, 's> {
                             return Value::Unknown(Reason::RunTimeIndex);
                         };
                         value = match value {
-                            Value::List(mut list) if position >= 1.0 && position as usize <= list.len() => {
-                                list.swap_remove(position as usize - 1)
-                            }
-                            Value::List(_) => return Value::Unknown(Reason::IndexOutOfRange),
+                            Value::List(mut list) => match index_of(position) {
+                                Some(at) if at < list.len() => list.swap_remove(at),
+                                _ => return Value::Unknown(Reason::IndexOutOfRange),
+                            },
                             unknown @ Value::Unknown(_) => return unknown,
                             _ => return Value::Unknown(Reason::WrongShape),
                         };
@@ -560,8 +562,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             let index = list.iter().position(|(component, _)| same_name(component.as_bytes(), name))?;
             return Some((index, list[index].1.as_bytes().to_vec()));
         }
-        let symbol = &self.symbols.symbols[self.symbols.find(scope, type_name)? as usize];
-        let What::Record(list) = &symbol.what else { return None };
+        let list = self.record(scope, type_name)?;
         let index = list.iter().position(|(component, _)| same_name(component, name))?;
         Some((index, list[index].1.clone()))
     }
@@ -572,8 +573,15 @@ impl<'a, 's> Evaluator<'a, 's> {
         if let Some(list) = components(type_name) {
             return Some(list.len());
         }
-        match &self.symbols.symbols[self.symbols.find(scope, type_name)? as usize].what {
-            What::Record(list) => Some(list.len()),
+        self.record(scope, type_name).map(|list| list.len())
+    }
+
+    /// The components of a record of the program; `None` where several modules declare one of this name: data of one may
+    /// be used in another.
+    fn record(&self, scope: u32, type_name: &[u8]) -> Option<&'a Vec<(Vec<u8>, Vec<u8>)>> {
+        let symbols: &'a Symbols = self.symbols;
+        match &symbols.symbols[symbols.find(scope, type_name)? as usize].what {
+            What::Record(list) if !symbols.records_twice.contains(type_name) => Some(list),
             _ => None,
         }
     }

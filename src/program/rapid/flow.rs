@@ -8,7 +8,7 @@
 //! name of data outside or of another parameter: where one changes, the others are forgotten. What is not known from the statements before has, as far as nothing
 //! assigns its components, its initial value.
 
-use super::evaluate::{Context, Evaluator, Known};
+use super::evaluate::{Context, Evaluator, Known, index_of};
 use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
 use super::predefined;
@@ -116,7 +116,8 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     let resumes = tree.child_nodes(unit.node).any(|clause| resumes(tree, clause));
     let (exits, any, handled) = (States::NONE, States::NONE, States::NONE);
     let aliases = aliases(evaluator, unit);
-    let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, aliases };
+    let wanders = symbols.wanders(evaluator.trees, unit);
+    let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, wanders, aliases };
     walk.handled = walk.handled();
     walk.any = walk.settings(unit.node).or(walk.handled).or(States::ENTRY);
     let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
@@ -166,6 +167,8 @@ struct Walk<'w, 'a, 's> {
     handled: States,
     /// Whether an error handler goes back to the statements, so that what they call may end anywhere.
     resumes: bool,
+    /// Whether an error handler that goes back to the statements, or a trap routine, moves the robot.
+    wanders: bool,
     /// The parameters that may be other names of data outside, or of each other.
     aliases: Vec<u32>,
 }
@@ -237,6 +240,12 @@ impl Walk<'_, '_, '_> {
                 self.exits = self.exits.or(state.modal);
                 State { reached: false, ..state }
             }
+            Syntax::Raise if self.resumes => {
+                // The handler of the routine goes on behind it.
+                self.exits = self.exits.or(state.modal);
+                self.may_set(self.handled, &mut state);
+                State { previous: None, ..state }
+            }
             Syntax::Goto | Syntax::Raise | Syntax::Leave => {
                 self.exits = if kind == Syntax::Goto { self.exits } else { self.exits.or(state.modal) };
                 State { reached: false, ..state }
@@ -261,6 +270,12 @@ impl Walk<'_, '_, '_> {
             if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
                 self.forget_changed(branch, &mut state);
                 continue;
+            }
+            // A condition is asked before the branches that follow, whether they are gone or not.
+            for asked in
+                tree.child_nodes(branch).filter(|&node| tree.nodes[node as usize].kind.is_expression())
+            {
+                self.forget_changed(asked, &mut state);
             }
             let first = parts(tree, branch).next();
             complete |= first.and_then(|first| token_kind(tree, first)) == Some(otherwise);
@@ -472,7 +487,8 @@ impl Walk<'_, '_, '_> {
         for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
             let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-            if let Some(sets) = (!late).then(|| setting(tree, node, name)).flatten() {
+            let own = symbols.routine(self.unit.scope, name).is_some();
+            if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
                 out = out.or(sets);
             } else if let Some(routine) = (!late).then(|| symbols.routine(self.unit.scope, name)).flatten() {
                 out = out.or(self.visitor.exit_of(routine));
@@ -508,20 +524,24 @@ impl Walk<'_, '_, '_> {
                 state.modal = state.modal.set(Which::Soft, false);
             }
             if motion.is_some() {
-                // A search stops where its signal comes.
-                state.previous = motion.filter(|_| !known.ends_early());
+                // A search stops where its signal comes, and a handler may go on from elsewhere.
+                state.previous = motion.filter(|_| !known.ends_early() && !self.wanders);
             }
             return state;
         }
         let stepped = self.stepped(node, &state, name);
         self.forget_written(node, &mut state);
+        if !late && symbols.writes_any(tree, self.unit.scope, node, name) {
+            state.known.retain(|&id, _| id == DISPLACEMENT);
+        }
         if let Some((place, value)) = stepped {
             self.put(place, value, &mut state);
         }
         if predefined::waits(name) {
             self.forget_shared(&mut state);
         }
-        if let Some(sets) = (!late).then(|| setting(tree, node, name)).flatten() {
+        let own = symbols.routine(self.unit.scope, name).is_some();
+        if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.then(sets);
             // One that also moves.
             state.previous = motion.or(state.previous);
@@ -723,7 +743,7 @@ impl Walk<'_, '_, '_> {
                 let Ok(position) = self.evaluator.value(context, position).number() else {
                     return Value::Unknown(Reason::Assigned);
                 };
-                let Some(part) = (position as usize).checked_sub(1).and_then(|at| list.get_mut(at)) else {
+                let Some(part) = index_of(position).and_then(|at| list.get_mut(at)) else {
                     return Value::Unknown(Reason::IndexOutOfRange);
                 };
                 let old = std::mem::replace(part, Value::Bool(false));

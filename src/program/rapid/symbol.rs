@@ -163,6 +163,8 @@ pub struct Symbols {
     pub everything: States,
     /// Whether the next cycle may begin in the middle of this one.
     pub cycles: bool,
+    /// Names of records that are declared more than once, in lower case.
+    pub(super) records_twice: std::collections::HashSet<Vec<u8>>,
     /// File, scope and name of the variables of loops, until they are settled.
     loop_names: Vec<(u32, u32, u32)>,
 }

@@ -125,6 +125,20 @@ impl Syntax {
         ) || self == Syntax::Body
     }
 
+    /// Whether it is an expression.
+    pub(super) fn is_expression(self) -> bool {
+        matches!(
+            self,
+            Syntax::Aggregate
+                | Syntax::Paren
+                | Syntax::Unary
+                | Syntax::Binary
+                | Syntax::Function
+                | Syntax::Place
+                | Syntax::Index
+        )
+    }
+
     /// Whether it may change data by itself.
     pub(super) fn may_change(self) -> bool {
         matches!(

@@ -523,7 +523,7 @@ impl<'a, 's> Lister<'a, 's> {
             let duration_s = self.evaluated(unit, state, time).number();
             self.listing.durations_s.insert(self.listing.motions.len() as u32, duration_s);
         }
-        let free = !options.timed && !options.whole && !around.guarded;
+        let free = !options.timed && !options.whole && !around.guarded && !self.asks(unit, node);
         let splits = instruction.between != Between::Nothing && instruction.also != Also::Triggers;
         motion.insertable = free && splits;
         motion.straightens = free
@@ -549,6 +549,18 @@ impl<'a, 's> Lister<'a, 's> {
             self.listing.left_by_frames(&motion)
         };
         motion
+    }
+
+    /// Whether an argument is a function of the program, or one that is not known: it may do more than answer, and would be
+    /// asked once more for each target that is put in.
+    fn asks(&self, unit: Unit, node: u32) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        let nodes = node..node + tree.nodes[node as usize].size;
+        let mut functions = nodes.filter(|&node| tree.nodes[node as usize].kind == Syntax::Function);
+        functions.any(|function| {
+            let name = tree.text(tree.nodes[function as usize].first);
+            self.symbols.routine(unit.scope, name).is_some() || predefined::effect(name).is_none()
+        })
     }
 
     /// A call that is no motion instruction of the table but takes a target.

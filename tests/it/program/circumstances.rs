@@ -604,10 +604,171 @@ fn data_that_is_written_all_at_once_is_of_the_type_that_is_stated() {
 
 #[test]
 fn a_circle_with_triggers_along_it_is_not_cut() {
-    let source = module(&format!(
-        "PROC main()\nMoveC p,p,v100,fine,tool0;\nTriggC p,p,v100,i,fine,tool0;\nMoveCDO p,p,v100,fine,tool0,d,1;\nENDPROC"
-    ));
+    let source = module(
+        "PROC main()\nMoveC p,p,v100,fine,tool0;\nTriggC p,p,v100,i,fine,tool0;\nMoveCDO p,p,v100,fine,tool0,d,1;\nENDPROC",
+    );
     let task = Task::read(&[("m.mod", source.as_bytes())]);
     let cut: Vec<bool> = task.listing.motions.iter().map(|motion| motion.straightens).collect();
     assert_eq!(cut, [true, false, true]);
+}
+
+const OFFS: &str = "MoveL Offs(p,0,0,m),v100,fine,tool0;\n";
+const RUN_TIME: Option<Reason> = Some(Reason::RunTimeOffset);
+
+#[test]
+fn conditions_are_asked_before_the_branches_behind_them() {
+    let ask = "FUNC bool ask()\nTPReadNum m,\"x\";\nRETURN m>1;\nENDFUNC\nFUNC bool shift()\nPDispSet [[0,0,10],[1,0,0,0]];\nRETURN FALSE;\nENDFUNC\n\
+               FUNC num three()\nm:=n;\nRETURN 3;\nENDFUNC\n";
+    let main = |body: &str| of("main", &format!("{ask}PROC main()\nVAR string s;\nm:=5;\n{body}ENDPROC"));
+    for asked in ["NOT StrToVal(s,m)", "ask()", "n=1 AND ask()"] {
+        let found = main(&format!("IF n=2 THEN\n{OFFS}ELSEIF {asked} THEN\n{OFFS}ELSE\n{OFFS}ENDIF\n{OFFS}"));
+        assert_eq!(found, [None, RUN_TIME, RUN_TIME, RUN_TIME], "{asked}");
+    }
+    // Also where every branch says the same.
+    let found = main(&format!("IF n=2 THEN\nm:=5;\nELSEIF ask() THEN\nm:=5;\nENDIF\n{OFFS}"));
+    assert_eq!(found, [RUN_TIME]);
+    let found = main(&format!("IF n=2 THEN\nn:=1;\nELSEIF shift() THEN\nn:=2;\nELSE\n{GO}ENDIF\n{GO}"));
+    assert_eq!(found, [LEFT, LEFT]);
+    let found = main(&format!("TEST n\nCASE 1:\n{OFFS}CASE three():\n{OFFS}DEFAULT:\n{OFFS}ENDTEST\n"));
+    assert_eq!(found, [None, RUN_TIME, RUN_TIME]);
+}
+
+#[test]
+fn behind_a_raise_the_routine_goes_on_where_its_handler_says_so() {
+    let main = |raised: &str, handler: &str| {
+        of(
+            "main",
+            &format!(
+                "PROC main()\nm:=1;\nIF n=1 THEN\n{raised}\nRAISE 5;\nENDIF\n{OFFS}ERROR\n{handler}\nENDPROC"
+            ),
+        )
+    };
+    assert_eq!(main("m:=40;", "TRYNEXT;"), [RUN_TIME]);
+    assert_eq!(main("PDispSet [[0,0,10],[1,0,0,0]];", "IF ERRNO=5 TRYNEXT;"), [LEFT]);
+    // A handler that leaves the routine does not.
+    assert_eq!(main("m:=40;", "RETURN;"), [None]);
+    assert_eq!(main("m:=40;", "RAISE;"), [None]);
+}
+
+#[test]
+fn what_is_written_by_a_name_that_is_not_told_is_not_known_behind_it() {
+    let body = |routines: &str, call: &str| {
+        of("main", &format!("PROC main()\nm:=1;\n{call}\n{OFFS}ENDPROC\n{routines}"))
+    };
+    for call in [
+        "SetDataVal name,40;",
+        "SetDataVal \"m\"+\"\",40;",
+        "SetAllDataVal \"num\"\\TypeMod:=30,40;",
+        "SetDataVal \"m\",40;",
+    ] {
+        assert_eq!(body("", call), [RUN_TIME], "{call}");
+        let sub = format!("PROC sub()\n{call}\nENDPROC");
+        assert_eq!(body(&sub, "sub;"), [RUN_TIME], "{call} in a routine");
+        let trap = format!("TRAP tr\n{call}\nENDTRAP");
+        assert_eq!(body(&trap, "WaitTime 1;"), [RUN_TIME], "{call} in a trap routine");
+    }
+    assert_eq!(body("", "SetDataVal \"n\",40;"), [None]);
+}
+
+#[test]
+fn a_parameter_by_reference_changes_with_what_is_given_for_it() {
+    let go = "PROC go(INOUT num q)\nq:=1;\nWaitTime 1;\nMoveL Offs(p,0,0,q),v100,fine,tool0;\nENDPROC\n";
+    let trap = "TRAP tr\nm:=40;\nENDTRAP\n";
+    assert_eq!(of("go", &format!("{go}PROC main()\ngo m;\nENDPROC")), [None]);
+    assert_eq!(
+        of("go", &format!("{go}{trap}PROC main()\nCONNECT i WITH tr;\ngo m;\nENDPROC")),
+        [Some(Reason::RunTimeOffset)]
+    );
+    // A truth value that a trap routine sets is no number.
+    let other = "VAR bool b;\nTRAP tr\nb:=TRUE;\nENDTRAP\n";
+    assert_eq!(of("go", &format!("{other}{go}PROC main()\nCONNECT i WITH tr;\ngo m;\nENDPROC")), [None]);
+    // What the controller keeps and writes later is that which was given.
+    let hook = "PROC hook(VAR num q)\nIVarValue \"s:\",1,q,i;\nENDPROC\n";
+    assert_eq!(of("main", &format!("{hook}PROC main()\nhook m;\nm:=1;\n{OFFS}ENDPROC")), [RUN_TIME]);
+}
+
+#[test]
+fn a_routine_that_is_named_like_an_instruction_is_followed() {
+    for name in ["PDispOff", "ConfL", "SoftDeact", "IndReset"] {
+        let own = format!("PROC {name}()\n{SET}ENDPROC\nPROC main()\n{name};\n{GO}ENDPROC");
+        assert_eq!(of("main", &own), [LEFT], "{name}");
+    }
+}
+
+#[test]
+fn an_index_is_that_of_single_precision() {
+    let data = "VAR num a{5};\nCONST num c{9}:=[0,0,0,0,0,0,0,30,0];\n";
+    let found = heights(
+        "s:=0.3;\na:=[0,10,20,30,40];\nMoveL Offs(p,0,0,a{s/0.1}),v100,fine,tool0;\na{s/0.1}:=35;\nMoveL Offs(p,0,0,a{3}),v100,fine,tool0;\n\
+         MoveL Offs(p,0,0,c{(0.7+0.1)*10}),v100,fine,tool0;",
+        &format!("{data}VAR num s;"),
+    );
+    assert_eq!(found, [Ok(20.0), Ok(35.0), Ok(30.0)]);
+}
+
+#[test]
+fn where_a_handler_or_a_trap_routine_moves_no_start_is_known() {
+    let far = "MoveL Offs(p,0,9,0),v100,fine,tool0;\n";
+    let run = |handler: &str, more: &str| {
+        let source = module(&format!("{more}PROC main()\n{GO}WaitDI d,1;\n{far}ERROR\n{handler}ENDPROC"));
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        let main = task
+            .listing
+            .motions
+            .iter()
+            .filter(|m| !m.conditional && m.routine == Some(task.listing.motions[0].routine.unwrap()));
+        main.map(|motion| motion.previous.is_some()).collect::<Vec<_>>()
+    };
+    assert_eq!(run("TRYNEXT;\n", "")[..2], [false, true]);
+    assert_eq!(run(&format!("{GO}TRYNEXT;\n"), "")[..2], [false, false]);
+    assert_eq!(run(&format!("{GO}RETURN;\n"), "")[..2], [false, true]);
+    let follows = |trap: &str| {
+        let source = module(&format!("PROC main()\n{GO}{far}ENDPROC\nTRAP tr\n{trap}ENDTRAP"));
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        task.listing.motions[1].previous.is_some()
+    };
+    assert!(follows("n:=1;\n"));
+    assert!(follows(&format!("StorePath;\n{GO}RestoPath;\n")));
+    assert!(!follows(&format!("ClearPath;\n{GO}")));
+}
+
+#[test]
+fn nothing_is_put_before_what_asks_a_function_of_the_program() {
+    let speed = "FUNC speeddata sp()\nIncr n;\nRETURN v100;\nENDFUNC\n";
+    let source = module(&format!(
+        "{speed}PROC main()\n{GO}MoveL p,sp(),fine,tool0;\nMoveL p,v100\\V:=Abs(5),fine,tool0;\nMoveL p,v100\\V:=who(5),fine,tool0;\nENDPROC"
+    ));
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    let may: Vec<bool> = task.listing.motions.iter().map(|motion| motion.insertable).collect();
+    assert_eq!(may, [true, false, true, false]);
+}
+
+#[test]
+fn a_target_that_is_read_by_its_name_is_used_elsewhere_too() {
+    let uses = |call: &str| {
+        let source = module(&format!("VAR robtarget pv;\nPROC main()\n{GO}{call}\nENDPROC"));
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        task.listing.declarations[0].other_uses.len()
+    };
+    assert_eq!(uses("TPWrite \"q\";"), 0);
+    assert_eq!(uses("GetDataVal \"P\",pv;"), 1);
+    assert_eq!(uses("GetDataVal name,pv;"), 1);
+}
+
+#[test]
+fn a_record_that_two_modules_declare_is_not_taken_apart() {
+    let rec = |local: &str, first: &str, second: &str| {
+        format!("MODULE {first}{second}\n{local}RECORD rec\nnum {first};\nnum {second};\nENDRECORD\n")
+    };
+    let a = format!("{}CONST rec r:=[10,20];\nENDMODULE\n", rec("LOCAL ", "a", "b"));
+    let b = format!("{}ENDMODULE\n", rec("", "b", "a"));
+    let c = format!(
+        "MODULE C\nCONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nPROC main()\nMoveL Offs(p,0,0,r.a),v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    );
+    let known = |files: &[&str]| {
+        let files: Vec<(&str, &[u8])> = files.iter().map(|text| ("m.mod", text.as_bytes())).collect();
+        Task::read(&files).listing.motions[0].reason().is_none()
+    };
+    assert!(known(&[&a, &c]));
+    assert!(!known(&[&a, &b, &c]));
 }

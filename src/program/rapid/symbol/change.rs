@@ -131,6 +131,9 @@ impl Found {
     }
 }
 
+/// Types without components.
+const SIMPLE: [&[u8]; 8] = [b"num", b"dnum", b"bool", b"string", b"byte", b"intnum", b"errnum", b"clock"];
+
 /// Nodes that one thread goes through at a time.
 const PORTION: u32 = 1 << 16;
 
@@ -140,6 +143,13 @@ const REACH: usize = 1024;
 impl Symbols {
     /// Finds what the program changes.
     pub(super) fn settle(&mut self, trees: &[RapidTree<'_>]) {
+        let mut seen: HashSet<Vec<u8>> = HashSet::new();
+        for symbol in self.symbols.iter().filter(|symbol| matches!(symbol.what, What::Record(_))) {
+            let name = folded(trees[symbol.file as usize].text(symbol.name));
+            if !seen.insert(name.clone()) {
+                self.records_twice.insert(name);
+            }
+        }
         let mut all = self.gone_through(trees);
         self.callees_first = self.order(&all);
         if self.settle_parameters(trees) {
@@ -361,7 +371,8 @@ impl Symbols {
         let tree = &trees[unit.file as usize];
         let name = tree.text(tree.nodes[node as usize].first);
         let is_call = kind == Syntax::Call;
-        if let Some(sets) = if is_call { setting(tree, node, name) } else { None } {
+        let own = self.routine(unit.scope, name);
+        if let Some(sets) = if is_call && own.is_none() { setting(tree, node, name) } else { None } {
             found.switch(node);
             found.sets = found.sets.or(sets);
         }
@@ -374,7 +385,7 @@ impl Symbols {
             }
             return;
         }
-        match self.routine(unit.scope, name) {
+        match own {
             Some(routine) => {
                 found.switch(node);
                 found.calls.push(routine);
@@ -388,6 +399,8 @@ impl Symbols {
                 found.moves |= predefined::displaces(name).is_some();
                 found.cycles |= predefined::begins_cycle(name);
                 found.waits |= predefined::waits(name);
+                // What it writes may be data of any routine's caller.
+                found.unknown |= self.writes_any(tree, unit.scope, node, name);
                 if name.eq_ignore_ascii_case(b"SetAllDataVal") {
                     found.by_name.push(named(tree, node).map(|name| self.type_named(unit.scope, name)));
                 } else if name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, node).is_none() {
@@ -395,6 +408,47 @@ impl Symbols {
                 }
             }
         }
+    }
+
+    /// Whether a call writes data by a name that the text does not tell.
+    pub fn writes_any(&self, tree: &RapidTree<'_>, scope: u32, call: u32, name: &[u8]) -> bool {
+        let by_name = name.eq_ignore_ascii_case(b"SetAllDataVal")
+            || name.eq_ignore_ascii_case(b"SetDataVal") && named(tree, call).is_none();
+        by_name && self.routine(scope, name).is_none()
+    }
+
+    /// Whether the robot may be moved between the statements of a unit: by an error handler that goes back to them, or by a
+    /// routine that interrupts it and does not store the path to come back to.
+    pub fn wanders(&self, trees: &[RapidTree<'_>], unit: Unit) -> bool {
+        let stores = |unit: Unit| {
+            let tree = &trees[unit.file as usize];
+            (unit.node..unit.node + tree.nodes[unit.node as usize].size).any(|node| {
+                let node = tree.nodes[node as usize];
+                node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
+            })
+        };
+        let leads_away = |routine: &u32| {
+            let routine = &self.routines[*routine as usize];
+            routine.reach.moves && !stores(self.units[routine.unit as usize])
+        };
+        if self.interrupting.iter().any(leads_away) {
+            return true;
+        }
+        let tree = &trees[unit.file as usize];
+        let moves = |node: u32| {
+            let name = tree.text(tree.nodes[node as usize].first);
+            match tree.nodes[node as usize].kind {
+                Syntax::LateCall => true,
+                Syntax::Call if self.is_motion(unit.scope, name) => true,
+                Syntax::Call | Syntax::Function => match self.routine(unit.scope, name) {
+                    Some(routine) => self.routines[routine as usize].reach.moves,
+                    None => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
+                },
+                _ => false,
+            }
+        };
+        let mut clauses = tree.child_nodes(unit.node).filter(|&clause| resumes(tree, clause));
+        clauses.any(|clause| (clause..clause + tree.nodes[clause as usize].size).any(moves))
     }
 
     fn type_named(&self, scope: u32, name: &[u8]) -> Vec<u8> {
@@ -548,8 +602,19 @@ impl Symbols {
                 }
             }
         }
-        for symbol in changes {
+        for &symbol in &changes {
             self.symbols[symbol as usize].volatile = true;
+        }
+        // A parameter that is kept and written later stands for whatever is given for it.
+        let kept = changes.iter().filter(|&&symbol| self.symbols[symbol as usize].what == What::Parameter);
+        let kept: HashSet<Vec<u8>> = kept.map(|&symbol| self.type_of_symbol(symbol)).collect();
+        for symbol in 0..self.symbols.len() as u32 {
+            let found = &self.symbols[symbol as usize];
+            let data = matches!(found.what, What::Data(_)) && !found.is_constant();
+            if data && !kept.is_empty() && kept.contains(&self.type_of_symbol(symbol)) {
+                let found = &mut self.symbols[symbol as usize];
+                (found.volatile, found.assigned, found.whole) = (true, true, true);
+            }
         }
         if anything {
             let routines: HashSet<u32> = self.routines.iter().map(|routine| routine.scope).collect();
@@ -557,6 +622,41 @@ impl Symbols {
                 symbol.volatile |= symbol.assigned && !routines.contains(&symbol.scope);
             }
         }
+        self.settle_references();
+    }
+
+    /// A parameter by reference may be another name of data that changes at any time: of its type, or of a component of it.
+    fn settle_references(&mut self) {
+        let volatile = (0..self.symbols.len() as u32).filter(|&symbol| {
+            let found = &self.symbols[symbol as usize];
+            found.volatile && matches!(found.what, What::Data(_))
+        });
+        let types: HashSet<Vec<u8>> = volatile.map(|symbol| self.type_of_symbol(symbol)).collect();
+        if types.is_empty() {
+            return;
+        }
+        let simple = |name: &Vec<u8>| SIMPLE.contains(&&**name);
+        let any = !types.iter().all(simple);
+        let referred: HashSet<(u32, u32)> = (self.routines.iter())
+            .flat_map(|routine| {
+                routine.head.parameters.iter().map(move |parameter| (routine.file, parameter))
+            })
+            .filter(|(_, parameter)| parameter.by_reference)
+            .map(|(file, parameter)| (file, parameter.name))
+            .collect();
+        for symbol in 0..self.symbols.len() as u32 {
+            let found = &self.symbols[symbol as usize];
+            let reference = found.what == What::Parameter && referred.contains(&(found.file, found.name));
+            if reference && (any || types.contains(&self.type_of_symbol(symbol))) {
+                self.symbols[symbol as usize].volatile = true;
+            }
+        }
+    }
+
+    /// The type of data or of a parameter, aliases resolved.
+    fn type_of_symbol(&self, symbol: u32) -> Vec<u8> {
+        let symbol = &self.symbols[symbol as usize];
+        self.resolved_type(symbol.scope, &symbol.type_name).to_vec()
     }
 
     // ---- one statement ----

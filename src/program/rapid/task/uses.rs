@@ -3,8 +3,8 @@
 use super::Lister;
 use crate::program::motion::{MotionKind, Origin, OtherUse};
 use crate::program::rapid::symbol::{Unit, What};
-use crate::program::rapid::syntax::{RapidTree, tokens_of};
-use crate::program::rapid::token::{Token, fold};
+use crate::program::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
+use crate::program::rapid::token::{Token, fold, same_name};
 
 impl<'s> Lister<'_, 's> {
     /// Finds every use of the declared targets in the listing that is no motion's own target argument.
@@ -40,6 +40,28 @@ impl<'s> Lister<'_, 's> {
             self.uses_in(*unit, tree, &motions, &likely, &hash);
         }
         self.uses_in_declarations(&likely, &hash);
+        self.uses_by_name();
+    }
+
+    /// GetDataVal with a name that the text does not tell may read any of them.
+    fn uses_by_name(&mut self) {
+        for (file, tree) in (0..).zip(self.trees) {
+            let reads = |node: &u32| {
+                let node = tree.nodes[*node as usize];
+                node.kind == Syntax::Call && same_name(tree.text(node.first), b"GetDataVal")
+            };
+            let computed = |node: &u32| {
+                let name = arguments(tree, *node).find(|argument| !argument.optional);
+                name.and_then(|name| name.value).and_then(|name| token_kind(tree, name))
+                    != Some(Token::String)
+            };
+            for node in (0..tree.nodes.len() as u32).filter(reads).filter(computed) {
+                let place = self.place(file, tree.nodes[node as usize].first);
+                for declaration in &mut self.listing.declarations {
+                    declaration.other_uses.push(OtherUse { motion: None, place });
+                }
+            }
+        }
     }
 
     pub(super) fn uses_in(
@@ -53,10 +75,16 @@ impl<'s> Lister<'_, 's> {
         let node = tree.nodes[unit.node as usize];
         let mut next = 0;
         for token in node.first..node.end {
-            if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
+            // A text may be the name with which GetDataVal reads it.
+            let name = match (tree.kind(token), tree.text(token)) {
+                (Some(Token::Ident), name) => name,
+                (Some(Token::String), [_, name @ .., _]) if !name.is_empty() => name,
+                _ => continue,
+            };
+            if !likely[hash(name)] {
                 continue;
             }
-            let Some(symbol) = self.symbols.find(unit.scope, tree.text(token)) else { continue };
+            let Some(symbol) = self.symbols.find(unit.scope, name) else { continue };
             let Some(&declaration) = self.declarations.get(&symbol) else { continue };
             let found = &self.symbols.symbols[symbol as usize];
             if found.file == unit.file && found.name == token {

@@ -70,10 +70,10 @@ fn a_cycle_that_is_called_where_the_tool_stands_is_listed() {
 fn blocks_that_haas_jumps_to_are_reached_from_elsewhere() {
     let local = "N5 X5.\nN1000 Y20.\nG0 X-40. Y-40.\nM97 P1000\nM30";
     let found = super::certain::reasons(Fanuc, local);
-    assert_eq!(found[..3], [None, left(UnknownInstruction), left(PositionUnknown)]);
+    assert_eq!(found[..3], [None, left(UnknownFlow), left(PositionUnknown)]);
     for jump in ["M96 P1000 Q3", "M98 P7 Q1000", "M98 P7 H1000", "M99 P1000", "M46 Q5 P1000", "M97 P#5"] {
         let found = super::certain::reasons(Fanuc, &format!("X5.\nN1000 Y20.\n{F}\n{jump}"));
-        assert_eq!(found[1], left(UnknownInstruction), "{jump}");
+        assert_eq!(found[1], left(UnknownFlow), "{jump}");
     }
     // A signal may call it at any time.
     check(Fanuc, &[(&format!("M96 P1000\n{F}"), &[left(UnknownFlow), left(UnknownFlow)])]);
