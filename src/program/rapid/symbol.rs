@@ -6,7 +6,7 @@
 
 mod change;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 pub(super) use self::change::resumes;
 pub use self::change::{Change, Ends, How, Reach};
@@ -164,7 +164,7 @@ pub struct Symbols {
     /// Whether the next cycle may begin in the middle of this one.
     pub cycles: bool,
     /// Names of records that are declared more than once, in lower case.
-    pub(super) records_twice: std::collections::HashSet<Vec<u8>>,
+    pub(super) records_twice: HashSet<Vec<u8>>,
     /// File, scope and name of the variables of loops, until they are settled.
     loop_names: Vec<(u32, u32, u32)>,
 }
