@@ -2,8 +2,8 @@
 //!
 //! A tool brings its own load (`tload`). `GripLoad` adds what the gripper holds until the next one, its centre in the
 //! tool frame (in the work object where the robot holds that); `\TLoad` of a motion stands for both together, unless it
-//! is `load0`. The grip is followed statement by statement through branches, loops and calls; where ways that join do
-//! not agree it is not known, and the tool alone is counted.
+//! is `load0`. The grip is followed statement by statement through branches, loops, calls and functions, and from the end
+//! of main to its next cycle; where ways that join do not agree it is not known, and the tool alone is counted.
 //!
 //! Source: ABB RAPID instruction reference (RobotWare 6), GripLoad, MoveL, loaddata, tooldata.
 
@@ -17,6 +17,7 @@ use crate::math::se3::Pose;
 use crate::program::motion::{Listing, Motion, ToolValue, WorkObjectValue};
 use crate::program::rapid::Task;
 use crate::program::rapid::evaluate::{Context, Evaluator, Known};
+use crate::program::rapid::predefined;
 use crate::program::rapid::symbol::Unit;
 use crate::program::rapid::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
 use crate::program::rapid::token::{Token, same_name};
@@ -141,9 +142,14 @@ struct Walk<'t, 's> {
     /// What is held when a unit ends; asked for while it is worked out it is not known.
     exits: Vec<Option<State>>,
     totals: HashMap<usize, Load>,
+    /// The routines that may grip something else, by themselves or in what they call.
+    gripping: Vec<bool>,
     unit: usize,
     silent: bool,
 }
+
+/// What `load0` weighs, which stands for no load (kg).
+const NOTHING_KG: f64 = 0.001;
 
 /// How deeply calls are followed.
 const DEPTH: usize = 12;
@@ -159,6 +165,7 @@ impl<'t, 's> Walk<'t, 's> {
             calls: Vec::new(),
             exits: vec![None; task.symbols.units.len()],
             totals: HashMap::new(),
+            gripping: gripping(task),
             unit: 0,
             silent: false,
         }
@@ -170,8 +177,17 @@ impl<'t, 's> Walk<'t, 's> {
             let exit = self.walk(self.task.symbols.units[unit], 0);
             self.exits[unit] = Some(exit);
         }
-        let entries = self.entries();
+        for unit in 0..self.exits.len() {
+            // The next cycle begins with what this one holds.
+            if let Some(exit) = self.exits[unit].filter(|_| self.is_main(unit)) {
+                self.calls.push((unit, exit, unit));
+            }
+        }
         let mut grips = vec![Grip::Unknown; self.task.listing.motions.len()];
+        if self.task.symbols.interrupting.iter().any(|routine| self.gripping[*routine as usize]) {
+            return Loads { grips, totals: self.totals };
+        }
+        let entries = self.entries();
         for (motion, state, unit) in &self.met {
             grips[*motion] = state.unwrap_or(entries[*unit]);
         }
@@ -181,14 +197,9 @@ impl<'t, 's> Walk<'t, 's> {
     /// What is held where each unit begins: nothing at the start of main; elsewhere what all calls agree on.
     fn entries(&self) -> Vec<Grip> {
         let units = &self.task.symbols.units;
-        let begins = |unit: &Unit| {
-            unit.routine.is_none_or(|routine| {
-                let routine = &self.task.symbols.routines[routine as usize];
-                same_name(self.task.trees[routine.file as usize].text(routine.head.name), b"main")
-            })
-        };
+        let begins = |unit: usize| units[unit].routine.is_none() || self.is_main(unit);
         let mut entries: Vec<Option<Grip>> =
-            units.iter().map(|unit| begins(unit).then_some(Grip::Empty)).collect();
+            (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
         for _ in 0..=units.len() {
             let mut changed = false;
             for (callee, state, caller) in &self.calls {
@@ -207,6 +218,13 @@ impl<'t, 's> Walk<'t, 's> {
         }
         // Nothing in these files calls it.
         entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
+    }
+
+    fn is_main(&self, unit: usize) -> bool {
+        self.task.symbols.units[unit].routine.is_some_and(|routine| {
+            let routine = &self.task.symbols.routines[routine as usize];
+            same_name(self.task.trees[routine.file as usize].text(routine.head.name), b"main")
+        })
     }
 
     fn tree(&self, unit: Unit) -> &'t RapidTree<'s> {
@@ -259,9 +277,15 @@ impl<'t, 's> Walk<'t, 's> {
             Syntax::Body => self.block(unit, node, state, exits, depth),
             Syntax::Call => self.call(unit, node, state, depth),
             Syntax::LateCall => unsure(true),
-            Syntax::CompactIf => either(self.block(unit, node, state, exits, depth), state),
+            Syntax::CompactIf => {
+                let state = unsure(self.asks_first(unit, node));
+                either(self.block(unit, node, state, exits, depth), state)
+            }
             Syntax::If | Syntax::Test => {
                 let (mut out, mut complete) = (None, false);
+                // The conditions are asked first.
+                let asks = |node: u32| self.asks_first(unit, node);
+                let state = unsure(asks(node) || tree.child_nodes(node).any(asks));
                 for branch in tree.child_nodes(node) {
                     if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
                         continue;
@@ -275,7 +299,8 @@ impl<'t, 's> Walk<'t, 's> {
             Syntax::For | Syntax::While => {
                 // What the loop grips is held, or not yet, where it begins again.
                 let entry = unsure(self.changes(unit, node));
-                either(self.block(unit, node, entry, exits, depth), state)
+                let passed = if self.asks_first(unit, node) { entry } else { state };
+                either(self.block(unit, node, entry, exits, depth), passed)
             }
             Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
                 let anywhere = if self.changes(unit, unit.node) { Some(Some(Grip::Unknown)) } else { state };
@@ -295,8 +320,33 @@ impl<'t, 's> Walk<'t, 's> {
             }
             Syntax::Goto => None,
             Syntax::Opaque | Syntax::Unwritten => unsure(true),
-            _ => state,
+            _ => unsure(self.asks(unit, node)),
         }
+    }
+
+    /// Whether a condition or bound of a statement may grip something else.
+    fn asks_first(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        tree.child_nodes(node)
+            .any(|child| tree.nodes[child as usize].kind.is_expression() && self.asks(unit, child))
+    }
+
+    /// Whether a function under a node may grip something else.
+    fn asks(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        (node..node + tree.nodes[node as usize].size)
+            .any(|node| tree.nodes[node as usize].kind == Syntax::Function && self.may_grip(unit, node))
+    }
+
+    /// Whether a call or function may grip something else.
+    fn may_grip(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        let name = tree.text(tree.nodes[node as usize].first);
+        let own = self.task.symbols.called(unit.scope, name);
+        own.iter().any(|routine| self.gripping[*routine as usize])
+            || own.is_empty()
+                && predefined::calls_by_name(name)
+                && self.task.symbols.late_of(unit).iter().any(|routine| self.gripping[*routine as usize])
     }
 
     /// Whether statements under a node may grip something else.
@@ -305,10 +355,8 @@ impl<'t, 's> Walk<'t, 's> {
         let end = node + tree.nodes[node as usize].size;
         (node..end).any(|node| match tree.nodes[node as usize].kind {
             Syntax::LateCall | Syntax::Opaque => true,
-            Syntax::Call => {
-                let name = tree.text(tree.nodes[node as usize].first);
-                same_name(name, b"GripLoad") || self.task.symbols.routine(unit.scope, name).is_some()
-            }
+            Syntax::Call => grips(tree, node) || self.may_grip(unit, node),
+            Syntax::Function => self.may_grip(unit, node),
             _ => false,
         })
     }
@@ -326,7 +374,7 @@ impl<'t, 's> Walk<'t, 's> {
         if same_name(name, b"GripLoad") {
             let value = arguments(tree, node).find(|a| !a.optional).and_then(|a| a.value);
             return Some(Some(match value.and_then(|value| self.load(unit, value)) {
-                Some(load) if load.mass_kg > 0.0 => Grip::Holds(load),
+                Some(load) if load.mass_kg > NOTHING_KG => Grip::Holds(load),
                 Some(_) => Grip::Empty,
                 None => Grip::Unknown,
             }));
@@ -340,11 +388,18 @@ impl<'t, 's> Walk<'t, 's> {
                 .find(|a| a.optional && a.name.is_some_and(|name| same_name(tree.text(name), b"TLoad")));
             let total = option.and_then(|a| a.value).and_then(|value| self.load(unit, value));
             // load0 leaves the tool's own load in force.
-            if let Some(total) = total.filter(|total| total.mass_kg > 0.0) {
+            if let Some(total) = total.filter(|total| total.mass_kg > NOTHING_KG) {
                 self.totals.insert(motion, total);
             }
         }
-        let Some(routine) = self.task.symbols.routine(unit.scope, name) else { return Some(state) };
+        let state = if self.asks(unit, node) { Some(Grip::Unknown) } else { state };
+        let routine = match *self.task.symbols.called(unit.scope, name) {
+            [] if self.may_grip(unit, node) => return Some(Some(Grip::Unknown)),
+            [] => return Some(state),
+            [routine] => routine,
+            // One of several.
+            _ => return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state }),
+        };
         let callee = self.task.symbols.units.iter().position(|unit| unit.routine == Some(routine));
         let Some(callee) = callee else { return Some(Some(Grip::Unknown)) };
         if !self.silent {
@@ -371,6 +426,45 @@ impl<'t, 's> Walk<'t, 's> {
         self.silent = silent;
         self.exits[unit] = Some(exit);
         exit
+    }
+}
+
+/// Whether a call is GripLoad.
+fn grips(tree: &RapidTree<'_>, node: u32) -> bool {
+    same_name(tree.text(tree.nodes[node as usize].first), b"GripLoad")
+}
+
+/// Which routines may grip something else.
+fn gripping(task: &Task<'_>) -> Vec<bool> {
+    let symbols = &task.symbols;
+    let routines = 0..symbols.routines.len();
+    let mut gripping = vec![false; routines.len()];
+    let mut callees: Vec<Vec<u32>> = vec![Vec::new(); routines.len()];
+    for routine in routines.clone() {
+        let unit = symbols.units[symbols.routines[routine].unit as usize];
+        let tree = &task.trees[unit.file as usize];
+        for node in unit.node..unit.node + tree.nodes[unit.node as usize].size {
+            let name = tree.text(tree.nodes[node as usize].first);
+            match tree.nodes[node as usize].kind {
+                Syntax::Call | Syntax::Function => {
+                    gripping[routine] |= grips(tree, node);
+                    callees[routine].extend_from_slice(symbols.called(unit.scope, name));
+                }
+                _ => {}
+            }
+        }
+        callees[routine].extend_from_slice(symbols.late_of(unit));
+    }
+    loop {
+        let mut grown = false;
+        for routine in routines.clone() {
+            let now = callees[routine].iter().any(|called| gripping[*called as usize]);
+            grown |= now && !gripping[routine];
+            gripping[routine] |= now;
+        }
+        if !grown {
+            return gripping;
+        }
     }
 }
 

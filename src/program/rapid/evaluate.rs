@@ -171,7 +171,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         {
             return unknown(Reason::WrongShape);
         }
-        if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+        if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
             return unknown(Reason::Ambiguous);
         }
         if symbol.assigned || context.known.contains_key(&id) {
@@ -186,17 +186,6 @@ impl<'a, 's> Evaluator<'a, 's> {
         };
         let source = if value.is_ok() { Source::Symbol(id) } else { Source::Unknown };
         (value, source)
-    }
-
-    fn module_scope(&self, scope: u32) -> u32 {
-        let mut scope = scope;
-        while let Some(parent) = self.symbols.scopes[scope as usize].parent {
-            if parent == 0 {
-                break;
-            }
-            scope = parent;
-        }
-        scope
     }
 
     /// `name{i, …}` of an array that nothing assigns.
@@ -214,7 +203,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             return None;
         }
         let symbol = &self.symbols.symbols[root as usize];
-        if symbol.assigned || symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+        if symbol.assigned || symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
             return None;
         }
         let Child::Node(index) = index else { return None };
@@ -268,7 +257,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         }
         let symbol = &self.symbols.symbols[id as usize];
         match &symbol.what {
-            What::Data(_) if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) => {
+            What::Data(_) if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) => {
                 Value::Unknown(Reason::Ambiguous)
             }
             What::Data(_) if symbol.assigned && symbol.whole => Value::Unknown(symbol.unknown),
@@ -684,7 +673,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         let Child::Token(_) = array else { return None };
         let symbol = &self.symbols.symbols[self.symbols.root(tree, context.scope, array)? as usize];
         let What::Data(data) = &symbol.what else { return None };
-        if symbol.ambiguous && symbol.scope != self.module_scope(context.scope) {
+        if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
             return None;
         }
         let number = self.value(context, number).number().ok()?.round();

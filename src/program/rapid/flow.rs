@@ -211,6 +211,10 @@ impl Walk<'_, '_, '_> {
                 let displaces = self.displaces(node);
                 let forget = |walk: &mut Self, state: &mut State| {
                     walk.forget_changed(node, state);
+                    if kind == Syntax::While {
+                        // It may wait for another task.
+                        walk.forget_shared(state);
+                    }
                     if displaces {
                         state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
                     }
@@ -286,7 +290,8 @@ impl Walk<'_, '_, '_> {
             });
         }
         match joined {
-            Some(joined) if complete => joined,
+            // TRYNEXT passes all branches where a condition fails.
+            Some(joined) if complete && !self.resumes => joined,
             Some(joined) => joined.joined(state),
             None => state,
         }
@@ -361,7 +366,7 @@ impl Walk<'_, '_, '_> {
                 Syntax::LateCall => self.forget_outside(state),
                 Syntax::Call => self.forget_called(name, kind, state),
                 Syntax::Function => {
-                    if let Some(routine) = symbols.routine(self.unit.scope, name) {
+                    for &routine in symbols.called(self.unit.scope, name) {
                         self.may_set(self.handled, state);
                         self.visitor.called(CallSite { routine, modal: state.modal });
                         self.may_set(symbols.routines[routine as usize].reach.sets, state);
@@ -421,21 +426,25 @@ impl Walk<'_, '_, '_> {
         if kind == Syntax::Call && symbols.is_motion(self.unit.scope, name) {
             return;
         }
-        let moves = match symbols.routine(self.unit.scope, name) {
-            Some(routine) => {
-                let reach = &symbols.routines[routine as usize].reach;
-                for &symbol in &reach.changes {
-                    self.forget(symbol, state);
+        let moves = match symbols.called(self.unit.scope, name) {
+            called @ [_, ..] => {
+                let mut moves = false;
+                for &routine in called {
+                    let reach = &symbols.routines[routine as usize].reach;
+                    for &symbol in &reach.changes {
+                        self.forget(symbol, state);
+                    }
+                    if reach.anything {
+                        self.forget_outside(state);
+                    }
+                    if reach.waits {
+                        self.forget_shared(state);
+                    }
+                    moves |= reach.moves;
                 }
-                if reach.anything {
-                    self.forget_outside(state);
-                }
-                if reach.waits {
-                    self.forget_shared(state);
-                }
-                reach.moves
+                moves
             }
-            None if predefined::effect(name).is_some() => {
+            [] if predefined::effect(name).is_some() => {
                 if kind == Syntax::Call && predefined::calls_by_name(name) {
                     self.forget_outside(state);
                 }
@@ -444,7 +453,7 @@ impl Walk<'_, '_, '_> {
                 }
                 predefined::displaces(name).is_some()
             }
-            None => {
+            [] => {
                 self.forget_outside(state);
                 true
             }
@@ -487,16 +496,17 @@ impl Walk<'_, '_, '_> {
         for &node in symbols.switches_in(self.unit, node..end) {
             let name = tree.text(tree.nodes[node as usize].first);
             let late = tree.nodes[node as usize].kind == Syntax::LateCall;
-            let own = symbols.routine(self.unit.scope, name).is_some();
-            if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
+            let called = if late { &[] } else { symbols.called(self.unit.scope, name) };
+            if let Some(sets) = (!late && called.is_empty()).then(|| setting(tree, node, name)).flatten() {
                 out = out.or(sets);
-            } else if let Some(routine) = (!late).then(|| symbols.routine(self.unit.scope, name)).flatten() {
+            } else if called.is_empty() {
+                out = out.or(symbols.late_sets_of(self.unit));
+            }
+            for &routine in called {
                 out = out.or(self.visitor.exit_of(routine));
                 if self.resumes || tree.nodes[node as usize].kind == Syntax::Function {
                     out = out.or(symbols.routines[routine as usize].reach.sets);
                 }
-            } else {
-                out = out.or(symbols.late_sets_of(self.unit));
             }
         }
         // "As at the entry" of a called routine is what holds here anyway.
@@ -554,8 +564,8 @@ impl Walk<'_, '_, '_> {
             }
             return state;
         }
-        let routine = if late { None } else { symbols.routine(self.unit.scope, name) };
-        if late || routine.is_none() && predefined::calls_by_name(name) {
+        let called = if late { &[] } else { symbols.called(self.unit.scope, name) };
+        if late || called.is_empty() && predefined::calls_by_name(name) {
             self.visitor.called_late(state.modal);
             if symbols.late_of(self.unit).is_empty() {
                 self.visitor.called_outside(state.modal);
@@ -565,9 +575,9 @@ impl Walk<'_, '_, '_> {
             state.previous = None;
             return state;
         }
-        match routine {
-            Some(routine) => self.call_own(routine, name, &mut state),
-            None if predefined::effect(name).is_some() => {
+        match called {
+            [_, ..] => self.call_own(called, name, &mut state),
+            [] if predefined::effect(name).is_some() => {
                 if predefined::begins_cycle(name) {
                     self.visitor.cycled(state.modal);
                     return State { reached: false, ..state };
@@ -577,7 +587,7 @@ impl Walk<'_, '_, '_> {
                 }
                 return state;
             }
-            None => {
+            [] => {
                 self.visitor.called_outside(state.modal);
                 self.forget_outside(&mut state);
                 if motion.is_some() {
@@ -590,15 +600,20 @@ impl Walk<'_, '_, '_> {
         state
     }
 
-    /// A call of a routine of the program.
-    fn call_own(&mut self, routine: u32, name: &[u8], state: &mut State) {
-        let sets = self.evaluator.symbols.routines[routine as usize].reach.sets;
+    /// A call of a routine of the program: of one of these, where modules declare several of the name.
+    fn call_own(&mut self, called: &[u32], name: &[u8], state: &mut State) {
+        let symbols = self.evaluator.symbols;
+        let sets = |all: States, routine: &u32| all.or(symbols.routines[*routine as usize].reach.sets);
+        let sets = called.iter().fold(States::NONE, sets);
         if self.resumes {
             // It may have been left anywhere by an error, and be called once more.
             self.may_set(sets, state);
         }
-        self.visitor.called(CallSite { routine, modal: state.modal });
-        let exit = self.visitor.exit_of(routine);
+        let mut exit = States::NONE;
+        for &routine in called {
+            self.visitor.called(CallSite { routine, modal: state.modal });
+            exit = exit.or(self.visitor.exit_of(routine));
+        }
         if exit == States::NONE {
             state.reached = self.resumes;
             return;

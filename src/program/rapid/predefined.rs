@@ -65,19 +65,34 @@ pub fn retries(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"StartMoveRetry")
 }
 
-/// Whether it waits for something that another task may bring about, with data that tasks share.
+/// Whether it waits: for something that another task may bring about, with data that tasks share, for an operator, who may
+/// change them, or for a device.
 pub fn waits(name: &[u8]) -> bool {
-    const WAITS: [&str; 14] = [
+    const WAITS: [&str; 28] = [
+        "Break",
         "RMQReadWait",
         "RMQSendWait",
+        "SocketAccept",
+        "SocketConnect",
+        "SocketReceive",
+        "Stop",
+        "StopMove",
         "SyncMoveOff",
         "SyncMoveOn",
+        "TPReadFK",
+        "UIListView",
+        "UIMessageBox",
+        "UIMsgBox",
+        "UIShow",
         "WaitAI",
         "WaitAO",
         "WaitDI",
         "WaitDO",
         "WaitGI",
         "WaitGO",
+        "WaitLoad",
+        "WaitRob",
+        "WaitSensor",
         "WaitSyncTask",
         "WaitTestAndSet",
         "WaitTime",

@@ -163,6 +163,8 @@ pub struct Symbols {
     pub everything: States,
     /// Whether the next cycle may begin in the middle of this one.
     pub cycles: bool,
+    /// The routines of names that several modules declare for all, in lower case.
+    namesakes: HashMap<Vec<u8>, Vec<u32>>,
     /// Names of records that are declared more than once, in lower case.
     pub(super) records_twice: HashSet<Vec<u8>>,
     /// File, scope and name of the variables of loops, until they are settled.
@@ -177,6 +179,7 @@ impl Symbols {
             symbols.file(tree, file as u32);
         }
         symbols.loops(trees);
+        symbols.settle_namesakes(trees);
         symbols.settle(trees);
         symbols
     }
@@ -211,6 +214,28 @@ impl Symbols {
             What::Routine(routine) => Some(routine),
             _ => None,
         }
+    }
+
+    /// The routines that a name may call: several where modules beside this one declare it, of which the controller has one.
+    pub fn called(&self, scope: u32, name: &[u8]) -> &[u32] {
+        let Some(symbol) = self.find(scope, name).map(|symbol| &self.symbols[symbol as usize]) else {
+            return &[];
+        };
+        let What::Routine(routine) = &symbol.what else { return &[] };
+        if symbol.ambiguous && symbol.scope != self.module_scope(scope) {
+            let name = folded(name);
+            return self.namesakes.get(&name).map_or(std::slice::from_ref(routine), Vec::as_slice);
+        }
+        std::slice::from_ref(routine)
+    }
+
+    /// The scope of the module around a scope.
+    pub(super) fn module_scope(&self, scope: u32) -> u32 {
+        let mut scope = scope;
+        while let Some(parent) = self.scopes[scope as usize].parent.filter(|&parent| parent != 0) {
+            scope = parent;
+        }
+        scope
     }
 
     /// What the statements of a unit may change by themselves, in order.
@@ -297,6 +322,7 @@ impl Symbols {
                     inside |= !self.item(tree, file, scope, item, &name);
                 }
                 if inside {
+                    self.loose_loops(tree, file, scope, node);
                     self.units.push(Unit { file, node, scope, routine: None });
                 }
             } else {
@@ -304,6 +330,7 @@ impl Symbols {
             }
         }
         if loose {
+            self.loose_loops(tree, file, outside, 0);
             self.units.push(Unit { file, node: 0, scope: outside, routine: None });
         }
     }
@@ -370,10 +397,7 @@ impl Symbols {
             match tree.nodes[inside as usize].kind {
                 Syntax::Data => self.data(tree, file, inner, inside, false),
                 Syntax::For => {
-                    let name = parts(tree, inside).find(|&part| token_kind(tree, part) == Some(Token::Ident));
-                    if let Some(Child::Token(name)) = name {
-                        self.loop_names.push((file, inner, name));
-                    }
+                    self.loop_names.extend(loop_name(tree, inside).map(|name| (file, inner, name)))
                 }
                 _ => {}
             }
@@ -384,6 +408,32 @@ impl Symbols {
         let unit = self.units.len() as u32;
         self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
         self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
+    }
+
+    /// The variables of the loops of a fragment, outside routines.
+    fn loose_loops(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
+        let (mut at, end) = (node + 1, node + tree.nodes[node as usize].size);
+        while at < end {
+            let kind = tree.nodes[at as usize].kind;
+            if kind.is_routine() || kind == Syntax::Module {
+                at += tree.nodes[at as usize].size;
+                continue;
+            }
+            if kind == Syntax::For {
+                self.loop_names.extend(loop_name(tree, at).map(|name| (file, scope, name)));
+            }
+            at += 1;
+        }
+    }
+
+    /// Gathers the routines that have their name together with others.
+    fn settle_namesakes(&mut self, trees: &[RapidTree<'_>]) {
+        for symbol in self.symbols.iter().filter(|symbol| symbol.ambiguous) {
+            if let What::Routine(routine) = symbol.what {
+                let name = folded(trees[symbol.file as usize].text(symbol.name));
+                self.namesakes.entry(name).or_default().push(routine);
+            }
+        }
     }
 
     /// The variables of loops: names of their routines where nothing else has the name. One that hides other data within its
@@ -419,4 +469,10 @@ impl Symbols {
         }
         self.find(scope, tree.text(token))
     }
+}
+
+/// The token that names the variable of a loop.
+fn loop_name(tree: &RapidTree<'_>, node: u32) -> Option<u32> {
+    let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident))?;
+    if let Child::Token(name) = name { Some(name) } else { None }
 }

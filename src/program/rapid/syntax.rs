@@ -126,7 +126,7 @@ impl Syntax {
     }
 
     /// Whether it is an expression.
-    pub(super) fn is_expression(self) -> bool {
+    pub fn is_expression(self) -> bool {
         matches!(
             self,
             Syntax::Aggregate

@@ -233,6 +233,16 @@ pub fn components(type_name: &[u8]) -> Option<&'static [(&'static str, &'static 
 /// The value of predefined data: tool0, wobj0, load0, the speeds and zones of the reference, pi.
 pub fn built_in(name: &[u8]) -> Option<Value> {
     let identity = || Value::from_frame(&Frame::IDENTITY);
+    let load0 = || {
+        vec![
+            Value::Number(0.001),
+            Value::from_numbers(&[0.0, 0.0, 0.001]),
+            Value::from_numbers(&[1.0, 0.0, 0.0, 0.0]),
+            Value::Number(0.0),
+            Value::Number(0.0),
+            Value::Number(0.0),
+        ]
+    };
     let speed = |tcp: f64| Value::from_numbers(&[tcp, 500.0, 5000.0, 1000.0]);
     let zone = |fine: bool, tcp: f64, ori: f64, deg: f64| {
         let mut parts = vec![Value::Bool(fine)];
@@ -240,17 +250,7 @@ pub fn built_in(name: &[u8]) -> Option<Value> {
         Value::List(parts)
     };
     Some(match name {
-        b"tool0" => {
-            let load = [
-                Value::Number(0.001),
-                Value::from_numbers(&[0.0, 0.0, 0.001]),
-                Value::from_numbers(&[1.0, 0.0, 0.0, 0.0]),
-                Value::Number(0.0),
-                Value::Number(0.0),
-                Value::Number(0.0),
-            ];
-            Value::List(vec![Value::Bool(true), identity(), Value::List(load.to_vec())])
-        }
+        b"tool0" => Value::List(vec![Value::Bool(true), identity(), Value::List(load0())]),
         b"wobj0" => Value::List(vec![
             Value::Bool(false),
             Value::Bool(true),
@@ -258,6 +258,7 @@ pub fn built_in(name: &[u8]) -> Option<Value> {
             identity(),
             identity(),
         ]),
+        b"load0" => Value::List(load0()),
         b"pi" => Value::Number(std::f64::consts::PI),
         b"vmax" => speed(5000.0),
         b"fine" => zone(true, 0.0, 0.0, 0.0),

@@ -69,3 +69,36 @@ fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
     let task = Task::read(&[("p.mod", text.as_bytes())]);
     assert_eq!(Loads::default().at(0, &task.listing.motions[0], &task.listing, &arm), None);
 }
+
+#[test]
+fn a_grip_changes_in_functions_by_names_in_traps_and_from_cycle_to_cycle() {
+    let unknown = |body: &str| grips(body).1.unknown();
+    let take = "PROC take1()\n GripLoad part;\nENDPROC\nFUNC bool took()\n take1;\n RETURN TRUE;\nENDFUNC\n";
+    let none = "PROC take1()\nENDPROC\nFUNC bool took()\n take1;\n RETURN TRUE;\nENDFUNC\n";
+    for body in [
+        "IF took() THEN\n ENDIF\n m;\n",
+        "IF took() m;\n",
+        "b := took();\n m;\n",
+        "WHILE took() DO\n ENDWHILE\n m;\n",
+        "CallByVar \"take\",1;\n m;\n",
+        "MoveLSync TARGET,v100,z10,t,\"take1\";\n m;\n",
+        "%\"take1\"%;\n m;\n",
+    ] {
+        // Nothing is held again when the next cycle begins.
+        let main = format!("PROC main()\n{body} GripLoad load0;\nENDPROC\n");
+        let motions = body.matches("m;").count() + body.matches("TARGET").count();
+        assert_eq!(unknown(&format!("{main}{take}")), motions, "{body}");
+        if !body.contains('%') {
+            assert_eq!(unknown(&format!("{main}{none}")), 0, "{body}");
+        }
+    }
+    let trap = "TRAP tr\n GripLoad part;\nENDTRAP\n";
+    assert_eq!(unknown(&format!("PROC main()\n m;\nENDPROC\n{trap}")), 1);
+    // What main holds at its end it holds when it begins again.
+    assert_eq!(unknown("PROC main()\n m;\n GripLoad part;\n m;\nENDPROC\n"), 1);
+    // load0 is nothing, whatever the tool weighs.
+    let (_, loads) = grips("PROC main()\n GripLoad load0;\n m;\nENDPROC\n");
+    assert_eq!(loads.grips, [Grip::Empty]);
+    let load0 = "PROC main()\n MoveL TARGET,v100,fine,t\\TLoad:=load0;\nENDPROC\n";
+    assert_eq!(masses(load0), [Some(2.0)]);
+}

@@ -772,3 +772,74 @@ fn a_record_that_two_modules_declare_is_not_taken_apart() {
     assert!(known(&[&a, &c]));
     assert!(!known(&[&a, &b, &c]));
 }
+
+#[test]
+fn what_another_task_may_write_is_not_known_behind_a_wait_of_any_kind() {
+    let shared = "PERS num sh:=0;\nPERS bool ready:=FALSE;\n";
+    let run = |wait: &str| {
+        let text = format!(
+            "{shared}PROC main()\nsh:=5;\nm:=5;\n{wait}MoveL Offs(p,0,0,sh),v100,fine,tool0;\n{OFFS}ENDPROC\n\
+             PROC poll()\nWHILE NOT ready DO\nENDWHILE\nENDPROC\n"
+        );
+        of("main", &text)
+    };
+    assert_eq!(run("TPReadNum n,\"x\";\nSet do1;\nFOR k FROM 1 TO 2 DO\nn:=n+1;\nENDFOR\n"), [None, None]);
+    for wait in [
+        "WHILE NOT ready DO\nENDWHILE\n",
+        "poll;\n",
+        "UIMsgBox \"set it\";\n",
+        "TPReadFK n,\"x\",\"a\",\"b\",\"\",\"\",\"\";\n",
+        "SocketReceive sock\\Str:=st;\n",
+        "Stop;\n",
+    ] {
+        assert_eq!(run(wait), [RUN_TIME, None], "{wait}");
+    }
+}
+
+#[test]
+fn the_variable_of_a_loop_outside_routines_hides_a_constant() {
+    let loops = "FOR c FROM 1 TO 3 DO\nMoveL Offs(p,0,0,c),v100,fine,tool0;\nENDFOR\n\
+                 FOR pi FROM 1 TO 3 DO\nMoveL Offs(p,0,0,pi),v100,fine,tool0;\nENDFOR\n";
+    let head = format!("CONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nCONST num c:=1;\n");
+    for text in [format!("{head}{loops}"), format!("MODULE M\n{head}{loops}ENDMODULE\n")] {
+        let task = Task::read(&[("m.mod", text.as_bytes())]);
+        let found: Vec<Option<Reason>> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
+        assert_eq!(found, [RUN_TIME, RUN_TIME], "{text}");
+    }
+}
+
+#[test]
+fn of_procedures_with_one_name_any_may_be_the_one_that_is_called() {
+    let a = format!(
+        "MODULE A\nCONST robtarget p:=[[500,0,300],[1,0,0,0],[0,0,0,0],{EXT}];\nVAR num m:=3;\nPROC main()\nm:=1;\ninit;\n{OFFS}{GO}ENDPROC\nENDMODULE\n"
+    );
+    let b = "MODULE B\nPROC init()\nENDPROC\nENDMODULE\n".to_owned();
+    let c = format!(
+        "MODULE C\nVAR num k;\nPROC init()\nm:=40;\n{SET}ENDPROC\nPROC other()\nk:=1;\ninit;\nENDPROC\nENDMODULE\n"
+    );
+    let of = |files: &[&str]| {
+        let files: Vec<(&str, &[u8])> = files.iter().map(|text| ("m.mod", text.as_bytes())).collect();
+        let task = Task::read(&files);
+        task.listing.motions.iter().map(|motion| motion.reason()).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&[&a, &b]), [None, None]);
+    assert_eq!(of(&[&a, &b, &c]), [LEFT, LEFT]);
+    assert_eq!(of(&[&a, &c, &b]), [LEFT, LEFT]);
+    // A module calls its own first.
+    let own = a.replace("ENDMODULE", "PROC init()\nENDPROC\nENDMODULE");
+    assert_eq!(of(&[&own, &c]), [None, None]);
+}
+
+#[test]
+fn trynext_passes_the_branches_of_a_condition_that_fails() {
+    let run = |handler: &str| {
+        of(
+            "main",
+            &format!(
+                "PROC main()\nm:=1;\nIF 1/n>0 THEN\nm:=2;\nELSE\nm:=2;\nENDIF\n{OFFS}ERROR\n{handler}\nENDPROC"
+            ),
+        )
+    };
+    assert_eq!(run("TRYNEXT;"), [RUN_TIME]);
+    assert_eq!(run("RETURN;"), [None]);
+}

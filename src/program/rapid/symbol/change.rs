@@ -351,6 +351,8 @@ impl Symbols {
                     self.found_late(trees, tree, (node, name), &mut found);
                 }
                 Syntax::Call | Syntax::Function => self.found_call(trees, unit, (node, kind), &mut found),
+                // It may wait for another task.
+                Syntax::While => found.waits = true,
                 _ => {}
             }
             node += 1;
@@ -371,8 +373,8 @@ impl Symbols {
         let tree = &trees[unit.file as usize];
         let name = tree.text(tree.nodes[node as usize].first);
         let is_call = kind == Syntax::Call;
-        let own = self.routine(unit.scope, name);
-        if let Some(sets) = if is_call && own.is_none() { setting(tree, node, name) } else { None } {
+        let own = self.called(unit.scope, name);
+        if let Some(sets) = if is_call && own.is_empty() { setting(tree, node, name) } else { None } {
             found.switch(node);
             found.sets = found.sets.or(sets);
         }
@@ -386,16 +388,16 @@ impl Symbols {
             return;
         }
         match own {
-            Some(routine) => {
+            [_, ..] => {
                 found.switch(node);
-                found.calls.push(routine);
+                found.calls.extend_from_slice(own);
             }
-            None if is_call && predefined::calls_by_name(name) => {
+            [] if is_call && predefined::calls_by_name(name) => {
                 let name = arguments(tree, node).find(|argument| !argument.optional);
                 self.found_late(trees, tree, (node, name.and_then(|name| name.value)), found);
             }
-            None if predefined::effect(name).is_none() => (found.unknown, found.moves) = (true, true),
-            None => {
+            [] if predefined::effect(name).is_none() => (found.unknown, found.moves) = (true, true),
+            [] => {
                 found.moves |= predefined::displaces(name).is_some();
                 found.cycles |= predefined::begins_cycle(name);
                 found.waits |= predefined::waits(name);
@@ -440,9 +442,9 @@ impl Symbols {
             match tree.nodes[node as usize].kind {
                 Syntax::LateCall => true,
                 Syntax::Call if self.is_motion(unit.scope, name) => true,
-                Syntax::Call | Syntax::Function => match self.routine(unit.scope, name) {
-                    Some(routine) => self.routines[routine as usize].reach.moves,
-                    None => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
+                Syntax::Call | Syntax::Function => match self.called(unit.scope, name) {
+                    own @ [_, ..] => own.iter().any(|routine| self.routines[*routine as usize].reach.moves),
+                    [] => predefined::displaces(name).is_some() || predefined::effect(name).is_none(),
                 },
                 _ => false,
             }
@@ -712,8 +714,8 @@ impl Symbols {
             return;
         }
         let root = |argument: &Argument| self.root(tree, scope, argument.value?);
-        if let Some(routine) = self.routine(scope, name) {
-            let routine = &self.routines[routine as usize];
+        let called = self.called(scope, name);
+        for routine in called.iter().map(|&routine| &self.routines[routine as usize]) {
             let mut required =
                 (0..).zip(&routine.head.parameters).filter(|(_, parameter)| !parameter.optional);
             for argument in arguments(tree, node) {
@@ -729,6 +731,8 @@ impl Symbols {
                     None => {}
                 }
             }
+        }
+        if !called.is_empty() {
             return;
         }
         if let Some(known) = known {
