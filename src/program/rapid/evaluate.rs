@@ -22,9 +22,9 @@ use nalgebra::Vector3;
 use self::functions::{Options, call};
 use super::literal;
 use super::number;
-use super::symbol::{Symbols, What};
+use super::symbol::{Symbol, Symbols, What};
 use super::syntax::{
-    RapidTree, Syntax, arguments, expressions, node_kind, parts, text_of, token_kind, tokens_of,
+    Data, RapidTree, Syntax, arguments, expressions, node_kind, parts, text_of, token_kind, tokens_of,
 };
 use super::token::{Token, fold, folded, same_name};
 use super::value::{Value, built_in, cartesian_target, components, joint_target};
@@ -163,6 +163,11 @@ impl<'a, 's> Evaluator<'a, 's> {
         let symbol = &self.symbols.symbols[id as usize];
         let data = match &symbol.what {
             What::Data(data) => data,
+            What::Parameter if context.known.contains_key(&id) => {
+                let value = self.symbol_value(context, id).target(joints);
+                let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+                return (value, source);
+            }
             What::Parameter => return unknown(Reason::Parameter),
             _ => return unknown(Reason::WrongShape),
         };
@@ -271,12 +276,20 @@ impl<'a, 's> Evaluator<'a, 's> {
                 }
                 Some(_) => Value::Unknown(Reason::WrongShape),
                 None if symbol.assigned => Value::Unknown(symbol.unknown),
+                None if self.is_zero(symbol, data) => Value::Number(0.0),
                 None => Value::Unknown(Reason::Uninitialised),
             },
             What::Loop => Value::Unknown(Reason::Assigned),
             What::Parameter => Value::Unknown(Reason::Parameter),
             _ => Value::Unknown(Reason::WrongShape),
         }
+    }
+
+    /// Whether data begin as zero, and nothing outside the files given can change them: a number of a routine.
+    fn is_zero(&self, symbol: &Symbol, data: &Data) -> bool {
+        let of_routine = self.symbols.module_scope(symbol.scope) != symbol.scope;
+        let number = matches!(&*symbol.type_name, b"num" | b"dnum") && data.dimensions.is_none();
+        of_routine && number && data.storage == Token::Var
     }
 
     /// Makes the component at a path of names unknown.

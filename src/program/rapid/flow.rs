@@ -120,6 +120,12 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, wanders, aliases };
     walk.handled = walk.handled();
     walk.any = walk.settings(unit.node).or(walk.handled).or(States::ENTRY);
+    if let Some(routine) = unit.routine
+        && tree.child_nodes(unit.node).any(|clause| catches(tree.nodes[clause as usize].kind))
+    {
+        // An error leaves what is called anywhere.
+        walk.any = walk.any.or(symbols.routines[routine as usize].reach.sets);
+    }
     let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
     // Where ExitCycle begins main anew, its variables may be as they were.
     if unit.routine.is_some_and(|routine| !(symbols.cycles && is_main(evaluator, routine))) {
@@ -200,6 +206,8 @@ impl Walk<'_, '_, '_> {
             Syntax::If => self.branches(node, state, conditional, Token::Else),
             Syntax::Test => self.branches(node, state, conditional, Token::Default),
             Syntax::CompactIf => {
+                // The condition is asked before the ways part.
+                self.forget_asked(node, &mut state);
                 let before = state.clone();
                 let guarded = Surroundings { guarded: true, ..conditional };
                 self.block(node, state, guarded).joined(before)
@@ -246,12 +254,13 @@ impl Walk<'_, '_, '_> {
             }
             Syntax::Raise if self.resumes => {
                 // The handler of the routine goes on behind it.
-                self.exits = self.exits.or(state.modal);
                 self.may_set(self.handled, &mut state);
                 State { previous: None, ..state }
             }
-            Syntax::Goto | Syntax::Raise | Syntax::Leave => {
-                self.exits = if kind == Syntax::Goto { self.exits } else { self.exits.or(state.modal) };
+            // Where a caller catches the error, it counts with all that is set here.
+            Syntax::Goto | Syntax::Raise => State { reached: false, ..state },
+            Syntax::Leave => {
+                self.exits = self.exits.or(state.modal);
                 State { reached: false, ..state }
             }
             Syntax::Opaque | Syntax::Unwritten => {
@@ -276,11 +285,7 @@ impl Walk<'_, '_, '_> {
                 continue;
             }
             // A condition is asked before the branches that follow, whether they are gone or not.
-            for asked in
-                tree.child_nodes(branch).filter(|&node| tree.nodes[node as usize].kind.is_expression())
-            {
-                self.forget_changed(asked, &mut state);
-            }
+            self.forget_asked(branch, &mut state);
             let first = parts(tree, branch).next();
             complete |= first.and_then(|first| token_kind(tree, first)) == Some(otherwise);
             let end = self.block(branch, state.clone(), place);
@@ -367,14 +372,27 @@ impl Walk<'_, '_, '_> {
                 Syntax::Call => self.forget_called(name, kind, state),
                 Syntax::Function => {
                     for &routine in symbols.called(self.unit.scope, name) {
+                        let sets = symbols.routines[routine as usize].reach.sets;
+                        if self.resumes {
+                            // It may be called once more after an error in it.
+                            self.may_set(sets, state);
+                        }
                         self.may_set(self.handled, state);
                         self.visitor.called(CallSite { routine, modal: state.modal });
-                        self.may_set(symbols.routines[routine as usize].reach.sets, state);
+                        self.may_set(sets, state);
                     }
                     self.forget_called(name, kind, state);
                 }
                 _ => {}
             }
+        }
+    }
+
+    /// Forgets what the expressions of a statement, such as its condition, may change.
+    fn forget_asked(&mut self, node: u32, state: &mut State) {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        for asked in tree.child_nodes(node).filter(|&node| tree.nodes[node as usize].kind.is_expression()) {
+            self.forget_changed(asked, state);
         }
     }
 
@@ -566,6 +584,10 @@ impl Walk<'_, '_, '_> {
         }
         let called = if late { &[] } else { symbols.called(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
+            if self.resumes {
+                // It may be called once more after an error in it.
+                self.may_set(symbols.late_sets_of(self.unit), &mut state);
+            }
             self.visitor.called_late(state.modal);
             if symbols.late_of(self.unit).is_empty() {
                 self.visitor.called_outside(state.modal);
@@ -646,6 +668,9 @@ impl Walk<'_, '_, '_> {
         let mut given = arguments(tree, node).filter(|argument| !argument.optional);
         let place = given.next()?.value?;
         let old = self.evaluator.value(context, place).number().ok();
+        if self.resumes && arguments(tree, node).filter_map(|a| a.value).any(|value| self.may_fail(value)) {
+            return None;
+        }
         let new = if is(b"Clear") {
             0.0
         } else if is(b"Incr") {
@@ -669,7 +694,24 @@ impl Walk<'_, '_, '_> {
         }
         let context = Context::new(self.unit.file, self.unit.scope, &state.known);
         let value = self.evaluator.value(context, expression);
+        // TRYNEXT passes an assignment that fails.
+        let passed =
+            (self.resumes && (self.may_fail(place) || self.may_fail(expression))).then(|| state.clone());
         self.put(place, value, state);
+        if let Some(passed) = passed {
+            *state = std::mem::replace(state, passed.clone()).joined(passed);
+        }
+    }
+
+    /// Whether an argument of a function of the program, which need not use it, may raise an error.
+    fn may_fail(&self, part: Child) -> bool {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        let Child::Node(node) = part else { return false };
+        (node..node + tree.nodes[node as usize].size).any(|node| {
+            let name = tree.text(tree.nodes[node as usize].first);
+            tree.nodes[node as usize].kind == Syntax::Function
+                && self.evaluator.symbols.routine(self.unit.scope, name).is_some()
+        })
     }
 
     /// Puts a value in a place.
@@ -708,15 +750,19 @@ impl Walk<'_, '_, '_> {
             _ => None,
         };
         let Some(dimensions) = dimensions else { return Value::Unknown(reason) };
-        let mut sizes = expressions(tree, dimensions);
-        let (Some(size), None) = (sizes.next(), sizes.next()) else { return Value::Unknown(reason) };
+        let sizes: Vec<Child> = expressions(tree, dimensions).collect();
         let there = Context::new(symbol.file, symbol.scope, context.known);
-        match self.evaluator.value(there, size).number() {
-            Ok(size) if (1.0..=ELEMENTS).contains(&size) => {
-                Value::List(vec![Value::Unknown(reason); size as usize])
+        let mut value = Value::Unknown(reason);
+        let mut count = 1.0;
+        for size in sizes.into_iter().rev() {
+            let Ok(size) = self.evaluator.value(there, size).number() else { return Value::Unknown(reason) };
+            count *= size;
+            if !(1.0..=ELEMENTS).contains(&size) || count > ELEMENTS {
+                return Value::Unknown(reason);
             }
-            _ => Value::Unknown(reason),
+            value = Value::List(vec![value; size as usize]);
         }
+        value
     }
 
     /// `old` with the component at `path` replaced.
@@ -750,21 +796,38 @@ impl Walk<'_, '_, '_> {
             }
             Child::Token(_) => self.replaced(context, old, type_name, rest, value),
             Child::Node(index) => {
-                let Value::List(mut list) = old else { return Value::Unknown(Reason::Assigned) };
-                let mut positions = expressions(tree, index);
-                let (Some(position), None) = (positions.next(), positions.next()) else {
-                    return Value::Unknown(Reason::Assigned);
-                };
-                let Ok(position) = self.evaluator.value(context, position).number() else {
-                    return Value::Unknown(Reason::Assigned);
-                };
-                let Some(part) = index_of(position).and_then(|at| list.get_mut(at)) else {
-                    return Value::Unknown(Reason::IndexOutOfRange);
-                };
-                let old = std::mem::replace(part, Value::Bool(false));
-                *part = self.replaced(context, old, type_name, rest, value);
-                Value::List(list)
+                let positions: Vec<Child> = expressions(tree, index).collect();
+                self.replaced_at(context, old, type_name, (&positions, rest), value)
             }
         }
     }
+
+    /// `old` with the component at `rest` of its element replaced.
+    fn replaced_at(
+        &self,
+        context: Context<'_>,
+        old: Value,
+        type_name: &[u8],
+        (positions, rest): (&[Child], &[Child]),
+        value: Value,
+    ) -> Value {
+        let Some((&position, positions)) = positions.split_first() else {
+            return self.replaced(context, old, type_name, rest, value);
+        };
+        let Value::List(mut list) = old else { return Value::Unknown(Reason::Assigned) };
+        let Ok(position) = self.evaluator.value(context, position).number() else {
+            return Value::Unknown(Reason::Assigned);
+        };
+        let Some(part) = index_of(position).and_then(|at| list.get_mut(at)) else {
+            return Value::Unknown(Reason::IndexOutOfRange);
+        };
+        let old = std::mem::replace(part, Value::Bool(false));
+        *part = self.replaced_at(context, old, type_name, (positions, rest), value);
+        Value::List(list)
+    }
+}
+
+/// Whether a clause of a routine is gone into from any of its statements.
+fn catches(clause: Syntax) -> bool {
+    matches!(clause, Syntax::ErrorClause | Syntax::UndoClause)
 }

@@ -843,3 +843,83 @@ fn trynext_passes_the_branches_of_a_condition_that_fails() {
     assert_eq!(run("TRYNEXT;"), [RUN_TIME]);
     assert_eq!(run("RETURN;"), [None]);
 }
+
+#[test]
+fn the_condition_of_a_compact_if_is_asked_on_the_way_past_it() {
+    let find = "FUNC bool find(INOUT robtarget q)\nq.trans.x:=n;\nRETURN TRUE;\nENDFUNC\n\
+                FUNC bool shift()\nPDispSet [[0,0,10],[1,0,0,0]];\nRETURN n=1;\nENDFUNC\n";
+    let main = |body: &str| {
+        of(
+            "main",
+            &format!("{find}PROC main()\nVAR string s;\nVAR robtarget q;\nm:=5;\nq:=p;\n{body}ENDPROC"),
+        )
+    };
+    assert_eq!(main(&format!("IF n=1 RETURN;\n{OFFS}")), [None]);
+    for leaves in ["RETURN", "EXIT", "m:=5"] {
+        assert_eq!(main(&format!("IF NOT StrToVal(s,m) {leaves};\n{OFFS}")), [RUN_TIME], "{leaves}");
+        assert_eq!(main(&format!("IF shift() {leaves};\n{GO}")), [LEFT], "{leaves}");
+    }
+    let found = main("IF NOT find(q) RETURN;\nMoveL q,v100,fine,tool0;\n");
+    assert!(found[0].is_some(), "{found:?}");
+}
+
+#[test]
+fn an_error_leaves_what_is_called_anywhere() {
+    let inner = format!("PROC inner()\n{SET}WaitDI d,1\\MaxTime:=1;\nPDispOff;\nENDPROC\n");
+    let run = |unit: &str, handler: &str| {
+        let more =
+            format!("{inner}PROC sub()\ninner;\nERROR\n{handler}ENDPROC\nPROC main()\nsub;\n{GO}ENDPROC");
+        of(unit, &more)
+    };
+    assert_eq!(run("sub", &format!("{GO}RETURN;\n")), [LEFT]);
+    assert_eq!(run("main", "RETURN;\n"), [LEFT]);
+    assert_eq!(run("main", "PDispOff;\nRETURN;\n"), [None]);
+    assert_eq!(run("main", "RAISE;\n"), [None]);
+    // A function that is asked once more begins with what it had set.
+    let again = |handler: &str| {
+        of(
+            "fx",
+            &format!(
+                "FUNC num fx()\n{GO}{SET}WaitDI d,1;\nPDispOff;\nRETURN 1;\nENDFUNC\nPROC main()\nn:=fx();\nERROR\n{handler}ENDPROC"
+            ),
+        )
+    };
+    assert_eq!(again("RETRY;\n"), [LEFT]);
+    let late = |handler: &str| {
+        let sub = format!("PROC sub()\n{GO}{SET}WaitDI d,1;\nPDispOff;\nENDPROC\n");
+        let main = format!("PROC main()\nPDispOff;\nsub;\nPDispOff;\n%\"sub\"%;\nERROR\n{handler}ENDPROC");
+        of("sub", &format!("{sub}{main}"))
+    };
+    assert_eq!((late("RETRY;\n"), late("RAISE;\n")), (vec![LEFT], vec![None]));
+}
+
+#[test]
+fn an_assignment_that_fails_is_passed_by_trynext() {
+    let run = |value: &str, handler: &str| {
+        of(
+            "main",
+            &format!(
+                "FUNC num g(num a)\nRETURN 5;\nENDFUNC\nPROC main()\nm:=1;\nm:={value};\n{OFFS}ERROR\n{handler}\nENDPROC"
+            ),
+        )
+    };
+    assert_eq!(run("g(1/n)", "TRYNEXT;"), [RUN_TIME]);
+    assert_eq!(run("g(1/n)", "RETURN;"), [None]);
+    assert_eq!(run("Abs(-5)", "TRYNEXT;"), [None]);
+}
+
+#[test]
+fn parameters_that_were_assigned_and_numbers_of_routines_are_told() {
+    let sub = |head: &str| {
+        let body = "q:=Offs(p,0,0,10);\nMoveL q,v100,fine,tool0;\nMoveL Offs(q,0,0,1),v100,fine,tool0;\n";
+        of("sub", &format!("PROC sub({head})\n{body}ENDPROC\nPROC main()\nsub p;\nENDPROC"))
+    };
+    assert_eq!(sub("robtarget q"), [None, None]);
+    assert_eq!(sub("INOUT robtarget q"), [None, None]);
+    let found = heights(
+        "VAR num z;\nMoveL Offs(p,0,0,z),v100,fine,tool0;\na{2,1}:=30;\nMoveL Offs(p,0,0,a{2,1}),v100,fine,tool0;\n\
+         MoveL Offs(p,0,0,a{1,2}),v100,fine,tool0;\nb{1,2,1}.trans.z:=7;\nMoveL Offs(p,0,0,b{1,2,1}.trans.z),v100,fine,tool0;",
+        "VAR num a{2,2}:=[[1,2],[3,4]];\nVAR pose b{2,2,1};\n",
+    );
+    assert_eq!(found, [Ok(0.0), Ok(30.0), Err(Reason::RunTimeOffset), Ok(7.0)]);
+}
