@@ -17,7 +17,7 @@ use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, Reason};
+use truegrind::program::motion::{Mark, MotionKind, Reason};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::{Language, Program};
 use truegrind::program::rewrite::{Outcome, RewriteOptions};
@@ -524,8 +524,12 @@ fn rewritten(
                 row.reason = Some(Why::Same);
             }
             Outcome::Refused(reason) => {
+                let kind = program.listing().motions[change.motion as usize].kind;
                 row.status = Status::Refused;
-                row.reason = Some(Why::Program(*reason));
+                row.reason = Some(match reason {
+                    Reason::WrongShape if kind == MotionKind::Circular => Why::NoCircle,
+                    reason => Why::Program(*reason),
+                });
                 row.after_mm = row.before_mm;
             }
             _ => {}

@@ -59,7 +59,8 @@ pub enum Why {
         /// Its speed over its limit, above 1.
         ratio: f64,
     },
-    /// The three points of a circular motion lie on a line, or two of them coincide.
+    /// The three points of a circular motion lie on a line, two of them coincide, or the circle through them leaves the way
+    /// that was meant.
     NoCircle,
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
     WholeCircle,
@@ -131,7 +132,7 @@ impl fmt::Display for Why {
                     joint + 1
                 )
             }
-            Why::NoCircle => f.write_str("its three points lie on a line or coincide: they make no circle"),
+            Why::NoCircle => f.write_str("its three points make no circle, or none that keeps to the way that was meant"),
             Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
             Why::JointNotMeasured { joint, by_deg } => {
                 write!(

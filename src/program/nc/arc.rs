@@ -4,6 +4,24 @@
 
 use std::f64::consts::{PI, TAU};
 
+/// Ends that lie in one direction from the centre to this angle make a whole turn: LinuxCNC takes a millionth (rad).
+const SAME_RAD: f64 = 1e-6;
+
+/// Ends farther apart than this share of the radius tell the circle with the point between.
+const FAR: f64 = 0.1;
+
+/// Points within this distance do not tell how they are turned (mm).
+const NEAR_MM: f64 = 0.05;
+
+/// The largest change by a correction of direction or scale.
+const MOST_TURN: f64 = 0.01;
+
+/// Radii at both ends that differ by less are the same to every control (mm).
+const SAME_MM: f64 = 5e-4;
+
+/// Pieces between which two arcs are compared.
+const SAMPLES: u8 = 12;
+
 /// The axes of a plane: first, second, and the one across.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plane {
@@ -59,16 +77,13 @@ impl Arc {
             return None;
         }
         let chord = (start[plane.a] - end[plane.a]).hypot(start[plane.b] - end[plane.b]);
-        let mut sweep_rad = (angle(end) - angle(start)).rem_euclid(TAU);
-        if chord < 1e-6 {
+        let turned = if positive { angle(end) - angle(start) } else { angle(start) - angle(end) };
+        let mut sweep_rad = turned.rem_euclid(TAU);
+        // Ends in one direction from the centre, if not at one distance.
+        if chord < 1e-6 || !(SAME_RAD..=TAU - SAME_RAD).contains(&sweep_rad) {
             sweep_rad = TAU;
         }
-        if !positive && sweep_rad < TAU {
-            sweep_rad -= TAU;
-        } else if !positive {
-            sweep_rad = -TAU;
-        }
-        Some(Arc { plane, centre_mm, sweep_rad })
+        Some(Arc { plane, centre_mm, sweep_rad: if positive { sweep_rad } else { -sweep_rad } })
     }
 
     /// An arc of a radius; a negative one takes the longer way.
@@ -146,6 +161,78 @@ impl Arc {
         // |centre − start| = |centre − via| with centre = middle + h normal.
         let h = (along * along + off * off - 0.25 * chord * chord) / (2.0 * off);
         Arc::about(plane, start, end, [middle[0] + h * normal[0], middle[1] + h * normal[1]], positive)
+    }
+
+    /// The arc that goes from where `told` begins to where it ends as this one goes between `meant` (start, middle, end);
+    /// `None` where none does.
+    ///
+    /// Where the ends are far apart for the radius the three points tell the circle. Where they are not, be the arc short or
+    /// nearly closed, what is rounded of them would turn it: the centre then moves with the points, as a whole.
+    pub fn moved(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3], positive: bool) -> Option<Arc> {
+        let Plane { a, b, .. } = self.plane;
+        let [start, via, end] = told;
+        let chord = [end[a] - start[a], end[b] - start[b]];
+        let length = chord[0].hypot(chord[1]);
+        let radius = (meant[0][a] - self.centre_mm[0]).hypot(meant[0][b] - self.centre_mm[1]);
+        if self.is_whole() || length >= FAR * radius {
+            return Arc::through(self.plane, start, via, end, positive, self.is_whole());
+        }
+        let mut centre_mm = self.moved_centre(meant, told);
+        if self.sweep_rad.abs() < PI {
+            if length < 1e-6 {
+                return None;
+            }
+            // Where both ends are as far, unless they are anyway, to what controls allow.
+            let along = chord.map(|x| x / length);
+            let middle = [start[a] + 0.5 * chord[0], start[b] + 0.5 * chord[1]];
+            let off = along[0] * (centre_mm[0] - middle[0]) + along[1] * (centre_mm[1] - middle[1]);
+            let end_radius = (meant[2][a] - self.centre_mm[0]).hypot(meant[2][b] - self.centre_mm[1]);
+            if off.abs() * length > (SAME_MM + (end_radius - radius).abs()) * radius {
+                centre_mm = [centre_mm[0] - off * along[0], centre_mm[1] - off * along[1]];
+            }
+        }
+        Arc::about(self.plane, start, end, centre_mm, positive)
+    }
+
+    /// The centre, moved and turned as the points are (least squares over turn, scale and shift).
+    fn moved_centre(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3]) -> [f64; 2] {
+        let Plane { a, b, .. } = self.plane;
+        let mean =
+            |points: &[[f64; 3]; 3]| [a, b].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
+        let (old, new) = (mean(&meant), mean(&told));
+        // The complex factor that takes the one to the other.
+        let (mut real, mut imaginary, mut square) = (0.0, 0.0, 0.0);
+        for (from, to) in meant.iter().zip(&told) {
+            let [x, y] = [from[a] - old[0], from[b] - old[1]];
+            let [u, v] = [to[a] - new[0], to[b] - new[1]];
+            real += x * u + y * v;
+            imaginary += x * v - y * u;
+            square += x * x + y * y;
+        }
+        (real, imaginary) = (real / square, imaginary / square);
+        // Points that nearly coincide tell no turn, and no correction turns more.
+        if square < NEAR_MM * NEAR_MM || (real - 1.0).hypot(imaginary) > MOST_TURN {
+            (real, imaginary) = (1.0, 0.0);
+        }
+        let [x, y] = [self.centre_mm[0] - old[0], self.centre_mm[1] - old[1]];
+        [new[0] + real * x - imaginary * y, new[1] + imaginary * x + real * y]
+    }
+
+    /// How far an arc that goes between `told` (start, middle, end) leaves this one, moved as its points are: the largest
+    /// distance in the plane (mm).
+    pub fn leaves(&self, meant: [[f64; 3]; 3], told: [[f64; 3]; 3], new: &Arc) -> f64 {
+        let axes = [self.plane.a, self.plane.b];
+        let moved = |point: usize, axis: usize| told[point][axis] - meant[point][axis];
+        (1..SAMPLES).fold(0.0, |most, k| {
+            let t = f64::from(k) / f64::from(SAMPLES);
+            let weights = [2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)];
+            let (was, is) = (self.at(meant[0], meant[2], t), new.at(told[0], told[2], t));
+            let off = axes.map(|axis| {
+                let shift: f64 = (0..3).map(|point| weights[point] * moved(point, axis)).sum();
+                is[axis] - was[axis] - shift
+            });
+            off[0].hypot(off[1]).max(most)
+        })
     }
 
     /// Whether it goes more than half round.

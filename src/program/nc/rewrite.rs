@@ -3,8 +3,10 @@
 //! Words keep their order, spacing and at least their decimals; a word that was left out because it held on is put in
 //! where its axis must now change, and a word of a motion that stays is put in where the motion before it has moved, so
 //! that what is left as it is goes where it always went. Arcs get the centre (or radius) of the circle through their new
-//! start, middle and end.
+//! start, middle and end, as long as it keeps to the way that was meant, with the numbers as they are written.
 
+mod arcs;
+mod ends;
 mod pen;
 mod slots;
 
@@ -19,17 +21,14 @@ use super::dialect::Dialect;
 use super::machine::Turn;
 use super::mark;
 use super::orientation::{Angles, vector_and_spin};
-use super::syntax::{Belongs, NcTree, Word};
-use super::task::{Event, Needs, Task, Written};
+use super::syntax::NcTree;
+use super::task::{Event, Task, Written};
 use crate::program::edit::{EditError, Edits};
 use crate::program::motion::{Frame, Motion, MotionKind, Reason, RobTarget, Role, TargetValue};
 use crate::program::rewrite::{Change, Extra, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
 
 /// How often a rewrite begins anew because an arc does not fit; a file that asks for more is left as it is.
 const ROUNDS: u32 = 32;
-
-/// Ends of a whole circle that are farther apart than this are none (mm).
-const CLOSED_MM: f64 = 1e-3;
 
 impl Task<'_> {
     /// The edits that make the changes; per file sorted and disjoint.
@@ -52,10 +51,10 @@ impl Task<'_> {
                 }
             }
         }
-        let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
         let mut edits = vec![Edits::new(); self.trees.len()];
         let mut rounds = 0;
         while !wanted.is_empty() {
+            let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
             let mut follower = Follower {
                 task: self,
@@ -85,12 +84,11 @@ impl Task<'_> {
                     }
                 }
             }
-            // An arc that no circle fits stays, and so does the motion that ends where it starts.
+            // An arc that no circle fits stays, and with it what ends where it starts.
             let mut again = false;
             for motion in follower.unfit {
-                let before = self.listing.motions[motion as usize].previous.or(motion.checked_sub(1));
-                if let Some(index) = before.and_then(|before| wanted.remove(&before)) {
-                    outcomes[index] = Outcome::Refused(Reason::BeforeLeftArc);
+                if let Some(index) = wanted.remove(&motion) {
+                    outcomes[index] = Outcome::Refused(Reason::WrongShape);
                     again = true;
                 }
             }
@@ -123,51 +121,6 @@ impl Task<'_> {
             files.push(file);
         }
         Ok(Rewritten { files, outcomes })
-    }
-
-    /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
-    /// last of them ends where it always did. Hands back the latter.
-    fn fixed_ends(
-        &self,
-        changes: &[Change],
-        wanted: &mut HashMap<u32, usize>,
-        outcomes: &mut [Outcome],
-    ) -> BTreeSet<u32> {
-        let mut fixed = BTreeSet::new();
-        let mut refused = BTreeSet::new();
-        // Motions whose start stays because what comes after them goes on in their direction.
-        let mut directed = BTreeSet::new();
-        for index in (1..self.listing.motions.len() as u32).rev() {
-            let motion = &self.listing.motions[index as usize];
-            let stays = motion.reason().is_some() || refused.contains(&index);
-            let needs = match self.needs(index as usize, stays) {
-                Needs::Nothing if !directed.contains(&index) => continue,
-                needs => needs,
-            };
-            let before = motion.previous.unwrap_or(index - 1);
-            if self.listing.motions[before as usize].place.file != motion.place.file {
-                continue;
-            }
-            if needs == Needs::Tangent || self.listing.motions[before as usize].conditional {
-                directed.insert(before);
-            }
-            match wanted.get(&before).copied() {
-                Some(change) if changes[change].straightens() && needs != Needs::Tangent => {
-                    fixed.insert(before);
-                }
-                Some(change) => {
-                    wanted.remove(&before);
-                    let arc = motion.kind == MotionKind::Circular;
-                    outcomes[change] = Outcome::Refused(match arc {
-                        true => Reason::BeforeLeftArc,
-                        false => Reason::BeforeLeftPath,
-                    });
-                    refused.insert(before);
-                }
-                None => {}
-            }
-        }
-        fixed
     }
 
     fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
@@ -292,17 +245,18 @@ impl<'s> Follower<'_, 's> {
         let mut aim = new.unwrap_or(original);
         let mut arc = None;
         let mut outcome = Outcome::Unchanged;
-        if let Some((old, positive, _)) = written.arc
-            && !straightens
-        {
-            arc = self.arc(&aim, start, &old, positive);
+        if written.arc.is_some() && !straightens {
+            let file = motion.place.file as usize;
+            let by_radius = slots(&task.trees[file], task.dialects[file], written).radius.is_some();
+            let meant = all(written.start).zip(via_of(motion)).map(|(from, via)| [from, via, to.position_mm]);
+            arc = meant.and_then(|meant| self.arc(&mut aim, start, written, (meant, by_radius)));
             if arc.is_none() {
                 self.unfit.push(index);
                 // No circle goes there: the motion stays.
                 if change.is_some() {
                     outcome = Outcome::Refused(Reason::WrongShape);
                     aim = Aim { position: to.position_mm, rotation: None, via: via_of(motion) };
-                    arc = self.arc(&aim, start, &old, positive);
+                    arc = meant.and_then(|meant| self.arc(&mut aim, start, written, (meant, by_radius)));
                 }
             }
         }
@@ -321,60 +275,6 @@ impl<'s> Follower<'_, 's> {
         }
         let done = self.write(motion, written, &slots, &aim, arc);
         if matches!(outcome, Outcome::Refused(_)) || done == Outcome::Unchanged { outcome } else { done }
-    }
-
-    /// Says G2 or G3 again in a block that leaves it out, where an arc before has become straight.
-    fn mode_again(&mut self, motion: &Motion, written: &Written, straightens: bool) {
-        if !self.now.straightened || straightens {
-            return;
-        }
-        let task = self.task;
-        let file = motion.place.file as usize;
-        let slots = slots(&task.trees[file], task.dialects[file], written);
-        if slots.mode.is_none() && motion.kind == MotionKind::Circular {
-            let at = slots
-                .first
-                .map_or(motion.statement.start as usize, |word| task.trees[file].start(word.first));
-            let text = format!("{} ", motion.instruction);
-            self.edits[file].insert(at, text.as_bytes());
-        }
-        // A motion of another kind that stands here has been told by a word of its own. A block that may be skipped
-        // may not have said it.
-        let told = slots.mode.is_some() || motion.kind != MotionKind::Unknown;
-        self.now.straightened &= !told || motion.conditional;
-    }
-
-    /// An arc's block becomes a straight one: G1 for G2 or G3, and no centre or radius.
-    fn straighten(&mut self, motion: &Motion, slots: &mut Slots<'s>, alone: bool) {
-        let file = motion.place.file as usize;
-        let tree = &self.task.trees[file];
-        let edits = &mut self.edits[file];
-        match slots.mode {
-            Some(Word { belongs: Belongs::Literal { number, .. }, .. }) => {
-                let range = tree.range(number, number + 1);
-                let digits = tree.text(number).iter().rposition(u8::is_ascii_digit).unwrap_or(0);
-                // G02 to G01: the last digit before a point.
-                let whole =
-                    tree.text(number).iter().position(|&byte| byte == b'.').map_or(digits, |point| point - 1);
-                edits.replace(range.start + whole..range.start + whole + 1, b"1");
-            }
-            _ if alone && !self.now.straightened => {
-                let at = slots.first.map_or(motion.statement.start as usize, |word| tree.start(word.first));
-                edits.insert(at, b"G1 ");
-            }
-            _ => {}
-        }
-        let first = slots.first.map(|word| word.first);
-        for word in slots.centre.iter_mut().chain([&mut slots.radius]).filter_map(Option::take) {
-            let range = tree.range(word.first, word.end);
-            let blanks =
-                tree.source()[..range.start].iter().rev().take_while(|byte| matches!(byte, b' ' | b'\t'));
-            // Before the first word G1 may be put in.
-            let begin = range.start - if first == Some(word.first) { 0 } else { blanks.count() };
-            let end = tree.start(word.end - 1) + tree.text(word.end - 1).len();
-            edits.replace(begin..end, b"");
-        }
-        self.now.straightened = true;
     }
 
     /// Whether the control stands where the original has it, so that a motion that stays needs nothing.
@@ -536,21 +436,6 @@ impl<'s> Follower<'_, 's> {
                 }
             }
         }
-    }
-
-    fn arc(&self, aim: &Aim, start: [Option<f64>; 3], old: &Arc, positive: bool) -> Option<Arc> {
-        let start = [start[0]?, start[1]?, start[2]?];
-        if start.iter().any(|x| x.is_nan()) {
-            return None;
-        }
-        if old.is_whole() {
-            let Plane { a, b, .. } = old.plane;
-            let gap = (start[a] - aim.position[a]).hypot(start[b] - aim.position[b]);
-            if gap > CLOSED_MM {
-                return None;
-            }
-        }
-        Arc::through(old.plane, start, aim.via?, aim.position, positive, old.is_whole())
     }
 
     /// Writes the words of one block.

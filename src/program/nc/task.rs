@@ -130,8 +130,9 @@ impl Task<'_> {
             if before.kind != MotionKind::Circular && before.reason().is_none() {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
+            let conditional = before.conditional;
             // Where the block before may be skipped, the one before that ends here too.
-            if needs == Needs::Tangent || before.conditional {
+            if needs == Needs::Tangent || conditional || self.passes_on(at as usize, index) {
                 let written = &mut self.written[at as usize];
                 written.needs = written.needs.max(Needs::Start);
             }

@@ -11,6 +11,7 @@ use truegrind::program::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOpti
 
 use super::samples::{root, told};
 
+mod arcs;
 mod certain;
 mod blocks;
 mod frames;

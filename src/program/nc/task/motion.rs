@@ -249,9 +249,11 @@ impl Lister<'_, '_> {
             && !heidenhain
             && !said.skippable
             && !motion.timed
+            && !begins_something(said)
             && before.start.iter().all(Option::is_some);
         motion.insertable = insertable;
         motion.straightens = arc.is_some()
+            && !begins_something(said)
             && !heidenhain
             && !said.skippable
             && !said.opaque
@@ -545,4 +547,11 @@ impl Lister<'_, '_> {
 
 fn all(values: [Worth; 3]) -> Result<[f64; 3], Reason> {
     Ok([values[0]?, values[1]?, values[2]?])
+}
+
+/// Whether a block starts the spindle, the coolant or what else an M word may: a block that is put in before it would move
+/// without. Stops and ends come when the motion is done.
+fn begins_something(said: &Said<'_>) -> bool {
+    said.m.iter().any(|m| !matches!(m, 0..=2 | 5 | 9 | 30))
+        || said.words.iter().any(|word| word.address() == Some(b'S'))
 }
