@@ -26,5 +26,6 @@ pub mod corner;
 mod slack;
 mod segment;
 mod circle;
+mod strayed;
 mod passage;
 mod speed;

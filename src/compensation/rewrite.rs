@@ -8,20 +8,22 @@
 //! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
 //! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
-use super::curve::{CLOSED_MM, Curve};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
-use super::segment::{Ends, Path, gap, middles_off};
+use super::segment::{Ends, Path, middles_off};
 use super::solve::{Solved, SolvedTargets, solve_all, take_room};
 use super::speed::{Pace, fastest};
+use super::strayed::strayed;
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::effect::Effect;
@@ -180,7 +182,9 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     let mut arms = Arms::of(estimated, &options.condition);
     let mountings = Mountings::of(listing, &arms, cell);
     let solved = solve_all(listing, &mut arms, &mountings, options);
-    let job = Job { listing, solved: &solved, mountings: &mountings, arms: &arms, options };
+    let strayed = strayed(listing, &solved, &mountings, options);
+    let job =
+        Job { listing, solved: &solved, strayed: &strayed, mountings: &mountings, arms: &arms, options };
     let portions: Vec<Portion> = (0..listing.motions.len())
         .into_par_iter()
         .step_by(PORTION)
@@ -323,6 +327,7 @@ const PORTION: usize = 64;
 struct Job<'a> {
     listing: &'a Listing,
     solved: &'a SolvedTargets,
+    strayed: &'a HashSet<u32>,
     mountings: &'a Mountings,
     arms: &'a Arms<'a>,
     options: &'a Options,
@@ -467,28 +472,16 @@ impl<'a> Job<'a> {
         let targets = self.solved.of(previous);
         let changes =
             |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
-        if !may_change(before, self.options) || !targets.iter().all(changes) || self.no_circle(previous) {
+        if !may_change(before, self.options)
+            || !targets.iter().all(changes)
+            || self.strayed.contains(&(previous as u32))
+        {
             return None;
         }
         let from = ends_of(before, targets, self.mountings)?;
         let to = ends_of(motion, self.solved.of(index), self.mountings)?;
         let way = self.solved.way(index, to.place);
         (from.index == to.index).then_some(Path { from, to, way })
-    }
-
-    /// Whether a circular motion has a known start with which its points make no circle. One that closes is another matter:
-    /// its ends say nothing of its plane.
-    fn no_circle(&self, index: usize) -> bool {
-        let motion = &self.listing.motions[index];
-        if motion.kind != MotionKind::Circular {
-            return false;
-        }
-        let Some(previous) = motion.previous else { return false };
-        let Some(Ok(from)) = self.solved.of(previous as usize).last() else { return false };
-        let [Ok(via), Ok(to)] = self.solved.of(index) else { return false };
-        from.mounted == to.mounted
-            && gap(&from.meant.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
-            && Curve::round(from.meant, &via.meant, to.meant, motion).is_none()
     }
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
@@ -602,7 +595,7 @@ fn work<'a>(
     if let Some(why) = good.iter().find_map(|s| s.forbidden) {
         return finish(outcome, Status::Refused, Some(why), None, point);
     }
-    if job.no_circle(index) {
+    if job.strayed.contains(&(index as u32)) {
         return finish(outcome, Status::Refused, Some(Why::NoCircle), None, point);
     }
     // Then the path from the motion before.

@@ -15,7 +15,7 @@ use truegrind::kinematics::estimated::Estimated;
 use truegrind::kinematics::inverse::Inverse;
 use truegrind::kinematics::model::{Joints, Model};
 use truegrind::math::se3::Pose;
-use truegrind::program::motion::{Listing, MotionKind, Switch};
+use truegrind::program::motion::{Listing, MotionKind, Reason, Switch};
 use truegrind::program::nc::dialect::Dialect;
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::rapid::Task;
@@ -229,6 +229,47 @@ fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
     ));
     let (planned, _) = rewrite(&line, &known(&actual), &Options::default());
     assert_eq!(planned.outcomes[1].reason, Some(Why::WholeCircle));
+}
+
+#[test]
+fn a_circle_whose_start_stays_is_no_other_circle() {
+    let pose = |x: f64, y: f64| {
+        format!("[[{x},{y},420],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    let of = |seed: u64, radius: f64, start: &str| {
+        let (via, to) = (pose(374.0 + radius, radius), pose(374.0 + 2.0 * radius, 0.0));
+        let source = module(&format!(
+            "  ConfL \\Off;\n  MoveL {start}\n  MoveC {via},{to},v50,fine,tool0;\n  MoveC {},{},v50,fine,tool0;\n",
+            pose(374.0 + radius, -radius),
+            pose(374.0, 0.0)
+        ));
+        let actual = perturbed(seed, 3.0);
+        let options = Options { max_correction_mm: 50.0, tolerance_mm: 50.0, ..Options::default() };
+        let (planned, text) = rewrite(&source, &known(&actual), &options);
+        let shift = planned.outcomes[0].before_mm.or(planned.outcomes[1].before_mm).unwrap();
+        assert!((0.5..20.0).contains(&shift), "{shift}");
+        let reasons: Vec<_> = planned.outcomes.iter().map(|outcome| outcome.reason).collect();
+        assert!(reasons[1].is_none() || text.contains(&format!("MoveC {via},{to}")), "{text}");
+        reasons
+    };
+    let start = pose(374.0, 0.0);
+    let (plain, corrected) = (format!("{start},v50,fine,tool0;"), format!("{start},v50,fine,tool0 \\Corr;"));
+    let unknown = "Offs(p0,0,0,found()),v50,fine,tool0;".to_owned();
+    let sensor = Some(Why::Program(Reason::SensorGuided));
+    let mut strayed = 0;
+    for seed in 11..19 {
+        for radius in [0.5, 100.0] {
+            assert_eq!(of(seed, radius, &plain)[..], [None; 3]);
+        }
+        // With all that begins where it ends.
+        let small = of(seed, 0.5, &corrected);
+        assert!(small == [sensor, None, None] || small[..2] == [sensor, Some(Why::NoCircle)], "{small:?}");
+        strayed += usize::from(small[1].is_some());
+        assert_eq!(of(seed, 100.0, &corrected), [sensor, None, None]);
+        assert_eq!(of(seed, 0.5, &unknown)[1], Some(Why::NoCircle));
+        assert_eq!(of(seed, 100.0, &unknown)[1..], [None; 2]);
+    }
+    assert!(strayed > 3, "{strayed}");
 }
 
 #[test]
