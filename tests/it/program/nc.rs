@@ -14,6 +14,7 @@ use super::samples::{root, told};
 mod certain;
 mod blocks;
 mod frames;
+mod klartext;
 mod m_words;
 mod stays;
 mod subprograms;
