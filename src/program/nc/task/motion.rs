@@ -78,6 +78,9 @@ impl Lister<'_, '_> {
             Mode::Other(Reason::NotFollowed) if self.state.tangent => Needs::Tangent,
             Mode::Other(Reason::NotFollowed) => Needs::Start,
             _ if said.aside == Some(Reason::NotFollowed) => Needs::Start,
+            // No word can be put into a block with R+, and none of A, B, C into this LN: what they leave out holds on.
+            _ if said.lengthens => Needs::Start,
+            _ if said.aside == Some(Reason::AlongNormal) && said.axes.contains(&None) => Needs::Start,
             _ => Needs::Nothing,
         }
     }
@@ -200,7 +203,10 @@ impl Lister<'_, '_> {
                 external: [None; 6],
             }))
         };
-        let value = target(to, rotation);
+        let value = match said.lengthens {
+            true => Err(Reason::RadiusCompensation),
+            false => target(to, rotation),
+        };
         let literal = said
             .axes
             .iter()
