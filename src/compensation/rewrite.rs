@@ -239,6 +239,13 @@ fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &[u32]) -> V
             unchecked.len()
         ));
     }
+    if let Some(lines) = lines_of(listing, &listing.outside) {
+        out.push(format!(
+            "{} of the blocks call programs that do not stand in their file: these are taken to leave work offset, shifts, tool, \
+             units and tool centre point control as they are ({lines})",
+            listing.outside.len()
+        ));
+    }
     let curve = |m: &u32| {
         let motion = &listing.motions[*m as usize];
         motion.left.is_none()

@@ -471,6 +471,8 @@ pub struct Listing {
     pub zones: Vec<Zone>,
     /// Routines that hold motions.
     pub routines: Vec<Routine>,
+    /// Motions that call a program which does not stand in their file (NC).
+    pub outside: Vec<u32>,
     /// What could not be read.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
@@ -643,7 +645,7 @@ reasons! {
         /// NC: a number without a point, which may count increments.
         AmbiguousNumber => "a number without decimal point: mm or increments, by a parameter of the control",
         /// NC: axis words, and no motion before.
-        NoMotionCode => "no motion code (G0, G1 and so on) is stated before it: what it does is set in the control",
+        NoMotionCode => "no motion code (G0, G1 and so on) is stated before it, or after G80: what it does is set in the control",
         /// NC: the place can be reached by a jump.
         UnknownFlow => "reached by a jump, call or loop: what holds here is known only at run time",
         /// NC: the block has a slash.
@@ -654,6 +656,8 @@ reasons! {
         Transformed => "coordinates are turned, scaled, mirrored, polar or in a tilted plane",
         /// NC: the control offsets the path by the tool's radius.
         RadiusCompensation => "the control offsets the path by the tool radius (G41, G42)",
+        /// NC: LN with a surface normal and no tool vector.
+        AlongNormal => "the control turns the tool to the surface normal of the block (LN without a tool vector under M128)",
         /// NC: in machine coordinates.
         MachineCoordinates => "in machine coordinates (G53, SUPA, M91)",
         /// NC: a cycle of the control.

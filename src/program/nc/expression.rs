@@ -120,6 +120,7 @@ impl<'r, 's> Reader<'r, 's> {
             (2, Token::Minus) => |a, b| Ok(a - b),
             (3, Token::Star) => |a, b| Ok(a * b),
             (3, Token::Slash) => |a, b| if b == 0.0 { Err(Reason::WrongShape) } else { Ok(a / b) },
+            (3, Token::Percent) => remainder,
             (4, Token::Power) => |a, b| Ok(a.powf(b)),
             // A chain of frames: known only as a whole.
             (0, Token::Colon) if self.dialect == Dialect::Siemens => |_, _| Err(Reason::Variable),
@@ -134,12 +135,7 @@ impl<'r, 's> Reader<'r, 's> {
                     (3, b"DIV") if divides => {
                         |a, b| if b == 0.0 { Err(Reason::WrongShape) } else { Ok(a / b) }
                     }
-                    // The sign of a remainder differs between controls.
-                    (3, b"MOD") if !floors => |a, b| match () {
-                        () if b == 0.0 => Err(Reason::WrongShape),
-                        () if a < 0.0 || b < 0.0 => Err(Reason::Variable),
-                        () => Ok(a % b),
-                    },
+                    (3, b"MOD") if !floors => remainder,
                     (0, b"AND") => |a, b| Ok(f64::from(u8::from(a != 0.0 && b != 0.0))),
                     (0, b"OR") => |a, b| Ok(f64::from(u8::from(a != 0.0 || b != 0.0))),
                     (0, b"XOR") => |a, b| Ok(f64::from(u8::from((a != 0.0) != (b != 0.0)))),
@@ -274,6 +270,9 @@ impl<'r, 's> Reader<'r, 's> {
             _ if self.dialect == Dialect::Heidenhain && FUNCTIONS.contains(&&*name) => {
                 return Ok(self.nested(Self::signed)?.and_then(|x| function(&name, x, None, self.dialect)));
             }
+            _ if self.dialect == Dialect::Heidenhain && &*name == b"PI" => {
+                return Ok(Ok(std::f64::consts::PI));
+            }
             _ => return Ok((self.variables)(&name)),
         };
         if !FUNCTIONS.contains(&&*name) {
@@ -323,6 +322,15 @@ impl<'r, 's> Reader<'r, 's> {
                 }
             }
         }
+    }
+}
+
+/// What is left of a division; its sign differs between controls.
+fn remainder(a: f64, b: f64) -> Worth {
+    match () {
+        () if b == 0.0 => Err(Reason::WrongShape),
+        () if a < 0.0 || b < 0.0 => Err(Reason::Variable),
+        () => Ok(a % b),
     }
 }
 

@@ -97,6 +97,8 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         // The end of a block on old tapes.
         b'*' if dialect.paren_comments() && ends_line(&rest[1..], cr) => (Token::Comment, 1),
         b'*' => two(b'*', Token::Power, Token::Star),
+        b'^' if dialect == Dialect::Heidenhain => (Token::Power, 1),
+        b'%' if dialect == Dialect::Heidenhain => (Token::Percent, 1),
         b'/' => (Token::Slash, 1),
         b'=' => two(b'=', Token::EqualEqual, Token::Equal),
         b'<' if second == b'>' => (Token::NotEqual, 2),

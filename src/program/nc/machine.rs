@@ -188,6 +188,8 @@ pub(super) struct State {
     pub(super) preset: bool,
     /// G54, G500, …
     pub(super) frame: String,
+    /// The datum shift of X, Y and Z (mm, Heidenhain); `None` where an axis of it is not known.
+    pub(super) datum: [Option<f64>; 3],
     /// TRANS, ROT: a frame within the work frame.
     pub(super) programmable: Option<Pose>,
     /// Groups that turn, scale or bend coordinates now, one bit each.
@@ -257,6 +259,7 @@ impl State {
             shift: [Ok(0.0); 3],
             preset: false,
             frame: frame.to_owned(),
+            datum: [Some(0.0); 3],
             programmable: None,
             turned: 0,
             radius: false,
@@ -386,6 +389,9 @@ impl State {
         pairs(&mut self.pole, &other.pole);
         same(&mut self.spin, &other.spin);
         same(&mut self.feed, &other.feed);
+        for (a, b) in self.datum.iter_mut().zip(other.datum) {
+            *a = a.filter(|_| *a == b);
+        }
         if self.turn != other.turn {
             self.turn = Turn::Unknown(Reason::UnknownFlow);
         }
@@ -413,7 +419,8 @@ impl State {
             (Group::Distance, self.absolute != other.absolute),
             (Group::Unit, self.unit_mm != other.unit_mm),
             (Group::Plane, self.plane != other.plane),
-            (Group::Frame, self.frame != other.frame || self.programmable != other.programmable),
+            (Group::Frame, self.frame != other.frame),
+            (Group::Programmable, self.programmable != other.programmable),
             (Group::Radius, self.radius != other.radius),
             (Group::Tip, self.tip != other.tip || self.vector_words != other.vector_words),
             (

@@ -75,8 +75,15 @@ impl Parser<'_, '_> {
                 self.bump();
             }
         }
-        if self.dialect == Dialect::Heidenhain && self.peek() == Token::Number {
-            self.bump();
+        if self.dialect == Dialect::Heidenhain {
+            if self.peek() == Token::Number {
+                self.bump();
+            }
+            // `5 /L X+60`: the mark stands after the block number too.
+            if self.peek() == Token::Slash {
+                self.nodes[node].kind = Syntax::Skippable;
+                self.bump();
+            }
         }
         let mut last = self.at;
         let begins = self.at;
@@ -479,7 +486,8 @@ pub fn word<'s>(tree: &NcTree<'s>, node: u32) -> Word<'s> {
         _ if kind(after_sign) == Token::Number && after_sign + 1 == end => {
             Belongs::Literal { sign, number: after_sign }
         }
-        _ if at >= end => Belongs::Nothing,
+        // R+, DR-: a bare sign.
+        _ if at >= end || kind(after_sign) == Token::End => Belongs::Nothing,
         _ => Belongs::Expression { first: at, end },
     };
     word

@@ -231,6 +231,8 @@ pub(super) struct Lister<'t, 's> {
     declared: BTreeSet<Vec<u8>>,
     /// Those of them that hold whole numbers only.
     whole_numbers: BTreeSet<Vec<u8>>,
+    /// The programs and subprograms that stand in the file, by their O.
+    programs: BTreeSet<Variable>,
     /// Blocks that jumps go to.
     targets: BTreeSet<u64>,
     /// Whether a jump goes to a computed block.
@@ -269,8 +271,12 @@ struct Said<'s> {
     d: Option<usize>,
     /// U, V, W, E: axes that are not followed.
     others: bool,
-    /// R0 (false), RL and RR of Heidenhain.
+    /// R0 (false), RL, RR, R+ and R- of Heidenhain.
     compensates: Option<bool>,
+    /// R+ and R-: the axes of the block go by the tool's radius farther or less far.
+    lengthens: bool,
+    /// NX, NY, NZ: the surface normal.
+    normal: bool,
     /// Why the block is left though it moves as its words say: measuring, poles, angles of a contour.
     aside: Option<Reason>,
     /// A word that is not known: what it is, and why.
@@ -327,6 +333,7 @@ impl<'t, 's> Lister<'t, 's> {
             contour: None,
             declared: BTreeSet::new(),
             whole_numbers: BTreeSet::new(),
+            programs: BTreeSet::new(),
             targets: BTreeSet::new(),
             anywhere: false,
             listing: Listing::default(),
@@ -404,6 +411,7 @@ impl<'t, 's> Lister<'t, 's> {
 
     fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, written]): &Lengths) {
         self.listing.motions.truncate(motions);
+        self.listing.outside.retain(|call| (*call as usize) < motions);
         self.listing.speeds.truncate(speeds);
         self.listing.zones.truncate(zones);
         self.listing.tools.truncate(tools);
@@ -475,6 +483,9 @@ impl<'t, 's> Lister<'t, 's> {
             self.gather_word(said, index);
         }
         self.values_of_m(said);
+        if said.normal && said.vector.iter().all(Option::is_none) && self.may_turn_to_normal(said) {
+            said.aside.get_or_insert(Reason::AlongNormal);
+        }
         let first = said.words.first();
         said.paraxial = self.dialect == Dialect::Heidenhain
             && first.is_some_and(|word| is_axis_name(word.name) && word.belongs != Belongs::Nothing);
@@ -485,6 +496,11 @@ impl<'t, 's> Lister<'t, 's> {
         {
             said.opaque = true;
         }
+    }
+
+    /// Whether the control may turn the tool to the normal of a surface: it does under M128 and TCPM.
+    fn may_turn_to_normal(&self, said: &Said<'_>) -> bool {
+        self.state.tip || said.m.contains(&128) || self.state.doubt(1 << Group::Tip as u32).is_some()
     }
 
     /// Whether a part that could not be read may hold more than axis words.
@@ -541,8 +557,8 @@ impl<'t, 's> Lister<'t, 's> {
                 {
                     said.compensates = Some(value != 0.0);
                 }
-                // R+ and R- of a positioning block.
-                (Belongs::Nothing, _) => said.compensates = Some(true),
+                // R+ and R- make the way of a positioning block longer or shorter.
+                (Belongs::Nothing, _) => (said.compensates, said.lengthens) = (Some(true), true),
                 _ => put(&mut said.radius),
             },
             Some(b'R') => put(&mut said.radius),
@@ -597,9 +613,10 @@ impl<'t, 's> Lister<'t, 's> {
             (Dialect::Heidenhain, b"RL" | b"RR") => said.compensates = Some(true),
             (
                 Dialect::Heidenhain,
-                b"L" | b"LN" | b"CC" | b"CR" | b"CT" | b"DR" | b"NX" | b"NY" | b"NZ" | b"FU" | b"FZ"
-                | b"FAUTO" | b"AUTO" | b"FQ" | b"FQL" | b"FQR" | b"FT" | b"MB" | b"MAX" | b"TCPM",
+                b"L" | b"LN" | b"CC" | b"CR" | b"CT" | b"DR" | b"FU" | b"FZ" | b"FAUTO" | b"AUTO" | b"FQ"
+                | b"FQL" | b"FQR" | b"FT" | b"LA" | b"MB" | b"MAX" | b"TCPM",
             ) => {}
+            (Dialect::Heidenhain, b"NX" | b"NY" | b"NZ") => said.normal = true,
             (Dialect::Heidenhain, _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
                 said.unknown = Some((text, Reason::UnknownWord));
@@ -805,6 +822,9 @@ fn is_axis_name(name: &[u8]) -> bool {
 
 /// All of X, Y and Z, for [`Event::Lost`].
 const POSITION: u8 = 7;
+
+/// All of A, B and C, for the same.
+const ORIENTATION: u8 = 7 << 3;
 
 /// A G number in tenths: 540 for G54, 434 for G43.4.
 fn code(number: f64) -> u32 {

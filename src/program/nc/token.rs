@@ -20,6 +20,7 @@ pub enum Token {
     Minus,
     Star,
     Power,
+    Percent,
     Slash,
     Equal,
     EqualEqual,

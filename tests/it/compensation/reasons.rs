@@ -256,3 +256,18 @@ fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_neares
         assert!(matches!(outcome.reason, Some(Why::OutsideLimits { .. })), "{conf} {:?}", outcome.reason);
     }
 }
+
+#[test]
+fn a_called_program_that_is_not_read_is_named() {
+    let go = "G1 X500. Y0. Z500. A180. B0. C0. F600.";
+    let notes = |body: &str| {
+        let source = format!("O1\n(truegrind angles wpr)\nG90 G21 G17 G54\nT1 M6\nG43.4 H1\n{body}\nM30\n");
+        let setup = truegrind::program::nc::setup::Setup::default();
+        let task = truegrind::program::nc::Task::read(&[("p.nc", source.as_bytes())], &setup);
+        plan(&task.listing, &known(), &Cell::default(), &Options::default()).notes
+    };
+    let found = notes(&format!("{go}\nM98 P2000\n{go}\nM98 P3000\n{go}"));
+    let note = found.iter().find(|note| note.contains("do not stand in their file")).unwrap();
+    assert!(note.starts_with("2 of the blocks") && note.ends_with("(lines 7, 9)"), "{note}");
+    assert!(!notes(go).iter().any(|note| note.contains("in their file")));
+}

@@ -15,6 +15,7 @@ mod arcs;
 mod certain;
 mod blocks;
 mod frames;
+mod klartext;
 mod m_words;
 mod stays;
 mod subprograms;

@@ -227,6 +227,7 @@ impl Lister<'_, '_> {
                 // Okuma: a work offset by its number.
                 150 | 160 if !siemens && said.h.is_some() => self.work_offset(code, said),
                 150 | 160 if !siemens => self.turn(Group::Polar, code == 160),
+                500 if self.limits_spindle(said) => return true,
                 500 | 510 if !siemens => {
                     self.turn(Group::Scale, code == 510);
                     return true;
@@ -297,7 +298,7 @@ impl Lister<'_, '_> {
                 // The motion word of before holds on a Fanuc; LinuxCNC wants a new one.
                 800 if fanuc && self.state.mode != Mode::Other(Reason::Cycle) => {}
                 800 if fanuc => self.state.mode = self.state.before_cycle,
-                800 => self.state.mode = Mode::Lost(Reason::UnknownFlow),
+                800 => self.state.mode = Mode::Lost(Reason::NoMotionCode),
                 900 | 910 => {
                     self.state.absolute = code == 900;
                     self.set(Group::Distance, u64::from(code));
@@ -310,6 +311,11 @@ impl Lister<'_, '_> {
             }
         }
         false
+    }
+
+    /// Whether G50 or G92 states the greatest speed of the spindle, and no place.
+    fn limits_spindle(&self, said: &Said<'_>) -> bool {
+        !said.moves() && !said.others && said.words.iter().any(|word| word.address() == Some(b'S'))
     }
 
     /// The plane of arcs.
@@ -417,8 +423,17 @@ impl Lister<'_, '_> {
     /// G words of one block. True where the block's axis words are no motion that is followed.
     pub(super) fn unmodal_codes(&mut self, said: &Said<'_>) -> bool {
         let siemens = self.dialect == Dialect::Siemens;
+        let linux = self.dialect == Dialect::LinuxCnc;
+        // A motion on LinuxCNC, none on a Fanuc: a plain file does not tell which.
+        let either = self.dialect == Dialect::Iso && said.moves();
         for &code in &said.g {
             match code {
+                // LinuxCNC dwells, stores the place or ends a shift, and then moves.
+                40 | 281 | 301 if linux => {}
+                40 if either && said.p.is_some() => {
+                    self.gone(said, code, Reason::UnknownWord);
+                    return true;
+                }
                 40 | 220 | 230 | 250 | 260 | 1030 | 1870 => return true,
                 110 if !siemens => return true,
                 100 if !siemens => {
@@ -502,12 +517,17 @@ impl Lister<'_, '_> {
                     return true;
                 }
                 670 => self.state.modal_call = None,
+                // The greatest speed of the spindle.
+                920 if self.limits_spindle(said) => return true,
                 920 => {
                     self.set_shift(said);
                     return true;
                 }
                 // Fanuc ends the shift of the axes that are named, LinuxCNC all.
                 921 if !self.ends_all(said) => {
+                    if either {
+                        self.gone(said, code, Reason::UnknownWord);
+                    }
                     self.shift_is_lost();
                     return true;
                 }
@@ -519,12 +539,22 @@ impl Lister<'_, '_> {
                     if self.state.turned & 1 << Group::Rotary as u32 != 0 {
                         self.turn(Group::Rotary, false);
                     }
-                    return true;
+                    if either {
+                        self.gone(said, code, Reason::UnknownWord);
+                    }
+                    if !linux {
+                        return true;
+                    }
                 }
                 923 => {
                     self.state.shift = [Err(Reason::Variable); 3];
                     self.doubt(Group::Rotary, Reason::Variable);
-                    return true;
+                    if either {
+                        self.gone(said, code, Reason::UnknownWord);
+                    }
+                    if !linux {
+                        return true;
+                    }
                 }
                 _ => {}
             }
@@ -608,6 +638,11 @@ impl Lister<'_, '_> {
             self.lose_all();
             return;
         }
+        self.lose_axes(said);
+    }
+
+    /// Where the axes go that a block names is not known.
+    pub(super) fn lose_axes(&mut self, said: &Said<'_>) {
         let mut lost = 0;
         for axis in 0..3 {
             if said.axes[axis].is_some() {

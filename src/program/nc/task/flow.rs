@@ -287,9 +287,32 @@ impl Lister<'_, '_> {
         }
     }
 
-    /// A call: listed, and what it leaves behind is not known.
+    /// A call: listed, and where it leaves the axes is not known. What a program that does not stand in the file may set
+    /// beside is not known either; it is taken to set nothing, and noted.
     pub(super) fn subprogram(&mut self, said: &Said<'_>, name: &str) {
+        if !self.stands_here(said) {
+            self.listing.outside.push(self.listing.motions.len() as u32);
+        }
         self.left(said, name, Reason::Subprogram);
         self.forget();
+    }
+
+    /// Whether what a block calls stands in the file.
+    fn stands_here(&self, said: &Said<'_>) -> bool {
+        let Some(first) = said.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
+        let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
+        match self.dialect {
+            Dialect::Heidenhain => {
+                text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).nth(1) == Some(b"LBL")
+            }
+            Dialect::Siemens => text.starts_with(b"REPEAT"),
+            Dialect::LinuxCnc if first.address() == Some(b'O') => self.programs.contains(&text),
+            _ => {
+                let number = said.p.and_then(|index| self.literal(&said.words[index]));
+                // M98 P51000 calls O1000 five times.
+                let here = |p: f64| [p, p % 1e4].iter().any(|p| self.programs.contains(&numbered(b"O", *p)));
+                said.m.contains(&97) || number.is_some_and(here)
+            }
+        }
     }
 }

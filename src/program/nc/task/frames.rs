@@ -30,7 +30,12 @@ impl Lister<'_, '_> {
         let before = self.state.programmable;
         let turned = |state: &State| state.turned & 1 << Group::Programmable as u32 != 0;
         let was = turned(&self.state);
+        let unknown = self.state.doubt(1 << Group::Programmable as u32).is_some();
         self.programmable_is_set();
+        if adds && unknown {
+            // To what it adds is not known.
+            self.state.turn_frame(Group::Programmable, true);
+        }
         if !adds {
             // Whatever is not added replaces all of the programmable frame, and nothing else.
             self.state.programmable = None;
@@ -92,9 +97,12 @@ impl Lister<'_, '_> {
 
     /// G58 and G59 of Siemens: shifts within the work offset, no motion.
     pub(super) fn axial_shift(&mut self, said: &Said<'_>, absolute: bool) {
+        let alone = self.state.programmable.is_none()
+            && self.state.doubt(1 << Group::Programmable as u32).is_none()
+            && absolute
+            && said.abc.iter().all(Option::is_none);
         self.programmable_is_set();
         self.lose_position();
-        let alone = self.state.programmable.is_none() && absolute && said.abc.iter().all(Option::is_none);
         let mut shift = Vector3::zeros();
         for axis in 0..3 {
             let Some(index) = said.axes[axis] else { continue };

@@ -93,7 +93,6 @@ impl<'s> Lister<'_, 's> {
         match name {
             b"TOOL" if second == b"CALL" => {
                 self.tool_call(&text);
-                self.lose_all();
             }
             // A length that the program states.
             b"TOOL" if second == b"DEF" && words.iter().skip(3).any(|word| word.starts_with(b"L")) => {
@@ -125,16 +124,17 @@ impl<'s> Lister<'_, 's> {
                 self.tip(true, false);
             }
             b"FUNCTION" if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
+            // What a mill does anyway; the name of a kinematic may follow, which is not known.
+            b"FUNCTION" if words[1..] == [b"MODE", b"MILL"] => {}
             b"FUNCTION" if matches!(second, b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
             b"TRANS" if second == b"DATUM" => {
                 match words.get(2).copied() {
                     Some(b"RESET") => {
-                        self.programmable_is_set();
-                        self.state.programmable = None;
-                        self.turn(Group::Datum, false);
+                        self.datum_is([Some(0.0); 3]);
+                        self.turn(Group::Rotary, false);
                     }
                     Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => self.turn(Group::Datum, true),
+                    _ => self.datum_is([None; 3]),
                 }
                 self.lose_position();
             }
@@ -155,12 +155,18 @@ impl<'s> Lister<'_, 's> {
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(said, "CALL");
             }
-            b"APPR" | b"DEP" | b"RND" | b"CHF" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT"
-            | b"FPOL" | b"SPL" => {
+            b"RND" | b"CHF" => {
+                // They round or cut the corner that their neighbours make; the next block counts from the corner.
+                let previous = self.state.previous;
+                let text = String::from_utf8_lossy(name).into_owned();
+                self.left_path(said, &text, Needs::Nothing);
+                self.state.previous = previous;
+            }
+            b"APPR" | b"DEP" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT" | b"FPOL"
+            | b"SPL" => {
                 let text = String::from_utf8_lossy(name).into_owned();
                 let needs = match name {
-                    // Round or cut the corner that their neighbours make.
-                    b"RND" | b"CHF" | b"FPOL" => Needs::Nothing,
+                    b"FPOL" => Needs::Nothing,
                     b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
                     _ => Needs::Tangent,
                 };
@@ -188,7 +194,7 @@ impl<'s> Lister<'_, 's> {
                 }
             }
             // Blanks, stops, texts, tables, declarations: nothing that moves.
-            b"BLK" | b"STOP" | b"DECLARE" | b"OPEN" | b"CLOSE" | b"SECTION" | b"SEL" | b"TABDATA"
+            b"BLK" | b"STOP" | b"QS" | b"DECLARE" | b"OPEN" | b"CLOSE" | b"SECTION" | b"SEL" | b"TABDATA"
             | b"PATTERN" | b"POS" => {}
             // The rest of a cycle's definition in lines of its own.
             _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
@@ -203,10 +209,10 @@ impl<'s> Lister<'_, 's> {
     fn tool_call(&mut self, text: &[u8]) {
         let text = String::from_utf8_lossy(text);
         let rest = text.split_once("CALL").map_or("", |(_, rest)| rest).trim();
-        let (mut name, after) = match rest.strip_prefix('"') {
+        let (tool, after) = match rest.strip_prefix('"') {
             Some(quoted) => {
                 let (name, after) = quoted.split_once('"').unwrap_or((quoted, ""));
-                (name.to_owned(), after)
+                (Some(name.to_owned()), after)
             }
             None => {
                 let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
@@ -215,12 +221,12 @@ impl<'s> Lister<'_, 's> {
                         let whole = word.bytes().all(|byte| byte.is_ascii_digit());
                         let number = word.trim_start_matches('0');
                         let zero = if number.is_empty() { "0" } else { number };
-                        (if whole { format!("T{zero}") } else { format!("T{word}") }, after)
+                        (Some(if whole { format!("T{zero}") } else { format!("T{word}") }), after)
                     }
                     // Only speed or axis: the tool stays.
-                    Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (self.state.tool.clone(), rest),
-                    None => (self.state.tool.clone(), rest),
-                    _ => (format!("T {word}"), after),
+                    Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (None, rest),
+                    None => (Some(self.state.tool.clone()), rest),
+                    _ => (Some(format!("T {word}")), after),
                 }
             }
         };
@@ -232,15 +238,20 @@ impl<'s> Lister<'_, 's> {
             _ => {}
         }
         // A tool that is longer than its table says.
-        for word in after.split_whitespace() {
-            let delta = word.strip_prefix("DL");
-            if delta
-                .is_some_and(|delta| literal(delta.trim_start_matches(['+', '-']).as_bytes()) != Some(0.0))
-            {
-                name += &format!(" {word}");
+        let longer = |word: &&str| {
+            let delta = word.strip_prefix("DL").map(|delta| delta.trim_start_matches(['+', '-']));
+            delta.is_some_and(|delta| literal(delta.as_bytes()) != Some(0.0))
+        };
+        let longer: String = after.split_whitespace().filter(longer).map(|word| format!(" {word}")).collect();
+        match tool {
+            Some(tool) => {
+                self.change_tool(tool + &longer);
+                self.lose_all();
             }
+            // Which tool that is may not be known.
+            None if !longer.is_empty() => self.change_tool(format!("T?{longer}")),
+            None => {}
         }
-        self.change_tool(name);
     }
 
     /// `CYCL DEF 8.1 X`: the number with what stands after the point, and the words from it on.
@@ -324,31 +335,32 @@ impl<'s> Lister<'_, 's> {
 
     /// A preset ends the shift within the one before on some controls, and not on others.
     fn shift_may_end(&mut self) {
-        if self.state.programmable.take().is_some() {
+        if self.state.datum != [Some(0.0); 3] {
+            self.state.programmable = None;
             self.frame_index = None;
+            self.state.datum = [None; 3];
             self.doubt(Group::Datum, Reason::Displacement);
         }
     }
 
-    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs; a
-    /// row of the datum table is not known here.
+    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs,
+    /// known or not: it may be told in several lines. A row of the datum table is not known here.
     fn datum_shift(&mut self, words: &[&[u8]]) {
-        let known = self.state.programmable.unwrap_or_else(Pose::identity);
-        let mut shift = known.translation.vector;
-        let mut good = known.rotation.angle() == 0.0;
-        // Axes that are not named, or by an increment, keep what is not known.
-        let mut open = match self.state.doubt(1 << Group::Datum as u32) {
-            Some(_) => [true; 3],
-            None => [false; 3],
+        if words.first().is_none_or(|word| word.len() > 3 && word.iter().all(u8::is_ascii_alphabetic)) {
+            // The title: what it sets stands in the lines after it.
+            return;
+        }
+        let doubts = 1 << Group::Datum as u32 | 1 << Group::Programmable as u32;
+        let mut shift = match self.state.doubt(doubts) {
+            Some(_) => [None; 3],
+            None => self.state.datum,
         };
         for word in words {
-            let (axis, increment) = match *word {
-                [b'I', axis @ b'X'..=b'Z', ..] => (axis, true),
-                [axis @ b'X'..=b'Z', ..] => (axis, false),
-                // The title of the cycle.
-                [first, ..] if first.is_ascii_alphabetic() => break,
+            let (name, increment) = match word {
+                [b'I', axis @ b'A'..=b'Z', ..] => (*axis, true),
+                [axis @ b'A'..=b'Z', ..] => (*axis, false),
                 _ => {
-                    good = false;
+                    shift = [None; 3];
                     break;
                 }
             };
@@ -356,29 +368,34 @@ impl<'s> Lister<'_, 's> {
                 [b'-', digits @ ..] => literal(digits).map(|value| -value),
                 [b'+', digits @ ..] | digits => literal(digits),
             };
-            match value {
-                Some(value) => {
-                    open[usize::from(axis - b'X')] &= increment;
-                    let entry = &mut shift[usize::from(axis - b'X')];
-                    *entry = value * self.state.unit_mm + if increment { *entry } else { 0.0 };
+            let value = value.map(|value| value * self.state.unit_mm);
+            match name {
+                b'X'..=b'Z' => {
+                    let entry = &mut shift[usize::from(name - b'X')];
+                    let old = if increment { *entry } else { Some(0.0) };
+                    *entry = old.zip(value).map(|(old, value)| old + value);
                 }
-                None => good = false,
+                // A, B and C are counted from elsewhere, until the whole shift ends.
+                b'A'..=b'C' if value != Some(0.0) => self.turn(Group::Rotary, true),
+                b'A'..=b'C' | b'U'..=b'W' => {}
+                _ => {
+                    shift = [None; 3];
+                    break;
+                }
             }
         }
-        let title =
-            words.first().is_none_or(|word| word.len() > 3 && word.iter().all(u8::is_ascii_alphabetic));
-        if title {
-            // What it sets stands in the lines after it.
-            return;
-        }
-        if good && open == [false; 3] {
-            self.programmable_is_set();
-            self.state.programmable =
-                (shift.norm() > 0.0).then(|| Pose::translation(shift.x, shift.y, shift.z));
-            self.turn(Group::Datum, false);
-        } else {
-            self.turn(Group::Datum, true);
-        }
+        self.datum_is(shift);
+    }
+
+    /// The datum shift is this, as far as it is known.
+    fn datum_is(&mut self, shift: [Option<f64>; 3]) {
+        self.programmable_is_set();
+        self.state.datum = shift;
+        self.state.programmable = match shift {
+            [Some(x), Some(y), Some(z)] if shift != [Some(0.0); 3] => Some(Pose::translation(x, y, z)),
+            _ => None,
+        };
+        self.turn(Group::Datum, shift.iter().any(Option::is_none));
     }
 
     /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.

@@ -78,6 +78,9 @@ impl Lister<'_, '_> {
             Mode::Other(Reason::NotFollowed) if self.state.tangent => Needs::Tangent,
             Mode::Other(Reason::NotFollowed) => Needs::Start,
             _ if said.aside == Some(Reason::NotFollowed) => Needs::Start,
+            // No word can be put into a block with R+, and none of A, B, C into this LN: what they leave out holds on.
+            _ if said.lengthens => Needs::Start,
+            _ if said.aside == Some(Reason::AlongNormal) && said.axes.contains(&None) => Needs::Start,
             _ => Needs::Nothing,
         }
     }
@@ -200,7 +203,10 @@ impl Lister<'_, '_> {
                 external: [None; 6],
             }))
         };
-        let value = target(to, rotation);
+        let value = match said.lengthens {
+            true => Err(Reason::RadiusCompensation),
+            false => target(to, rotation),
+        };
         let literal = said
             .axes
             .iter()
@@ -292,6 +298,10 @@ impl Lister<'_, '_> {
         let call = self.modal_call(said);
         if call == Some(Reason::Subprogram) || call == Some(Reason::Cycle) && self.calls_program {
             let held = self.state.modal_call;
+            // G66 has been noted itself.
+            if !self.dialect.paren_comments() {
+                self.listing.outside.push(self.listing.motions.len() as u32 - 1);
+            }
             self.forget();
             self.state.modal_call = held;
         } else if (machine || said.aside.is_some())
@@ -306,9 +316,17 @@ impl Lister<'_, '_> {
             || said.others && self.parallel()
         {
             self.lose_position();
+        } else if said.aside == Some(Reason::AlongNormal) {
+            // How the tool is turned at the end of this is not what the block before says.
+            self.state.lose_orientation();
+            self.state.previous = None;
+            self.events.push(Event::Lost(super::ORIENTATION));
         } else if said.aside.is_some() {
             self.state.lose_orientation();
             self.events.push(Event::Unknown);
+        }
+        if said.lengthens {
+            self.lose_axes(said);
         }
         if said.opaque || self.contour.is_some() {
             self.lose_all();

@@ -1,7 +1,7 @@
 //! What the whole file sets, and where its jumps go: read once before the blocks are followed.
 
 use super::super::dialect::Dialect;
-use super::super::expression::literal;
+use super::super::expression::{Variable, literal, numbered};
 use super::super::parser::word;
 use super::super::syntax::{Belongs, Syntax};
 use super::super::token::Token;
@@ -55,6 +55,12 @@ impl Lister<'_, '_> {
             block.sub |= said.is("SUB");
             block.endsub |= said.is("ENDSUB");
             block.does |= said.is("CALL");
+            if matches!(address, Some(b'O' | b':')) {
+                block.program = Some(match number {
+                    Some(number) if self.dialect != Dialect::LinuxCnc => numbered(b"O", number),
+                    _ => self.tree.source()[self.tree.range(said.first, said.end)].to_ascii_uppercase(),
+                });
+            }
             block.returns |= said.is("RET");
             if jump {
                 // GOTO N100: the block number stands in a word of its own.
@@ -147,6 +153,9 @@ impl Lister<'_, '_> {
         if self.dialect == Dialect::Heidenhain {
             return;
         }
+        if block.sub || self.dialect != Dialect::LinuxCnc {
+            self.programs.extend(block.program.clone());
+        }
         if block.back || block.jumps {
             self.targets.extend(block.p);
         }
@@ -193,6 +202,8 @@ struct Block {
     endsub: bool,
     /// Words that set or move something.
     does: bool,
+    /// O and its number or name.
+    program: Option<Variable>,
     p: Option<u64>,
     q: Option<u64>,
     h: Option<u64>,

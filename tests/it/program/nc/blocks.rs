@@ -2,7 +2,7 @@
 
 use truegrind::program::motion::Reason::*;
 use truegrind::program::nc::Task;
-use truegrind::program::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, Siemens};
+use truegrind::program::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
 use truegrind::program::nc::parser::parse;
 use truegrind::program::nc::setup::Setup;
 
@@ -114,4 +114,46 @@ fn a_file_of_another_control_is_read_and_left() {
     let last = task.listing.motions.iter().find(|motion| motion.place.line == 8).unwrap();
     assert_eq!(last.reason(), left(UnknownWord));
     assert!(task.listing.opaque.iter().all(|opaque| opaque.place.line == 4), "{:?}", task.listing.opaque);
+}
+
+#[test]
+fn linuxcnc_moves_beside_a_dwell_and_the_end_of_a_shift() {
+    let go = begin(LinuxCnc);
+    for (block, x) in [("G4 P1 X30", 30.0), ("G1 X30 G4 P.5", 30.0), ("G28.1 X30", 30.0)] {
+        let found = ends(&format!("{go}{block}\nY5\n"), LinuxCnc);
+        assert_eq!(found[1..], [Ok([x, 2.0, 3.0]), Ok([x, 5.0, 3.0])], "{block}");
+    }
+    // The shift ends, and then the block moves.
+    for code in ["G92.1", "G92.2"] {
+        let found = ends(&format!("{go}G92 X0\n{code} X30\nY5\n"), LinuxCnc);
+        assert_eq!(found[1..], [Ok([30.0, 2.0, 3.0]), Ok([30.0, 5.0, 3.0])], "{code}");
+    }
+    check(LinuxCnc, &[("G4 P1\nX5", &[None]), ("G92.3 X30", &[left(Variable)])]);
+    // On a Fanuc X is the time; a plain file does not tell what it is where P says the time.
+    let found = ends(&format!("{}G4 X30.\nY5.\n", begin(Fanuc)), Fanuc);
+    assert_eq!(found[1..], [Ok([1.0, 5.0, 3.0])]);
+    check(
+        Iso,
+        &[
+            ("G4 X1.5\nY5", &[None]),
+            ("G4 P500\nY5", &[None]),
+            ("G4 P1 X30\nY5\nX5", &[left(UnknownWord), left(PositionUnknown), None]),
+            ("G92.1 X30\nG1 X5 Y5 Z5", &[left(UnknownWord), None]),
+        ],
+    );
+}
+
+#[test]
+fn the_limit_of_the_spindle_shifts_nothing() {
+    check(Fanuc, &[("G92 S2000\nX11.\nG52 X5.\nX10.", &[None, None]), ("G50 S2000\nX11.", &[None])]);
+    check(Iso, &[("G92 S2000 M3\nX11", &[None]), ("G50 S2000\nX11", &[None])]);
+    // With an axis it is a place.
+    check(Fanuc, &[("G92 X0. S2000\nG52 X5.\nX10.", &[left(Displacement)])]);
+}
+
+#[test]
+fn after_g80_linuxcnc_wants_a_motion_word() {
+    check(LinuxCnc, &[("G80\nX11", &[left(NoMotionCode)]), ("G80\nG1 X11", &[None])]);
+    check(Iso, &[("G80\nX11", &[left(NoMotionCode)])]);
+    check(Fanuc, &[("G80\nX11.", &[None])]);
 }

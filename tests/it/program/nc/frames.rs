@@ -60,7 +60,7 @@ fn a_shift_within_a_shift_is_not_known() {
         ],
     );
     let found =
-        ends(&format!("{}G92 X0 Y0\nG52 X5\nX1\nG92.1 X0\nX1 Y1 Z1 A180 B0 C0\n", begin(LinuxCnc)), LinuxCnc);
+        ends(&format!("{}G92 X0 Y0\nG52 X5\nX1\nG92.1\nX1 Y1 Z1 A180 B0 C0\n", begin(LinuxCnc)), LinuxCnc);
     assert_eq!(found[1..], [Ok([6.0, 2.0, 3.0]), Ok([1.0, 1.0, 1.0])]);
 }
 
@@ -141,4 +141,18 @@ fn what_ends_where_nothing_is_on_changes_nothing() {
     // Where it has been on, the axes are counted anew.
     check(Fanuc, &[("G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50.", &[left(OrientationUnknown)])]);
     assert_eq!(reasons(Fanuc, "/G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50."), [left(OrientationUnknown)]);
+}
+
+#[test]
+fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
+    let go = "G1 X5 Y5 Z5 A=180 B=0 C=0";
+    let t = left(Transformed);
+    check(
+        Siemens,
+        &[
+            (&format!("/TRANS X10\nG500\n{go}\nTRANS\n{go}"), &[left(UnknownFlow), None]),
+            (&format!("/TRANS X10\nATRANS X5\n{go}\nTRANS X5\n{go}"), &[t, None]),
+            (&format!("TRANS X1\nAGAIN:\nATRANS X5\n{go}\nGOTOB AGAIN"), &[t]),
+        ],
+    );
 }

@@ -59,6 +59,20 @@ fn a_cycle_runs_where_it_always_ran() {
 }
 
 #[test]
+fn blocks_that_take_no_other_words_are_written_as_they_were() {
+    for block in ["X+20 R+", "LN X+20 NX+0.1 NY+0 NZ+0.995"] {
+        let body = format!("L X+4 Y+5\nL X+10\n{block}\nL X+1 R0\n");
+        let expected = format!("L X+4.5000 Y+4.7500\nL X+10 Y+5.0000 Z+3.0000\n{block}\nL X+1 R0\n");
+        let found = rewritten(Heidenhain, &body);
+        let lines = |text: &str| text.lines().take(3).map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(lines(&found), lines(&expected), "{block}");
+    }
+    let all = "LN X+20 Y+5 Z+3 NX+0.1 NY+0 NZ+0.995";
+    let text = rewritten(Heidenhain, &format!("L X+4 Y+5\n{all}"));
+    assert_eq!(text, format!("L X+4.5000 Y+4.7500\n{all}\n"));
+}
+
+#[test]
 fn a_shift_that_has_moved_with_the_tool_moves_nothing_that_is_left() {
     // G92 calls a place X0 that is now 0.5 mm on; G52 says its shift whole.
     assert_eq!(rewritten(LinuxCnc, "G92 X0\nX10\nG52 X4\nX3"), "G92 X0\nX10\nG52 X4\nX3.5000\n");

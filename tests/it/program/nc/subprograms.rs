@@ -44,3 +44,25 @@ fn a_main_program_with_subprograms_of_its_own_begins_as_it_did() {
     assert_eq!(reasons("a.ngc", &format!("o<part> sub\nG1 X5\no<part> endsub\n{ngc}"))[1], None);
     assert_eq!(reasons("a.mpf", "TRAORI\nT1 D1\nG54\nG1 X300 Y0 Z300 A=180 B=0 C=90 F500\nM30"), [None]);
 }
+
+#[test]
+fn calls_of_programs_that_stand_elsewhere_are_named() {
+    let outside = |name: &str, body: &str| -> Vec<u32> {
+        let task = Task::read(&[(name, body.as_bytes())], &Setup::default());
+        let motions = &task.listing.motions;
+        task.listing.outside.iter().map(|&call| motions[call as usize].place.line).collect()
+    };
+    let go = "G1 X1. Y2. Z3. A180. B0. C0. F600.";
+    let fanuc = format!("O1\nM98 P2\nM98 P30002\nM98 P9\nG65 P9010 A1.\n{go}\nM30\nO2\nX5.\nM99\n");
+    assert_eq!(outside("a.nc", &fanuc), [4, 5]);
+    let linux = format!(
+        "o<in> sub\nG1 X5\no<in> endsub\no10 sub\no10 endsub\no<IN> call [1]\no10 call\no<out> call\n{go}\nM2\n"
+    );
+    assert_eq!(outside("a.ngc", &linux), [8]);
+    let siemens =
+        format!("TRAORI\n{go}\nSUB1\nCALL \"SUB2\"\nL10\nAGAIN:\nX5\nDONE:\nREPEAT AGAIN DONE\nM30\n");
+    assert_eq!(outside("a.mpf", &siemens), [3, 4, 5]);
+    let klartext = "0 BEGIN PGM A MM\n1 CALL LBL 1\n2 CALL PGM B.H\n3 CYCL DEF 12.0 PGM CALL\n4 CYCL DEF 12.1 PGM C.H\n5 CYCL CALL\n6 LBL 1\n7 LBL 0\n8 END PGM A MM\n";
+    assert_eq!(outside("a.h", klartext), [3, 6]);
+    assert_eq!(outside("a.h", &klartext.replace("5 CYCL CALL", "5 L X+5 M99")), [3, 6]);
+}
