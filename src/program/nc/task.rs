@@ -115,10 +115,13 @@ impl Task<'_> {
     /// goes on in the direction of that, so does the start of that. Where an arc ends there it is the rewrite that sees to it,
     /// because that arc may become straight.
     fn spare_arcs(&mut self) {
+        let mut held = vec![0; self.listing.motions.len()];
         for index in (0..self.listing.motions.len()).rev() {
             let motion = &self.listing.motions[index];
-            let needs = self.needs(index, motion.reason().is_some());
-            if needs == Needs::Nothing {
+            let stays = motion.reason().is_some();
+            let needs = self.needs(index, stays);
+            let axes = self.start_axes(index, stays, held[index]);
+            if axes == 0 {
                 continue;
             }
             let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
@@ -127,12 +130,12 @@ impl Task<'_> {
             if before.place.file != file {
                 continue;
             }
+            held[at as usize] |= axes;
             if before.kind != MotionKind::Circular && before.reason().is_none() {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
-            let conditional = before.conditional;
             // Where the block before may be skipped, the one before that ends here too.
-            if needs == Needs::Tangent || conditional || self.passes_on(at as usize, index) {
+            if needs == Needs::Tangent || before.conditional {
                 let written = &mut self.written[at as usize];
                 written.needs = written.needs.max(Needs::Start);
             }

@@ -8,6 +8,9 @@ use crate::program::motion::{MotionKind, Reason};
 use crate::program::nc::task::{Needs, Task};
 use crate::program::rewrite::{Change, Outcome};
 
+/// Axes X, Y and Z as bits.
+const ALL: u8 = 0b111;
+
 impl Task<'_> {
     /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
     /// last of them ends where it always did. Hands back the latter.
@@ -21,21 +24,21 @@ impl Task<'_> {
         let mut refused = BTreeSet::new();
         // Motions whose start stays because what comes after them goes on in their direction.
         let mut directed = BTreeSet::new();
+        let mut held = vec![0; self.listing.motions.len()];
         for index in (1..self.listing.motions.len() as u32).rev() {
             let motion = &self.listing.motions[index as usize];
             let arc_stays = motion.kind == MotionKind::Circular && !wanted.contains_key(&index);
             let stays = motion.reason().is_some() || refused.contains(&index) || arc_stays;
-            let needs = match self.needs(index as usize, stays) {
-                Needs::Nothing if !directed.contains(&index) => continue,
-                needs => needs,
-            };
-            let before = motion.previous.unwrap_or(index - 1);
-            if self.passes_on(before as usize, index as usize) {
-                directed.insert(before);
+            let needs = self.needs(index as usize, stays);
+            let axes = self.start_axes(index as usize, stays, held[index as usize]);
+            if axes == 0 && !directed.contains(&index) {
+                continue;
             }
+            let before = motion.previous.unwrap_or(index - 1);
             if self.listing.motions[before as usize].place.file != motion.place.file {
                 continue;
             }
+            held[before as usize] |= axes;
             if needs == Needs::Tangent || self.listing.motions[before as usize].conditional {
                 directed.insert(before);
             }
@@ -58,28 +61,42 @@ impl Task<'_> {
         fixed
     }
 
-    /// Whether a motion that stays ends, in an axis that the one after it starts from, where the motion before it does.
-    pub(in crate::program::nc) fn passes_on(&self, motion: usize, after: usize) -> bool {
-        let found = &self.listing.motions[motion];
-        let (file, written) = (found.place.file as usize, &self.written[motion]);
-        let Some(reason) = found.reason() else { return false };
+    /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,
+    /// in which it must end there, that it takes from the motion before.
+    pub(in crate::program::nc) fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
+        let (motion, written) = (&self.listing.motions[index], &self.written[index]);
+        let own = match self.needs(index, stays) {
+            Needs::Nothing => 0,
+            Needs::Start if written.needs == Needs::Nothing => self.arc_axes(index),
+            _ => ALL,
+        };
         // Behind a call or a cycle the tool stands where that has left it.
-        if found.kind == MotionKind::Unknown {
-            return false;
-        }
+        let moves = motion.kind != MotionKind::Unknown;
+        own | if stays && moves && held != 0 { held & !self.own_ends(index) } else { 0 }
+    }
+
+    /// The axes of an arc as far as its words tell them; all where they do not.
+    fn arc_axes(&self, index: usize) -> u8 {
+        let file = self.listing.motions[index].place.file as usize;
+        let slots = slots(&self.trees[file], self.dialects[file], &self.written[index]);
+        let named = |axis: &usize| slots.axes[*axis].is_some() || slots.centre[*axis].is_some();
+        let axes = (0..3).filter(named).fold(0, |all, axis| all | 1 << axis);
+        if u8::count_ones(axes) < 2 { ALL } else { axes }
+    }
+
+    /// The axes in which a motion that stays ends where it says, whatever is before it: it states them, or what it leaves out
+    /// is said again.
+    fn own_ends(&self, index: usize) -> u8 {
+        let (motion, written) = (&self.listing.motions[index], &self.written[index]);
+        let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);
-        let of = |motion: usize| slots(tree, dialect, &self.written[motion]);
-        let (here, then) = (of(motion), of(after));
-        let from: Vec<usize> =
-            (0..3).filter(|&axis| then.axes[axis].is_some() || then.centre[axis].is_some()).collect();
-        let from = if from.len() < 2 { vec![0, 1, 2] } else { from };
-        // What it leaves out can be said again only where it is known.
-        let again = written.restates || stays_in_place(reason);
-        let states = |axis: usize| {
-            again && written.start[axis].is_some()
-                || here.axes[axis]
+        let slots = slots(tree, dialect, written);
+        let again = written.restates || motion.reason().is_none_or(stays_in_place);
+        let own = |axis: &usize| {
+            again && written.start[*axis].is_some()
+                || slots.axes[*axis]
                     .is_some_and(|word| !said(tree, dialect, &word).unwrap_or(!written.absolute))
         };
-        !from.into_iter().all(states)
+        (0..3).filter(own).fold(0, |all, axis| all | 1 << axis)
     }
 }

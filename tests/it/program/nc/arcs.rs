@@ -152,7 +152,21 @@ fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
             ("X10\nX20\nG55\nG91 X2 Y0\nG90 G2 X25 Y0 I5 J0", &[None, before, unknown, unknown]),
         ],
     );
-    check(Siemens, &[("X10\nX20\nTRANS\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown])]);
+    check(
+        Siemens,
+        &[
+            ("X10\nX20\nTRANS\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown]),
+            // Y counts from where the motion before the change of frame ended, through all that comes between.
+            (
+                "X10\nX20\nTRANS\nX5 Y=IC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                &[None, before, unknown, unknown, unknown, unknown],
+            ),
+            (
+                "X10\nX20\nTRANS\nX5 Y=AC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                &[None, None, None, None, None, None],
+            ),
+        ],
+    );
 }
 
 #[test]
