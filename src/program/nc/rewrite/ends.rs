@@ -70,8 +70,8 @@ impl Task<'_> {
             Needs::Start if written.needs == Needs::Nothing => self.arc_axes(index),
             _ => ALL,
         };
-        // Behind a call or a cycle the tool stands where that has left it.
-        let moves = motion.kind != MotionKind::Unknown;
+        // Behind a call the tool stands where that has left it; a cycle begins where the tool stands.
+        let moves = motion.kind != MotionKind::Unknown || motion.reason() == Some(Reason::Cycle);
         own | if stays && moves && held != 0 { held & !self.own_ends(index) } else { 0 }
     }
 
