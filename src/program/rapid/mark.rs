@@ -22,7 +22,7 @@ pub fn token(tree: &RapidTree<'_>) -> Option<u32> {
 /// The token of the mark among some tokens.
 pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
     // Long stretches hold no comment: that is told without looking at each token by itself.
-    const STRETCH: usize = 4096;
+    const STRETCH: usize = 128;
     let is_comment = |kind: &Token| *kind == Token::Comment;
     let holds_comment = |kinds: &[Token]| kinds.iter().fold(false, |any, kind| any | is_comment(kind));
     let first = tokens.start as usize;
@@ -40,6 +40,11 @@ pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
 
 /// Reads a comment as a mark.
 pub fn read(comment: &[u8]) -> Option<Mark> {
+    // Nearly no comment is one.
+    let begins = comment.iter().position(|byte| *byte != b'!' && !byte.is_ascii_whitespace())?;
+    if !comment[begins..].starts_with(b"truegrind") {
+        return None;
+    }
     let text = std::str::from_utf8(comment).ok()?.trim_start_matches('!');
     let mut words = text.split_ascii_whitespace();
     if words.next() != Some("truegrind") {
