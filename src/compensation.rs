@@ -27,5 +27,6 @@ mod slack;
 mod segment;
 mod circle;
 mod strayed;
+mod notes;
 mod passage;
 mod speed;

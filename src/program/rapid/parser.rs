@@ -703,6 +703,7 @@ impl Token {
     /// Keywords with which something new certainly begins, where reading can start again.
     fn begins_statement(self) -> bool {
         self.ends_block()
+            || self.begins_with_keyword()
             || matches!(
                 self,
                 Token::Module
@@ -715,17 +716,24 @@ impl Token {
                     | Token::Var
                     | Token::Record
                     | Token::Alias
-                    | Token::If
-                    | Token::For
-                    | Token::While
-                    | Token::Test
-                    | Token::Goto
-                    | Token::Return
-                    | Token::Raise
-                    | Token::Exit
-                    | Token::Retry
-                    | Token::TryNext
-                    | Token::Connect
             )
+    }
+
+    /// Whether a statement begins with it that its keyword tells.
+    fn begins_with_keyword(self) -> bool {
+        matches!(
+            self,
+            Token::If
+                | Token::For
+                | Token::While
+                | Token::Test
+                | Token::Goto
+                | Token::Return
+                | Token::Raise
+                | Token::Exit
+                | Token::Retry
+                | Token::TryNext
+                | Token::Connect
+        )
     }
 }

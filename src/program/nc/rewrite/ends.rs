@@ -12,6 +12,37 @@ use crate::program::rewrite::{Change, Outcome};
 const ALL: u8 = 0b111;
 
 impl Task<'_> {
+    /// An arc or another path that stays as it is needs its start: the straight motion that ends there stays too, and where it
+    /// goes on in the direction of that, so does the start of that. Where an arc ends there it is the rewrite that sees to it,
+    /// because that arc may become straight.
+    pub(in crate::program::nc) fn spare_arcs(&mut self) {
+        let mut held = vec![0; self.listing.motions.len()];
+        for index in (0..self.listing.motions.len()).rev() {
+            let motion = &self.listing.motions[index];
+            let stays = motion.reason().is_some();
+            let needs = self.needs(index, stays);
+            let axes = self.start_axes(index, stays, held[index]);
+            if axes == 0 {
+                continue;
+            }
+            let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
+            let Some(at) = motion.previous.or((index as u32).checked_sub(1)) else { continue };
+            let before = &mut self.listing.motions[at as usize];
+            if before.place.file != file {
+                continue;
+            }
+            held[at as usize] |= axes;
+            if before.kind != MotionKind::Circular && before.reason().is_none() {
+                before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
+            }
+            // Where the block before may be skipped, the one before that ends here too.
+            if needs == Needs::Tangent || before.conditional {
+                let written = &mut self.written[at as usize];
+                written.needs = written.needs.max(Needs::Start);
+            }
+        }
+    }
+
     /// An arc or other path that stays starts where the one before it ends: that one stays too, or, where it becomes straight pieces, the
     /// last of them ends where it always did. Hands back the latter.
     pub(super) fn fixed_ends(
@@ -63,7 +94,7 @@ impl Task<'_> {
 
     /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,
     /// in which it must end there, that it takes from the motion before.
-    pub(in crate::program::nc) fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
+    fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
         let (motion, written) = (&self.listing.motions[index], &self.written[index]);
         let own = match self.needs(index, stays) {
             Needs::Nothing => 0,

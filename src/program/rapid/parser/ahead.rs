@@ -86,23 +86,7 @@ impl Parser<'_, '_> {
 impl Token {
     /// Whether a statement that may stand anywhere in a body begins with it.
     fn begins_plain(self) -> bool {
-        matches!(
-            self,
-            Token::Ident
-                | Token::Percent
-                | Token::Placeholder
-                | Token::Semicolon
-                | Token::If
-                | Token::For
-                | Token::While
-                | Token::Test
-                | Token::Goto
-                | Token::Return
-                | Token::Raise
-                | Token::Exit
-                | Token::Retry
-                | Token::TryNext
-                | Token::Connect
-        )
+        self.begins_with_keyword()
+            || matches!(self, Token::Ident | Token::Percent | Token::Placeholder | Token::Semicolon)
     }
 }
