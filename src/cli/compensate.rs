@@ -527,6 +527,7 @@ fn rewritten(
                 let kind = program.listing().motions[change.motion as usize].kind;
                 row.status = Status::Refused;
                 row.reason = Some(match reason {
+                    // An arc that no circle fits once it is written.
                     Reason::WrongShape if kind == MotionKind::Circular => Why::NoCircle,
                     reason => Why::Program(*reason),
                 });

@@ -142,8 +142,6 @@ struct Walk<'t, 's> {
     /// What is held when a unit ends; asked for while it is worked out it is not known.
     exits: Vec<Option<State>>,
     totals: HashMap<usize, Load>,
-    /// The routines that may grip something else, by themselves or in what they call.
-    gripping: Vec<bool>,
     unit: usize,
     silent: bool,
 }
@@ -165,7 +163,6 @@ impl<'t, 's> Walk<'t, 's> {
             calls: Vec::new(),
             exits: vec![None; task.symbols.units.len()],
             totals: HashMap::new(),
-            gripping: gripping(task),
             unit: 0,
             silent: false,
         }
@@ -184,7 +181,7 @@ impl<'t, 's> Walk<'t, 's> {
             }
         }
         let mut grips = vec![Grip::Unknown; self.task.listing.motions.len()];
-        if self.task.symbols.interrupting.iter().any(|routine| self.gripping[*routine as usize]) {
+        if self.task.symbols.interrupting.iter().any(|routine| self.may_grip_in(*routine)) {
             return Loads { grips, totals: self.totals };
         }
         let entries = self.entries();
@@ -221,10 +218,8 @@ impl<'t, 's> Walk<'t, 's> {
     }
 
     fn is_main(&self, unit: usize) -> bool {
-        self.task.symbols.units[unit].routine.is_some_and(|routine| {
-            let routine = &self.task.symbols.routines[routine as usize];
-            same_name(self.task.trees[routine.file as usize].text(routine.head.name), b"main")
-        })
+        let routine = self.task.symbols.units[unit].routine;
+        routine.is_some_and(|routine| self.task.symbols.is_main(&self.task.trees, routine))
     }
 
     fn tree(&self, unit: Unit) -> &'t RapidTree<'s> {
@@ -343,10 +338,15 @@ impl<'t, 's> Walk<'t, 's> {
         let tree = self.tree(unit);
         let name = tree.text(tree.nodes[node as usize].first);
         let own = self.task.symbols.called(unit.scope, name);
-        own.iter().any(|routine| self.gripping[*routine as usize])
+        own.iter().any(|routine| self.may_grip_in(*routine))
             || own.is_empty()
                 && predefined::calls_by_name(name)
-                && self.task.symbols.late_of(unit).iter().any(|routine| self.gripping[*routine as usize])
+                && self.task.symbols.late_of(unit).iter().any(|routine| self.may_grip_in(*routine))
+    }
+
+    /// Whether a routine may grip something else, by itself or in what it calls.
+    fn may_grip_in(&self, routine: u32) -> bool {
+        self.task.symbols.routines[routine as usize].reach.grips
     }
 
     /// Whether statements under a node may grip something else.
@@ -355,7 +355,9 @@ impl<'t, 's> Walk<'t, 's> {
         let end = node + tree.nodes[node as usize].size;
         (node..end).any(|node| match tree.nodes[node as usize].kind {
             Syntax::LateCall | Syntax::Opaque => true,
-            Syntax::Call => grips(tree, node) || self.may_grip(unit, node),
+            Syntax::Call => {
+                predefined::grips(tree.text(tree.nodes[node as usize].first)) || self.may_grip(unit, node)
+            }
             Syntax::Function => self.may_grip(unit, node),
             _ => false,
         })
@@ -371,7 +373,7 @@ impl<'t, 's> Walk<'t, 's> {
         let state = state?;
         let tree = self.tree(unit);
         let name = tree.text(tree.nodes[node as usize].first);
-        if same_name(name, b"GripLoad") {
+        if predefined::grips(name) {
             let value = arguments(tree, node).find(|a| !a.optional).and_then(|a| a.value);
             return Some(Some(match value.and_then(|value| self.load(unit, value)) {
                 Some(load) if load.mass_kg > NOTHING_KG => Grip::Holds(load),
@@ -426,45 +428,6 @@ impl<'t, 's> Walk<'t, 's> {
         self.silent = silent;
         self.exits[unit] = Some(exit);
         exit
-    }
-}
-
-/// Whether a call is GripLoad.
-fn grips(tree: &RapidTree<'_>, node: u32) -> bool {
-    same_name(tree.text(tree.nodes[node as usize].first), b"GripLoad")
-}
-
-/// Which routines may grip something else.
-fn gripping(task: &Task<'_>) -> Vec<bool> {
-    let symbols = &task.symbols;
-    let routines = 0..symbols.routines.len();
-    let mut gripping = vec![false; routines.len()];
-    let mut callees: Vec<Vec<u32>> = vec![Vec::new(); routines.len()];
-    for routine in routines.clone() {
-        let unit = symbols.units[symbols.routines[routine].unit as usize];
-        let tree = &task.trees[unit.file as usize];
-        for node in unit.node..unit.node + tree.nodes[unit.node as usize].size {
-            let name = tree.text(tree.nodes[node as usize].first);
-            match tree.nodes[node as usize].kind {
-                Syntax::Call | Syntax::Function => {
-                    gripping[routine] |= grips(tree, node);
-                    callees[routine].extend_from_slice(symbols.called(unit.scope, name));
-                }
-                _ => {}
-            }
-        }
-        callees[routine].extend_from_slice(symbols.late_of(unit));
-    }
-    loop {
-        let mut grown = false;
-        for routine in routines.clone() {
-            let now = callees[routine].iter().any(|called| gripping[*called as usize]);
-            grown |= now && !gripping[routine];
-            gripping[routine] |= now;
-        }
-        if !grown {
-            return gripping;
-        }
     }
 }
 

@@ -131,7 +131,7 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     }
     let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
     // Where ExitCycle begins main anew, its variables may be as they were.
-    if unit.routine.is_some_and(|routine| !(symbols.cycles && is_main(evaluator, routine))) {
+    if unit.routine.is_some_and(|routine| !(symbols.cycles && symbols.is_main(evaluator.trees, routine))) {
         for &id in symbols.changed_in(unit) {
             // A variable of the routine has its initial value at every call.
             let symbol = &symbols.symbols[id as usize];
@@ -148,12 +148,6 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     }
     let end = walk.block(unit.node, state, Surroundings::default());
     if end.reached { walk.exits.or(end.modal) } else { walk.exits }
-}
-
-/// Whether a routine is main.
-pub(super) fn is_main(evaluator: &Evaluator<'_, '_>, routine: u32) -> bool {
-    let routine = &evaluator.symbols.routines[routine as usize];
-    same_name(evaluator.trees[routine.file as usize].text(routine.head.name), b"main")
 }
 
 /// The parameters of a unit that may be other names of data outside it, or of each other.

@@ -101,6 +101,11 @@ pub fn waits(name: &[u8]) -> bool {
     WAITS.iter().any(|wait| wait.as_bytes().eq_ignore_ascii_case(name))
 }
 
+/// Whether it tells what the gripper holds.
+pub fn grips(name: &[u8]) -> bool {
+    name.eq_ignore_ascii_case(b"GripLoad")
+}
+
 /// Whether it begins the next cycle at main with everything set as it is.
 pub fn begins_cycle(name: &[u8]) -> bool {
     name.eq_ignore_ascii_case(b"ExitCycle")

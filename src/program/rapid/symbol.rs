@@ -13,7 +13,7 @@ pub use self::change::{Change, Ends, How, Reach};
 use super::instruction;
 use super::modal::States;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
-use super::token::{Token, display, fold, folded};
+use super::token::{Token, display, fold, folded, same_name};
 use crate::program::motion::Reason;
 use crate::program::tree::Child;
 
@@ -227,6 +227,12 @@ impl Symbols {
             return self.namesakes.get(&name).map_or(std::slice::from_ref(routine), Vec::as_slice);
         }
         std::slice::from_ref(routine)
+    }
+
+    /// Whether a routine is the one with which a program begins.
+    pub fn is_main(&self, trees: &[RapidTree<'_>], routine: u32) -> bool {
+        let routine = &self.routines[routine as usize];
+        same_name(trees[routine.file as usize].text(routine.head.name), b"main")
     }
 
     /// The scope of the module around a scope.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::evaluate::{Context, Evaluator, Source};
-use super::flow::{CallSite, State, Surroundings, Visitor, is_main, walk};
+use super::flow::{CallSite, State, Surroundings, Visitor, walk};
 use super::instruction::{self, Also, Between, INSTRUCTIONS, Instruction, Slot};
 use super::mark;
 use super::modal::{States, Which};
@@ -208,7 +208,7 @@ impl<'a, 's> Lister<'a, 's> {
         }
         let units = self.symbols.units.clone();
         let routines = 0..self.symbols.routines.len() as u32;
-        self.mains = routines.filter(|&routine| is_main(&self.evaluator, routine)).collect();
+        self.mains = routines.filter(|&routine| self.symbols.is_main(self.trees, routine)).collect();
         // What is called ends before its callers are followed, however long the chain of calls is.
         for &unit in &self.symbols.callees_first {
             let Some(routine) = units[unit as usize].routine else { continue };

@@ -53,6 +53,8 @@ pub struct Reach {
     pub moves: bool,
     /// Whether it waits, so that another task may write what tasks share.
     pub waits: bool,
+    /// Whether it may grip something else (GripLoad).
+    pub grips: bool,
     /// The switches that statements in it, or in what it calls, set: at some time, not at its end alone.
     pub sets: States,
 }
@@ -91,6 +93,7 @@ struct Found {
     unknown: bool,
     moves: bool,
     waits: bool,
+    grips: bool,
     /// Of which types data is changed by a name that is computed; `None` for any type.
     by_name: Vec<Option<Vec<u8>>>,
     /// The calls that set a switch or call a routine of the program.
@@ -118,6 +121,7 @@ impl Found {
         self.unknown |= next.unknown;
         self.moves |= next.moves;
         self.waits |= next.waits;
+        self.grips |= next.grips;
         self.by_name.extend(next.by_name);
         self.cycles |= next.cycles;
         self.sets = self.sets.or(next.sets);
@@ -401,6 +405,7 @@ impl Symbols {
                 found.moves |= predefined::displaces(name).is_some();
                 found.cycles |= predefined::begins_cycle(name);
                 found.waits |= predefined::waits(name);
+                found.grips |= predefined::grips(name);
                 // What it writes may be data of any routine's caller.
                 found.unknown |= self.writes_any(tree, unit.scope, node, name);
                 if name.eq_ignore_ascii_case(b"SetAllDataVal") {
@@ -538,6 +543,7 @@ impl Symbols {
                 anything: found.unknown,
                 moves: found.moves,
                 waits: found.waits,
+                grips: found.grips,
                 sets: found.sets,
             };
             reach.settle();
@@ -548,15 +554,21 @@ impl Symbols {
             for &unit in &self.callees_first {
                 let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
-                let before = (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.sets);
+                let said = |reach: &Reach| {
+                    (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.grips, reach.sets)
+                };
+                let before = said(&reach);
                 for &called in &all[unit as usize].late {
-                    reach.sets = reach.sets.or(self.routines[called as usize].reach.sets);
+                    let other = &self.routines[called as usize].reach;
+                    reach.grips |= other.grips;
+                    reach.sets = reach.sets.or(other.sets);
                 }
                 for &called in &all[unit as usize].calls {
                     let other = &self.routines[called as usize].reach;
                     reach.anything |= other.anything;
                     reach.moves |= other.moves;
                     reach.waits |= other.waits;
+                    reach.grips |= other.grips;
                     reach.sets = reach.sets.or(other.sets);
                     reach.changes.extend_from_slice(&other.changes);
                     if reach.changes.len() > 4 * REACH {
@@ -564,8 +576,7 @@ impl Symbols {
                     }
                 }
                 reach.settle();
-                grown |=
-                    before != (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.sets);
+                grown |= before != said(&reach);
                 self.routines[routine as usize].reach = reach;
             }
             if !grown {
