@@ -2,7 +2,9 @@
 //!
 //! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
-//! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
+//! - [`compensate`]: the main job, from a program that was read to its new bytes.
+//! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
+//! - [`undeclared`]: tools and work objects that no file declares, and what to give.
 //! - [`untouched`]: the plan that changes nothing, for the nominal arm.
 //! - [`curve`]: the way from target to target as the controller interpolates it; [`corner`]: how it rounds a point.
 //! - [`verify`]: runs a program on an arm; [`precision`]: what single precision makes of its numbers.
@@ -14,7 +16,10 @@ pub mod mounting;
 pub mod payload;
 pub mod why;
 pub mod rewrite;
+pub mod cut;
+pub mod compensate;
 pub mod untouched;
+pub mod undeclared;
 mod circumstance;
 mod course;
 mod solve;

@@ -44,7 +44,7 @@ fn changes(program: &Program<'_>) -> Vec<Change> {
 
 /// Rewriting ends, its edits are disjoint, the diff says the same, and the result can be read.
 fn rewritten(source: &[u8], program: &Program<'_>) -> Vec<u8> {
-    let mark = Mark { version: "0.0.0".into(), model: "0123456789ab".into() };
+    let mark = Mark { version: "0.0.0".into(), model: "0123456789ab".into(), partial: false };
     let options = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
     let rewritten = program.rewrite(&changes(program), &options).expect("edits do not overlap");
     let edits = &rewritten.files[0].edits;

@@ -8,21 +8,23 @@ use clap::{Args, ValueEnum};
 use nalgebra::Point3;
 use rayon::prelude::*;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::deviation::{After, PathReport, Status};
+use truegrind::compensation::compensate::{Compensated, compensate};
+use truegrind::compensation::cut::Cuts;
+use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::payload::Loads;
-use truegrind::compensation::precision::single_precision;
-use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan, plan};
+use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan};
 use truegrind::compensation::untouched::untouched;
 use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, MotionKind, Reason};
+use truegrind::program::motion::{Mark, Reason};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::{Language, Program};
-use truegrind::program::rewrite::{Outcome, RewriteOptions};
+use truegrind::program::rewrite::RewriteOptions;
 use truegrind::report::batch::{self, Ended, Row};
 use truegrind::report::compensation::{self as view, ProgramFile};
+use truegrind::report::status::Status as Judged;
 use truegrind::surface::SurfaceFile;
 
 use super::files::{self, Batch};
@@ -134,6 +136,10 @@ pub(super) struct Arguments {
     /// Largest correction that is written (mm); a larger one is refused.
     #[arg(long, value_name = "MM", default_value_t = 10.0, allow_negative_numbers = true)]
     max_correction: f64,
+    /// Correct what can be corrected of a cut of which a motion must stay as it is, without steps above the tolerance; without
+    /// it such a cut stays as a whole.
+    #[arg(long)]
+    partial: bool,
     /// Rewrite joint targets (MoveAbsJ) too.
     #[arg(long)]
     joint_targets: bool,
@@ -170,6 +176,18 @@ struct Shop<'a> {
     ends: bool,
 }
 
+impl Shop<'_> {
+    /// How a run ended that refused and flagged nothing (`clean`) or something, and rewrote something or nothing.
+    fn ending(&self, clean: bool, changed: bool) -> Ending {
+        let as_asked = match self.corrector {
+            None => true,
+            Some(_) if self.arguments.check => !changed,
+            Some(_) => changed,
+        };
+        if clean && as_asked { Ending::Done } else { Ending::Flagged }
+    }
+}
+
 /// The estimated arm, as it was named.
 #[derive(Clone, Copy)]
 struct Corrector<'a> {
@@ -186,7 +204,7 @@ struct Done {
     diff: Vec<u8>,
     /// What to say on stderr.
     notes: Vec<String>,
-    /// Whether nothing was refused or flagged.
+    /// Whether everything that it holds was rewritten, without refusal, flag or doubt.
     clean: bool,
     /// Whether any byte changes.
     changed: bool,
@@ -240,6 +258,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         tolerance_mm: arguments.tolerance,
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
+        cuts: if arguments.partial { Cuts::Partial } else { Cuts::Whole },
         condition,
         points: jobs.len() == 1 && arguments.outputs.of_points(),
         ..Options::default()
@@ -326,8 +345,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     if let Some(summary) = &summary {
         outputs.print_beside(summary, arguments.output.as_deref() == Some(Path::new("-")))?;
     }
-    let would_change = arguments.check && done.changed;
-    Ok(if done.clean && !would_change { Ending::Done } else { Ending::Flagged })
+    Ok(shop.ending(done.clean, done.changed))
 }
 
 /// Many programs: in parallel, each written on its own, going on past a bad one; one table for all.
@@ -390,7 +408,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
     if rows.iter().all(|row| row.ended == Ended::Failed) {
         bail!("none of {} programs could be done", rows.len());
     }
-    Ok(if clean && !(arguments.check && changed) { Ending::Done } else { Ending::Flagged })
+    Ok(shop.ending(clean, changed))
 }
 
 fn failed(job: &Job, error: &str) -> Done {
@@ -487,22 +505,20 @@ fn rewritten(
         return Ok(nothing_left(notes));
     }
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
-    let mut planned = match shop.corrector {
-        Some(corrector) => plan(listing, corrector.arm, &shop.cell, &options),
-        None => untouched(listing, &options),
+    let Compensated { plan: mut planned, rewritten } = match shop.corrector {
+        Some(corrector) => {
+            let mark = Mark {
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                model: corrector.hash.to_owned(),
+                partial: false,
+            };
+            compensate(&program, corrector.arm, &shop.cell, &options, Some(mark))?
+        }
+        None => Compensated {
+            plan: untouched(listing, &options),
+            rewritten: program.rewrite(&[], &RewriteOptions::default())?,
+        },
     };
-    if program.language() == Language::Rapid
-        && let Some(off) = single_precision(&planned.changes)
-    {
-        planned.notes.push(off.text());
-    }
-    let rewrite = RewriteOptions {
-        mark: shop
-            .corrector
-            .map(|c| Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: c.hash.to_owned() }),
-        ..RewriteOptions::default()
-    };
-    let rewritten = program.rewrite(&planned.changes, &rewrite)?;
     if marked.contains(&true) {
         // Modules of one task, some corrected before. What carries no mark has nothing to correct, or was left out then.
         let open =
@@ -515,26 +531,6 @@ fn rewritten(
             names[open],
             names[done]
         );
-    }
-    for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
-        let row = &mut planned.outcomes[change.motion as usize];
-        match outcome {
-            Outcome::Unchanged if row.status == Status::Changed => {
-                row.status = Status::Left;
-                row.reason = Some(Why::Same);
-            }
-            Outcome::Refused(reason) => {
-                let kind = program.listing().motions[change.motion as usize].kind;
-                row.status = Status::Refused;
-                row.reason = Some(match reason {
-                    // An arc that no circle fits once it is written.
-                    Reason::WrongShape if kind == MotionKind::Circular => Why::NoCircle,
-                    reason => Why::Program(*reason),
-                });
-                row.after_mm = row.before_mm;
-            }
-            _ => {}
-        }
     }
     worked();
     if let Some(surface) = &shop.surface {
@@ -565,14 +561,21 @@ fn rewritten(
     let ended = if changed { Ended::Changed } else { Ended::Unchanged };
     let output = targets.iter().flatten().map(|t| t.display().to_string()).collect::<Vec<_>>().join(", ");
     let output = Some(output).filter(|output| !output.is_empty());
-    let row = Row::of(names.join(", "), output, ended, &planned, listing.opaque.len());
+    let row = Row::of(names.join(", "), output, ended, &planned, listing);
     let undeclared = [Reason::Undeclared, Reason::ToolUnknown, Reason::WorkObjectUnknown].map(Why::Program);
     let undeclared =
         planned.outcomes.iter().filter(|o| o.reason.is_some_and(|why| undeclared.contains(&why))).count();
-    // Nothing but what cannot be read: nobody has looked at a motion.
-    let unread = listing.motions.is_empty() && !listing.opaque.is_empty() && shop.corrector.is_some();
-    let clean =
-        !unread && planned.outcomes.iter().all(|o| matches!(o.status, Status::Changed | Status::Left));
+    let clean = match shop.corrector {
+        // Asked to change nothing, and nothing was in doubt.
+        None => true,
+        // Read whole, and no motion in it.
+        Some(_) if listing.motions.is_empty() => listing.opaque.is_empty(),
+        // A check passes where nothing is left to change.
+        Some(_) if shop.arguments.check && !changed => {
+            planned.outcomes.iter().all(|o| o.reason == Some(Why::Same))
+        }
+        Some(_) => view::verdict(&planned, listing).status == Judged::Good,
+    };
     report(&mut planned, &program, &files)?;
     if shop.ends {
         // To take a million pieces apart just before all memory goes back takes a tenth of the time of the whole.

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use truegrind::comparison::grinding::taught_cell;
+use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, PathReport};
-use truegrind::compensation::rewrite::{Options as RewriteBounds, plan};
+use truegrind::compensation::rewrite::Options as RewriteBounds;
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::diagnosis;
 use truegrind::identification::identify::{Identification, Options};
@@ -21,7 +22,7 @@ use truegrind::measurement::import;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::program::motion::Mark;
 use truegrind::program::rapid::{Task, writer};
-use truegrind::program::rewrite::RewriteOptions;
+use truegrind::program::reading::Program;
 use truegrind::report::document::Document;
 use truegrind::report::{
     deviation as deviation_view, diagnosis as diagnosis_view, format, identification as identification_view,
@@ -62,7 +63,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let surface = sample::BLADE.read()?;
     let path = toolpath(&surface, nominal, &robot.sheet.name)?;
     let program = writer::write(&path.draft)?;
-    let task = Task::read(&[("blade.mod", program.as_slice())]);
+    let task = Program::Rapid(Task::read(&[("blade.mod", program.as_slice())]));
     let cell = taught_cell(&surface, &path, nominal, [&surface.tool.name, &surface.work_object.name])?;
 
     drop(work);
@@ -100,16 +101,18 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let mut rewritten_program = None;
     for (name, estimated) in arms {
         let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
-        let planned = plan(&task.listing, estimated, &cell, &bounds);
         let text = estimated.to_toml().map_err(anyhow::Error::msg)?;
-        let mark =
-            Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: inputs::hash(text.as_bytes()) };
-        let rewrite = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
-        let edits = task.rewrite(&planned.changes, &rewrite)?;
-        let bytes = edits.files[0].edits.apply(&program)?;
+        let mark = Mark {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            model: inputs::hash(text.as_bytes()),
+            partial: false,
+        };
+        let done = compensate(&task, estimated, &cell, &bounds, Some(mark))?;
+        let planned = done.plan;
+        let bytes = done.rewritten.files[0].edits.apply(&program)?;
         let after = Task::read(&[("blade.mod", bytes.as_slice())]);
         let judged = Judged {
-            original: &task.listing,
+            original: task.listing(),
             rewritten: Some(&after.listing),
             cell: &cell,
             surface: Some(&surface.surface),

@@ -16,8 +16,10 @@ use crate::comparison::experiment::{ExperimentError, Grinding, PaperPoints};
 use crate::comparison::protocol::{Options as CaseOptions, drawn, register};
 use crate::comparison::verdict::{Test, paired};
 use crate::compensation::cell::{Cell, CellFrame, FrameOrigin};
+use crate::compensation::compensate::compensate;
+use crate::compensation::cut::Cuts;
 use crate::compensation::deviation::{After, Block, PathPoint, PathReport, Status};
-use crate::compensation::rewrite::{Options as RewriteBounds, plan};
+use crate::compensation::rewrite::Options as RewriteBounds;
 use crate::compensation::verify::{Acting, Judged, judge};
 use crate::estimation::estimate::Termination;
 use crate::identification::identify::{Identification, Options, identify, observe};
@@ -37,7 +39,6 @@ use crate::program::nc::orientation::Angles;
 use crate::program::nc::setup::Setup;
 use crate::program::nc::writer;
 use crate::program::reading::Program;
-use crate::program::rewrite::RewriteOptions;
 use crate::surface::{SurfaceFile, sample};
 
 /// The result.
@@ -318,31 +319,30 @@ fn ground(
     };
     case.held_out = one.estimated.geometry.held_out;
     case.termination = one.training.termination();
-    // The papers know no bounds. Methods without priors move what the measurements cannot see by centimetres: here
+    // The papers know no bounds, and judge point by point. Methods without priors move what the measurements cannot see by centimetres: here
     // that is let through, so that its consequence is seen and not only its refusal.
     let bounds = RewriteBounds {
         condition: shop.condition,
         max_correction_mm: LARGEST_CORRECTION_MM,
         max_turn_rad: LARGEST_TURN_RAD,
+        cuts: Cuts::Single,
         ..RewriteBounds::default()
     };
-    let planned = plan(shop.task.listing(), &one.estimated, shop.cell, &bounds);
-    let refused = |p: &&PathPoint| p.status == Status::Refused;
-    case.refused = planned.points.iter().filter(refused).count();
-    let mark = Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: String::new() };
-    let rewrite = RewriteOptions { mark: Some(mark), ..RewriteOptions::default() };
-    let rewritten = shop
-        .task
-        .rewrite(&planned.changes, &rewrite)
-        .map_err(|e| e.to_string())
-        .and_then(|edits| edits.files[0].edits.apply(shop.program).map_err(|e| e.to_string()));
-    let bytes = match rewritten {
-        Ok(bytes) => bytes,
+    let mark = Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: String::new(), partial: false };
+    let done = compensate(shop.task, &one.estimated, shop.cell, &bounds, Some(mark));
+    let written = done.map_err(|e| e.to_string()).and_then(|done| {
+        let bytes = done.rewritten.files[0].edits.apply(shop.program).map_err(|e| e.to_string())?;
+        Ok((done.plan, bytes))
+    });
+    let (planned, bytes) = match written {
+        Ok(written) => written,
         Err(why) => {
             case.failure = Some(why);
             return (case, None);
         }
     };
+    let refused = |p: &&PathPoint| p.status == Status::Refused;
+    case.refused = planned.points.iter().filter(refused).count();
     let changed = Program::read(&[(shop.name, bytes.as_slice())], shop.setup);
     let judged = Judged {
         original: shop.task.listing(),

@@ -8,13 +8,14 @@
 //! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
 //! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
 
-use std::collections::HashSet;
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
+use super::cut::{self, Cuts};
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
@@ -82,6 +83,8 @@ pub struct Options {
     pub condition: Condition,
     /// What the program says that the arm carries; absent where the payload of `condition` counts throughout.
     pub loads: Option<Loads>,
+    /// What becomes of a cut of which not every motion can be corrected.
+    pub cuts: Cuts,
     /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
     pub points: bool,
 }
@@ -99,6 +102,7 @@ impl Default for Options {
             position_decimals: 4,
             condition: Condition::default(),
             loads: None,
+            cuts: Cuts::Whole,
             points: true,
         }
     }
@@ -180,12 +184,23 @@ impl<'a> Arms<'a> {
 /// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
 /// before; the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    plan_without(listing, estimated, cell, options, &BTreeMap::new())
+}
+
+/// [`plan`], where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the cuts
+/// that they are part of.
+pub(super) fn plan_without(
+    listing: &Listing,
+    estimated: &Estimated,
+    cell: &Cell,
+    options: &Options,
+    refused: &BTreeMap<u32, Why>,
+) -> Plan {
     let mut arms = Arms::of(estimated, &options.condition);
     let mountings = Mountings::of(listing, &arms, cell);
     let solved = solve_all(listing, &mut arms, &mountings, options);
-    let strayed = strayed(listing, &solved, &mountings, options);
-    let job =
-        Job { listing, solved: &solved, strayed: &strayed, mountings: &mountings, arms: &arms, options };
+    let stays = staying(listing, &solved, &mountings, options, refused);
+    let job = Job { listing, solved: &solved, stays: &stays, mountings: &mountings, arms: &arms, options };
     let portions: Vec<Portion> = (0..listing.motions.len())
         .into_par_iter()
         .step_by(PORTION)
@@ -209,6 +224,71 @@ pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Opt
     plan
 }
 
+/// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
+/// circles that would become others, and the rest of a cut of which a part stays. Each may bring about another, until
+/// none does.
+fn staying(
+    listing: &Listing,
+    solved: &SolvedTargets,
+    mountings: &Mountings,
+    options: &Options,
+    refused: &BTreeMap<u32, Why>,
+) -> BTreeMap<u32, Why> {
+    let mut stays = refused.clone();
+    let cuts = cut::of(listing);
+    loop {
+        let before = stays.len();
+        for motion in strayed(listing, solved, mountings, options, &stays) {
+            stays.insert(motion, Why::NoCircle);
+        }
+        let kept = |motion: u32| obstacle(motion, listing, solved, options, &stays);
+        let more = match options.cuts {
+            Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
+            Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
+                solved
+                    .of(motion as usize)
+                    .last()
+                    .and_then(|to| to.as_ref().ok())
+                    .map_or(0.0, Solved::shift_mm)
+            }),
+            Cuts::Single => Vec::new(),
+        };
+        stays.extend(more);
+        if stays.len() == before {
+            return stays;
+        }
+    }
+}
+
+/// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
+fn obstacle(
+    index: u32,
+    listing: &Listing,
+    solved: &SolvedTargets,
+    options: &Options,
+    stays: &BTreeMap<u32, Why>,
+) -> Option<(Status, Why)> {
+    let motion = &listing.motions[index as usize];
+    if let Some(reason) = motion.left {
+        return Some((Status::Left, Why::Program(reason)));
+    }
+    let targets = solved.of(index as usize);
+    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
+    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
+    if let Some(why) = unknown.or_else(|| errors().next()) {
+        let status = if matches!(why, Why::Program(_)) { Status::Left } else { Status::Refused };
+        return Some((status, why));
+    }
+    if targets.is_empty() {
+        return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
+    }
+    if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
+        return Some((Status::Left, Why::JointTarget));
+    }
+    let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
+    forbidden.or_else(|| stays.get(&index).copied()).map(|why| (Status::Refused, why))
+}
+
 /// Motions that one thread takes at a time.
 const PORTION: usize = 64;
 
@@ -216,7 +296,8 @@ const PORTION: usize = 64;
 struct Job<'a> {
     listing: &'a Listing,
     solved: &'a SolvedTargets,
-    strayed: &'a HashSet<u32>,
+    /// Motions that stay though their targets could be corrected.
+    stays: &'a BTreeMap<u32, Why>,
     mountings: &'a Mountings,
     arms: &'a Arms<'a>,
     options: &'a Options,
@@ -363,7 +444,7 @@ impl<'a> Job<'a> {
             |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
         if !may_change(before, self.options)
             || !targets.iter().all(changes)
-            || self.strayed.contains(&(previous as u32))
+            || self.stays.contains_key(&(previous as u32))
         {
             return None;
         }
@@ -454,9 +535,6 @@ fn work<'a>(
         });
         Worked { change, outcome, point, passage: None }
     };
-    if let Some(reason) = motion.left {
-        return finish(outcome, Status::Left, Some(Why::Program(reason)), None, None);
-    }
     let targets = solved.of(index);
     let point = match targets.last() {
         Some(Ok(to)) => {
@@ -467,26 +545,10 @@ fn work<'a>(
         }
         _ => None,
     };
-    // First what forbids a change, of any target of the motion: what the text does not tell before what no arm reaches.
-    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
-    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
-    if let Some(why) = unknown.or_else(|| errors().next()) {
-        let status = if matches!(why, Why::Program(_)) { Status::Left } else { Status::Refused };
+    if let Some((status, why)) = obstacle(index as u32, listing, solved, options, job.stays) {
         return finish(outcome, status, Some(why), None, point);
     }
     let good: Vec<&Solved> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
-    if good.is_empty() {
-        return finish(outcome, Status::Left, Some(Why::Program(Reason::ExternalOnly)), None, point);
-    }
-    if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
-        return finish(outcome, Status::Left, Some(Why::JointTarget), None, point);
-    }
-    if let Some(why) = good.iter().find_map(|s| s.forbidden) {
-        return finish(outcome, Status::Refused, Some(why), None, point);
-    }
-    if job.strayed.contains(&(index as u32)) {
-        return finish(outcome, Status::Refused, Some(Why::NoCircle), None, point);
-    }
     // Then the path from the motion before.
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
     (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
@@ -517,7 +579,7 @@ pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
 
 /// Why a corrected target must not be written.
 pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
-    let shift = (solved.told.translation.vector - solved.meant.translation.vector).norm();
+    let shift = solved.shift_mm();
     if !(shift <= options.max_correction_mm) {
         return Some(Why::TooFar { mm: shift });
     }

@@ -68,6 +68,13 @@ pub(super) struct Solved {
     pub(super) place: usize,
 }
 
+impl Solved {
+    /// How far the commanded position lies from the intended one (mm): what the program's numbers move by.
+    pub(super) fn shift_mm(&self) -> f64 {
+        (self.told.translation.vector - self.meant.translation.vector).norm()
+    }
+}
+
 /// The targets of all motions.
 pub(super) struct SolvedTargets {
     /// Where the targets of each motion begin, and the end of the last.

@@ -3,13 +3,14 @@
 //! A circle hangs on where it starts. Where the motion before is corrected as well the circle moves as a whole; where it
 //! is not, two points of three move, and of a circle that is small against the correction another one becomes.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::curve::{CLOSED_MM, Curve};
 use super::mountings::Mountings;
 use super::rewrite::{Options, may_change};
 use super::segment::gap;
 use super::solve::{Solved, SolvedTargets};
+use super::why::Why;
 use crate::math::se3::Pose;
 use crate::program::motion::{Listing, Motion, MotionKind, TargetValue};
 
@@ -28,16 +29,18 @@ const UNKNOWN_SHARE: f64 = 0.25;
 /// Places on a circle that are looked at.
 const SAMPLES: u8 = 12;
 
-/// The circular motions of a listing that cannot be corrected for such a reason, by index.
+/// The circular motions of a listing that cannot be corrected for such a reason, by index. `stays`: motions that are not
+/// corrected for other reasons than their own targets.
 pub(super) fn strayed(
     listing: &Listing,
     solved: &SolvedTargets,
     mountings: &Mountings,
     options: &Options,
-) -> HashSet<u32> {
-    let mut strayed = HashSet::new();
+    stays: &BTreeMap<u32, Why>,
+) -> BTreeSet<u32> {
+    let mut strayed = BTreeSet::new();
     for (index, motion) in (0_u32..).zip(&listing.motions) {
-        if motion.kind != MotionKind::Circular || !may_change(motion, options) {
+        if motion.kind != MotionKind::Circular || !may_change(motion, options) || stays.contains_key(&index) {
             continue;
         }
         let ([Ok(via), Ok(to)], Some(previous)) = (solved.of(index as usize), motion.previous) else {
@@ -56,7 +59,8 @@ pub(super) fn strayed(
         let corrected = may_change(before, options)
             && !targets.is_empty()
             && targets.iter().all(changes)
-            && !strayed.contains(&previous);
+            && !strayed.contains(&previous)
+            && !stays.contains_key(&previous);
         if corrected {
             continue;
         }
@@ -86,8 +90,7 @@ fn stated(before: &Motion, mounted: usize, mountings: &Mountings) -> Option<Pose
 
 /// Whether the circle from a start that is not corrected through two corrected points is another one than was meant.
 fn strays(start: Option<Pose>, via: &Solved, to: &Solved, motion: &Motion) -> bool {
-    let shift = |solved: &Solved| (solved.told.translation.vector - solved.meant.translation.vector).norm();
-    let shift = shift(via).max(shift(to));
+    let shift = via.shift_mm().max(to.shift_mm());
     let Some(start) = start else {
         return shift > UNKNOWN_SHARE * gap(&via.meant.translation.vector, &to.meant.translation.vector);
     };

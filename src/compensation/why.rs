@@ -71,6 +71,20 @@ pub enum Why {
         /// By how much (°).
         by_deg: f64,
     },
+    /// It is part of a cut of which another motion stays as it is: half a correction would be a step in the part.
+    PartOfCut {
+        /// The line of the motion that stays for a reason of its own, from 1.
+        line: u32,
+        /// That reason, without its figures.
+        because: &'static str,
+    },
+    /// The motion before or after it in the same cut stays as it is, and the step to that one would be too large.
+    Step {
+        /// The line of that motion, from 1.
+        line: u32,
+        /// The step (mm).
+        mm: f64,
+    },
     /// No measured pose is near.
     NotCovered {
         /// Distance over that of measured poses, above 1.
@@ -90,6 +104,37 @@ impl Why {
             InverseError::OutsideLimits { joint, .. } => Why::OutsideLimits { joint },
             InverseError::NearSingularity { .. } => Why::NearSingularity,
             other => Why::Inverse(other),
+        }
+    }
+
+    /// The reason without the figures of one motion.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Why::Program(reason) => reason.text(),
+            Why::MovingBase { .. } => "an external axis carries the robot's base",
+            Why::JointTarget => "a joint target",
+            Why::Same => "nothing to change",
+            Why::Inverse(InverseError::Unreachable { .. }) => "out of reach",
+            Why::Inverse(InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. }) => {
+                "not reachable in its configuration"
+            }
+            Why::Inverse(_) => "no joints were found",
+            Why::OutsideLimits { .. } => "a joint would leave its range",
+            Why::TooFar { .. } => "correction exceeds the bound (--max-correction)",
+            Why::TooMuchTurn { .. } => "correction of the orientation exceeds the bound",
+            Why::NearSingularity => "too close to a singularity",
+            Why::OtherBranch => "the corrected target lies in another configuration",
+            Why::Bend { .. } => "the path between targets leaves the intended one",
+            Why::Corner { .. } => "the rounded corner leaves the intended one",
+            Why::CircleKept => "the circle stays a circle",
+            Why::TooFast { .. } => "a joint turns faster than it can",
+            Why::NoCircle => "no circle through its points keeps to the way that was meant",
+            Why::WholeCircle => "a whole circle",
+            Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
+            Why::PartOfCut { because, .. } => because,
+            Why::Step { .. } => "the step to its neighbour is too large",
+            Why::NotCovered { .. } => "no measured pose is near",
+            Why::Uncertain { .. } => "the model is uncertain here",
         }
     }
 }
@@ -141,6 +186,17 @@ impl fmt::Display for Why {
                     joint + 1
                 )
             }
+            Why::PartOfCut { line, because } => {
+                write!(
+                    f,
+                    "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
+                     corrects the rest)"
+                )
+            }
+            Why::Step { line, mm } => write!(
+                f,
+                "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
+            ),
             Why::NotCovered { ratio } => {
                 write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")
             }

@@ -529,6 +529,8 @@ pub struct Mark {
     pub version: String,
     /// The hash of the model.
     pub model: String,
+    /// Whether cuts may be corrected in part.
+    pub partial: bool,
 }
 
 macro_rules! reasons {

@@ -7,6 +7,8 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use crate::compensation::deviation::Status as Fate;
 use crate::compensation::rewrite::Plan;
+use crate::compensation::undeclared::undeclared;
+use crate::program::motion::Listing;
 
 /// What became of one program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,14 +31,6 @@ impl Ended {
             Ended::Unchanged => "unchanged",
             Ended::Already => "already compensated",
             Ended::Failed => "failed",
-        }
-    }
-
-    fn judged(self) -> Status {
-        match self {
-            Ended::Changed | Ended::Unchanged => Status::Good,
-            Ended::Already => Status::Warning,
-            Ended::Failed => Status::Bad,
         }
     }
 }
@@ -64,7 +58,7 @@ pub struct Row {
 
 impl Row {
     /// The row of a program that was planned.
-    pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, opaque: usize) -> Row {
+    pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, listing: &Listing) -> Row {
         let count = |fate: Fate| plan.outcomes.iter().filter(|outcome| outcome.status == fate).count();
         let written = |fate: Fate| matches!(fate, Fate::Changed | Fate::Flagged);
         let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm);
@@ -80,10 +74,10 @@ impl Row {
                 count(Fate::Refused),
                 count(Fate::Left),
             ],
-            opaque,
+            opaque: listing.opaque.len(),
             before_mm: before.reduce(f64::max),
             after_mm: after.reduce(f64::max),
-            note: None,
+            note: undeclared_note(listing),
         }
     }
 
@@ -92,11 +86,31 @@ impl Row {
         Row { file, output: None, ended, motions: [0; 5], opaque: 0, before_mm: None, after_mm: None, note }
     }
 
+    /// Nothing rewritten must not look like done.
+    fn judged(&self) -> Status {
+        match self.ended {
+            Ended::Changed => Status::Good,
+            Ended::Unchanged if self.motions[0] == 0 => Status::NotEvaluated,
+            Ended::Unchanged | Ended::Already => Status::Warning,
+            Ended::Failed => Status::Bad,
+        }
+    }
+
     /// Share of its motions that is rewritten (%).
     pub fn covered_percent(&self) -> Option<f64> {
         let [all, changed, flagged, ..] = self.motions;
         (all > 0).then(|| 100.0 * (changed + flagged) as f64 / all as f64)
     }
+}
+
+/// What is declared nowhere, in a few words.
+fn undeclared_note(listing: &Listing) -> Option<String> {
+    /// How many names a row has room for.
+    const NAMED: usize = 4;
+    let all = undeclared(listing);
+    let names: Vec<&str> = all.iter().take(NAMED).map(|one| one.name.as_str()).collect();
+    let more = if all.len() > NAMED { " and more" } else { "" };
+    (!names.is_empty()).then(|| format!("declared in no file: {}{more}", names.join(", ")))
 }
 
 /// One row per program.
@@ -121,7 +135,7 @@ pub fn table(rows: &[Row]) -> Table {
     );
     for row in rows {
         let mut cells: Vec<Cell> =
-            vec![row.file.as_str().into(), Cell::Judged(row.ended.judged(), row.ended.text().to_owned())];
+            vec![row.file.as_str().into(), Cell::Judged(row.judged(), row.ended.text().to_owned())];
         cells.extend(row.motions.map(Cell::from));
         cells.extend([
             row.covered_percent().into(),
@@ -199,7 +213,9 @@ fn title(rows: &[Row]) -> String {
 fn verdict(rows: &[Row]) -> Verdict {
     let failed = rows.iter().filter(|row| row.ended == Ended::Failed).count();
     let doubtful: usize = rows.iter().map(|row| row.motions[2] + row.motions[3]).sum();
+    let rewritten: usize = rows.iter().map(|row| row.motions[1] + row.motions[2]).sum();
     let (status, headline) = match (failed, doubtful) {
+        (0, _) if rewritten == 0 => (Status::NotEvaluated, "Nothing was rewritten"),
         (0, 0) => (Status::Good, "Every program was done"),
         (0, _) => (Status::Warning, "Every program was done; look at what was refused or flagged"),
         _ => (Status::Bad, "Some programs could not be done"),

@@ -10,7 +10,7 @@ use crate::compensation::deviation::{PathReport, Status as Fate};
 use crate::compensation::rewrite::{MotionOutcome, Plan};
 use crate::compensation::why::Why;
 use crate::kinematics::inverse::InverseError;
-use crate::program::motion::{Listing, Place};
+use crate::program::motion::{Listing, MotionKind, Place};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -273,22 +273,45 @@ fn heading(files: &[ProgramFile]) -> Document {
     page
 }
 
-fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
+/// How a rewrite is judged, the same on the terminal, on the page and in the exit code.
+pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
     let written = count(plan, Fate::Changed) + flagged;
+    let unsure = unsure(plan, listing);
+    let same = !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(Why::Same));
     let (status, headline) = match (written, refused + flagged) {
+        (0, 0) if same => {
+            (Status::NotEvaluated, "Nothing was rewritten: every number is right to its last decimal")
+        }
         (0, 0) => (Status::NotEvaluated, "Nothing was rewritten"),
         (0, _) => (Status::Bad, "Nothing could be rewritten"),
+        (_, 0) if unsure.is_some() => (
+            Status::Warning,
+            "Rewritten, but the model does not know enough here to say that the correction helps",
+        ),
         (_, 0) => (Status::Good, "Everything that can be rewritten is rewritten"),
         _ => (Status::Warning, "Rewritten, but look at what was refused or flagged before the program runs"),
     };
     let mut reasons = vec![coverage(plan)];
+    if let Some((sigma, rms)) = unsure {
+        reasons.push(format!(
+            "the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the model does not \
+             know enough here to say that the correction helps"
+        ));
+    }
     if refused > 0 && written > 0 {
         reasons.push(
             "a refused motion goes where it always went: between it and its rewritten neighbours the path steps by the \
              correction"
                 .to_owned(),
         );
+    }
+    let steps = count_why(plan, |why| matches!(why, Why::PartOfCut { .. } | Why::Step { .. }));
+    if steps > 0 {
+        reasons.push(format!(
+            "{steps} motions could be corrected but stay, since another motion of their cut stays: half a correction would be \
+             a step in the part"
+        ));
     }
     if !listing.opaque.is_empty() {
         reasons.push(format!(
@@ -303,6 +326,28 @@ fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
         ));
     }
     Verdict::new(status, headline, reasons)
+}
+
+/// Where the model's uncertainty exceeds what it corrects, both as root mean squares over the lines and arcs that are
+/// rewritten (mm).
+fn unsure(plan: &Plan, listing: &Listing) -> Option<(f64, f64)> {
+    let cuts = |o: &&MotionOutcome| {
+        let kind = listing.motions.get(o.motion as usize).map(|motion| motion.kind);
+        matches!(kind, Some(MotionKind::Linear | MotionKind::Circular))
+            && matches!(o.status, Fate::Changed | Fate::Flagged)
+    };
+    let squares =
+        plan.outcomes.iter().filter(cuts).filter_map(|o| Some((o.sigma_mm?.powi(2), o.before_mm?.powi(2))));
+    let (mut count, mut sigma, mut before) = (0_usize, 0.0, 0.0);
+    for (s, b) in squares {
+        (count, sigma, before) = (count + 1, sigma + s, before + b);
+    }
+    let rms = |sum: f64| (sum / count as f64).sqrt();
+    (count > 0 && rms(sigma) > rms(before)).then(|| (rms(sigma), rms(before)))
+}
+
+fn count_why(plan: &Plan, is: impl Fn(&Why) -> bool) -> usize {
+    plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
 }
 
 fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
@@ -411,6 +456,12 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
             by_deg,
             "°",
         ),
+        Why::PartOfCut { because, .. } => plain(&format!(
+            "its cut is corrected as a whole or not at all, and another motion stays: {because}"
+        )),
+        Why::Step { mm, .. } => {
+            sized("the step to a motion of the same cut that stays exceeds --tolerance".to_owned(), mm, "mm")
+        }
         Why::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
         Why::Uncertain { sigma_mm } => sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ"),
         ref other => (other.to_string(), None),

@@ -1,5 +1,6 @@
 //! Rewriting programs: the estimated arm follows what was meant, and nothing dangerous is ever written.
 
+mod cut;
 mod path;
 mod payload;
 mod play;

@@ -33,6 +33,10 @@ fn workshop() -> TempDir {
     dir
 }
 
+/// How rewriting with the model of one cable ends: it is done, but one outlet leaves the model less sure of positions than
+/// what it corrects is large, and the exit code says so as terminal and page do.
+const UNSURE: i32 = 1;
+
 /// What the RAPID program's tool data say of its load, for programs that say nothing: the arm yields under it.
 const LOAD: [&str; 4] = ["--payload", "1.2", "--payload-centre", "0,0,55"];
 
@@ -252,9 +256,11 @@ fn modules_of_a_folder_are_one_task_when_asked() {
         truegrind(at, &[&arguments, more].concat())
     };
     let contract = || json(&fs::read_to_string(at.join("all.json")).unwrap());
-    // Each by itself: the tool is not there, and the way out is named.
+    // Each by itself: the tool is not there, and the way out is named. Nothing was rewritten, which is not done.
     let (code, text, err) = run(&["-o", "alone"]);
-    assert_eq!(code, 0, "{text}\n{err}");
+    assert_eq!(code, 1, "{text}\n{err}");
+    assert!(text.contains("Nothing was rewritten") && !text.contains("[ok]"), "{text}");
+    assert!(text.contains("declared in no file: tWheel"), "{text}");
     assert!(err.contains("5 motions") && err.contains("--together"), "{err}");
     assert_eq!(fs::read_to_string(at.join("alone/PROGMOD/Work.mod")).unwrap(), work);
     // Together they are one task; every file keeps its place.
@@ -364,7 +370,7 @@ fn dry_run_check_and_diff_write_no_program() {
     fs::write(at.join("a.mod"), module("A", 5, 0.0)).unwrap();
     let (code, text, err) =
         truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run", "--diff"]);
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, UNSURE, "{err}");
     assert!(text.contains("--- a.mod\n+++ a.mod\n"), "{text}");
     assert!(text.contains("+  ! truegrind ") || text.contains("+! truegrind "), "{text}");
     let (code, _, _) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--check"]);
@@ -432,11 +438,11 @@ fn links_and_pipes_stay_what_they_are() {
     fs::write(at.join("a.mod"), module("A", 5, 0.0)).unwrap();
     let compensate =
         |output: &str| truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "-o", output]);
-    assert_eq!(compensate("plain.mod").0, 0);
+    assert_eq!(compensate("plain.mod").0, UNSURE);
     let plain = fs::read(at.join("plain.mod")).unwrap();
     // The standard output: the program and nothing else.
     let (code, text, err) = compensate("-");
-    assert_eq!((code, text.as_bytes() == plain), (0, true), "{text}");
+    assert_eq!((code, text.as_bytes() == plain), (UNSURE, true), "{text}");
     assert!(err.contains("Compensation of a.mod") && !at.join("-").exists(), "{err}");
     // A link: the file that it names is written.
     fs::write(at.join("target.mod"), "old").unwrap();
@@ -456,7 +462,7 @@ fn links_and_pipes_stay_what_they_are() {
         let pipe = pipe.clone();
         move || fs::read(pipe).unwrap()
     });
-    assert_eq!(compensate("pipe").0, 0);
+    assert_eq!(compensate("pipe").0, UNSURE);
     assert_eq!(reader.join().unwrap(), plain);
     assert!(!fs::metadata(&pipe).unwrap().is_file());
 }
@@ -480,7 +486,7 @@ fn a_module_without_the_mark_of_its_task_is_not_called_compensated() {
         truegrind(at, &[&["compensate"], files, &["--model", "model.toml", "-o", out]].concat())
     };
     let (code, _, err) = run(&["one.mod", "points.sys"], "first");
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, UNSURE, "{err}");
     // The same task again: points.sys carries the mark, and one.mod has nothing of its own to correct.
     let (code, text, err) = run(&["first/one.mod", "first/points.sys"], "again");
     assert_eq!((code, text.contains("already compensated")), (1, true), "{text}{err}");
@@ -505,7 +511,7 @@ fn what_cannot_be_read_is_not_called_done() {
     let some = module("A", 5, 0.0).replace("    ConfL\\Off;\n", &format!("    ConfL\\Off;\n{broken}"));
     fs::write(at.join("some.mod"), some).unwrap();
     let (code, text, err) = run("some.mod");
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, UNSURE, "{err}");
     assert!(text.contains("regions that could not be read and stay as they are: 1;"), "{text}");
 }
 
@@ -517,7 +523,7 @@ fn lines_whose_path_nobody_checked_are_named() {
     let text = text.replacen("    IF di1=1 Stop;\n", "    IF di1=1 MoveL CRobT(),v100,fine,tool0;\n", 2);
     fs::write(at.join("a.mod"), text).unwrap();
     let (code, text, err) = truegrind(at, &["compensate", "a.mod", "--model", "model.toml", "--dry-run"]);
-    assert_eq!(code, 0, "{err}");
+    assert_eq!(code, UNSURE, "{err}");
     let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains("3 of the lines and arcs start where the text alone does not tell"), "{text}");
     assert!(words.contains("the path between is not checked (lines 4, 6, 8)"), "{text}");
@@ -545,4 +551,77 @@ fn a_motion_that_is_right_already_is_left_for_that_reason() {
         assert_eq!(motion["status"], "left", "{motion}");
         assert_eq!(motion["reason"], "its numbers are right to the last decimal that is written", "{motion}");
     }
+}
+
+/// What the class is: a green end of a run in which nothing, or nothing that helps, was done.
+#[test]
+fn nothing_rewritten_is_never_ok_and_names_what_is_missing() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir(at.join("nc")).unwrap();
+    let head = "%\nO1\nG90 G21 G17 G54\nT7 M6\nG43.4 H7\n";
+    let body = "G1 X0. Y0. Z20. A180. B0. C0. F600.\nG1 X5. Y0. Z20. A180. B0. C0.\nM30\n%\n";
+    for name in ["a.nc", "b.nc"] {
+        fs::write(at.join("nc").join(name), format!("{head}{body}")).unwrap();
+    }
+    fs::copy(at.join("nc/a.nc"), at.join("one.nc")).unwrap();
+    let nc = ["--model", "model.toml", "--robot", "abb-irb-120"];
+    let (code, text, _) = truegrind(at, &[&["compensate", "one.nc", "-o", "out.nc"], &nc[..]].concat());
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("[not evaluated] Nothing was rewritten") && !text.contains("[ok]"), "{text}");
+    let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("tool T7 is declared in none of the files, and 2 motions use it (first: line 6)"),
+        "{text}"
+    );
+    assert!(
+        words.contains("[[tool]] name = \"T7\", origin = \"metrology\", position_mm = [x, y, z]"),
+        "{text}"
+    );
+    assert!(
+        words.contains("work offset G54 is declared") && words.contains("[[wobj]] name = \"G54\""),
+        "{text}"
+    );
+    let (code, text, _) = truegrind(at, &[&["compensate", "nc", "-o", "out"], &nc[..]].concat());
+    assert_eq!(code, 1, "{text}");
+    assert!(!text.contains("[ok]") && !text.contains("✓ unchanged"), "{text}");
+    let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("Nothing was rewritten") && words.contains("declared in no file: T7, G54"),
+        "{text}"
+    );
+    // With what was asked for they are rewritten.
+    let cell = "[[tool]]\nname = \"T7\"\norigin = \"metrology\"\nposition_mm = [0, 0, 50]\n\
+                [[wobj]]\nname = \"G54\"\norigin = \"metrology\"\nposition_mm = [400, 0, 250]\n";
+    fs::write(at.join("cell.toml"), cell).unwrap();
+    let source =
+        fs::read_to_string(at.join("one.nc")).unwrap().replace("O1\n", "O1\n(truegrind angles wpr)\n");
+    fs::write(at.join("one.nc"), source).unwrap();
+    let with_cell = ["compensate", "one.nc", "-o", "out.nc", "--cell", "cell.toml"];
+    let (_, text, _) = truegrind(at, &[&with_cell, &nc[..]].concat());
+    assert!(text.contains("2 changed"), "{text}");
+}
+
+#[test]
+fn a_cut_corrected_in_part_says_so_in_its_mark() {
+    let dir = workshop();
+    let at = dir.path();
+    let far = module("A", 5, 0.0).replacen("[[370", "[[900", 1);
+    fs::write(at.join("a.mod"), &far).unwrap();
+    assert_ne!(far, module("A", 5, 0.0));
+    let run = |more: &[&str]| {
+        let arguments = ["compensate", "a.mod", "--model", "model.toml", "-o", "out.mod"];
+        let (code, text, err) = truegrind(at, &[&arguments, more].concat());
+        assert_eq!(code, 1, "{text}{err}");
+        (fs::read_to_string(at.join("out.mod")).unwrap(), text)
+    };
+    let (whole, text) = run(&[]);
+    assert_eq!(whole, far);
+    assert!(
+        text.contains("Nothing could be rewritten") && text.contains("as a whole or not at all"),
+        "{text}"
+    );
+    let (partial, text) = run(&["--partial", "--tolerance", "5"]);
+    assert!(text.contains("4 changed") || text.contains("4 flagged"), "{text}");
+    assert!(partial.contains("! truegrind ") && partial.contains(" partial\n"), "{partial}");
 }

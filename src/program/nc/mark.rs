@@ -1,6 +1,7 @@
 //! The comment line that says that a file was compensated.
 //!
-//! `; truegrind 0.1.0 model 3f9a…` or `(truegrind 0.1.0 model 3f9a…)`, on a line of its own after the lines with which
+//! `; truegrind 0.1.0 model 3f9a…` or `(truegrind 0.1.0 model 3f9a…)`, and `partial` behind it where
+//! cuts may be corrected in part, on a line of its own after the lines with which
 //! a file begins (tape start, program number, `BEGIN PGM`).
 
 use super::dialect::Dialect;
@@ -35,12 +36,18 @@ pub fn read(comment: &[u8]) -> Option<Mark> {
     if !words.next()?.eq_ignore_ascii_case("model") {
         return None;
     }
-    Some(Mark { version, model: words.next()?.to_ascii_lowercase() })
+    let model = words.next()?.to_ascii_lowercase();
+    Some(Mark {
+        version,
+        model,
+        partial: words.next().is_some_and(|word| word.eq_ignore_ascii_case("partial")),
+    })
 }
 
 /// The comment of a mark, as the dialect writes comments.
 pub fn text(mark: &Mark, dialect: Dialect) -> String {
-    let text = format!("truegrind {} model {}", mark.version, mark.model);
+    let partial = if mark.partial { " partial" } else { "" };
+    let text = format!("truegrind {} model {}{partial}", mark.version, mark.model);
     // Fanuc knows `;` only as the end of a block.
     if matches!(dialect, Dialect::Fanuc | Dialect::Iso) { format!("({text})") } else { format!("; {text}") }
 }

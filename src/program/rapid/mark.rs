@@ -1,6 +1,6 @@
 //! The comment line that says that a file was compensated.
 //!
-//! `! truegrind 0.1.0 model 3f9a…`, on a line of its own after the head of each MODULE in which something changed: a
+//! `! truegrind 0.1.0 model 3f9a…`, and `partial` behind it where cuts may be corrected in part, on a line of its own after the head of each MODULE in which something changed: a
 //! controller keeps the modules of a file apart.
 
 use std::ops::Range;
@@ -54,12 +54,12 @@ pub fn read(comment: &[u8]) -> Option<Mark> {
     if words.next() != Some("model") {
         return None;
     }
-    Some(Mark { version, model: words.next()?.to_owned() })
+    Some(Mark { version, model: words.next()?.to_owned(), partial: words.next() == Some("partial") })
 }
 
 /// The comment of a mark.
 pub fn text(mark: &Mark) -> String {
-    format!("! truegrind {} model {}", mark.version, mark.model)
+    format!("! truegrind {} model {}{}", mark.version, mark.model, if mark.partial { " partial" } else { "" })
 }
 
 /// The modules of a file; a fragment has none.

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::corner::Corner;
 use truegrind::compensation::curve::{Arc, Curve};
+use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::{Circles, Options, Plan, plan};
 use truegrind::compensation::why::Why;
@@ -376,7 +377,9 @@ fn an_arc_that_stays_says_its_word_again_after_one_that_became_straight() {
     );
     let setup = nc_setup();
     let task = truegrind::program::nc::Task::read(&[("p.ngc", source.as_bytes())], &setup);
-    let options = Options { circles: Circles::Segments, tolerance_mm: 1.0, ..Options::default() };
+    // The block that may be skipped stays, and would keep the whole cut.
+    let cuts = Cuts::Single;
+    let options = Options { circles: Circles::Segments, tolerance_mm: 1.0, cuts, ..Options::default() };
     let planned = plan(&task.listing, &known(&perturbed(12, 1.0)), &Cell::default(), &options);
     assert!(planned.outcomes[1].inserted > 0 && planned.outcomes[2].inserted == 0);
     let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();

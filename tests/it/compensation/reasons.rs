@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use truegrind::compensation::cell::Cell;
+use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::{Circles, Options, Plan, plan};
 use truegrind::compensation::why::Why;
@@ -33,12 +34,14 @@ fn name(why: &Why) -> &'static str {
         Why::NoCircle => "no circle",
         Why::WholeCircle => "whole circle",
         Why::JointNotMeasured { .. } => "joint not measured",
+        Why::PartOfCut { .. } => "part of cut",
+        Why::Step { .. } => "step",
         Why::NotCovered { .. } => "not covered",
         Why::Uncertain { .. } => "uncertain",
     }
 }
 
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 20] = [
     "program",
     "moving base",
     "joint target",
@@ -55,6 +58,8 @@ const NAMES: [&str; 18] = [
     "no circle",
     "whole circle",
     "joint not measured",
+    "part of cut",
+    "step",
     "not covered",
     "uncertain",
 ];
@@ -66,7 +71,12 @@ fn known() -> Estimated {
     known
 }
 
+/// Each motion by itself, so that its own reason shows and not that of its cut.
 fn planned(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    planned_in_cuts(source, known, cell, &Options { cuts: Cuts::Single, ..options.clone() })
+}
+
+fn planned_in_cuts(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
     let task = Task::read(&[("p.mod", source)]);
     assert!(task.listing.opaque.is_empty(), "{:?}", task.listing.opaque);
     plan(&task.listing, known, cell, options)
@@ -176,6 +186,13 @@ fn every_reason_there_is_shows_in_a_program() {
     ];
     for options in &bounds {
         look(&planned(&refusals, &known(), &cell, options));
+    }
+    for cuts in [Cuts::Whole, Cuts::Partial] {
+        let line = |x: u32| {
+            format!("MoveL [[{x},0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0;\n")
+        };
+        let source = ["MODULE M\nPROC main()\n", &line(380), &line(900), "ENDPROC\nENDMODULE\n"].concat();
+        look(&planned_in_cuts(source.as_bytes(), &known(), &cell, &Options { cuts, ..fine() }));
     }
     let mut unsure = known();
     unsure.region.sigma_mm = 1e-12;

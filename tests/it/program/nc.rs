@@ -559,7 +559,7 @@ fn blocks_are_put_in_before_a_motion_and_a_mark_after_the_head() {
         external: None,
     };
     let change = Change { motion: 1, targets: vec![NewTarget::Keep], before: vec![extra] };
-    let mark_of = Mark { version: "9.9.9".into(), model: "0123456789ab".into() };
+    let mark_of = Mark { version: "9.9.9".into(), model: "0123456789ab".into(), partial: false };
     let options = RewriteOptions { mark: Some(mark_of.clone()), ..RewriteOptions::default() };
     let rewritten = task.rewrite(&[change], &options).unwrap();
     let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();

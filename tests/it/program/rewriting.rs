@@ -270,7 +270,7 @@ fn two_changes_of_one_motion_are_an_error() {
 
 #[test]
 fn a_changed_file_is_marked_once_and_an_unchanged_one_not() {
-    let mark = |model: &str| Mark { version: "0.1.0".into(), model: model.into() };
+    let mark = |model: &str| Mark { version: "0.1.0".into(), model: model.into(), partial: false };
     let options = |model: &str| RewriteOptions { mark: Some(mark(model)), ..RewriteOptions::default() };
     let source = module("", &format!("  MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}],v100,fine,tool0;\n"));
     let source = source.replace('\n', "\r\n");
@@ -297,7 +297,7 @@ fn a_changed_file_is_marked_once_and_an_unchanged_one_not() {
 
 #[test]
 fn each_changed_module_is_marked_behind_its_head() {
-    let mark = Mark { version: "0.1.0".into(), model: "abc".into() };
+    let mark = Mark { version: "0.1.0".into(), model: "abc".into(), partial: false };
     let options = RewriteOptions { mark: Some(mark.clone()), ..RewriteOptions::default() };
     let go = format!("PROC a() MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],{EXT}],v100,fine,tool0; ENDPROC");
     let written = |source: &str, motion: u32| {
