@@ -227,8 +227,27 @@ fn verdict(rows: &[Row]) -> Verdict {
             .take(20)
             .map(|row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"))),
     );
+    // What would be needed is said in full: a table cuts it where a terminal is narrow.
+    let missing: Vec<&Row> =
+        rows.iter().filter(|row| row.ended == Ended::Unchanged && row.note.is_some()).collect();
+    reasons.extend(missing.iter().take(MISSING_NAMED).filter_map(|row| {
+        let note = row.note.as_ref()?;
+        Some(format!(
+            "{}: {note}; give the file that declares them, or a cell file (--cell) that says where they are",
+            row.file
+        ))
+    }));
+    if missing.len() > MISSING_NAMED {
+        reasons.push(format!(
+            "and {} more programs of which nothing is rewritten for want of them",
+            missing.len() - MISSING_NAMED
+        ));
+    }
     Verdict::new(status, headline, reasons)
 }
+
+/// Programs that are named for what is missing.
+const MISSING_NAMED: usize = 5;
 
 /// The contract `truegrind.compensation/1` of all programs together, with what failed. `programs` are the entries of
 /// each program's own contract.
