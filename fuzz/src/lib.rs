@@ -1,5 +1,23 @@
 //! What is tried on any bytes: each function must end, without a panic, and what it asserts must hold.
 
+pub mod targets;
+mod workbook;
+
+use std::sync::LazyLock;
+
+use truegrind::comparison::experiment::Experiment;
+use truegrind::compensation::cell::Cell;
+use truegrind::compensation::compensate::compensate;
+use truegrind::compensation::deviation::Status;
+use truegrind::compensation::rewrite::Options as Bounds;
+use truegrind::kinematics::condition::Condition;
+use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::Joints;
+use truegrind::measurement::simulation::recipe::Recipe;
+use truegrind::program::rapid::task_list;
+use truegrind::robots;
+use truegrind::surface::mesh::{Mesh, MeshOptions};
+
 use truegrind::measurement::import::{self, Options};
 use truegrind::program::diff::unified;
 use truegrind::program::motion::{Mark, MotionKind, Role, TargetValue};
@@ -92,3 +110,119 @@ pub fn surface(bytes: &[u8]) {
     let resolve = |name: &str| -> Result<Vec<u8>, String> { Err(format!("{name}: no file here")) };
     let _ = SurfaceFile::read("fuzz.toml", bytes, resolve);
 }
+
+/// The estimated arm that programs and cells are tried with.
+static ARM: LazyLock<Estimated> = LazyLock::new(|| {
+    Estimated::from_toml(include_str!("../corpus/model/causes.toml")).expect("the sample is a model")
+});
+
+/// The main job on any program: it ends, and no number that is written is other than finite.
+fn job(program: &Program<'_>, sources: &[&[u8]], cell: &Cell, arm: &Estimated) {
+    let done = compensate(program, arm, cell, &Bounds::default(), None).expect("edits do not overlap");
+    for (change, outcome) in done.plan.changes.iter().map(|c| (c, &done.plan.outcomes[c.motion as usize])) {
+        for target in &change.targets {
+            if let NewTarget::Cartesian { position_mm, quaternion, .. } = target {
+                assert!(position_mm.iter().chain(quaternion).all(|x| x.is_finite()));
+            }
+        }
+        let written = matches!(outcome.status, Status::Changed | Status::Flagged);
+        assert!(!written || [outcome.after_mm, outcome.sigma_mm].iter().flatten().all(|mm| mm.is_finite()));
+    }
+    for (file, source) in done.rewritten.files.iter().zip(sources) {
+        file.edits.apply(source).expect("edits are within the file");
+    }
+}
+
+/// RAPID: the main job.
+pub fn rapid_job(bytes: &[u8]) {
+    let program = Program::Rapid(rapid::Task::read(&[("fuzz.mod", bytes)]));
+    job(&program, &[bytes], &Cell::default(), &ARM);
+}
+
+/// NC: the main job.
+pub fn nc_job(bytes: &[u8]) {
+    let setup = Setup { angles: Some(nc::orientation::Angles::Wpr), ..Setup::default() };
+    let program = Program::Nc(nc::Task::read(&[("fuzz.nc", bytes)], &setup));
+    job(&program, &[bytes], &Cell::default(), &ARM);
+}
+
+/// Any bytes as text; what is no UTF-8 is replaced, as the command line refuses it.
+fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    String::from_utf8_lossy(bytes)
+}
+
+/// A workbook: the parts of one, put together; or its bytes with some changed behind the back of the container.
+pub fn xlsx(bytes: &[u8]) {
+    let mut book = workbook::of(bytes);
+    if bytes.len() % 8 == 7 && !book.is_empty() {
+        let at = bytes.iter().fold(0_usize, |sum, byte| sum.wrapping_mul(31).wrapping_add(usize::from(*byte)));
+        let length = book.len();
+        book[at % length] ^= 1 << (at % 8);
+    }
+    let _ = import::read("fuzz.xlsx", &book, &Options::default());
+}
+
+/// A mesh, and a ray through it.
+pub fn stl(bytes: &[u8]) {
+    if let Ok(mesh) = Mesh::from_stl(bytes, &MeshOptions::default()) {
+        let down = -nalgebra::Vector3::z_axis();
+        if let Some(contact) = mesh.ray(&nalgebra::Point3::new(1.0, 2.0, 1e4), &down) {
+            assert!(contact.normal.iter().all(|x| x.is_finite()));
+        }
+    }
+}
+
+/// A model that is taken: it is written and read again, and works.
+pub fn model(bytes: &[u8]) {
+    let Ok(arm) = Estimated::from_toml(&text(bytes)) else { return };
+    let again = arm.to_toml().expect("what was read can be written");
+    Estimated::from_toml(&again).expect("what was written can be read");
+    let posed = arm.model.under(&Condition::default());
+    assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
+    let program = Program::Rapid(rapid::Task::read(&[("fuzz.mod", LINES.as_bytes())]));
+    job(&program, &[LINES.as_bytes()], &Cell::default(), &arm);
+}
+
+/// A robot file that is taken reaches its own published pose, so loading checks all.
+pub fn robot(bytes: &[u8]) {
+    if let Ok(robot) = robots::parse(&text(bytes), "fuzz.toml") {
+        let posed = robot.model.under(&Condition::default());
+        assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
+    }
+}
+
+/// A cell file that is taken, and the main job with it.
+pub fn cell(bytes: &[u8]) {
+    let Ok(cell) = Cell::from_toml(&text(bytes)) else { return };
+    let program = Program::Rapid(rapid::Task::read(&[("fuzz.mod", LINES.as_bytes())]));
+    job(&program, &[LINES.as_bytes()], &cell, &ARM);
+}
+
+/// A recipe that is taken, and its measurements where they are few.
+pub fn recipe(bytes: &[u8]) {
+    let Ok(recipe) = Recipe::parse(&text(bytes), "fuzz.toml") else { return };
+    if recipe.check().is_ok() && bytes.len() % 4 == 0 {
+        let resolve = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+        let _ = recipe.simulate(resolve);
+    }
+}
+
+/// An experiment of the papers.
+pub fn experiment(bytes: &[u8]) {
+    let _ = Experiment::parse(&text(bytes), "fuzz.toml");
+}
+
+/// A task list.
+pub fn list(bytes: &[u8]) {
+    assert!(task_list::modules(bytes).iter().map(String::len).sum::<usize>() <= 4 * bytes.len());
+}
+
+/// A short cut in a work object, with a tool.
+const LINES: &str = "MODULE M\n\
+    PERS tooldata tWheel:=[TRUE,[[0,0,100],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];\n\
+    PERS wobjdata wPart:=[FALSE,TRUE,\"\",[[400,0,200],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n\
+    PROC main()\n\
+    MoveJ [[0,0,50],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tWheel\\WObj:=wPart;\n\
+    MoveL [[0,10,20],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tWheel\\WObj:=wPart;\n\
+    MoveL [[20,10,20],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tWheel\\WObj:=wPart;\n\
+    ENDPROC\nENDMODULE\n";
