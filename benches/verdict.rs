@@ -31,7 +31,7 @@ fn main() {
                     for scale in SCALES {
                         for k in 0..seeds {
                             let seed = cases.len() as u64 + 1;
-                            let spread = [0.5, 1.0, 2.0][(seed as usize + k as usize) % 3];
+                            let spread = [0.5, 1.0, 2.0][((seed / 6 + seed / 60 + k) % 3) as usize];
                             cases.push(Case { robot, cable, rows, noise_mm, scale, spread, seed });
                         }
                     }

@@ -5,7 +5,7 @@
 //!
 //! - arms nearer to their data sheet than the prior allows, with more noise: the width of lengths and angles and the
 //!   sensor's σ are no numbers here but grids, weighed by evidence;
-//! - a sensor whose scale is off, in all directions alike or in each of its own, beside any such arm.
+//! - a sensor whose scale is off, beside any such arm.
 //!
 //! With x̂ what is written and x the arm as these rivals believe it, a point that rides on the flange moves by J x̂ where it
 //! should move by J x. Against the arm of the data sheet that is worth
@@ -16,11 +16,11 @@
 //! J is taken apart from motions of the base and of the point on the flange, which the data do not see and which placing
 //! the part takes care of.
 //!
-//! Everything is linear about the estimate, from one pass over the rows: normal equations with the rivals' columns beside
+//! Everything is linear about the estimate, from one pass over the rows: normal equations with the scale's column beside
 //! them. Evidence of linear models with normal priors as in any text (Bishop 2006, section 3.5).
 //! Checked against: simulated arms at fresh poses (tests, and the sweep in `benches/verdict.rs`).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -84,40 +84,32 @@ const NOISES: [f64; 4] = [0.71, 1.0, 1.41, 2.0];
 /// With more parameters than this every second width is left out.
 const MANY: usize = 90;
 
-/// What may stand beside the arm, with its probability beforehand: nothing, one scale, a scale of each axis. Scales of a
-/// good instrument are parts in a million; what is weighed here are faults, met in a quarter of the cases.
+/// What may stand beside the arm, with its probability beforehand: nothing, or a scale. Those of a good instrument are
+/// parts in a million; what is weighed here are faults, met in a fifth of the cases: atmosphere and drift, a wrong wheel or
+/// calibration, a wrong unit.
 const RIVALS: [Rival; 4] = [
-    Rival { scales: Scales::None, sigma: 0.0, before: 0.75 },
-    Rival { scales: Scales::One, sigma: 1e-3, before: 0.1 },
-    Rival { scales: Scales::One, sigma: 1e-2, before: 0.1 },
-    Rival { scales: Scales::Axes, sigma: 3e-3, before: 0.05 },
+    Rival { sigma: None, before: 0.8 },
+    Rival { sigma: Some(1e-3), before: 0.05 },
+    Rival { sigma: Some(4e-3), before: 0.1 },
+    Rival { sigma: Some(1e-2), before: 0.05 },
 ];
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Scales {
-    None,
-    One,
-    Axes,
-}
 
 #[derive(Debug, Clone, Copy)]
 struct Rival {
-    scales: Scales,
-    sigma: f64,
+    /// Standard deviation of the sensor's relative scale error; absent where the scale is taken to be right.
+    sigma: Option<f64>,
     before: f64,
 }
 
-/// Readings as linear equations in the parameters and up to three scales.
+/// Readings as linear equations in the parameters and a scale of the sensor.
 struct Readings {
-    /// JᵀJ, scales last.
+    /// JᵀJ, the scale last.
     matrix: DMatrix<f64>,
     /// Jᵀy.
     right: DVector<f64>,
     /// yᵀy.
     square: f64,
     count: usize,
-    /// Columns of scales: one for a cable, three for a position or pose.
-    scales: usize,
 }
 
 /// Weighs the fit `fitted` of `dataset` against its rivals. `tolerance` is what an arm plausibly deviates by; `lack` is how
@@ -198,34 +190,27 @@ fn weighed(beliefs: &[Belief], readings: &Readings, written: &Written<'_>) -> Op
 const NEGLIGIBLE: f64 = -14.0;
 
 impl Readings {
-    /// Takes of each scale what the parameters of the fit could explain as well. What is left over would fit whatever else the
-    /// arm does that is no geometry, and with thousands of rows make a scale of it; and a scale of all directions has nothing
-    /// left over, since it is an arm that is larger. Which of two explanations of the same readings holds is then for the
-    /// tolerances to say alone.
+    /// Takes of the scale what the parameters of the fit could explain as well. What is left over would fit whatever else the
+    /// arm does that is no geometry, and with thousands of rows make a scale of it; and a true scale has next to nothing left
+    /// over, since it is an arm that is larger. Which of two explanations of the same readings holds is then for the
+    /// tolerances alone to say.
     fn within_the_arm(&mut self, fitted: &Fitted) -> Option<()> {
         let arm = fitted.parameters.len();
-        let mut matrix = self.matrix.view((0, 0), (arm, arm)).into_owned();
+        let held = self.matrix.view((0, 0), (arm, arm)).into_owned();
+        let mut matrix = held.clone();
         for (k, (parameter, prior)) in fitted.parameters.iter().zip(&fitted.priors).enumerate() {
-            let sigma =
-                if matches!(parameter, Parameter::Link { .. }) { FREE * prior.sigma } else { prior.sigma };
-            matrix[(k, k)] += 1.0 / (sigma * sigma);
+            let free = if matches!(parameter, Parameter::Link { .. }) { FREE } else { 1.0 };
+            matrix[(k, k)] += 1.0 / (free * prior.sigma).powi(2);
         }
         let (factor, _) = factored(&matrix)?;
-        let right = self.right.rows(0, arm).into_owned();
-        let beside = self.matrix.view((0, arm), (arm, self.scales)).into_owned();
-        let moves: Vec<DVector<f64>> =
-            beside.column_iter().map(|column| factor.solve(&column.into_owned())).collect();
-        let held = self.matrix.view((0, 0), (arm, arm)).into_owned();
-        for (i, a) in moves.iter().enumerate() {
-            let seen = &held * a;
-            self.right[arm + i] = a.dot(&right);
-            for k in 0..arm {
-                self.matrix[(k, arm + i)] = seen[k];
-                self.matrix[(arm + i, k)] = seen[k];
-            }
-            for (j, b) in moves.iter().enumerate() {
-                self.matrix[(arm + i, arm + j)] = b.dot(&seen);
-            }
+        let beside = self.matrix.view((0, arm), (arm, 1)).column(0).into_owned();
+        let moves = factor.solve(&beside);
+        let seen = held * &moves;
+        self.right[arm] = moves.dot(&self.right.rows(0, arm));
+        self.matrix[(arm, arm)] = moves.dot(&seen);
+        for k in 0..arm {
+            self.matrix[(k, arm)] = seen[k];
+            self.matrix[(arm, k)] = seen[k];
         }
         Some(())
     }
@@ -243,7 +228,7 @@ fn held_already(fitted: &Fitted) -> bool {
 struct Belief {
     /// Place in [`RIVALS`].
     rival: usize,
-    /// Weight of each parameter's prior, 1/σ², scales included.
+    /// Weight of each parameter's prior, 1/σ², the scale's included.
     precision: Vec<f64>,
     noise: f64,
 }
@@ -253,9 +238,7 @@ fn beliefs(fitted: &Fitted, readings: &Readings, tolerance: &Tolerance) -> Vec<B
     let held = held_already(fitted);
     let mut out = Vec::new();
     for (rival, kind) in RIVALS.iter().enumerate() {
-        let pointless =
-            kind.scales != Scales::None && held || kind.scales == Scales::Axes && readings.scales < 2;
-        if pointless {
+        if kind.sigma.is_some() && held {
             continue;
         }
         for length in LENGTHS.iter().step_by(step) {
@@ -268,8 +251,7 @@ fn beliefs(fitted: &Fitted, readings: &Readings, tolerance: &Tolerance) -> Vec<B
                         Parameter::Link { .. } => angle * tolerance.angle_rad,
                         _ => prior.sigma,
                     });
-                let scales = (0..kind.columns(readings.scales)).map(|_| kind.sigma);
-                let precision: Vec<f64> = links.chain(scales).map(|s| 1.0 / (s * s)).collect();
+                let precision: Vec<f64> = links.chain(kind.sigma).map(|s| 1.0 / (s * s)).collect();
                 out.extend(NOISES.map(|noise| Belief { rival, precision: precision.clone(), noise }));
             }
         }
@@ -278,22 +260,13 @@ fn beliefs(fitted: &Fitted, readings: &Readings, tolerance: &Tolerance) -> Vec<B
 }
 
 impl Rival {
-    fn columns(&self, scales: usize) -> usize {
-        match self.scales {
-            Scales::None => 0,
-            Scales::One => 1,
-            Scales::Axes => scales,
-        }
-    }
-
-    /// The readings as this rival sees them: without scales, with their sum as one, or with each.
+    /// The readings as this rival sees them.
     fn seen(&self, readings: &Readings, arm: usize) -> Seen {
-        let all = arm + readings.scales;
-        let fold = DMatrix::from_fn(all, arm + self.columns(readings.scales), |i, j| match self.scales {
-            Scales::One if i >= arm => f64::from(u8::from(j == arm)),
-            _ => f64::from(u8::from(i == j)),
-        });
-        Seen { matrix: fold.tr_mul(&readings.matrix) * &fold, right: fold.tr_mul(&readings.right) }
+        let size = arm + usize::from(self.sigma.is_some());
+        Seen {
+            matrix: readings.matrix.view((0, 0), (size, size)).into_owned(),
+            right: readings.right.rows(0, size).into_owned(),
+        }
     }
 }
 
@@ -356,7 +329,7 @@ impl Belief {
     fn view(&self, seen: &Seen, written: &Written<'_>) -> Option<View> {
         let (factor, _, found) = self.solved(seen)?;
         let Written { moved, x, toward, square, lack } = *written;
-        let (arm, extra) = (x.len(), found.len() - x.len());
+        let arm = x.len();
         let along = DVector::from_fn(found.len(), |k, _| if k < arm { toward[k] } else { 0.0 });
         let variance = 4.0 * lack * along.dot(&factor.solve(&along));
         let there = found.rows(0, arm).into_owned();
@@ -365,11 +338,7 @@ impl Belief {
         let unknown = lack * moved.component_mul(&inverse.view((0, 0), (arm, arm))).sum();
         let off = x - &there;
         let believed = there.dot(&(moved * &there));
-        let scale = (extra > 0).then(|| {
-            let n = extra as f64;
-            let variance = inverse.view((arm, arm), (extra, extra)).sum() / (n * n);
-            (found.rows(arm, extra).sum() / n, variance)
-        });
+        let scale = (found.len() > arm).then(|| (found[arm], inverse[(arm, arm)]));
         Some(View {
             chance: if variance > 0.0 { below(mean / variance.sqrt()) } else { 0.5 },
             nominal: believed + unknown,
@@ -454,18 +423,12 @@ pub fn lack(training: &Fitted, held: &Observed) -> f64 {
 fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
     let task = &fitted.task;
     let (p, per) = (task.parameters(), task.rows_per_observation());
-    let scales = if dataset.sensor == Sensor::Cable { 1 } else { 3 };
     let x = &fitted.estimate.x;
-    let turn = fitted.frames.base_from_sensor.rotation.to_rotation_matrix();
+    let turn = fitted.frames.base_from_sensor.rotation;
     let middle = middle(dataset);
-    let all = p + scales;
-    let mut out = Readings {
-        matrix: DMatrix::zeros(all, all),
-        right: DVector::zeros(all),
-        square: 0.0,
-        count: 0,
-        scales,
-    };
+    let all = p + 1;
+    let mut out =
+        Readings { matrix: DMatrix::zeros(all, all), right: DVector::zeros(all), square: 0.0, count: 0 };
     for from in (0..dataset.rows.len()).step_by(ROWS) {
         let to = (from + ROWS).min(dataset.rows.len());
         let n = (to - from) * per;
@@ -473,16 +436,13 @@ fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
         task.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
         for (i, row) in dataset.rows[from..to].iter().enumerate() {
             let weight = task.weight(from + i).per_mm;
-            match &row.reading {
-                Reading::Cable(length) => jacobian[n * p + i] = weight * (length - middle[0]),
-                Reading::Position(_) | Reading::Pose(_) => {
-                    let seen = placed(&row.reading);
-                    for axis in 0..3 {
-                        for component in 0..3 {
-                            jacobian[(p + axis) * n + i * per + component] =
-                                -weight * turn.matrix()[(component, axis)] * (seen[axis] - middle[axis]);
-                        }
-                    }
+            let seen = Vector3::from(placed(&row.reading)) - Vector3::from(middle);
+            match dataset.sensor {
+                Sensor::Cable => jacobian[n * p + i] = weight * seen.x,
+                Sensor::Position | Sensor::Pose => {
+                    let pushed = -weight * (turn * seen);
+                    let first = n * p + i * per;
+                    jacobian[first..first + 3].copy_from_slice(pushed.as_slice());
                 }
             }
         }

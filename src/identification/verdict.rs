@@ -11,7 +11,7 @@ use crate::kinematics::estimated::{EstimatedParameter, Judgement, Verdict};
 use crate::measurement::dataset::Sensor;
 
 /// Least probability of a benefit with which a model is not doubtful.
-pub const LEAST_CHANCE: f64 = 0.95;
+pub const LEAST_CHANCE: f64 = 0.96;
 
 /// Probability from which a scale of the sensor counts as found.
 const FOUND: f64 = 0.95;
@@ -120,6 +120,7 @@ impl Hearing {
 fn spoils(scale: &ScaleError) -> bool {
     scale.probability > FOUND
         && scale.value.abs() > 3.0 * scale.sigma
+        && scale.left < 1.0
         && scale.estimated_mm > SPOILT * scale.nominal_mm
 }
 
@@ -146,11 +147,16 @@ fn percent(scale: &ScaleError) -> String {
 }
 
 fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
-    let left = 100.0 * (1.0 - scale.left.clamp(0.0, 1.0).sqrt());
+    let share = 100.0 * (1.0 - scale.left.clamp(0.0, 1.0).sqrt());
+    let bent = if share >= 0.5 {
+        format!(", and {share:.0} % of what the links were bent by")
+    } else {
+        String::new()
+    };
     let (long, error) = if scale.value < 0.0 { ("short", -scale.value) } else { ("long", scale.value) };
     format!(
-        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {:.1} %), and \
-         {left:.0} % of what the links were bent by: {}",
+        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {:.1} \
+         %){bent}: {}",
         100.0 * error,
         100.0 * scale.sigma,
         100.0 * scale.probability,

@@ -1,6 +1,9 @@
 //! Simulated calibrations and what becomes of programs: whether the verdict writes what helps. Shared by the tests and by
 //! the sweep of `benches/verdict.rs`.
 
+// Public to the bench that includes this file.
+#![allow(unreachable_pub)]
+
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion};
