@@ -40,10 +40,15 @@ fn a_scale_of_the_sensor_is_named_and_its_model_is_not_written() {
 /// The class: a model of few noisy rows follows the noise, and three held-out rows cannot tell.
 #[test]
 fn few_noisy_rows_make_a_doubtful_model() {
-    let outcome = tracker(15, 2.0, 0.0).outcome();
-    assert_ne!(outcome.status, Some(Judgement::NotEvaluated), "{}", reasons(&outcome));
-    assert_eq!(outcome.status, Some(Judgement::Doubtful), "{}", reasons(&outcome));
-    assert!(reasons(&outcome).contains("measure more poses"), "{}", reasons(&outcome));
+    let mut doubtful = 0;
+    for seed in 1..=8 {
+        let outcome = Case { seed, ..tracker(15, 2.0, 0.0) }.outcome();
+        // Some fail already by what three held-out rows happen to say.
+        assert!(!outcome.written(), "{seed}: {}", reasons(&outcome));
+        assert!(reasons(&outcome).contains("measure more poses"), "{seed}: {}", reasons(&outcome));
+        doubtful += usize::from(outcome.status == Some(Judgement::Doubtful));
+    }
+    assert!(doubtful > 0);
 }
 
 /// What is measured soundly is written, from forty rows on, whichever the sensor and the arm.
