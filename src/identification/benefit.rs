@@ -130,7 +130,7 @@ pub fn benefit(
     let toward = &moved * &x;
     let square = x.dot(&toward);
     let written = Written { moved: &moved, x: &x, toward: &toward, square, lack };
-    let weighed = weighed(&beliefs(fitted, &readings, tolerance), &readings, &written)?;
+    let weighed = weighed(&beliefs(fitted, tolerance), &readings, &written)?;
     let total: f64 = weighed.iter().map(|(w, _)| w).sum();
     let mean = |of: &dyn Fn(&View) -> f64, only: &dyn Fn(&View) -> bool| {
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -233,7 +233,7 @@ struct Belief {
     noise: f64,
 }
 
-fn beliefs(fitted: &Fitted, readings: &Readings, tolerance: &Tolerance) -> Vec<Belief> {
+fn beliefs(fitted: &Fitted, tolerance: &Tolerance) -> Vec<Belief> {
     let step = if fitted.parameters.len() > MANY { 2 } else { 1 };
     let held = held_already(fitted);
     let mut out = Vec::new();

@@ -90,14 +90,18 @@ impl Hearing {
             return;
         }
         self.doubt(promise);
+        if found.chance_without_scale < LEAST_CHANCE {
+            self.doubt(few(found));
+            return;
+        }
         match &found.scale {
             Some(scale) if scale.probability > 0.5 => self.doubt(scale_sentence(scale, sensor)),
-            Some(scale) if found.chance_without_scale >= LEAST_CHANCE => self.doubt(format!(
+            Some(scale) => self.doubt(format!(
                 "a scale error of the sensor of {} cannot be told from longer links by these rows: {}",
                 percent(scale),
                 remedy(sensor)
             )),
-            _ => self.doubt(few(found)),
+            None => self.doubt(few(found)),
         }
     }
 
@@ -179,7 +183,7 @@ fn remedy(sensor: Sensor) -> &'static str {
 fn few(found: &Benefit) -> String {
     format!(
         "{} readings determine {:.1} of {} parameters, and with the noise that they show the correction is as likely to follow \
-         the noise as the arm: measure more poses, or with less noise",
+         the noise as the arm: measure more poses, or with less noise; `diagnose` tells whether something moved while measuring",
         found.readings, found.determined, found.parameters
     )
 }
