@@ -1,8 +1,8 @@
 //! Simulated calibrations and what becomes of programs: whether the verdict writes what helps. Shared by the tests and by
 //! the sweep of `benches/verdict.rs`.
 
-// Public to the bench that includes this file.
-#![allow(unreachable_pub)]
+// Public to the bench that includes this file, which does not read all of it.
+#![allow(unreachable_pub, dead_code)]
 
 use std::fmt;
 
