@@ -9,5 +9,7 @@ pub mod network;
 pub mod solver;
 pub mod fit;
 pub mod start;
+pub mod benefit;
+pub mod verdict;
 pub mod identify;
 pub mod study;

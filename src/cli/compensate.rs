@@ -154,6 +154,9 @@ pub(super) struct Arguments {
     /// Correct a program again that carries the mark of another model: corrections add up.
     #[arg(long)]
     again: bool,
+    /// Use a doubtful model: one whose data do not promise that programs gain.
+    #[arg(long)]
+    allow_doubtful: bool,
     /// What changes, as a unified diff.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     diff: Option<PathBuf>,
@@ -233,6 +236,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
     }
     let model = inputs::model(&arguments.model)?;
+    inputs::refuse_doubtful(&model, arguments.allow_doubtful)?;
     refuse_compensating_controller(arguments.robot.as_deref())?;
     let (robot, nominal) = inputs::nominal(&model, arguments.robot.as_deref())?;
     let corrector = match &model {

@@ -6,13 +6,12 @@ use anyhow::bail;
 use clap::Args;
 use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::diagnosis::transfer::transfer;
-use truegrind::kinematics::estimated::Judgement;
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
 
 use super::files::Batch;
-use super::identify::{DataArguments, best_start, read};
+use super::identify::{DataArguments, best_start, read, write_model};
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::{Common, Ending, on_threads};
@@ -22,9 +21,13 @@ use super::{Common, Ending, on_threads};
 pub(super) struct Arguments {
     #[command(flatten)]
     data: DataArguments,
-    /// The extended model to write; one that is worse than geometry on held-out rows is not written.
+    /// The extended model to write; one that fails the verdicts of `identify`, or is worse than geometry on held-out rows, is
+    /// not written, a doubtful one only with --allow-doubtful.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
+    /// Write a doubtful model too: one whose data do not promise that programs gain. The file carries the verdict.
+    #[arg(long)]
+    allow_doubtful: bool,
     /// Chance of any false finding on data with nothing hidden.
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
@@ -106,21 +109,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(path) = &arguments.outputs.rrd {
         batch.add(path, super::view::diagnosis(&found, &dataset)?);
     }
-    if let Some(path) = &arguments.output {
-        if found.estimated.verdict.status == Judgement::Fail {
-            batch.write()?;
-            bail!(
-                "{} was not written, because the fit failed: {}",
-                path.display(),
-                found.estimated.verdict.reasons.join("; ")
-            );
-        }
-        batch.add(path, found.estimated.to_toml().map_err(anyhow::Error::msg)?);
-    }
-    batch.write()?;
-    let doubtful = found.estimated.verdict.status == Judgement::Fail
-        || found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
-    Ok(if doubtful { Ending::Flagged } else { Ending::Done })
+    let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
+    let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;
+    Ok(if unexplained { Ending::Flagged } else { ending })
 }
 
 /// The diagnosis, starting frames included.

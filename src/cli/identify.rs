@@ -1,6 +1,6 @@
 //! `truegrind identify DATA --robot R -o MODEL.toml`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
@@ -11,7 +11,7 @@ use truegrind::identification::solver::{SOLVERS, by_name};
 use truegrind::identification::start::starts;
 use truegrind::identification::study::study;
 use truegrind::identification::tolerance::Tolerance;
-use truegrind::kinematics::estimated::Judgement;
+use truegrind::kinematics::estimated::{Estimated, Judgement};
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::convention::AngleConvention;
 use truegrind::measurement::dataset::Dataset;
@@ -61,9 +61,12 @@ pub(super) struct DataArguments {
 pub(super) struct Arguments {
     #[command(flatten)]
     data: DataArguments,
-    /// The model file to write; a failed fit is not written.
+    /// The model file to write; a failed fit is not written, a doubtful one only with --allow-doubtful.
     #[arg(short, long, value_name = "MODEL.toml")]
     output: Option<PathBuf>,
+    /// Write a doubtful model too: one whose data do not promise that programs gain. The file carries the verdict.
+    #[arg(long)]
+    allow_doubtful: bool,
     /// Method, such as lm, ltlm, ekf, ukf-vslm, rls, rbf or lm-as-printed; an unknown one gets the list.
     #[arg(long, default_value = "lm")]
     method: String,
@@ -144,21 +147,35 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         let text = format::terminal::table(&study_view::table(&rows), width());
         if arguments.outputs.takes_stdout() { eprint!("{text}") } else { print!("{text}") }
     }
-    let failed = found.estimated.verdict.status == Judgement::Fail;
-    if let Some(path) = &arguments.output {
-        if failed {
+    write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
+}
+
+/// Writes what was made, and the model where its verdict allows it.
+pub(super) fn write_model(
+    estimated: &Estimated,
+    output: Option<&Path>,
+    allow_doubtful: bool,
+    mut batch: Batch,
+) -> anyhow::Result<Ending> {
+    let status = estimated.verdict.status;
+    let reasons = || estimated.verdict.reasons.join("; ");
+    if let Some(path) = output {
+        let why = match status {
+            Judgement::Fail => Some("the fit failed"),
+            Judgement::Doubtful if !allow_doubtful => {
+                Some("the model is doubtful (--allow-doubtful writes it all the same)")
+            }
+            _ => None,
+        };
+        if let Some(why) = why {
             batch.write()?;
-            bail!(
-                "{} was not written, because the fit failed: {}",
-                path.display(),
-                found.estimated.verdict.reasons.join("; ")
-            );
+            bail!("{} was not written, because {why}: {}", path.display(), reasons());
         }
-        let text = found.estimated.to_toml().map_err(anyhow::Error::msg)?;
-        batch.add(path, text);
+        batch.add(path, estimated.to_toml().map_err(anyhow::Error::msg)?);
     }
     batch.write()?;
-    Ok(if failed { Ending::Flagged } else { Ending::Done })
+    let poor = matches!(status, Judgement::Fail | Judgement::Doubtful);
+    Ok(if poor { Ending::Flagged } else { Ending::Done })
 }
 
 fn options(arguments: &Arguments) -> anyhow::Result<Options> {

@@ -57,6 +57,22 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     Ok(NamedModel::Estimated { name: files::name(path), hash, arm: Box::new(arm) })
 }
 
+/// A doubtful model corrects programs only where that is asked for, and is called what it is where it does.
+pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Result<()> {
+    let NamedModel::Estimated { name, arm, .. } = model else { return Ok(()) };
+    if arm.verdict.status != Judgement::Doubtful {
+        return Ok(());
+    }
+    let reasons = arm.verdict.reasons.join("; ");
+    if !allowed {
+        bail!(
+            "{name}: this model is doubtful, programs are corrected with it only with --allow-doubtful: {reasons}"
+        );
+    }
+    eprintln!("note: {name}: this model is doubtful: {reasons}");
+    Ok(())
+}
+
 /// First twelve hex digits of the SHA-256.
 pub(super) fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()

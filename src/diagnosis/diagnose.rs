@@ -13,6 +13,8 @@ use super::rows::{Prepared, prepare};
 use super::selection::{self, Accepted, BLOCKS, Selection};
 use super::silence::not_testable;
 use super::validation::{StageError, Validation, nominal};
+use crate::estimation::problem::Problem;
+use crate::identification::benefit::benefit;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
 use crate::identification::identify::{
@@ -21,7 +23,10 @@ use crate::identification::identify::{
 use crate::identification::network::with_network;
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
+use crate::identification::verdict::Hearing;
+use crate::kinematics::estimated::{
+    Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict,
+};
 use crate::kinematics::model::Model;
 use crate::kinematics::region::Region;
 use crate::measurement::dataset::{Dataset, Sensor};
@@ -222,8 +227,9 @@ pub fn diagnose(
         .collect();
     measure_again.sort_unstable();
     measure_again.dedup();
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
+        verdict: None,
         dataset: Source {
             file: dataset.file.clone(),
             rows: dataset.rows.len(),
@@ -260,6 +266,7 @@ pub fn diagnose(
         options,
         &prepared,
     );
+    diagnosis.verdict = Some(estimated.verdict.clone());
     Ok(Diagnosed {
         diagnosis,
         geometric,
@@ -365,23 +372,6 @@ fn estimated(
 ) -> Estimated {
     let fitted = Fitted::from(extended);
     let parameters = parameter_table(&fitted, nominal_arm);
-    let mut reasons = vec![format!("the fit {}", extended.estimate.termination)];
-    let mut failed = !extended.estimate.termination.is_converged();
-    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
-        failed = true;
-        reasons.push(format!(
-            "with the findings the held-out error is {:.3} mm, geometry alone has {:.3}",
-            stages[2].random.rmse, stages[1].random.rmse
-        ));
-    }
-    if stages[2].random.rmse > stages[0].random.rmse {
-        failed = true;
-        reasons.push(format!(
-            "held out, geometry is worse than registered frames: {:.3} against {:.3} mm",
-            stages[2].random.rmse, stages[0].random.rmse
-        ));
-    }
-    reasons.push("held-out error not evaluated: no limits were stated".to_owned());
     let order = arm_of(&fitted);
     let estimated = Estimated {
         robot: robot.to_owned(),
@@ -409,7 +399,7 @@ fn estimated(
         registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
         geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
         noise_floor_mm: diagnosis.noise_floor_mm,
-        verdict: Verdict { status: if failed { Judgement::Fail } else { Judgement::NotEvaluated }, reasons },
+        verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region {
             min_deg: [0.0; 6],
             max_deg: [0.0; 6],
@@ -419,5 +409,52 @@ fn estimated(
         },
         condition: mean_condition(dataset),
     };
-    with_region(estimated, &subject.observed.dataset, &fitted)
+    let mut estimated = with_region(estimated, &subject.observed.dataset, &fitted);
+    estimated.verdict = judge(&fitted, &subject.observed.dataset, &estimated, &parameters, stages);
+    estimated
+}
+
+/// Every verdict of an identification, and that findings may not make geometry worse. Links and what the model promises are
+/// held against the tolerance of arms, not against the wide priors of a diagnosis.
+fn judge(
+    fitted: &Fitted,
+    dataset: &Dataset,
+    estimated: &Estimated,
+    parameters: &[EstimatedParameter],
+    stages: &[StageError; 3],
+) -> Verdict {
+    let mut hearing = Hearing::default();
+    if fitted.termination().is_converged() {
+        hearing.tell(format!("the fit {}", fitted.termination()));
+    } else {
+        hearing.fail(format!("the fit did not converge: {}", fitted.termination()));
+    }
+    if stages[2].blocks.rmse > stages[1].blocks.rmse * 1.05 && stages[2].random.rmse > stages[1].random.rmse {
+        hearing.fail(format!(
+            "with the findings the held-out error is {:.3} mm, geometry alone has {:.3}",
+            stages[2].random.rmse, stages[1].random.rmse
+        ));
+    }
+    let plausible = Tolerance::default();
+    hearing.strange_links(parameters, &plausible, SURE);
+    hearing.held_out(stages[0].random.rmse, stages[2].random.rmse);
+    let benefit = benefit(fitted, dataset, estimated, &plausible, lack(fitted, dataset, &stages[2]));
+    hearing.benefit(benefit.as_ref(), dataset.sensor);
+    hearing.tell("held-out error not evaluated: no limits were stated");
+    hearing.verdict()
+}
+
+/// With its wide priors a link that the rows hardly see is believed off only beyond this many standard deviations.
+const SURE: f64 = 2.0;
+
+/// How many times larger than it should be the square of the held-out error is: with k parameters determined by n readings
+/// it is (n + k) / (n − k) times that of the fit.
+fn lack(fitted: &Fitted, dataset: &Dataset, errors: &StageError) -> f64 {
+    let per = fitted.task.rows_per_observation();
+    let n = (dataset.rows.len() * per) as f64;
+    let shares = fitted.sigmas().into_iter().zip(&fitted.priors);
+    let spent: f64 = shares.map(|(s, p)| (1.0 - (s / p.sigma).powi(2)).clamp(0.0, 1.0)).sum();
+    let expected = (n + spent) / (n - spent).max(0.05 * n).max(1.0);
+    let lack = (errors.random.rmse / errors.fitted.rmse).powi(2) / expected;
+    if lack.is_finite() { lack.max(1.0) } else { 1.0 }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::identification::identify::IdentifyError;
+use crate::kinematics::estimated::Verdict;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
@@ -183,6 +184,9 @@ pub struct Diagnosis {
     pub schema: String,
     /// The rows.
     pub dataset: Source,
+    /// The verdict on the extended model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     /// What sensor and rounding leave (mm); absent where it cannot be told.
     pub noise_floor_mm: Option<f64>,
     /// Where the floor comes from, in words.

@@ -155,6 +155,14 @@ impl Calibration {
         out
     }
 
+    /// Weight of a row.
+    ///
+    /// # Panics
+    /// Beyond the last row.
+    pub fn weight(&self, row: usize) -> Weight {
+        Weight { per_mm: self.columns.per_mm[row], per_rad: self.columns.per_rad[row] }
+    }
+
     /// What may move, in the order of x.
     pub fn parameters_list(&self) -> &[Parameter] {
         &self.parameters

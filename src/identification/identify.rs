@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::estimation::estimate::Termination;
 use crate::estimation::problem::Problem;
+use crate::identification::benefit::{Benefit, benefit, lack};
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{
     Fitted, Observed, Outliers, Start, arm_parameters, errors_on, fit, frame_parameters, outliers, summary_on,
@@ -15,6 +16,7 @@ use crate::identification::rounding::{NotSharpened, Sharpening, logged_covarianc
 use crate::identification::solver::{Family, Solver};
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
+use crate::identification::verdict::Hearing;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::estimated::{
     Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict,
@@ -92,6 +94,8 @@ pub enum IdentifyError {
 pub struct Identification {
     /// The estimated arm, fitted to all rows that were not set aside.
     pub estimated: Estimated,
+    /// What it promises programs; absent for methods that make no model.
+    pub benefit: Option<Benefit>,
     /// The fit behind it.
     pub geometry: Fitted,
     /// The fit of the frames alone, on all rows.
@@ -114,9 +118,6 @@ pub struct Identification {
 
 /// More than this with frames fitted is no tolerance but a mistake (mm).
 const WRONG_ARM_MM: f64 = 25.0;
-
-/// A parameter farther than this many prior standard deviations from nominal makes the fit fail.
-const STRANGE_DEVIATION: f64 = 6.0;
 
 /// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows
 /// that were not set aside, given their number.
@@ -182,8 +183,6 @@ pub fn identify(
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let identifiability = geometry.identifiability();
     let parameters = parameter_table(&geometry, nominal);
-    let verdict =
-        judge(&training, &geometry, &registered_errors, &geometry_errors, &parameters, &outliers, options);
     let estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal.clone(),
@@ -210,7 +209,7 @@ pub fn identify(
         registered: registered_errors,
         geometry: geometry_errors,
         noise_floor_mm: noise_floor(&observed, &geometry),
-        verdict,
+        verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region {
             min_deg: [0.0; 6],
             max_deg: [0.0; 6],
@@ -220,9 +219,27 @@ pub fn identify(
         },
         condition: mean_condition(dataset),
     };
-    let estimated = with_region(estimated, &observed.dataset, &geometry);
+    let mut estimated = with_region(estimated, &observed.dataset, &geometry);
+    let benefit = if options.solver.literal {
+        None
+    } else {
+        let lack = lack(&training, &held_rows);
+        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack)
+    };
+    let case = Case {
+        training: &training,
+        geometry: &geometry,
+        registered: &registered_errors,
+        after: &geometry_errors,
+        parameters: &parameters,
+        outliers: &outliers,
+        benefit: benefit.as_ref(),
+        sensor: dataset.sensor,
+    };
+    estimated.verdict = judge(&case, options);
     Ok(Identification {
         estimated,
+        benefit,
         geometry,
         registered,
         training,
@@ -433,89 +450,61 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
     estimated
 }
 
-fn judge(
-    training: &Fitted,
-    geometry: &Fitted,
-    registered: &StageErrors,
-    after: &StageErrors,
-    parameters: &[EstimatedParameter],
-    outliers: &Outliers,
-    options: &Options,
-) -> Verdict {
-    let mut reasons = Vec::new();
-    let mut failed = false;
-    let mut fail = |reasons: &mut Vec<String>, text: String| {
-        failed = true;
-        reasons.push(text);
-    };
-    for (fitted, rows) in [(training, "the rows of the split"), (geometry, "all rows")] {
+struct Case<'a> {
+    training: &'a Fitted,
+    geometry: &'a Fitted,
+    registered: &'a StageErrors,
+    after: &'a StageErrors,
+    parameters: &'a [EstimatedParameter],
+    outliers: &'a Outliers,
+    benefit: Option<&'a Benefit>,
+    sensor: Sensor,
+}
+
+fn judge(case: &Case<'_>, options: &Options) -> Verdict {
+    let mut hearing = Hearing::default();
+    for (fitted, rows) in [(case.training, "the rows of the split"), (case.geometry, "all rows")] {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            reasons.push(format!("on {rows} the fit {}", fitted.termination()));
+            hearing.tell(format!("on {rows} the fit {}", fitted.termination()));
         } else if filtered {
-            reasons.push(format!("on {rows} the filter took in every reading; it claims no minimum"));
+            hearing.tell(format!("on {rows} the filter took in every reading; it claims no minimum"));
         } else {
-            fail(&mut reasons, format!("on {rows} the fit did not converge: {}", fitted.termination()));
+            hearing.fail(format!("on {rows} the fit did not converge: {}", fitted.termination()));
         }
     }
     if options.solver.literal {
-        fail(
-            &mut reasons,
-            format!(
-                "{} has no priors: what the data cannot see moved freely, so its parameters are a comparison and no model",
-                options.solver.name
-            ),
-        );
-    }
-    for p in parameters.iter().filter(|p| p.name.starts_with("link")) {
-        let off = (p.value - p.nominal).abs() / p.prior_sigma.unwrap_or(f64::INFINITY);
-        if !(off < STRANGE_DEVIATION) {
-            fail(
-                &mut reasons,
-                format!(
-                    "{} came out {off:.0} tolerances from nominal: wrong units, wrong robot, or an effect that geometry cannot hold",
-                    p.name
-                ),
-            );
-        }
-    }
-    if outliers.too_many > 0 {
-        reasons.push(format!(
-            "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
-            outliers.too_many
+        hearing.fail(format!(
+            "{} has no priors: what the data cannot see moved freely, so its parameters are a comparison and no model",
+            options.solver.name
         ));
     }
-    let (before, held) = (registered.held_out.rmse, after.held_out.rmse);
-    if held > before {
-        fail(
-            &mut reasons,
-            format!(
-                "geometry is worse than registered frames on held-out rows: {held:.3} against {before:.3} mm RMSE"
-            ),
-        );
+    hearing.strange_links(case.parameters, &options.tolerance, 0.0);
+    if case.outliers.too_many > 0 {
+        hearing.tell(format!(
+            "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
+            case.outliers.too_many
+        ));
     }
-    let mut stated = false;
+    let (before, held) = (case.registered.held_out.rmse, case.after.held_out.rmse);
+    hearing.held_out(before, held);
+    if !options.solver.literal {
+        hearing.benefit(case.benefit, case.sensor);
+    }
     for (name, limit, found) in
-        [("RMSE", options.limit_rmse_mm, held), ("maximum", options.limit_max_mm, after.held_out.max)]
+        [("RMSE", options.limit_rmse_mm, held), ("maximum", options.limit_max_mm, case.after.held_out.max)]
     {
         let Some(limit) = limit else { continue };
-        stated = true;
+        hearing.limits_stated = true;
         if found <= limit {
-            reasons.push(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
+            hearing.tell(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
         } else {
-            fail(&mut reasons, format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
+            hearing.fail(format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
         }
     }
-    if !stated {
-        reasons.push(
-            "held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)".to_owned(),
-        );
+    if !hearing.limits_stated {
+        hearing.tell("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
     }
-    let status = match (failed, stated) {
-        (true, _) => Judgement::Fail,
-        (false, true) => Judgement::Pass,
-        (false, false) => Judgement::NotEvaluated,
-    };
-    Verdict { status, reasons }
+    hearing.verdict()
 }

@@ -28,6 +28,8 @@ pub enum Judgement {
     Pass,
     /// The fit may not be used.
     Fail,
+    /// The data do not promise that programs gain: used only where that is asked for.
+    Doubtful,
     /// Nothing speaks against the fit, and no limits were stated to judge it by.
     NotEvaluated,
 }

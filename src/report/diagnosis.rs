@@ -87,6 +87,7 @@ pub fn summary(found: &Diagnosed) -> Document {
         "{}, {} rows, sensor {}, {} set aside",
         diagnosis.dataset.file, diagnosis.dataset.rows, diagnosis.dataset.sensor, diagnosis.dataset.set_aside
     );
+    page.push(super::identification::judged(&found.estimated));
     let fits = &diagnosis.fits;
     let causes: Vec<String> = diagnosis
         .findings

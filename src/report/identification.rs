@@ -13,7 +13,7 @@ use super::number::Precision;
 use super::status::Status;
 use super::table::Cell;
 use crate::identification::identify::Identification;
-use crate::kinematics::estimated::{EstimatedParameter, Judgement};
+use crate::kinematics::estimated::{Estimated, EstimatedParameter, Judgement};
 use crate::measurement::dataset::{Dataset, Sensor};
 
 pub use tables::{
@@ -161,6 +161,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
             "costs_by_round": rounds,
         },
         "verdict": estimated.verdict,
+        "benefit": found.benefit,
         "noise_floor_mm": estimated.noise_floor_mm,
         "sigma_mm": found.geometry.sigma_mm,
         "stages": {
@@ -243,13 +244,21 @@ fn row_number(dataset: &Dataset, index: usize) -> usize {
 }
 
 fn verdict(found: &Identification) -> Verdict {
-    let estimated = &found.estimated;
+    judged(&found.estimated)
+}
+
+/// The verdict on an estimated arm as every report says it, whichever way the arm was found.
+pub fn judged(estimated: &Estimated) -> Verdict {
     let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
     let errors =
         format!("held-out error {after:.3} mm RMSE, where registered frames alone leave {before:.3} mm");
     let (status, headline) = match estimated.verdict.status {
         Judgement::Pass => (Status::Good, format!("The model meets the stated limits: {errors}")),
         Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
+        Judgement::Doubtful => (
+            Status::Warning,
+            format!("The model is doubtful, it is not written or used without --allow-doubtful: {errors}"),
+        ),
         Judgement::NotEvaluated => (
             Status::NotEvaluated,
             format!("Nothing speaks against the model, but no limits were stated: {errors}"),

@@ -41,6 +41,58 @@ fn changed(columns: &[&str], change: impl Fn(usize, &str) -> String) -> String {
     out
 }
 
+/// The shipped tracker's rows with every reading too long by `error`.
+fn scaled(error: f64) -> String {
+    let mut lines = include_str!("../data/irb120-tracker.csv").lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut out = header.join(",") + "\n";
+    for line in lines {
+        let cells = line.split(',').zip(&header).map(|(cell, name)| match name.strip_prefix("measured_") {
+            Some(_) => format!("{:.7}", cell.parse::<f64>().unwrap() * (1.0 + error)),
+            None => cell.to_owned(),
+        });
+        out += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    out
+}
+
+/// A model whose data do not promise that programs gain is written, and used, only where that is asked for; identify,
+/// diagnose and all their outputs call it doubtful first, in the same words.
+#[test]
+fn a_doubtful_model_needs_a_flag_to_be_written_and_to_be_used() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("data.csv"), scaled(0.005)).unwrap();
+    let program = "MODULE m\nPROC main()\nMoveJ [[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\nENDPROC\nENDMODULE\n";
+    fs::write(at.join("in.mod"), program).unwrap();
+    let word = "The model is doubtful, it is not written or used without --allow-doubtful";
+    for verb in ["identify", "diagnose"] {
+        let begin = [verb, "data.csv", "--robot", "abb-irb-120", "-o", "m.toml"];
+        let (code, _, err) =
+            truegrind(at, &[&begin[..], &["--json", "o.json", "--html", "o.html", "--md", "o.md"]].concat());
+        assert_eq!(code, 2, "{verb}: {err}");
+        assert!(err.contains("--allow-doubtful") && err.contains("too long"), "{verb}: {err}");
+        assert!(!at.join("m.toml").exists(), "{verb}");
+        let json: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(at.join("o.json")).unwrap()).unwrap();
+        assert_eq!(json["verdict"]["status"], "doubtful", "{verb}");
+        for page in ["o.html", "o.md"] {
+            let text = fs::read_to_string(at.join(page)).unwrap();
+            assert!(text.contains(word) && !text.contains("Nothing speaks against"), "{verb} {page}");
+        }
+        let (code, _, err) = truegrind(at, &[&begin[..], &["--allow-doubtful"]].concat());
+        assert_eq!(code, 1, "{verb}: {err}");
+        let compensate = ["compensate", "in.mod", "--model", "m.toml", "-o", "out.mod"];
+        let (code, _, err) = truegrind(at, &compensate);
+        assert_eq!(code, 2, "{verb}: {err}");
+        assert!(err.contains("doubtful") && !at.join("out.mod").exists(), "{verb}: {err}");
+        let (code, _, err) = truegrind(at, &[&compensate[..], &["--allow-doubtful"]].concat());
+        assert!(code < 2 && err.contains("doubtful"), "{verb}: {err}");
+        fs::remove_file(at.join("m.toml")).unwrap();
+        fs::remove_file(at.join("out.mod")).unwrap();
+    }
+}
+
 /// Runs `identify` on a text and expects exit code 2, no model, and all of `words` in the message.
 fn refused(text: &str, words: &[&str]) {
     let dir = folder();

@@ -1,4 +1,6 @@
 //! Tests of `identification`.
 
 mod calibration;
+mod promise;
 mod real;
+mod verdict;

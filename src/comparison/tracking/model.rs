@@ -43,10 +43,10 @@ impl Tracker {
         out.condition = self.condition;
         out.region.clone_from(&self.state.region);
         out.verdict = Verdict {
-            status: if self.begun.verdict.status == Judgement::Fail {
-                Judgement::Fail
-            } else {
-                Judgement::NotEvaluated
+            status: match self.begun.verdict.status {
+                // What was wrong with the beginning is not mended by following it.
+                bad @ (Judgement::Fail | Judgement::Doubtful) => bad,
+                Judgement::Pass | Judgement::NotEvaluated => Judgement::NotEvaluated,
             },
             reasons: self.reasons(),
         };

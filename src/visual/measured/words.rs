@@ -80,6 +80,7 @@ fn verdict(text: &mut String, found: &Identification) {
     let status = match verdict.status {
         Judgement::Pass => "pass",
         Judgement::Fail => "FAIL",
+        Judgement::Doubtful => "doubtful",
         Judgement::NotEvaluated => "not evaluated",
     };
     let method = line(&found.estimated.provenance.method);
