@@ -130,10 +130,19 @@ fn print(bytes: &[u8]) -> anyhow::Result<()> {
     }
 }
 
+/// Characters of one message; more is not read by anybody.
+const MOST_TOLD: usize = 10_000;
+
 /// Tells something on stderr. It begins at the margin and goes on indented, so that no name or cell with an end of line in it
 /// passes for a message of its own.
 pub(super) fn tell(text: impl Display) {
-    let text = text.to_string();
+    let mut text = text.to_string();
+    // A file of a megabyte without a line feed is no message.
+    if let Some((cut, _)) = text.char_indices().nth(MOST_TOLD) {
+        let more = text[cut..].chars().count();
+        text.truncate(cut);
+        text += &format!("… ({more} more characters)");
+    }
     tell_lines(&format!("{}\n", visible::text(&text).replace('\n', "\n  ")));
 }
 

@@ -49,10 +49,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ),
         _ => writer::write(&path.draft)?,
     };
-    say(&path, &robot, &arguments.output);
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
+    say(&path, &robot, &arguments.output);
     Ok(Ending::Done)
 }
 

@@ -62,6 +62,9 @@ fn what_acts_without_showing_never_reaches_a_terminal_or_a_log() {
     fs::write(at.join("c.csv"), lines.join("\n")).unwrap();
     let told = run(at, &["identify", "c.csv", "--robot", "abb-irb-120"]);
     assert!(!told.contains("\nerror: forged"), "{told}");
+    // A word of a megabyte is cut where it is told.
+    fs::write(at.join("l.csv"), CABLE.replacen("q6", &"q".repeat(1_000_000), 1)).unwrap();
+    assert!(run(at, &["identify", "l.csv", "--robot", "abb-irb-120"]).len() < 100_000);
     // Keys and words of TOML.
     for text in [format!("\"k{EVIL}\" = 1\n").replace('\u{7f}', ""), format!("robot = \"{EVIL}\n")] {
         fs::write(at.join("t.toml"), &text).unwrap();
