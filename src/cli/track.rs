@@ -95,6 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.state.is_some() || folder.is_dir() {
         targets.push(&state_path);
     }
+    measurement_files(arguments)?.iter().try_for_each(|path| files::expect(path))?;
     Batch::check(&inputs_of_run, &targets)?;
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: a track has no recording; --html FILE writes a page");

@@ -190,7 +190,7 @@ fn only_one_file_opens_files_and_only_one_prints() {
         "fs::copy",
         "fs::rename",
     ];
-    let printing = ["println!(", "print!(", "stdout()", "stderr()"];
+    let printing = ["println!(", "print!(", "io::stdout()", "io::stderr()"];
     for file in &files {
         let name = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
         let text = fs::read_to_string(file).unwrap();

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+#[allow(dead_code, reason = "the hook belongs to the program")]
 #[path = "../../../src/cli/defect.rs"]
 mod caught;
 

@@ -28,7 +28,6 @@ struct Verb {
     others: &'static [&'static str],
 }
 
-const TABLES: [&str; 6] = ["--json", "--csv", "--parquet", "--md", "--html", "--rrd"];
 const CELL: [&str; 4] = ["--cell", "--surface", "--payload", "--payload-centre"];
 
 fn verbs() -> Vec<Verb> {
@@ -345,7 +344,7 @@ fn copied() -> TempDir {
 }
 
 fn arguments<'a>(verb: &Verb, more: &[&'a str]) -> Vec<&'a str> {
-    let needs = if more.contains(&"-o") { &[][..] } else { verb.needs };
+    let needs = if more.iter().any(|word| word.starts_with("-o")) { &[][..] } else { verb.needs };
     [verb.base, needs, more].concat()
 }
 
@@ -445,12 +444,11 @@ fn no_two_outputs_are_one_file() {
             let pair = [["x.out", "./x.out"], ["old", "older"], ["-", "/dev/stdout"]][second % 3];
             let takes_stdout = ![first, other].iter().any(|o| ["--parquet", "--rrd", "--state"].contains(o));
             let pair = if pair[0] == "-" && !takes_stdout { ["y", "y"] } else { pair };
-            let run = arguments(
-                verb,
-                &[&format!("{first}={}", pair[0]), &format!("{other}={}", pair[1])].map(String::as_str),
-            );
-            let run: Vec<String> = run.iter().map(|word| word.replacen("-o=", "-o", 1)).collect();
-            let run: Vec<&str> = run.iter().map(String::as_str).collect();
+            let named = |option: &str, file: &str| {
+                if option == "-o" { format!("-o{file}") } else { format!("{option}={file}") }
+            };
+            let both = [named(first, pair[0]), named(other, pair[1])];
+            let run = arguments(verb, &[&both[0], &both[1]]);
             let (code, out, err) = truegrind(at, &run);
             let told = ["the second", "two outputs"].iter().any(|words| err.contains(words));
             let kept = fs::read_to_string(at.join("old")).unwrap() == "old" && !at.join("x.out").exists();
