@@ -3,8 +3,7 @@
 //! Results go to stdout, talk and progress to stderr. Exit code 0: done; 1: done, but something was refused or
 //! flagged; 2: nothing done.
 
-#![allow(clippy::print_stdout, clippy::print_stderr)]
-
+mod defect;
 mod files;
 mod inputs;
 mod outputs;
@@ -93,15 +92,21 @@ pub(crate) fn run() -> ExitCode {
         Err(error) => {
             // Help and version are no failure.
             let code = if error.use_stderr() { 2 } else { 0 };
-            let _ = error.print();
+            if error.use_stderr() {
+                // What was typed stands in it, names of files that a pattern found among them.
+                outputs::tell_lines(&error.render().to_string());
+            } else {
+                let _ = error.print();
+            }
             return ExitCode::from(code);
         }
     };
-    match dispatch(cli.verb) {
+    defect::hush();
+    match defect::isolated(|| dispatch(cli.verb)) {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Flagged) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            outputs::tell(format!("error: {error:#}"));
             ExitCode::from(2)
         }
     }

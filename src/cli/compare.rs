@@ -15,7 +15,7 @@ use truegrind::report::format;
 
 use super::files::{self, Batch};
 use super::identify::{Angles, DataArguments};
-use super::outputs::{Outputs, say, width};
+use super::outputs::{Outputs, say, tell, tell_lines, width};
 use super::progress::Work;
 use super::{Common, Ending, identify, inputs, on_threads};
 
@@ -45,9 +45,12 @@ pub(super) struct Arguments {
     /// Take the units as they are, however odd they look.
     #[arg(long)]
     allow_odd_units: bool,
-    /// Measured seconds as CSV; they are in no other file for programs, since no two runs agree on them.
+    /// Measured seconds as CSV; they are in no other file unless --timings says so, since no two runs agree on them.
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
+    /// Show measured seconds on stderr and on the pages, which are then not the same in every run.
+    #[arg(long)]
+    timings: bool,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -88,14 +91,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     };
     let kind = experiment.kind().ok_or_else(|| anyhow!("{name}: says nothing to run"))?;
     let seed = arguments.common.seed;
-    let mut origin = Origin { seed, ..Origin::default() };
+    let mut origin = Origin { seed, timings: arguments.timings, ..Origin::default() };
     let measured = if experiment.takes_rows() { Some(measured(arguments, &experiment)?) } else { None };
     if let Some(measured) = &measured {
         origin.file = Some(measured.dataset.file.clone());
         origin.sha256 = Some(measured.dataset.sha256.clone());
         origin.rows = Some(measured.dataset.rows.len());
         origin.robot = Some(measured.robot.clone());
-        measured.dataset.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        measured.dataset.notes.iter().for_each(|note| tell(format_args!("note: {note}")));
     } else if let Some(data) = &arguments.data {
         bail!("{}: experiment {name} takes no measurements; leave DATA out", data.display());
     }
@@ -138,8 +141,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     drop(work);
     arguments.outputs.print(&view::summary(&experiment, &results))?;
     let times = view::times(&results);
-    if let Some(times) = &times {
-        eprint!("{}", format::terminal::table(times, width()));
+    if let Some(times) = times.as_ref().filter(|_| arguments.timings) {
+        tell_lines(&format::terminal::table(times, width()));
     }
     let mut batch = Batch::sparing(inputs);
     arguments.outputs.add_made(

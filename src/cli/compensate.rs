@@ -27,9 +27,10 @@ use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::status::Status as Judged;
 use truegrind::surface::SurfaceFile;
 
+use super::defect::isolated;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
-use super::outputs::{Outputs, say};
+use super::outputs::{Outputs, say, tell, tell_lines};
 use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
 use super::{Common, Ending, inputs, on_threads};
@@ -273,7 +274,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if corrector.is_none() {
         let text = "model nominal: nothing to correct, every byte stays\n";
         if arguments.outputs.takes_stdout() || arguments.output.as_deref() == Some(Path::new("-")) {
-            eprint!("{text}");
+            tell_lines(text);
         } else {
             say(text)?;
         }
@@ -292,6 +293,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     let targets = outputs_of(arguments, job, &programs, false)?;
     let inputs_of: Vec<&Path> = programs.files.iter().map(|(p, _)| p.as_path()).collect();
     let mut checked: Vec<&Path> = arguments.outputs.files();
+    checked.extend(arguments.diff.as_deref());
     if programs.files.len() == 1 {
         checked.extend(targets.iter().flatten().map(PathBuf::as_path));
     }
@@ -335,7 +337,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         rewritten(shop, &programs, &targets, || drop(work), &mut report)
     })??;
     for note in &done.notes {
-        eprintln!("note: {note}");
+        tell(format_args!("note: {note}"));
     }
     if done.row.ended == Ended::Already {
         say(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
@@ -364,7 +366,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
     let done: Vec<Done> = on_threads(arguments.common.threads, || {
         jobs.par_iter()
             .map(|job| {
-                let done = file_to_file(shop, job);
+                let done = isolated(|| file_to_file(shop, job));
                 let mut done = done.unwrap_or_else(|error| failed(job, &format!("{error:#}")));
                 if !with_json {
                     done.json = Vec::new();
@@ -379,15 +381,15 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
     drop(work);
     for done in &done {
         for note in &done.notes {
-            eprintln!("note: {}: {note}", done.row.file);
+            tell(format_args!("note: {}: {note}", done.row.file));
         }
     }
     let undeclared: usize = done.iter().map(|done| done.undeclared).sum();
     if undeclared > 0 && jobs.iter().any(|job| job.under.is_some() && job.paths.len() == 1) {
-        eprintln!(
+        tell(format_args!(
             "note: {undeclared} motions use tools, work objects or targets that their own file does not declare: where the \
              modules of a folder run together, --together reads them as one task"
-        );
+        ));
     }
     let clean = done.iter().all(|done| done.clean);
     let changed = done.iter().any(|done| done.changed);

@@ -18,9 +18,10 @@ use truegrind::report::document::Document;
 use truegrind::surface::SurfaceFile;
 
 use super::compensate::CellArguments;
+use super::defect::isolated;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
-use super::outputs::Outputs;
+use super::outputs::{Outputs, tell};
 use super::programs::{self, Grouping, Job, Programs};
 use super::{Common, Ending, inputs, on_threads};
 
@@ -92,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         arguments: &arguments.cell,
     };
     let found: Vec<anyhow::Result<Vec<PathReport>>> = on_threads(arguments.common.threads, || {
-        jobs.par_iter().map(|job| shop.reports(job, surface.as_ref())).collect()
+        jobs.par_iter().map(|job| isolated(|| shop.reports(job, surface.as_ref()))).collect()
     })?;
     let (mut reports, mut failed) = (Vec::new(), 0);
     for (found, job) in found.into_iter().zip(&jobs) {
@@ -101,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             // A bad one among many is listed, and the others go on.
             Err(error) if several => {
                 failed += 1;
-                eprintln!("failed: {}: {error:#}", job.name());
+                tell(format_args!("failed: {}: {error:#}", job.name()));
             }
             Err(error) => return Err(error),
         }

@@ -12,7 +12,7 @@ use truegrind::report::diagnosis as view;
 
 use super::files::Batch;
 use super::identify::{DataArguments, best_start, read, write_model};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, tell};
 use super::progress::Work;
 use super::{Common, Ending, on_threads};
 
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     })??;
     drop(work);
     for note in found.diagnosis.notes.iter().chain(&dataset.notes) {
-        eprintln!("note: {note}");
+        tell(format_args!("note: {note}"));
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(given);

@@ -1,52 +1,127 @@
 //! Files: read whole, written whole or not at all, inputs never overwritten.
+//!
+//! Every file that a verb reads or writes passes here, so that nothing has to be listed: `ledger` knows each by itself and
+//! not by its name, refuses an output that is an input, an input that is an output and two outputs that are one file, and
+//! does so before the work where both are known by then.
+//!
+//! Outputs are handled as `cp` would handle them. A new file gets the permissions of new files (`umask`), one that is there keeps
+//! owner and permissions, a read-only one stays. A link is followed to its file, which is made where it is not there yet.
+//! Devices and pipes are written through. A file with several names (hard links) keeps them: it is written in place,
+//! everything else is written beside its place, synced, and renamed.
 
 use std::fs;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::outputs::say;
+use super::outputs::hand_over;
+use in_place::InPlace;
 use pending::Pending;
+use place::{Kind, Place, parent};
 
+pub(super) use ledger::new_round;
+pub(super) use place::is_stdout;
+
+mod in_place;
+mod ledger;
 mod pending;
+mod place;
 
-/// The bytes of a file.
+/// The bytes of a file: an input, which no output may overwrite from here on.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    whole(path).with_context(|| format!("{}: cannot be read", path.display()))
+    let (file, meta) = opened(path)?;
+    ledger::note_read(path, &meta)?;
+    whole(file, &meta, path)
 }
+
+/// The bytes of a file that is this program's own and will be written again, such as the state of a track.
+pub(super) fn read_own(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let (file, meta) = opened(path)?;
+    whole(file, &meta, path)
+}
+
+/// Takes a file for an input before it is read. One that cannot be looked at is left to whoever reads it.
+///
+/// # Errors
+/// It is an output too.
+pub(super) fn expect(path: &Path) -> anyhow::Result<()> {
+    fs::metadata(path).map_or(Ok(()), |meta| ledger::note_read(path, &meta))
+}
+
+fn opened(path: &Path) -> anyhow::Result<(fs::File, fs::Metadata)> {
+    let open = || {
+        let file = fs::File::open(path)?;
+        let meta = file.metadata()?;
+        Ok::<_, std::io::Error>((file, meta))
+    };
+    open().with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+fn whole(file: fs::File, meta: &fs::Metadata, path: &Path) -> anyhow::Result<Vec<u8>> {
+    let bytes = in_parts(file, meta).with_context(|| format!("{}: cannot be read", path.display()))?;
+    if !meta.is_file() && bytes.len() as u64 > MOST_OF_A_STREAM {
+        bail!(
+            "{}: more than {} MB come from it without an end; expected a file",
+            path.display(),
+            MOST_OF_A_STREAM >> 20
+        );
+    }
+    Ok(bytes)
+}
+
+/// A pipe or device may never end: more than this is not taken from it (bytes).
+const MOST_OF_A_STREAM: u64 = 1 << 28;
 
 /// Files from here on are read in parts, on all threads (bytes).
 #[cfg(unix)]
 const LARGE: u64 = 1 << 22;
 
 #[cfg(unix)]
-fn whole(path: &Path) -> std::io::Result<Vec<u8>> {
+fn in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
     use std::os::unix::fs::FileExt;
 
     use rayon::prelude::*;
 
-    let length = fs::metadata(path).ok().filter(fs::Metadata::is_file).map_or(0, |meta| meta.len());
+    let length = if meta.is_file() { meta.len() } else { 0 };
     if length < LARGE {
-        return fs::read(path);
+        return at_once(file, meta);
     }
-    let file = fs::File::open(path)?;
     let mut bytes = vec![0; length as usize];
     let part = LARGE as usize;
     let parts = bytes.par_chunks_mut(part).enumerate();
     parts.try_for_each(|(index, bytes)| file.read_exact_at(bytes, (index * part) as u64))?;
     // One that grew meanwhile is read again, to its end.
-    if file.metadata()?.len() == length { Ok(bytes) } else { fs::read(path) }
+    if file.metadata()?.len() == length { Ok(bytes) } else { at_once(file, meta) }
 }
 
 #[cfg(not(unix))]
-fn whole(path: &Path) -> std::io::Result<Vec<u8>> {
-    fs::read(path)
+fn in_parts(file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
+    at_once(file, meta)
+}
+
+fn at_once(mut file: fs::File, meta: &fs::Metadata) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    if meta.is_file() {
+        bytes.reserve_exact(meta.len() as usize + 1);
+        file.read_to_end(&mut bytes)?;
+    } else {
+        file.take(MOST_OF_A_STREAM + 1).read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
 }
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> anyhow::Result<String> {
-    let bytes = read(path)?;
+    as_text(read(path)?, path)
+}
+
+/// The same of a file that is this program's own.
+pub(super) fn read_own_text(path: &Path) -> anyhow::Result<String> {
+    as_text(read_own(path)?, path)
+}
+
+fn as_text(bytes: Vec<u8>, path: &Path) -> anyhow::Result<String> {
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text),
         Err(error) => {
@@ -70,7 +145,7 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// A batch that refuses to write over `inputs`.
+    /// A batch that spares `inputs` too, beside all that was read.
     pub(super) fn sparing<P: AsRef<Path>>(inputs: impl IntoIterator<Item = P>) -> Self {
         Self { files: Vec::new(), inputs: inputs.into_iter().map(|p| p.as_ref().to_path_buf()).collect() }
     }
@@ -80,97 +155,82 @@ impl Batch {
         self.files.push((path.into(), bytes.into()));
     }
 
-    /// Refuses early, before the work, what writing would refuse late.
+    /// Refuses early, before the work, what writing would refuse late: an output that is an input (these, what was read
+    /// already, and from here on what is read), two outputs that are one file, and outputs that cannot be written.
     pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> anyhow::Result<()> {
-        for output in outputs.iter().filter(|o| **o != Path::new("-")) {
-            for input in inputs {
-                if same(output, input) {
-                    bail!(
-                        "{} is an input: an input is never overwritten; name another output",
-                        output.display()
-                    );
-                }
-            }
-            let folder = parent(output);
-            if !folder.is_dir() {
-                bail!("{}: folder {} does not exist", output.display(), folder.display());
-            }
-        }
-        Ok(())
+        inputs.iter().try_for_each(|input| expect(input))?;
+        ledger::promise(outputs)
     }
 
     /// Writes everything or nothing.
     pub(super) fn write(self) -> anyhow::Result<()> {
-        let (mut ready, mut streams) = (Vec::new(), Vec::new());
-        for (path, bytes) in &self.files {
-            if path == Path::new("-") {
-                continue;
+        self.inputs.iter().try_for_each(|input| expect(input))?;
+        let named: Vec<&Path> = self.files.iter().map(|(path, _)| path.as_path()).collect();
+        let places = ledger::take(&named)?;
+        let (mut ready, mut over, mut last) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, (_, bytes)) in places.iter().zip(&self.files) {
+            let failed = || format!("{}: cannot be written; nothing was changed", place.named.display());
+            match written_beside(place, bytes).with_context(failed)? {
+                Some(pending) => ready.push((place, pending)),
+                None if matches!(place.kind, Kind::Over(_)) => {
+                    over.push((place, bytes, InPlace::open(&place.path).with_context(failed)?));
+                }
+                None => last.push((place, bytes)),
             }
-            if self.inputs.iter().any(|input| same(path, input)) {
-                bail!("{} is an input: an input is never overwritten; name another output", path.display());
+        }
+        // What may still fail for want of room goes first: then all that was done can be taken back.
+        for index in 0..over.len() {
+            let (place, bytes, file) = &mut over[index];
+            if let Err(error) = file.put(bytes) {
+                let named = place.named.display().to_string();
+                over[..index].iter_mut().for_each(|(_, _, file)| drop(file.restore()));
+                return Err(error)
+                    .with_context(|| format!("{named}: cannot be written; nothing was changed"));
             }
-            // A link is not ours to replace, nor is a device or a pipe.
-            let path = linked(path);
-            if fs::metadata(&path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
-                streams.push((path, bytes));
-                continue;
-            }
-            let folder = parent(&path);
-            let failed = || format!("{}: cannot be written; nothing was changed", path.display());
-            ready.push(Pending::write(path.clone(), &folder, bytes).with_context(failed)?);
         }
-        for file in ready {
-            let place = file.place().to_path_buf();
-            file.put(permissions(&place))
-                .with_context(|| format!("{}: cannot be put in place", place.display()))?;
+        for (place, file) in ready {
+            file.put().with_context(|| format!("{}: cannot be put in place", place.named.display()))?;
+            ledger::note_put(place);
         }
-        for (path, bytes) in streams {
-            let written =
-                fs::OpenOptions::new().write(true).open(&path).and_then(|mut to| to.write_all(bytes));
-            written.with_context(|| format!("{}: cannot be written", path.display()))?;
-        }
-        for (path, bytes) in &self.files {
-            if path == Path::new("-") {
-                say(bytes)?;
+        for (place, bytes) in last {
+            match place.kind {
+                Kind::Stdout => hand_over(bytes)?,
+                _ => through(&place.path, bytes)
+                    .with_context(|| format!("{}: cannot be written", place.named.display()))?,
             }
         }
         Ok(())
     }
 }
 
-/// What the file shall allow: what the one in its place allows.
+/// The file beside its place, on the disk; `None` where it is sent, printed, or written where it stands.
+fn written_beside(place: &Place, bytes: &[u8]) -> std::io::Result<Option<Pending>> {
+    let over = match &place.kind {
+        Kind::Stdout | Kind::Stream => return Ok(None),
+        Kind::Over(meta) if names(meta) > 1 => return Ok(None),
+        Kind::Over(meta) => Some(meta),
+        Kind::New => None,
+    };
+    match Pending::write(place.path.clone(), &parent(&place.path), over, bytes) {
+        Err(error) if over.is_some() && error.kind() == std::io::ErrorKind::PermissionDenied => Ok(None),
+        done => done.map(Some),
+    }
+}
+
+/// How many names a file has.
 #[cfg(unix)]
-fn permissions(place: &Path) -> Option<fs::Permissions> {
-    use std::os::unix::fs::PermissionsExt;
-    let mode = fs::metadata(place).map_or(0o644, |meta| meta.permissions().mode());
-    Some(fs::Permissions::from_mode(mode))
+fn names(meta: &fs::Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(meta)
 }
 
 #[cfg(not(unix))]
-fn permissions(_: &Path) -> Option<fs::Permissions> {
-    None
+fn names(_: &fs::Metadata) -> u64 {
+    1
 }
 
-/// The file that a link names; any other path as it is.
-fn linked(path: &Path) -> PathBuf {
-    match fs::symlink_metadata(path) {
-        Ok(meta) if meta.is_symlink() => fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()),
-        _ => path.to_path_buf(),
-    }
-}
-
-fn parent(path: &Path) -> PathBuf {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
-        _ => PathBuf::from("."),
-    }
-}
-
-fn same(a: &Path, b: &Path) -> bool {
-    match (fs::canonicalize(a), fs::canonicalize(b)) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => a == b,
-    }
+/// Sends bytes to a device, a pipe or an open file.
+fn through(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    fs::OpenOptions::new().write(true).truncate(true).open(path)?.write_all(bytes)
 }
 
 /// Makes a folder for outputs.

@@ -23,7 +23,7 @@ use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
 use super::files::{self, Batch};
-use super::outputs::{Outputs, width};
+use super::outputs::{Outputs, say, tell, tell_lines, width};
 use super::progress::Work;
 use super::stated::StatedArguments;
 use super::{Common, Ending, inputs, on_threads};
@@ -121,7 +121,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
     drop(work);
     for note in &dataset.notes {
-        eprintln!("note: {note}");
+        tell(format_args!("note: {note}"));
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing([&arguments.data.data]);
@@ -145,7 +145,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })??;
         drop(work);
         let text = format::terminal::table(&study_view::table(&rows), width());
-        if arguments.outputs.takes_stdout() { eprint!("{text}") } else { print!("{text}") }
+        if arguments.outputs.takes_stdout() { tell_lines(&text) } else { say(text)? }
     }
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }

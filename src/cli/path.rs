@@ -13,6 +13,7 @@ use truegrind::robots::Robot;
 use truegrind::surface::SurfaceFile;
 
 use super::files::{self, Batch};
+use super::outputs::tell;
 use super::programs::angles;
 use super::{Ending, inputs};
 
@@ -48,10 +49,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ),
         _ => writer::write(&path.draft)?,
     };
-    say(&path, &robot, &arguments.output);
     let mut batch = Batch::sparing([&arguments.surface]);
     batch.add(&arguments.output, bytes);
     batch.write()?;
+    say(&path, &robot, &arguments.output);
     Ok(Ending::Done)
 }
 
@@ -62,13 +63,13 @@ fn angles_of(robot: &Robot) -> Angles {
 
 fn say(path: &Toolpath, robot: &Robot, output: &Path) {
     let passes = path.points.iter().map(|p| p.pass + 1).max().unwrap_or(0);
-    eprintln!(
+    tell(format_args!(
         "{} targets in {passes} passes for {}, distance to singularity at least {:.3}; written to {}",
         path.points.len(),
         robot.sheet.name,
         path.singularity,
         output.display()
-    );
+    ));
 }
 
 /// Reads a surface file; a mesh is looked up beside it.

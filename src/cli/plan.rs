@@ -15,7 +15,7 @@ use truegrind::program::rapid::writer;
 use truegrind::report::planning as view;
 
 use super::files::{self, Batch};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, tell};
 use super::progress::Work;
 use super::stated::{StatedArguments, numbers};
 use super::{Common, Ending, inputs, on_threads};
@@ -223,10 +223,10 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
             let found =
                 rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
             if found.is_empty() {
-                eprintln!(
+                tell(format_args!(
                     "note: {}: nothing is ambiguous or untested; planned for the geometry",
                     path.display()
-                );
+                ));
             }
             found
         }

@@ -13,6 +13,7 @@ use truegrind::program::rapid::task_list;
 use truegrind::program::reading::{Language, Program};
 use truegrind::robots::sheet::Orientation;
 
+use super::outputs::tell;
 use super::{files, inputs};
 
 /// Files that are read and rewritten together.
@@ -137,6 +138,10 @@ pub(super) fn jobs(
     if !together.is_empty() {
         jobs.insert(0, Job { paths: together, under: None });
     }
+    // What is read late is an input from here on: no output of one program is the source of the next.
+    for path in jobs.iter().flat_map(|job| job.paths.iter().cloned().chain(job.files())) {
+        files::expect(&path)?;
+    }
     if jobs.is_empty() {
         bail!(
             "no program found: a folder is searched for .mod, .prg, .sys, .pgf, .nc, .mpf, .ngc, .h and the like"
@@ -163,7 +168,10 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
             } else if path.is_file() && Language::by_name(&files::name(&path)).is_some() {
                 found.push(path);
             } else if kind.is_symlink() && path.is_dir() {
-                eprintln!("note: {}: a link to a folder is not followed; name the folder", path.display());
+                tell(format_args!(
+                    "note: {}: a link to a folder is not followed; name the folder",
+                    path.display()
+                ));
             }
         }
     }

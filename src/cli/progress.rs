@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use truegrind::report::format::visible;
 
 /// A piece of work that takes a while. Nothing is shown where stderr is no terminal.
 pub(super) struct Work(ProgressBar);
@@ -14,14 +15,14 @@ impl Work {
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
             bar.set_style(style);
         }
-        bar.set_message(message.into());
+        bar.set_message(visible::line(&message.into()).into_owned());
         bar.enable_steady_tick(Duration::from_millis(120));
         Self(bar)
     }
 
     /// Shows what is being done now.
     pub(super) fn tell(&self, message: &str) {
-        self.0.set_message(message.to_owned());
+        self.0.set_message(visible::line(message).into_owned());
     }
 }
 

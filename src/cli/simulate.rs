@@ -9,6 +9,7 @@ use truegrind::measurement::simulation::Simulation;
 use truegrind::measurement::simulation::recipe::Recipe;
 
 use super::files::{self, Batch};
+use super::outputs::tell;
 use super::{Ending, inputs};
 
 /// Arguments of `simulate`.
@@ -34,17 +35,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let text = files::read_text(&arguments.recipe)?;
     let simulation = simulation(&text, &arguments.recipe.display().to_string(), arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);
-    eprintln!(
-        "{} rows, sensor {:?}, written to {}",
-        simulation.rows.len(),
-        simulation.sensor(),
-        arguments.output.display()
-    );
+    let (rows, sensor) = (simulation.rows.len(), simulation.sensor());
     batch.add(&arguments.output, simulation.csv);
     if let Some(path) = &arguments.arm {
         batch.add(path, arm_text(&simulation.actual)?);
     }
     batch.write()?;
+    tell(format_args!("{rows} rows, sensor {sensor:?}, written to {}", arguments.output.display()));
     Ok(Ending::Done)
 }
 

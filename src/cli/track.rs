@@ -16,10 +16,11 @@ use truegrind::measurement::plausibility::{Evidence, plausibility};
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
 
+use super::defect::isolated;
 use super::files::{self, Batch};
 use super::identify::Angles;
 use super::inputs::NamedModel;
-use super::outputs::Outputs;
+use super::outputs::{Outputs, tell};
 use super::{Common, Ending, inputs, on_threads};
 
 /// Arguments of `track`.
@@ -94,6 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.state.is_some() || folder.is_dir() {
         targets.push(&state_path);
     }
+    measurement_files(arguments)?.iter().try_for_each(|path| files::expect(path))?;
     Batch::check(&inputs_of_run, &targets)?;
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: a track has no recording; --html FILE writes a page");
@@ -106,10 +108,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         stamp(date)?;
     }
     if state_path.is_file() && arguments.states_settings() {
-        eprintln!(
+        tell(format_args!(
             "note: {} goes on with the settings that it began with: --sigma, --drift and --first-poses are for a new track",
             state_path.display()
-        );
+        ));
     }
     let track = Track {
         arguments,
@@ -123,6 +125,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut flagged = false;
     let mut said = BTreeSet::new();
     loop {
+        files::new_round();
         flagged |= on_threads(arguments.common.threads, || track.look(&mut said))??;
         let Some(seconds) = arguments.follow else { break };
         std::thread::sleep(Duration::from_secs_f64(seconds));
@@ -148,7 +151,7 @@ impl Track<'_> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
-        let datasets = self.datasets(&known, said)?;
+        let (datasets, failed) = self.datasets(&known, said)?;
         if tracker.is_none()
             && let Some(first) = first_poses(&datasets, self.options.first_poses)
         {
@@ -181,17 +184,17 @@ impl Track<'_> {
         let fresh = tracker.state().poses - before;
         if fresh == 0 {
             if arguments.follow.is_none() {
-                eprintln!("note: no new measurements since {before} poses; nothing written");
+                tell(format_args!("note: no new measurements since {before} poses; nothing written"));
             }
-            return Ok(false);
+            return Ok(failed);
         }
-        eprintln!(
+        tell(format_args!(
             "note: {fresh} poses taken in within {:.1} ms, {:.0} µs each",
             taking.as_secs_f64() * 1e3,
             taking.as_secs_f64() * 1e6 / fresh as f64
-        );
+        ));
         self.write(&tracker, fresh, &alarms)?;
-        Ok(!alarms.is_empty())
+        Ok(failed || !alarms.is_empty())
     }
 
     /// Where the last run left off.
@@ -199,7 +202,7 @@ impl Track<'_> {
         if !self.state_path.is_file() {
             return Ok(None);
         }
-        let text = files::read_text(self.state_path)?;
+        let text = files::read_own_text(self.state_path)?;
         let name = self.state_path.display().to_string();
         let state = State::from_toml(&text).map_err(|e| anyhow!("{name}: {e}"))?;
         if state.model_hash != self.hash {
@@ -228,7 +231,7 @@ impl Track<'_> {
         // The model first, the state last: what is cut off between the two is done again in the next run, to the same bits.
         if !model_path.exists() {
             batch.add(&model_path, text);
-        } else if files::read(&model_path)? != text.as_bytes() {
+        } else if files::read_own(&model_path)? != text.as_bytes() {
             bail!("{path} is there already: it is never overwritten; give another --date or -o");
         }
         arguments.outputs.add_made(
@@ -241,26 +244,36 @@ impl Track<'_> {
         batch.write()
     }
 
-    /// What there is to take in. Who follows waits for what cannot be read yet.
-    fn datasets(&self, known: &[Consumed], said: &mut BTreeSet<String>) -> anyhow::Result<Vec<Dataset>> {
+    /// What there is to take in, and whether a file of a folder failed: it is listed, and the others go on. Who follows waits
+    /// for what cannot be read yet.
+    fn datasets(
+        &self,
+        known: &[Consumed],
+        said: &mut BTreeSet<String>,
+    ) -> anyhow::Result<(Vec<Dataset>, bool)> {
         let waits = self.arguments.follow.is_some();
-        let mut out = Vec::new();
+        let several = self.arguments.data.is_dir();
+        let (mut out, mut failed) = (Vec::new(), false);
         for path in measurement_files(self.arguments)? {
             let is_new = !known.iter().any(|k| k.file == files::name(&path));
-            match read(self.arguments, self.arm, &path, is_new) {
+            match isolated(|| read(self.arguments, self.arm, &path, is_new)) {
                 Ok(dataset) => out.extend(dataset),
                 Err(error) if waits => say_once(said, format!("note: {error:#}; left for the next look")),
+                Err(error) if several => {
+                    failed = true;
+                    tell(format_args!("failed: {}: {error:#}", path.display()));
+                }
                 Err(error) => return Err(error),
             }
         }
-        Ok(out)
+        Ok((out, failed))
     }
 }
 
 /// Says a thing once.
 fn say_once(said: &mut BTreeSet<String>, what: String) {
     if !said.contains(&what) {
-        eprintln!("{what}");
+        tell(&what);
         said.insert(what);
     }
 }
@@ -272,8 +285,10 @@ fn measurement_files(arguments: &Arguments) -> anyhow::Result<Vec<PathBuf>> {
         let waits = arguments.follow.is_some() && !path.exists();
         return Ok(if waits { Vec::new() } else { vec![path.clone()] });
     }
-    let own: Vec<PathBuf> =
-        arguments.outputs.files().iter().filter_map(|o| std::fs::canonicalize(o).ok()).collect();
+    // The table of an earlier run, by what is in it: anything else under that name is a measurement, and stays.
+    let is_own = |path: &Path| files::read_own(path).is_ok_and(|bytes| view::is_table(&bytes));
+    let outputs = arguments.outputs.files().into_iter().filter(|path| path.is_file() && is_own(path));
+    let own: Vec<PathBuf> = outputs.filter_map(|o| std::fs::canonicalize(o).ok()).collect();
     let mut out: Vec<PathBuf> = std::fs::read_dir(path)
         .with_context(|| format!("{}: cannot be read", path.display()))?
         .filter_map(|entry| entry.ok().map(|e| e.path()))

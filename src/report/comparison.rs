@@ -1,7 +1,7 @@
 //! Experiments of the papers: tables with the paper's figures beside ours, the verdict, and the plots.
 //!
-//! Terminal, CSV and JSON carry nothing that changes from run to run; measured seconds have a table of their own
-//! ([`times`]), which the pages show too.
+//! Nothing here changes from run to run but measured seconds: they have a table of their own ([`times`]), and a page shows
+//! them where it is asked to ([`Origin::timings`]).
 
 mod methods;
 mod words;
@@ -30,6 +30,8 @@ pub struct Origin {
     pub robot: Option<String>,
     /// Seed.
     pub seed: u64,
+    /// Whether measured seconds are shown, on which no two runs agree.
+    pub timings: bool,
 }
 
 /// What the terminal shows.
@@ -49,11 +51,11 @@ pub fn summary(experiment: &Experiment, results: &Results) -> Document {
 pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> Document {
     let mut page = opening(experiment, results);
     match results {
-        Results::Methods(study) => methods::page(&mut page, study),
+        Results::Methods(study) => methods::page(&mut page, study, origin.timings),
         Results::Grinding(result) => grinding::page(&mut page, result),
         Results::Uniformity(result) => uniformity::page(&mut page, result),
         Results::SignedRank(tables) => signed_rank::summary(&mut page, tables),
-        Results::Degradation(result) => degradation::page(&mut page, result),
+        Results::Degradation(result) => degradation::page(&mut page, result, origin.timings),
     }
     let source = origin.file.as_ref().map(|name| Source {
         name: name.clone(),

@@ -18,6 +18,11 @@ pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -
     page
 }
 
+/// Whether a file is what CSV makes of [`table`]: a result, and no measurement.
+pub fn is_table(csv: &[u8]) -> bool {
+    csv.starts_with(b"parameter,unit,")
+}
+
 /// The page.
 pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
     let mut page = summary(tracker, fresh, alarms, model);

@@ -6,6 +6,11 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use tempfile::TempDir;
 
+mod defect;
+mod files;
+mod same;
+mod text;
+
 const CABLE: &str = include_str!("../data/irb120-cable.csv");
 
 fn truegrind(folder: &Path, arguments: &[&str]) -> (i32, String, String) {

@@ -172,3 +172,35 @@ fn only_visual_names_rerun_and_only_cli_opens_files_or_prints() {
         }
     }
 }
+
+/// Files are opened in one place and things are printed in one place: only there is an input known by itself, and only
+/// there is text of others made harmless.
+#[test]
+fn only_one_file_opens_files_and_only_one_prints() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let reading = [
+        "fs::read(",
+        "fs::read_to_string",
+        "File::open",
+        "OpenOptions",
+        "fs::write",
+        "File::create",
+        "fs::copy",
+        "fs::rename",
+    ];
+    let printing = ["println!(", "print!(", "io::stdout()", "io::stderr()"];
+    for file in &files {
+        let name = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        let text = fs::read_to_string(file).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            let code = line.split("//").next().unwrap_or_default();
+            let opens = reading.iter().any(|word| code.contains(word)) && !name.starts_with("cli/files");
+            // The ledger asks where stdout goes, the spinner draws itself.
+            let prints = printing.iter().any(|word| code.contains(word))
+                && !["cli/outputs.rs", "cli/progress.rs", "cli/files/ledger.rs"].contains(&name.as_str());
+            assert!(!opens && !prints, "{name}:{}: {line}", number + 1);
+        }
+    }
+}

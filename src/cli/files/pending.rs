@@ -3,11 +3,13 @@
 //! Where the file system can, it has no name until then: a process that is killed meanwhile leaves nothing behind.
 //! Elsewhere it is a temporary file in the same folder.
 
-use std::fs::{File, Permissions};
+use std::fs::{File, Metadata};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
+
+use super::ledger;
 
 /// See the module.
 #[derive(Debug)]
@@ -24,39 +26,52 @@ enum Written {
 }
 
 impl Pending {
-    /// Writes `bytes` to the disk, in the folder of `place`.
-    pub(super) fn write(place: PathBuf, folder: &Path, bytes: &[u8]) -> io::Result<Self> {
-        let mut file = Written::new(folder)?;
+    /// Writes `bytes` to the disk, in the folder of `place`. A file that replaces another gets its permissions and owner; a
+    /// new one gets what the system gives to new files (`umask`).
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::PermissionDenied`] where the folder takes no new file, or a new file cannot have the old one's owner.
+    pub(super) fn write(
+        place: PathBuf,
+        folder: &Path,
+        over: Option<&Metadata>,
+        bytes: &[u8],
+    ) -> io::Result<Self> {
+        let mut file = Written::new(folder, over.is_none())?;
+        ledger::note_made(folder, &file.handle().metadata()?);
+        if let Some(old) = over {
+            like(file.handle(), old)?;
+        }
         file.handle().write_all(bytes)?;
         file.handle().sync_all()?;
         Ok(Self { file, place })
     }
 
     /// Puts the file in its place, over what was there.
-    pub(super) fn put(mut self, permissions: Option<Permissions>) -> io::Result<()> {
-        if let Some(permissions) = permissions {
-            let _ = self.file.handle().set_permissions(permissions);
-        }
+    pub(super) fn put(self) -> io::Result<()> {
         match self.file {
             Written::Named(file) => file.persist(&self.place).map(drop).map_err(|error| error.error),
             #[cfg(target_os = "linux")]
             Written::Nameless(file) => nameless::put(&file, &self.place),
         }
     }
-
-    /// Where it goes.
-    pub(super) fn place(&self) -> &Path {
-        &self.place
-    }
 }
 
 impl Written {
-    fn new(folder: &Path) -> io::Result<Self> {
+    /// `open`: with the permissions of new files; else the owner's alone until it has those of the old one.
+    fn new(folder: &Path, open: bool) -> io::Result<Self> {
         #[cfg(target_os = "linux")]
-        if let Some(file) = nameless::new(folder) {
+        if let Some(file) = nameless::new(folder, open) {
             return Ok(Written::Nameless(file));
         }
-        NamedTempFile::new_in(folder).map(Written::Named)
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        if open {
+            use std::os::unix::fs::PermissionsExt;
+            // The system takes away what its umask forbids.
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        builder.tempfile_in(folder).map(Written::Named)
     }
 
     fn handle(&mut self) -> &mut File {
@@ -66,6 +81,22 @@ impl Written {
             Written::Nameless(file) => file,
         }
     }
+}
+
+/// Gives a file the owner and the permissions of another.
+#[cfg(unix)]
+fn like(file: &File, old: &Metadata) -> io::Result<()> {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+    let new = file.metadata()?;
+    if (new.uid(), new.gid()) != (old.uid(), old.gid()) {
+        fchown(file, Some(old.uid()), Some(old.gid()))?;
+    }
+    file.set_permissions(std::fs::Permissions::from_mode(old.permissions().mode() & 0o777))
+}
+
+#[cfg(not(unix))]
+fn like(file: &File, old: &Metadata) -> io::Result<()> {
+    file.set_permissions(old.permissions())
 }
 
 /// Files of Linux that get their name last.
@@ -80,8 +111,11 @@ mod nameless {
     use rustix::io::Errno;
 
     /// A file without a name; `None` where the file system has no such thing.
-    pub(super) fn new(folder: &Path) -> Option<File> {
-        let mode = Mode::RUSR | Mode::WUSR;
+    pub(super) fn new(folder: &Path, open_to_others: bool) -> Option<File> {
+        let owner = Mode::RUSR | Mode::WUSR;
+        let all = owner | Mode::RGRP | Mode::WGRP | Mode::ROTH | Mode::WOTH;
+        // The system takes away what its umask forbids.
+        let mode = if open_to_others { all } else { owner };
         let file = open(folder, OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC, mode).ok()?;
         // Its name is given through the list of open files, which not every machine shows.
         let file = File::from(file);

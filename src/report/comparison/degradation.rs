@@ -23,8 +23,8 @@ pub(super) fn summary(page: &mut Document, result: &DegradationResult) {
     page.push(against_rls(result));
 }
 
-/// Page.
-pub(super) fn page(page: &mut Document, result: &DegradationResult) {
+/// Page; `timings`: with the measured seconds.
+pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: bool) {
     page.push(verdict(result));
     page.heading(2, "The arm degrades");
     figures::groups(page, result);
@@ -41,8 +41,10 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult) {
         summary: "Group by group, all methods".to_owned(),
         blocks: vec![steps(result).into()],
     });
-    page.heading(2, "Time saved");
-    page.push(times(result));
+    if timings {
+        page.heading(2, "Time saved");
+        page.push(times(result));
+    }
 }
 
 /// Pose counts of the journeys, each once.

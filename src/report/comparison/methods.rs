@@ -29,8 +29,8 @@ pub(super) fn summary(page: &mut Document, study: &Study) {
     page.push(cost(study));
 }
 
-/// Page.
-pub(super) fn page(page: &mut Document, study: &Study) {
+/// Page; `timings`: with the measured seconds.
+pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
     head(page, study);
     page.push(verdict(study));
     page.push(errors(study));
@@ -62,11 +62,13 @@ pub(super) fn page(page: &mut Document, study: &Study) {
         "The same over passes through the rows, those with derivatives counted once: what an engineer pays for.",
     );
     page.push(cost(study));
-    page.push(times(study));
-    page.figure(
-        time_bars(study),
-        "Time of one case, while other cases ran on other cores: not the same in every run.",
-    );
+    if timings {
+        page.push(times(study));
+        page.figure(
+            time_bars(study),
+            "Time of one case, while other cases ran on other cores: not the same in every run.",
+        );
+    }
     if !study.parameters.is_empty() {
         page.heading(2, "What was identified");
         page.paragraph(

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use super::visible;
 use crate::report::document::{Block, Document, Figure, KeyFigure, Verdict};
 use crate::report::status::Status;
 use crate::report::table::{Alignment, Cell, Table};
@@ -78,18 +79,18 @@ pub fn table(table: &Table) -> String {
     html
 }
 
-/// Text with what HTML reads as markup made harmless, in content and in quoted attributes.
+/// Text with what HTML reads as markup made harmless, in content and in quoted attributes; control characters, which are
+/// errors in HTML and forbidden in XML, and others that act without showing are spelled out.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
+    for character in visible::text(text).chars() {
         match character {
+            '\r' => {}
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
-            // Control characters are errors in HTML and forbidden in XML.
-            c if c.is_control() && !matches!(c, '\n' | '\t') => escaped.push('\u{fffd}'),
             c => escaped.push(c),
         }
     }

@@ -1,8 +1,10 @@
-//! JSON: keys in the order in which they are stated, numbers with every digit, what is not finite as `null`.
+//! JSON: keys in the order in which they are stated, numbers with every digit, what is not finite as `null`. A reader gets
+//! back every character; those that act without showing stand as `\u…`.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq, Serializer};
 
+use super::visible;
 use crate::report::table::{Cell, Field, Table};
 
 /// Any result as indented JSON with a newline at the end. Fields come in the order in which the type states them, and
@@ -13,7 +15,24 @@ use crate::report::table::{Cell, Field, Table};
 pub fn text<T: Serialize + ?Sized>(value: &T) -> Result<String, serde_json::Error> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    Ok(text)
+    if !text.contains(visible::acts) {
+        return Ok(text);
+    }
+    // JSON wants only the first 32 escaped. The others stand in strings alone, where their numbers mean the same.
+    let mut escaped = String::with_capacity(text.len() + 64);
+    for character in text.chars() {
+        if visible::acts(character) {
+            let units = character
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .map(|unit| format!("\\u{unit:04x}"))
+                .collect::<String>();
+            escaped.push_str(&units);
+        } else {
+            escaped.push(character);
+        }
+    }
+    Ok(escaped)
 }
 
 /// The table as an object: `title`, `units` by column key, `rows` as objects by column key, `notes`.

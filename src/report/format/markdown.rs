@@ -2,7 +2,7 @@
 //!
 //! Pictures appear by their captions: Markdown has no place for SVG inside the file.
 
-use super::html;
+use super::{html, visible};
 use crate::report::document::{Block, Document};
 use crate::report::table::{Alignment, Table};
 
@@ -116,7 +116,8 @@ fn push_blocks(text: &mut String, blocks: &[Block]) {
                 // A fence longer than any run of backticks inside.
                 let longest = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
                 let fence = "`".repeat((longest + 1).max(3));
-                text.push_str(&format!("{fence}\n{}\n{fence}\n", code.trim_end_matches('\n')));
+                let code = visible::text(code.trim_end_matches('\n'));
+                text.push_str(&format!("{fence}\n{code}\n{fence}\n"));
             }
             Block::Provenance(provenance) => {
                 for (name, value) in provenance.entries() {
@@ -127,9 +128,9 @@ fn push_blocks(text: &mut String, blocks: &[Block]) {
     }
 }
 
-/// Text that Markdown shows as it is, on one line. Underscores inside words (`path_01.mod`) need no escape.
+/// Text that Markdown shows as it is, on one line, with what acts without showing spelled out. Underscores inside words (`path_01.mod`) need no escape.
 fn escape(text: &str) -> String {
-    let characters: Vec<char> = text.chars().collect();
+    let characters: Vec<char> = visible::text(text).chars().collect();
     let mut escaped = String::with_capacity(text.len());
     for (index, &character) in characters.iter().enumerate() {
         let word = |i: Option<usize>| {

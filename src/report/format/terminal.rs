@@ -1,7 +1,9 @@
 //! Plain text for a terminal: aligned columns within a given width, no colour codes.
 //!
-//! One character counts as one cell, which holds for everything truegrind itself writes.
+//! One character counts as one cell, which holds for everything truegrind itself writes. What would act on a terminal
+//! is spelled out ([`visible`]).
 
+use super::visible;
 use crate::report::document::{Block, Document};
 use crate::report::status::Status;
 use crate::report::table::{Alignment, Table};
@@ -95,12 +97,14 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
             let unit_width = figures.iter().map(|figure| length(figure.shown().1)).max().unwrap_or(0);
             for figure in figures {
                 let (shown, unit) = figure.shown();
-                let mut line = format!("{:label$}  {shown:>value$} {unit:unit_width$}", figure.label);
+                let name = visible::line(&figure.label);
+                let (shown, unit) = (visible::line(&shown), visible::line(unit));
+                let mut line = format!("{name:label$}  {shown:>value$} {unit:unit_width$}");
                 if let Some(status) = figure.status {
                     line.push_str(&format!("  {}", badge(status)));
                 }
                 if !figure.note.is_empty() {
-                    line.push_str(&format!("  {}", figure.note));
+                    line.push_str(&format!("  {}", visible::line(&figure.note)));
                 }
                 text.push_str(line.trim_end());
                 text.push('\n');
@@ -115,7 +119,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
             }
         }
         Block::Code(code) => {
-            for line in code.lines() {
+            for line in visible::text(code).lines() {
                 text.push_str(&format!("    {line}\n"));
             }
         }
@@ -165,7 +169,7 @@ fn total(widths: impl Iterator<Item = usize>) -> usize {
 
 /// A cell on one line.
 fn flat(cell: &str) -> String {
-    cell.replace(['\r', '\n', '\t'], " ")
+    visible::line(cell).into_owned()
 }
 
 fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
@@ -191,6 +195,7 @@ fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
 /// Words in lines of at most `width` characters, each with a newline; later lines start with `indent`. A single longer
 /// word, such as a file name, is not cut.
 fn wrapped(text: &str, width: usize, indent: &str) -> String {
+    let text = &*visible::text(text);
     let mut lines = String::new();
     let leading: String = text.chars().take_while(|c| *c == ' ').collect();
     let mut line = leading;

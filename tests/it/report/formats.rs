@@ -1,6 +1,6 @@
 use proptest::prelude::*;
-use truegrind::report::document::{Block, Document, Verdict};
-use truegrind::report::format::{csv, html, json, markdown, terminal};
+use truegrind::report::document::{Block, Document, KeyFigure, Provenance, Verdict};
+use truegrind::report::format::{csv, html, json, markdown, terminal, visible};
 use truegrind::report::status::Status;
 use truegrind::report::table::{Alignment, Cell, Column, Table};
 
@@ -153,7 +153,8 @@ fn equal_keys_are_told_apart() {
 }
 
 proptest! {
-    /// Whatever the words and numbers, a CSV reader gets back the same words and the same bits.
+    /// Whatever the words and numbers, a CSV reader gets back the same words and the same bits, but for an apostrophe before
+    /// words that a spreadsheet would compute.
     #[test]
     fn csv_round_trip(
         words in proptest::collection::vec("[ -~\r\n\té–\"]{0,12}", 1..6),
@@ -168,7 +169,8 @@ proptest! {
         let records: Vec<_> = reader.records().map(Result::unwrap).collect();
         prop_assert_eq!(records.len(), words.len());
         for ((record, word), number) in records.iter().zip(&words).zip(&numbers) {
-            prop_assert_eq!(&record[0], word);
+            let computed = word.len() > 1 && word.starts_with(['=', '+', '-', '@', '\r']) && word.parse::<f64>().is_err();
+            prop_assert_eq!(&record[0], &format!("{}{word}", if computed { "'" } else { "" }));
             if number.is_nan() {
                 prop_assert_eq!(&record[1], "");
             } else {
@@ -276,4 +278,56 @@ fn file_names_stay_readable_in_markdown() {
         markdown::document(&page),
         "# path_01_left.mod\n\n\\- 3 of 4 targets in main_program.mod, R&D cell\n"
     );
+}
+
+/// Text of others that acts without showing never stands in a page as it is. Not the escape sequence alone: all control
+/// characters of ASCII and Latin-1, what turns the direction of reading round, what has no width, other ends of lines.
+#[test]
+fn what_acts_without_showing_is_spelled_out_in_every_format() {
+    let hidden = (0..=0x10_ffff).filter_map(char::from_u32).filter(|c| visible::acts(*c)).collect::<String>();
+    for c in [
+        '\0', '\x07', '\x1b', '\x7f', '\u{80}', '\u{9b}', '\u{9f}', '\u{200b}', '\u{2028}', '\u{202e}',
+        '\u{2066}', '\u{2069}', '\u{feff}',
+    ] {
+        assert!(hidden.contains(c), "{c:?}");
+    }
+    let words = format!("a{hidden}z");
+    let mut table =
+        Table::new(&words, vec![Column::text(&words, &words), Column::number("n", &words, &words, 1)]);
+    table.push([words.as_str().into()]);
+    table.push([Cell::Judged(Status::Bad, words.clone())]);
+    table.notes.push(words.clone());
+    let mut page = Document::new(&words);
+    page.subtitle.clone_from(&words);
+    page.heading(2, &words);
+    page.paragraph(&words);
+    page.push(Block::List(vec![words.clone()]));
+    page.push(Block::Code(words.clone()));
+    page.push(vec![KeyFigure::new(&words, 1.0, 1, &words).note(&words)]);
+    page.push(Verdict::new(Status::Bad, &words, [&words]));
+    page.push(Provenance { remarks: vec![(words.clone(), words.clone())], ..Provenance::here() });
+    page.push(Block::Table(table.clone()));
+    page.push(Block::Details { summary: words.clone(), blocks: vec![table.clone().into()] });
+    for (format, text) in [
+        ("terminal", terminal::document(&page, 100)),
+        ("markdown", markdown::document(&page)),
+        ("html", html::document(&page)),
+        ("json", json::table(&table)),
+        ("csv", csv::table(&table).replace('\r', "")),
+    ] {
+        let found: Vec<char> = text.chars().filter(|c| visible::acts(*c)).collect();
+        assert!(found.is_empty(), "{format}: {found:?}");
+        if format != "json" {
+            assert!(text.contains("x1b") && text.contains("u{202e}"), "{format}");
+        }
+    }
+    let back: serde_json::Value = serde_json::from_str(&json::table(&table)).unwrap();
+    assert_eq!(back["title"], words.as_str(), "a reader of JSON gets every character back");
+}
+
+#[test]
+fn bytes_that_are_no_text_are_spelled_out() {
+    assert_eq!(visible::bytes(b"ok \x9b2J \xc3\xa4\r\n\x1b[m"), "ok \\x9b2J \u{e4}\r\n\\x1b[m");
+    assert_eq!(visible::line("a\r\nb\tc\rd\x08"), "a b c d\\x08");
+    assert_eq!(visible::text("a\rb\r\n"), "a\\x0db\r\n");
 }

@@ -1,0 +1,189 @@
+//! What a name stands for: the file itself, whatever it is called.
+//!
+//! `a.mod`, `./a.mod`, a link to it, another hard link of it and, where the folder takes no notice of case, `A.MOD` are one
+//! file. What is not there yet is known by its folder and its name.
+
+use std::ffi::OsString;
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+/// A file that exists, whatever its name.
+#[cfg(unix)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Identity {
+    device: u64,
+    inode: u64,
+}
+
+#[cfg(unix)]
+impl Identity {
+    pub(super) fn of(_: &Path, meta: &Metadata) -> Self {
+        use std::os::unix::fs::MetadataExt;
+        Self { device: meta.dev(), inode: meta.ino() }
+    }
+}
+
+/// A file that exists, whatever its name.
+#[cfg(not(unix))]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Identity(PathBuf);
+
+#[cfg(not(unix))]
+impl Identity {
+    pub(super) fn of(path: &Path, _: &Metadata) -> Self {
+        Self(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+    }
+}
+
+/// What two outputs must not have in common.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Key {
+    /// Standard output.
+    Stdout,
+    /// A file that is there.
+    There(Identity),
+    /// A file that is to be made: its folder and its name.
+    New(Identity, OsString),
+}
+
+/// How an output gets there.
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    /// Printed.
+    Stdout,
+    /// Sent: a device, a pipe, a socket.
+    Stream,
+    /// Made anew.
+    New,
+    /// Put over a file that is there.
+    Over(Metadata),
+}
+
+/// Where an output goes, links followed.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    /// As the user named it.
+    pub(super) named: PathBuf,
+    /// The file that is written.
+    pub(super) path: PathBuf,
+    pub(super) kind: Kind,
+    /// `None` for a device, which takes any number of outputs.
+    pub(super) key: Option<Key>,
+}
+
+/// Names of the standard output.
+pub(in crate::cli) fn is_stdout(path: &Path) -> bool {
+    ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
+}
+
+impl Place {
+    /// Looks where an output would go.
+    ///
+    /// # Errors
+    /// A folder, a file that must not be written, a place whose folder is not there.
+    pub(super) fn of(named: &Path) -> anyhow::Result<Self> {
+        let place =
+            |path: &Path, kind, key| Self { named: named.to_path_buf(), path: path.to_path_buf(), kind, key };
+        if is_stdout(named) {
+            return Ok(place(Path::new("-"), Kind::Stdout, Some(Key::Stdout)));
+        }
+        let meta = match fs::metadata(named) {
+            Ok(meta) => meta,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let path = followed(named)?;
+                let folder = parent(&path);
+                let Some(meta) = fs::metadata(&folder).ok().filter(Metadata::is_dir) else {
+                    bail!("{}: folder {} does not exist", named.display(), folder.display());
+                };
+                let name = path.file_name().map(OsString::from);
+                let name =
+                    name.with_context(|| format!("{}: expected the name of a file", named.display()))?;
+                let key = Key::New(Identity::of(&folder, &meta), name);
+                return Ok(place(&path, Kind::New, Some(key)));
+            }
+            Err(error) => {
+                return Err(error).with_context(|| format!("{}: cannot be written", named.display()));
+            }
+        };
+        if meta.is_dir() {
+            bail!("{} is a folder: name a file", named.display());
+        }
+        let identity = Identity::of(named, &meta);
+        if !meta.is_file() {
+            let key = (!is_device(&meta)).then_some(Key::There(identity));
+            return Ok(place(named, Kind::Stream, key));
+        }
+        if meta.permissions().readonly() {
+            bail!("{} is read-only: it is not overwritten; name another output", named.display());
+        }
+        if let Err(error) = fs::OpenOptions::new().write(true).open(named) {
+            return Err(error).with_context(|| format!("{}: cannot be written", named.display()));
+        }
+        // What a link leads to may be nameless (an open file of this process): then it stays the link's business.
+        let real = fs::canonicalize(named)
+            .ok()
+            .filter(|real| fs::metadata(real).is_ok_and(|meta| Identity::of(real, &meta) == identity));
+        Ok(match real {
+            Some(real) => place(&real, Kind::Over(meta), Some(Key::There(identity))),
+            None => place(named, Kind::Stream, Some(Key::There(identity))),
+        })
+    }
+
+    /// Whether another output goes to the same file.
+    pub(super) fn meets(&self, other: &Key) -> bool {
+        match (&self.key, other) {
+            (Some(Key::New(folder, name)), Key::New(others, another))
+                if folder == others && name != another =>
+            {
+                let alike = name.to_string_lossy().to_lowercase() == another.to_string_lossy().to_lowercase();
+                alike && ignores_case(&parent(&self.path))
+            }
+            (key, other) => key.as_ref() == Some(other),
+        }
+    }
+}
+
+/// A link that leads nowhere yet, followed to where it points; any other path as it is.
+fn followed(named: &Path) -> anyhow::Result<PathBuf> {
+    /// As many links as a system follows.
+    const MOST: usize = 40;
+    let mut path = named.to_path_buf();
+    for _ in 0..MOST {
+        match fs::read_link(&path) {
+            Ok(to) => path = parent(&path).join(to),
+            Err(_) => return Ok(path),
+        }
+    }
+    bail!("{}: the link leads round in a circle", named.display())
+}
+
+/// Whether two names that differ in case are one file in a folder. Asked only where two outputs differ in nothing else.
+fn ignores_case(folder: &Path) -> bool {
+    let probe = tempfile::Builder::new().prefix("case-a").tempfile_in(folder);
+    probe.ok().and_then(|probe| {
+        let name = probe.path().file_name()?.to_string_lossy().replace("case-a", "CASE-A");
+        Some(folder.join(name).exists())
+    }) == Some(true)
+}
+
+#[cfg(unix)]
+fn is_device(meta: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    meta.file_type().is_char_device() || meta.file_type().is_block_device()
+}
+
+#[cfg(not(unix))]
+fn is_device(_: &Metadata) -> bool {
+    true
+}
+
+/// The folder of a file.
+pub(super) fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
