@@ -324,6 +324,7 @@ fn ground(
         condition: shop.condition,
         max_correction_mm: LARGEST_CORRECTION_MM,
         max_turn_rad: LARGEST_TURN_RAD,
+        joint_gain: f64::INFINITY,
         ..RewriteBounds::default()
     };
     let planned = plan(shop.task.listing(), &one.estimated, shop.cell, &bounds);
