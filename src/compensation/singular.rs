@@ -338,8 +338,9 @@ fn alone(margins: &[f64; 3]) -> f64 {
     margins[0].abs().min(margins[1].abs()).min(1.0) * 1.5
 }
 
-/// Share of that within which the start cannot be nearer to the other one.
-const LONE: f64 = 0.5;
+/// Share of that within which the start cannot be nearer to the other one, by the largest joint or by the sum of squares:
+/// 1/(1 + √6).
+const LONE: f64 = 0.28;
 
 /// Whether a piece of a way with these margins at its ends keeps clear of singularities.
 fn clear(from: &[f64; 3], to: &[f64; 3], way: f64) -> bool {

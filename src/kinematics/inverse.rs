@@ -152,8 +152,9 @@ impl<'a> Inverse<'a> {
     /// An axis may lie outside its requested quarter by up to 5°, since the estimated arm stands a little beside the
     /// nominal one for which the program was written; so may a branch be left across its border. A solution on the very
     /// branch goes before all others: near a singularity the arm has two solutions close together, and cfx tells which is
-    /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters. Joints 2, 3 and 5 stand on the turn nearest to `near`, or in the middle
-    /// of their range.
+    /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters.
+    /// Joints 2, 3 and 5 stand on the turn nearest to `near`; without it, or with less than a turn of room, on that nearest
+    /// to the middle of their range.
     pub fn solve_configured(
         &self,
         target: &Pose,

@@ -71,7 +71,10 @@ impl Inverse<'_> {
     ) -> Result<Solution, InverseError> {
         let wanted = Joints::from_fn(|axis, _| match QUARTER_AXES.iter().position(|&a| a == axis) {
             Some(k) => (f64::from(configuration.quarters()[k]) + 0.5) * FRAC_PI_2,
-            None => near.map_or_else(|| self.middle(axis), |near| near[axis]),
+            // A joint with less than a turn of room has one turn within it at most, wherever the arm comes from.
+            None => {
+                near.filter(|_| self.room(axis) > TAU).map_or_else(|| self.middle(axis), |near| near[axis])
+            }
         });
         let mut best: Option<([f64; 3], Outcome)> = None;
         let mut nearest: Option<(f64, Joints)> = None;
@@ -252,6 +255,12 @@ impl Inverse<'_> {
             return outcome;
         }
         newton::solve(&self.arm, goal, &joints, self.kernel.length_mm)
+    }
+
+    /// Range of an axis (rad).
+    fn room(&self, axis: usize) -> f64 {
+        let (low, high) = range(&self.arm.model.limits, axis);
+        high - low
     }
 
     fn middle(&self, axis: usize) -> f64 {

@@ -219,7 +219,9 @@ fn every_reason_there_is_shows_in_a_program() {
             &options,
         ));
     }
-    look(&planned(singular().as_bytes(), &known(), &cell, &fine()));
+    for min_singularity in [1e-3, 0.02] {
+        look(&planned(singular().as_bytes(), &known(), &cell, &Options { min_singularity, ..fine() }));
+    }
     let missing: Vec<&&str> = NAMES.iter().filter(|name| !seen.contains(*name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
 }
@@ -240,7 +242,7 @@ fn singular() -> String {
     let mut text = String::from("MODULE M\n PROC main()\n");
     text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 0.8, 30.0], [0; 4]));
     text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 20.0, 30.0], [0; 4]));
-    text += &format!("  MoveL {}", at([10.0, 20.0, -10.0, 40.0, -20.0, 30.0], [0, 0, 0, 1]));
+    text += &format!("  MoveL {}", at([10.0, 20.0, -10.0, 40.0, -12.0, 30.0], [0, 0, 0, 1]));
     text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 10.0, 70.0, 10.0], [0; 4]));
     text += "  ConfJ\\Off;\n";
     text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 150.0, 25.0, 175.0], [0; 4]));
