@@ -257,10 +257,10 @@ impl Inverse<'_> {
         newton::solve(&self.arm, goal, &joints, self.kernel.length_mm)
     }
 
-    /// Range of an axis (rad).
+    /// Range of an axis (rad); infinite where none is stated.
     fn room(&self, axis: usize) -> f64 {
-        let (low, high) = range(&self.arm.model.limits, axis);
-        high - low
+        let room = self.arm.model.limits.max_rad[axis] - self.arm.model.limits.min_rad[axis];
+        if room.is_finite() { room } else { f64::INFINITY }
     }
 
     fn middle(&self, axis: usize) -> f64 {
