@@ -32,6 +32,7 @@ mod slack;
 mod segment;
 mod circle;
 mod strayed;
+mod singular;
 mod notes;
 mod passage;
 mod speed;

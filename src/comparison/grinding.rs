@@ -326,6 +326,7 @@ fn ground(
         max_correction_mm: LARGEST_CORRECTION_MM,
         max_turn_rad: LARGEST_TURN_RAD,
         cuts: Cuts::Single,
+        joint_gain: f64::INFINITY,
         ..RewriteBounds::default()
     };
     let mark = Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: String::new(), partial: false };

@@ -9,6 +9,7 @@
 use super::curve::{Curve, between};
 use super::rewrite::{Arms, Emit, Options};
 use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, STEPS, extra_of, largest};
+use super::singular::leaps;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
 use crate::program::motion::Motion;
@@ -77,17 +78,24 @@ impl Circle {
             if count > MOST_PIECES {
                 return None;
             }
-            let (extra, left) = self.cut(count as usize, path, arms)?;
+            let (extra, left) = self.cut(count as usize, path, arms, options)?;
             if left <= options.tolerance_mm {
-                return Some((extra, left));
+                return Some((extra?, left));
             }
             count = (1.5 * count).ceil();
         }
         None
     }
 
-    /// So many pieces, and how far they leave the intended arc; `None` where the arm cannot go.
-    fn cut(&self, count: usize, path: &Path<'_>, arms: &Arms<'_>) -> Option<(Vec<Extra>, f64)> {
+    /// So many pieces, none where a target of theirs would turn a joint too far near a singularity, and how far they leave
+    /// the intended arc; `None` where the arm cannot go.
+    fn cut(
+        &self,
+        count: usize,
+        path: &Path<'_>,
+        arms: &Arms<'_>,
+        options: &Options,
+    ) -> Option<(Option<Vec<Extra>>, f64)> {
         let Path { from, to, way } = path;
         let mut corners = Vec::with_capacity(count + 1);
         corners.push((from.told, from.joints));
@@ -127,7 +135,12 @@ impl Circle {
         let corner = |(k, (told, joints)): (usize, &(Pose, Joints))| {
             extra_of((told, joints), k as f64 / count as f64, Emit::Targets, path, arms)
         };
-        let extra = (1..).zip(&corners[1..count]).map(corner).collect();
+        let leap = |(k, (told, joints)): (usize, &(Pose, Joints))| {
+            let meant = self.meant.at(k as f64 / count as f64);
+            leaps([&meant, told], joints, &to.mounted.told, arms, options)
+        };
+        let inner = || (1..).zip(&corners[1..count]);
+        let extra = (!inner().any(leap)).then(|| inner().map(corner).collect());
         most.is_finite().then_some((extra, most + CHORD_MM))
     }
 }

@@ -122,10 +122,10 @@ pub(super) fn corner_bend(
     // The samples that every corner needs, in lanes.
     let solved = arms.nominal.reach_seeded(&FIRST.map(flange), &[point.joints; FIRST.len()]);
     let joints: Vec<Joints> =
-        solved.iter().map(|(_, joints)| *joints.as_ref().unwrap_or(&point.joints)).collect();
+        solved.iter().map(|found| found.as_ref().map_or(point.joints, |found| found.joints)).collect();
     let flanges = arm.forward_many(&joints);
     let first: [f64; FIRST.len()] =
-        std::array::from_fn(|k| if solved[k].1.is_ok() { off(FIRST[k], &flanges[k]) } else { f64::INFINITY });
+        std::array::from_fn(|k| if solved[k].is_ok() { off(FIRST[k], &flanges[k]) } else { f64::INFINITY });
     let even = |t: f64| match FIRST.iter().position(|first| (*first - t).abs() < 1e-9) {
         Some(k) => first[k],
         None => motor(t).map_or(f64::INFINITY, |joints| off(t, &arm.forward(&joints))),

@@ -78,8 +78,11 @@ fn line(motion: &Motion, path: &Path<'_>, middle_mm: f64, arms: &Arms<'_>, optio
     }
     let mut left = bend;
     // Where the wrist is interpolated by itself, a target on the line would say how the tool turns, which nobody did.
-    if motion.insertable && motion.modal.wrist_interpolation != Switch::On {
-        (out.before, left) = insertions(path, arms, options);
+    if motion.insertable
+        && motion.modal.wrist_interpolation != Switch::On
+        && let Some(cut) = insertions(path, arms, options)
+    {
+        (out.before, left) = cut;
         out.bend_mm = Some(left);
     }
     out.flag = (!(left <= options.tolerance_mm)).then_some(Why::Bend { mm: left });

@@ -23,7 +23,8 @@ use super::notes::{load_notes, open_notes, play_note};
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
 use super::segment::{Ends, Path, middles_off};
-use super::solve::{Solved, SolvedTargets, solve_all, take_room};
+use super::singular::forbid_ways;
+use super::solve::{Solved, SolvedTargets, as_joints, solve_all, take_room};
 use super::speed::{Pace, fastest};
 use super::strayed::strayed;
 use super::why::Why;
@@ -75,6 +76,13 @@ pub struct Options {
     pub max_turn_rad: f64,
     /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
     pub min_singularity: f64,
+    /// How far a correction may turn a joint: so many times the size of the correction, which is the shift of the flange
+    /// over half the length of the arm's links (so that it is in rad) plus its turn (rad). An arm far from singularities
+    /// needs once that, hardly ever five times; 1/sin θ5 and the like make it more near a singularity.
+    pub joint_gain: f64,
+    /// A joint may turn by this for any correction (rad), so that rounding and small corrections are let through where
+    /// what they cost does no harm.
+    pub joint_free_rad: f64,
     /// Whether joint targets are rewritten too: a home position says joints, not a pose.
     pub joint_targets: bool,
     /// Decimals of positions as they will be written, to state what rounding leaves.
@@ -98,6 +106,8 @@ impl Default for Options {
             max_correction_mm: 10.0,
             max_turn_rad: 2.0_f64.to_radians(),
             min_singularity: 1e-3,
+            joint_gain: 8.0,
+            joint_free_rad: 0.5_f64.to_radians(),
             joint_targets: false,
             position_decimals: 4,
             condition: Condition::default(),
@@ -198,8 +208,8 @@ pub(super) fn plan_without(
 ) -> Plan {
     let mut arms = Arms::of(estimated, &options.condition);
     let mountings = Mountings::of(listing, &arms, cell);
-    let solved = solve_all(listing, &mut arms, &mountings, options);
-    let stays = staying(listing, &solved, &mountings, options, refused);
+    let mut solved = solve_all(listing, &mut arms, &mountings, options);
+    let stays = staying(listing, &mut solved, &mountings, &arms, options, refused);
     let job = Job { listing, solved: &solved, stays: &stays, mountings: &mountings, arms: &arms, options };
     let portions: Vec<Portion> = (0..listing.motions.len())
         .into_par_iter()
@@ -225,23 +235,26 @@ pub(super) fn plan_without(
 }
 
 /// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
-/// circles that would become others, and the rest of a cut of which a part stays. Each may bring about another, until
-/// none does.
+/// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
+/// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
 fn staying(
     listing: &Listing,
-    solved: &SolvedTargets,
+    solved: &mut SolvedTargets,
     mountings: &Mountings,
+    arms: &Arms<'_>,
     options: &Options,
     refused: &BTreeMap<u32, Why>,
 ) -> BTreeMap<u32, Why> {
     let mut stays = refused.clone();
     let cuts = cut::of(listing);
+    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None);
     loop {
         let before = stays.len();
         for motion in strayed(listing, solved, mountings, options, &stays) {
             stays.insert(motion, Why::NoCircle);
         }
-        let kept = |motion: u32| obstacle(motion, listing, solved, options, &stays);
+        let solved_so_far = &*solved;
+        let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
         let more = match options.cuts {
             Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
             Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
@@ -254,9 +267,10 @@ fn staying(
             Cuts::Single => Vec::new(),
         };
         stays.extend(more);
-        if stays.len() == before {
+        if stays.len() == before && !forbidden {
             return stays;
         }
+        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays));
     }
 }
 
@@ -633,9 +647,7 @@ fn doubtful(solved: &Solved, arms: &Arms<'_>) -> Option<Why> {
 const SIGMA_GROWTH: f64 = 2.0;
 
 fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: &Options) -> NewTarget {
-    let joint_value = matches!(target.value, Ok(TargetValue::Joint(_)));
-    let can_be_joint = target.role == Role::To && motion.kind != MotionKind::Circular;
-    if joint_value || (options.emit == Emit::Joints && can_be_joint) {
+    if as_joints(motion, target, options.emit) {
         return NewTarget::Joint { robot_deg: std::array::from_fn(|i| solved.after[i].to_degrees()) };
     }
     let q = solved.told.rotation.quaternion();

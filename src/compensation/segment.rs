@@ -6,6 +6,7 @@ use super::circumstance::picked;
 use super::curve::{beside, between};
 use super::mounting::Mounted;
 use super::rewrite::{Arms, Emit, Options};
+use super::singular::leaps;
 use super::slack::Slack;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
@@ -137,7 +138,8 @@ pub(super) fn middles_off(lines: &[&Path<'_>], arms: &Arms<'_>, emit: Emit) -> V
                 line.to.mounted.told.flange_for(&between(&line.from.told, &line.to.told, 0.5))
             };
             let flanges: Vec<Pose> = lines.iter().map(told).collect();
-            arms.nominal.reach_seeded(&flanges, &halfway).into_iter().map(|reached| reached.1.ok()).collect()
+            let reached = arms.nominal.reach_seeded(&flanges, &halfway).into_iter();
+            reached.map(|reached| reached.ok().map(|reached| reached.joints)).collect()
         }
     };
     let places: Vec<usize> = lines.iter().map(|line| line.way.at(0.5)).collect();
@@ -249,7 +251,9 @@ const CLEARLY_STRAIGHT_MM: f64 = 0.01;
 ///
 /// A told line between two of them bends a joint's course a little. Close to where the joint turns it then turns once more,
 /// and the link waits: where this leaves more than the tolerance, the lines are cut finer.
-pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) -> (Vec<Extra>, f64) {
+///
+/// `None` where such a target would turn a joint by far more than the correction elsewhere, near a singularity.
+pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) -> Option<(Vec<Extra>, f64)> {
     let mut best = cut(path, arms, options.emit, options.tolerance_mm);
     if let Some(slack) = path.slack(arms) {
         let mut aim_mm = options.tolerance_mm;
@@ -269,7 +273,12 @@ pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) ->
     let extra = |stop: &Stopover<'_>| {
         extra_of((&stop.at.told, &stop.at.joints), stop.share, options.emit, path, arms)
     };
-    (best.stops.iter().map(extra).collect(), best.left_mm)
+    let told = &path.to.mounted.told;
+    let leap = |stop: &Stopover<'_>| {
+        let meant = between(&path.from.meant, &path.to.meant, stop.share);
+        leaps([&meant, &stop.at.told], &stop.at.joints, told, arms, options)
+    };
+    (!best.stops.iter().any(leap)).then(|| (best.stops.iter().map(extra).collect(), best.left_mm))
 }
 
 /// How often the lines between targets that are put in are cut finer.
@@ -423,10 +432,11 @@ pub(super) fn extra_of(
             target: NewTarget::Cartesian {
                 position_mm: told.translation.vector.into(),
                 quaternion: [q.w, q.i, q.j, q.k],
-                // cfx stays where only the quarters are used.
+                // cfx stays where only the quarters are used: where the end of the motion does not state its own.
                 conf: path.to.conf.map(|[_, _, _, cfx]| {
                     let here = arms.nominal.configuration(joints);
-                    [here.cf1, here.cf4, here.cf6, cfx]
+                    let used = cfx == arms.nominal.configuration(&path.to.joints).cfx;
+                    [here.cf1, here.cf4, here.cf6, if used { here.cfx } else { cfx }]
                 }),
             },
             external,

@@ -19,6 +19,7 @@ use super::mountings::Mountings;
 use super::payload::Load;
 use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
 use super::segment::Way;
+use super::singular::{Replay, at_target};
 use super::why::Why;
 use crate::kinematics::estimated::RidingPoint;
 use crate::kinematics::inverse::configuration::Configuration;
@@ -62,6 +63,8 @@ pub(super) struct Solved {
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
+    /// [`Inverse::branch_margins`](crate::kinematics::inverse::Inverse::branch_margins) of the nominal arm, before and after.
+    pub(super) margins: [[f64; 3]; 2],
     /// Why it must not be written.
     pub(super) forbidden: Option<Why>,
     /// The condition under which the arm comes there.
@@ -88,6 +91,17 @@ pub(super) struct SolvedTargets {
 }
 
 impl SolvedTargets {
+    /// Forbids that a motion is changed; of no effect where its last target was not worked out.
+    pub(super) fn forbid(&mut self, motion: usize, why: Why) {
+        let portion = motion / PORTION;
+        let end = self.first[motion + 1] - self.first[portion * PORTION];
+        if end > 0
+            && let Some(Ok(solved)) = self.portions[portion].get_mut(end - 1)
+        {
+            solved.forbidden = Some(why);
+        }
+    }
+
     /// The targets of one motion; none where the motion must be left.
     pub(super) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
         let portion = motion / PORTION;
@@ -121,6 +135,8 @@ struct Start {
     meant: Pose,
     joints: Joints,
     conf: Configuration,
+    /// [`Solved::margins`] before.
+    margins: [f64; 3],
     /// Whether the controller takes the solution next to where the arm stands, which is not known, and there are others.
     guessed: bool,
 }
@@ -271,9 +287,11 @@ impl Work<'_> {
             // What the controller is told, and the joints there.
             let at = |target: usize| match rewritten {
                 Some(portions) => match portions[m / PORTION].get(target - begin)? {
-                    Ok(solved) => Some((solved.mounted, solved.told, solved.after)),
+                    Ok(solved) if solved.forbidden.is_none() => {
+                        Some((solved.mounted, solved.told, solved.after))
+                    }
                     // A target that is refused stays as it is.
-                    Err(_) => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
+                    _ => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
                 },
                 None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
             };
@@ -448,11 +466,12 @@ fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Re
     let mut taken = 0;
     for (told, reached) in told.iter().zip(arms.nominal.reach_path(&flanges, last)) {
         let Ok(reached) = reached else { break };
-        if told.monitored != Switch::Off && !reached.fits(&wanted(told.target)) {
+        if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
             break;
         }
-        let (joints, conf) = (reached.joints, reached.configuration);
-        out[taken] = Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, guessed: false });
+        let (joints, conf, margins) = (reached.joints, reached.configuration, reached.margins());
+        out[taken] =
+            Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, margins, guessed: false });
         *last = joints;
         taken += 1;
     }
@@ -480,7 +499,8 @@ fn start(
             let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
             let conf = arms.nominal.configuration(&joints);
             let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
-            Ok(Start { mounted, meant, joints, conf, guessed })
+            let margins = arms.nominal.branch_margins(&joints);
+            Ok(Start { mounted, meant, joints, conf, margins, guessed })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -490,7 +510,8 @@ fn start(
             }
             let meant = told.target_of(&nominal.forward(&joints));
             let conf = arms.nominal.configuration(&joints);
-            Ok(Start { mounted, meant, joints, conf, guessed: false })
+            let margins = arms.nominal.branch_margins(&joints);
+            Ok(Start { mounted, meant, joints, conf, margins, guessed: false })
         }
     }
 }
@@ -544,14 +565,13 @@ fn finish(
     }
     // What the controller is told, and where it goes when the told numbers are rounded.
     let after: Vec<Joints> = way.iter().map(|w| w.after).collect();
+    let told_flanges = nominal.forward_many(&after);
     let told: Vec<Pose> = way
         .iter()
-        .zip(nominal.forward_many(&after))
-        .map(|(w, flange)| mountings.list[w.start.mounted].told.target_of(&flange))
+        .zip(&told_flanges)
+        .map(|(w, flange)| mountings.list[w.start.mounted].told.target_of(flange))
         .collect();
-    let joint_form = |w: &OnItsWay| {
-        matches!(asked[w.index].target.value, Ok(TargetValue::Joint(_))) || options.emit == Emit::Joints
-    };
+    let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
     let heard: Vec<Pose> = way
         .iter()
         .zip(&told)
@@ -559,16 +579,14 @@ fn finish(
             mountings.list[w.start.mounted].told.flange_for(&rounded(told, options.position_decimals))
         })
         .collect();
-    let replayed = match options.emit {
-        Emit::Targets => arms.nominal.reach_seeded(&heard, &after),
-        Emit::Joints => Vec::new(),
-    };
+    let replayed =
+        if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
     let mut last: Vec<Joints> = Vec::with_capacity(way.len());
     let mut failed: Vec<Option<Why>> = vec![None; way.len()];
     for (k, w) in way.iter().enumerate() {
         last.push(match replayed.get(k) {
-            Some((_, Ok(joints))) if !joint_form(w) => *joints,
-            Some((_, Err(error))) if !joint_form(w) => {
+            Some(Ok(reached)) if !joint_form(w) => reached.joints,
+            Some(Err(error)) if !joint_form(w) => {
                 failed[k] = Some(Why::of_inverse(*error));
                 w.after
             }
@@ -606,6 +624,10 @@ fn finish(
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
+        let (conf, margins) = match replayed.get(k) {
+            Some(Ok(reached)) if !joint_form(w) => (reached.configuration, reached.margins()),
+            _ => (arms.nominal.configuration(&w.after), arms.nominal.branch_margins(&w.after)),
+        };
         let mut solved = Solved {
             mounted: w.start.mounted,
             meant,
@@ -613,7 +635,8 @@ fn finish(
             after: w.after,
             told: told[k],
             conf_before: w.start.conf,
-            conf: replayed.get(k).map_or_else(|| arms.nominal.configuration(&w.after), |heard| heard.0),
+            conf,
+            margins: [w.start.margins, margins],
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
             sigma_mm: sigmas[k].hypot(in_play_mm),
@@ -623,10 +646,28 @@ fn finish(
             singularity: w.singularity,
             forbidden: None,
         };
-        solved.forbidden = forbidden(&solved, arms, options);
+        solved.forbidden = forbidden(&solved, arms, options).or_else(|| {
+            let told = &mountings.list[solved.mounted].told;
+            let flanges = [told.flange_for(&meant), told_flanges[k]];
+            let stated = if joint_form(w) { None } else { stated(&asked[w.index]) };
+            let replay = Replay { flanges, heard: &heard[k], joints: &last[k], stated };
+            at_target(&solved, &replay, arms, options)
+        });
         out[w.index] = Ok(solved);
     }
     out
+}
+
+/// Whether a target is written as joints.
+pub(super) fn as_joints(motion: &Motion, target: &MotionTarget, emit: Emit) -> bool {
+    let may = target.role == Role::To && motion.kind != MotionKind::Circular;
+    matches!(target.value, Ok(TargetValue::Joint(_))) || (emit == Emit::Joints && may)
+}
+
+/// The target, where the controller may go by the configuration that it states.
+fn stated<'a>(asked: &Asked<'a>) -> Option<&'a RobTarget> {
+    let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
+    (monitored(asked.motion) != Switch::Off).then_some(target)
 }
 
 /// A target whose joints are found.

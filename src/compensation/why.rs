@@ -38,8 +38,23 @@ pub enum Why {
     },
     /// Near a singularity small corrections become large joint motions.
     NearSingularity,
+    /// The correction turns a joint by much more than it would elsewhere on the arm: at the target, or on the way to it.
+    JointJump {
+        /// Joint, 0-based.
+        joint: usize,
+        /// By how much the correction turns it (°).
+        deg: f64,
+        /// The most that a correction of this size may turn it by (°).
+        most_deg: f64,
+        /// Whether this happens on the way, not at the target.
+        on_the_way: bool,
+    },
+    /// The corrected way comes to a singularity.
+    SingularWay,
     /// The corrected target lies in another configuration.
     OtherBranch,
+    /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
+    OpenBranch,
     /// The path between two targets leaves the intended one by more than the tolerance.
     Bend {
         /// By how much (mm).
@@ -131,6 +146,9 @@ impl Why {
             Why::NoCircle => "no circle through its points keeps to the way that was meant",
             Why::WholeCircle => "a whole circle",
             Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
+            Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
+            Why::SingularWay => "the way to it passes too close to a singularity",
+            Why::OpenBranch => "which configuration the controller takes is open",
             Why::PartOfCut { because, .. } => because,
             Why::Step { .. } => "the step to its neighbour is too large",
             Why::NotCovered { .. } => "no measured pose is near",
@@ -157,7 +175,19 @@ impl fmt::Display for Why {
             Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
             Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
             Why::NearSingularity => f.write_str("too close to a singularity"),
+            Why::JointJump { joint, deg, most_deg, on_the_way } => write!(
+                f,
+                "{}the correction would turn joint {} by {deg:.1}°, more than {most_deg:.1}°, which is enough away from \
+                 singularities: keep farther from the singular configuration",
+                if *on_the_way { "on the way to it " } else { "" },
+                joint + 1
+            ),
+            Why::SingularWay => f.write_str("on the corrected way to it the arm comes too close to a singularity"),
             Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
+            Why::OpenBranch => f.write_str(
+                "the controller may take another configuration, since none is stated and another lies as near: state it, or \
+                 come nearer before",
+            ),
             Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
             Why::Corner { mm } if !mm.is_finite() => {
                 f.write_str("the arm cannot follow the rounded corner before it: make the zone smaller")

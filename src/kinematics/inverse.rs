@@ -105,6 +105,23 @@ impl<'a> Inverse<'a> {
         self.structure.has_branches().then_some(SingularityDistances { wrist, elbow, shoulder })
     }
 
+    /// The distances of [`Inverse::singularity_distances`] with the signs that tell the branches apart: shoulder, elbow,
+    /// wrist; negative for behind, elbow back and axis 5 negative. All 1 for an arm without a closed form.
+    pub fn branch_margins(&self, joints: &Joints) -> [f64; 3] {
+        self.margins(joints)
+    }
+
+    /// Whether the arm has a closed form, and so branches.
+    pub fn has_branches(&self) -> bool {
+        self.structure.has_branches()
+    }
+
+    /// Distance to singularity at controller angles, as [`Solution::singularity`] states it.
+    pub fn singularity(&self, joints: &Joints) -> f64 {
+        let jacobian = newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm);
+        jacobian.try_inverse().map_or(0.0, |inverse| 1.0 / inverse.norm())
+    }
+
     /// Smallest singular value of the 6 × 6 Jacobian of the flange, translations divided by [`Inverse::length_mm`],
     /// with respect to the rotations of the joints (couplings and slopes of effects not counted).
     pub fn smallest_singular_value(&self, joints: &Joints) -> f64 {
@@ -133,9 +150,11 @@ impl<'a> Inverse<'a> {
     /// The solution in a requested configuration.
     ///
     /// An axis may lie outside its requested quarter by up to 5°, since the estimated arm stands a little beside the
-    /// nominal one for which the program was written. Among several the one nearest to `near` is taken, without `near`
-    /// the one that best keeps to the quarters. Joints 2, 3 and 5 stand on the turn nearest to `near`, or in the middle
-    /// of their range.
+    /// nominal one for which the program was written; so may a branch be left across its border. A solution on the very
+    /// branch goes before all others: near a singularity the arm has two solutions close together, and cfx tells which is
+    /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters.
+    /// Joints 2, 3 and 5 stand on the turn nearest to `near`; without it, or with less than a turn of room, on that nearest
+    /// to the middle of their range.
     pub fn solve_configured(
         &self,
         target: &Pose,
@@ -148,7 +167,9 @@ impl<'a> Inverse<'a> {
         }
         if let Some(near) = near
             && let Ok(solution) = self.solve_near(target, near)
-            && configuration.fits(&solution.joints, &self.margins(&solution.joints))
+            && let margins = self.margins(&solution.joints)
+            && configuration.fits(&solution.joints, &margins)
+            && configuration.states_branch(&margins)
         {
             return Ok(solution);
         }
@@ -200,13 +221,12 @@ impl<'a> Inverse<'a> {
     }
 
     fn solution(&self, outcome: &Outcome) -> Solution {
-        let jacobian = newton::scaled_jacobian(&self.arm, &outcome.joints, self.kernel.length_mm);
         Solution {
             joints: outcome.joints,
             residual_mm: outcome.residual_mm,
             residual_rad: outcome.residual_rad,
             iterations: outcome.iterations,
-            singularity: jacobian.try_inverse().map_or(0.0, |inverse| 1.0 / inverse.norm()),
+            singularity: self.singularity(&outcome.joints),
         }
     }
 }

@@ -445,6 +445,15 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
         Why::TooMuchTurn { deg } => {
             sized("correction of the orientation exceeds the bound".to_owned(), deg, "°")
         }
+        Why::JointJump { joint, deg, on_the_way, .. } => sized(
+            format!(
+                "{}the correction would turn joint {} too far near a singularity",
+                if on_the_way { "on the way to it " } else { "" },
+                joint + 1
+            ),
+            deg,
+            "°",
+        ),
         Why::Bend { mm } => sized("the path between targets leaves the intended one".to_owned(), mm, "mm"),
         Why::TooFast { joint, ratio } => sized(
             format!("at the programmed speed joint {} turns faster than it can", joint + 1),

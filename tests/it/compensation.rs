@@ -5,6 +5,7 @@ mod path;
 mod payload;
 mod play;
 mod reasons;
+mod singular;
 
 use nalgebra::{DMatrix, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -71,14 +71,19 @@ impl Inverse<'_> {
     ) -> Result<Solution, InverseError> {
         let wanted = Joints::from_fn(|axis, _| match QUARTER_AXES.iter().position(|&a| a == axis) {
             Some(k) => (f64::from(configuration.quarters()[k]) + 0.5) * FRAC_PI_2,
-            None => near.map_or_else(|| self.middle(axis), |near| near[axis]),
+            // A joint with less than a turn of room has one turn within it at most, wherever the arm comes from.
+            None => {
+                near.filter(|_| self.room(axis) > TAU).map_or_else(|| self.middle(axis), |near| near[axis])
+            }
         });
-        let mut best: Option<([f64; 2], Outcome)> = None;
+        let mut best: Option<([f64; 3], Outcome)> = None;
         let mut nearest: Option<(f64, Joints)> = None;
         let mut outside = None;
         let mut found = self.branches(goal, near, &[1.0; 3], 0)?;
         let fits = |o: &Outcome| {
-            configuration.fits(&self.turned(goal, *o, &wanted).joints, &self.margins(&o.joints))
+            let margins = self.margins(&o.joints);
+            configuration.states_branch(&margins)
+                && configuration.fits(&self.turned(goal, *o, &wanted).joints, &margins)
         };
         if !found.iter().any(fits) {
             found = self.branches(goal, near, &[1.0; 3], SPREAD_RESCUE)?;
@@ -96,7 +101,8 @@ impl Inverse<'_> {
             if nearest.is_none_or(|(o, _)| overshoot < o) {
                 nearest = Some((overshoot, joints));
             }
-            if !configuration.fits(&joints, &self.margins(&joints)) {
+            let margins = self.margins(&joints);
+            if !configuration.fits(&joints, &margins) {
                 continue;
             }
             if let Err(error) = self.check_limits(&joints) {
@@ -104,7 +110,9 @@ impl Inverse<'_> {
                 continue;
             }
             let distance = near.map_or(0.0, |near| (joints - near).amax());
-            let rank = [distance, overshoot.max(0.0)];
+            // A joint more or less is no reason to take another branch than the one that is stated.
+            let strays = f64::from(u8::from(!configuration.states_branch(&margins)));
+            let rank = [strays, distance, overshoot.max(0.0)];
             if best.as_ref().is_none_or(|(r, _)| rank < *r) {
                 best = Some((rank, outcome));
             }
@@ -118,6 +126,15 @@ impl Inverse<'_> {
             }),
             (None, None, None) => Err(InverseError::NotFinite),
         }
+    }
+
+    /// One solution within the limits for each branch, each joint on the turn nearest to `near`: those between which a
+    /// controller chooses that goes to the nearest one. Empty where there is none.
+    pub fn solve_around(&self, target: &Pose, near: &Joints) -> Vec<Joints> {
+        let Ok(goal) = self.goal(target) else { return Vec::new() };
+        let found = self.branches(&goal, Some(near), &self.margins(near), 0).unwrap_or_default();
+        let within = |o: &Outcome| self.check_limits(&o.joints).is_ok();
+        found.iter().filter(|o| within(o)).map(|o| o.joints).collect()
     }
 
     /// Every solution within the limits.
@@ -238,6 +255,12 @@ impl Inverse<'_> {
             return outcome;
         }
         newton::solve(&self.arm, goal, &joints, self.kernel.length_mm)
+    }
+
+    /// Range of an axis (rad); infinite where none is stated.
+    fn room(&self, axis: usize) -> f64 {
+        let room = self.arm.model.limits.max_rad[axis] - self.arm.model.limits.min_rad[axis];
+        if room.is_finite() { room } else { f64::INFINITY }
     }
 
     fn middle(&self, axis: usize) -> f64 {

@@ -93,6 +93,11 @@ impl Configuration {
         self.overshoot_rad(joints) <= QUARTER_TOLERANCE_RAD && self.has_branch(margins)
     }
 
+    /// Whether margins are of the stated branch to the sign, as a controller that uses cfx reads it.
+    pub(super) fn states_branch(&self, margins: &[f64; 3]) -> bool {
+        Branch::of(margins).index() == self.cfx
+    }
+
     /// Whether margins of a solution belong to the stated branch, borders counted to both sides.
     fn has_branch(&self, margins: &[f64; 3]) -> bool {
         (0..3).all(|k| {

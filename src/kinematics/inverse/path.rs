@@ -34,6 +34,16 @@ impl Reached {
     pub fn fits(&self, wanted: &Configuration) -> bool {
         wanted.fits(&self.joints, &self.margins)
     }
+
+    /// The same with the branch to the sign: no other solution of the target is of that configuration.
+    pub fn is_of(&self, wanted: &Configuration) -> bool {
+        self.fits(wanted) && wanted.states_branch(&self.margins)
+    }
+
+    /// [`Inverse::branch_margins`] at these joints.
+    pub fn margins(&self) -> [f64; 3] {
+        self.margins
+    }
 }
 
 impl Inverse<'_> {
@@ -116,19 +126,24 @@ impl Inverse<'_> {
     }
 
     /// The joints of [`Inverse::solve_seeded`], without residuals and distances to singularity: half the work; they may
-    /// differ by 1e-12 rad. Each with the configuration of its seed. One thread.
-    pub fn reach_seeded(
-        &self,
-        targets: &[Pose],
-        seeds: &[Joints],
-    ) -> Vec<(Configuration, Result<Joints, InverseError>)> {
+    /// differ by 1e-12 rad. One thread.
+    pub fn reach_seeded(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Reached, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
         for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
             let solved = self.solve_lanes(targets, &padded(seeds), Asked::Joints);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let row = lane(&solved, k);
-                let solution = self.judged(&row, target, seed);
-                out.push((self.configuration_of(seed, &row.margins[0]), solution.map(|s| s.joints)));
+                let found = match self.accepted(&row, seed) {
+                    Some(solution) => {
+                        self.check_limits(&solution.joints).map(|()| (solution.joints, row.margins[1]))
+                    }
+                    None => self.solve_near(target, seed).map(|s| (s.joints, self.margins(&s.joints))),
+                };
+                out.push(found.map(|(joints, margins)| Reached {
+                    joints,
+                    configuration: self.configuration_of(&joints, &margins),
+                    margins,
+                }));
             }
         }
         out

@@ -7,11 +7,12 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::{Circles, Options, Plan, plan};
 use truegrind::compensation::why::Why;
+use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::kinematics::model::Joints;
 use truegrind::program::rapid::Task;
 
-use super::{estimated, perturbed};
+use super::{estimated, nominal, perturbed};
 
 /// Every variant by name: a new one does not compile until it stands here.
 fn name(why: &Why) -> &'static str {
@@ -26,7 +27,10 @@ fn name(why: &Why) -> &'static str {
         Why::TooFar { .. } => "too far",
         Why::TooMuchTurn { .. } => "too much turn",
         Why::NearSingularity => "near singularity",
+        Why::JointJump { .. } => "joint jump",
+        Why::SingularWay => "singular way",
         Why::OtherBranch => "other branch",
+        Why::OpenBranch => "open branch",
         Why::Bend { .. } => "bend",
         Why::Corner { .. } => "corner",
         Why::CircleKept => "circle kept",
@@ -41,7 +45,7 @@ fn name(why: &Why) -> &'static str {
     }
 }
 
-const NAMES: [&str; 20] = [
+const NAMES: [&str; 23] = [
     "program",
     "moving base",
     "joint target",
@@ -50,7 +54,10 @@ const NAMES: [&str; 20] = [
     "too far",
     "too much turn",
     "near singularity",
+    "joint jump",
+    "singular way",
     "other branch",
+    "open branch",
     "bend",
     "corner",
     "circle kept",
@@ -229,8 +236,34 @@ fn every_reason_there_is_shows_in_a_program() {
             &options,
         ));
     }
+    for min_singularity in [1e-3, 0.02] {
+        look(&planned(singular().as_bytes(), &known(), &cell, &Options { min_singularity, ..fine() }));
+    }
     let missing: Vec<&&str> = NAMES.iter().filter(|name| !seen.contains(*name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
+}
+
+/// A target close to the wrist singularity, a line through it, and a joint motion without configuration to a pose of which
+/// another solution is nearer.
+fn singular() -> String {
+    let at = |q_deg: [f64; 6], conf: [i32; 4]| {
+        let q = Joints::from_fn(|j, _| q_deg[j].to_radians());
+        let pose = nominal().under(&Condition::default()).forward(&q);
+        let (t, r) = (pose.translation.vector, pose.rotation.quaternion());
+        let [cf1, cf4, cf6, cfx] = conf;
+        format!(
+            "[[{:.6},{:.6},{:.6}],[{:.9},{:.9},{:.9},{:.9}],[{cf1},{cf4},{cf6},{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n",
+            t.x, t.y, t.z, r.w, r.i, r.j, r.k
+        )
+    };
+    let mut text = String::from("MODULE M\n PROC main()\n");
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 0.8, 30.0], [0; 4]));
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 20.0, 30.0], [0; 4]));
+    text += &format!("  MoveL {}", at([10.0, 20.0, -10.0, 40.0, -12.0, 30.0], [0, 0, 0, 1]));
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 10.0, 70.0, 10.0], [0; 4]));
+    text += "  ConfJ\\Off;\n";
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 150.0, 25.0, 175.0], [0; 4]));
+    text + " ENDPROC\nENDMODULE\n"
 }
 
 #[test]
