@@ -3,6 +3,8 @@
 //! The TOML file of an estimated arm is complete: it holds the nominal arm too, so a program can be rewritten from it
 //! alone.
 
+mod checks;
+
 use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -321,10 +323,11 @@ impl Estimated {
         Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
     }
 
-    /// Reads the file.
+    /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
+    /// parameters are the arm's.
     ///
     /// # Errors
-    /// A sentence that says what in the file cannot be used.
+    /// A sentence that says what in the file cannot be used: key, what was found, what was expected.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let file: ModelFile = toml::from_str(text).map_err(|e| format!("not a truegrind model: {e}"))?;
         if file.schema != SCHEMA {
@@ -345,7 +348,7 @@ impl Estimated {
             return Err(format!("`covariance.lower`: expected {n} rows of 1 to {n} numbers"));
         }
         let covariance = DMatrix::from_fn(n, n, |i, j| file.covariance.lower[i.max(j)][i.min(j)]);
-        Ok(Self {
+        let model = Self {
             robot: file.robot,
             nominal: file.nominal.model().map_err(|e| format!("`nominal`: {e}"))?,
             model: file.estimated.model().map_err(|e| format!("`estimated`: {e}"))?,
@@ -359,7 +362,9 @@ impl Estimated {
             verdict: file.verdict,
             region: file.region,
             condition: file.condition,
-        })
+        };
+        checks::check(&model).map_err(|unfit| unfit.to_string())?;
+        Ok(model)
     }
 }
 
