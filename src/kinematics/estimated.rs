@@ -204,6 +204,11 @@ fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
     out
 }
 
+/// √v of a variance that rounding may have taken below 0; not a number of what is none.
+fn root(variance: f64) -> f64 {
+    if variance > 0.0 || variance.is_nan() { variance.sqrt() } else { 0.0 }
+}
+
 impl Estimated {
     /// Covariance of the position of a point on the flange (mm²), 3 × 3 in the base.
     pub fn position_covariance(
@@ -282,7 +287,7 @@ impl Estimated {
                 #[inline(always)]
                 || quadratic(self.covariance.as_slice(), &velocities),
             );
-            out.extend(variance.0[..block.len()].iter().map(|v| v.max(0.0).sqrt()));
+            out.extend(variance.0[..block.len()].iter().map(|v| root(*v)));
         }
         out
     }

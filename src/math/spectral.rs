@@ -1,10 +1,10 @@
-//! Singular values of small matrices in a bounded number of steps, whatever the numbers are: the iteration of the library
+//! Singular values and eigenvalues in a bounded number of steps, whatever the numbers are: the iteration of the library
 //! never ends on one that is not finite unless it is told when.
 
-use nalgebra::{Matrix6, SVD, U6, Vector6};
+use nalgebra::{DMatrix, Dyn, Matrix6, SVD, SymmetricEigen, U6, Vector6};
 
-/// Steps after which an iteration is given up; a 6 × 6 matrix takes some twenty.
-pub const MOST_STEPS: usize = 1_000;
+/// Steps after which an iteration is given up, for each row; some two or three are needed.
+const MOST_STEPS: usize = 200;
 
 /// What the library's own iterations stop at.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
@@ -19,5 +19,14 @@ pub fn decomposed(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }
-    SVD::try_new(*matrix, false, directions, PRECISION, MOST_STEPS)
+    SVD::try_new(*matrix, false, directions, PRECISION, 6 * MOST_STEPS)
+}
+
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one that is not finite.
+pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    if !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let most = MOST_STEPS * matrix.nrows().max(1);
+    SymmetricEigen::try_new(matrix, f64::EPSILON, most)
 }

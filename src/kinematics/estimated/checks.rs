@@ -170,6 +170,10 @@ fn order(model: &Estimated) -> Result<(), Unfit> {
             ));
         }
     }
+    // A model may leave its list of parameters away: nothing is computed from it.
+    if model.parameters.is_empty() {
+        return Ok(());
+    }
     let named: Vec<String> = model.order.iter().map(ToString::to_string).collect();
     let found: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
     if named == found {
