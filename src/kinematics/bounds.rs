@@ -79,13 +79,13 @@ pub fn shown(value: f64) -> String {
 }
 
 /// Lengths of links, frames and levers (mm).
-pub const LENGTH_MM: Bound = Bound::new(-1e4, 1e4, "a length in mm, within ±10,000");
+pub const LENGTH_MM: Bound = Bound::new(-1e4, 1e4, "a finite length in mm, within ±10,000");
 /// Positions in a cell (mm).
-pub const PLACE_MM: Bound = Bound::new(-1e6, 1e6, "a position in mm, within ±1,000,000");
+pub const PLACE_MM: Bound = Bound::new(-1e6, 1e6, "a finite position in mm, within ±1,000,000");
 /// Twists and offsets of links (°).
-pub const TWIST_DEG: Bound = Bound::new(-720.0, 720.0, "an angle in degrees, within ±720");
+pub const TWIST_DEG: Bound = Bound::new(-720.0, 720.0, "a finite angle in degrees, within ±720");
 /// Joint angles (°).
-pub const JOINT_DEG: Bound = Bound::new(-3600.0, 3600.0, "a joint angle in degrees, within ±3600");
+pub const JOINT_DEG: Bound = Bound::new(-3600.0, 3600.0, "a finite joint angle in degrees, within ±3600");
 /// Speeds of joints [°/s].
 pub const SPEED_DEG_S: Bound = Bound::new(1e-3, 1e5, "a speed above 0 in degrees per second");
 /// Masses (kg).

@@ -9,7 +9,7 @@ use std::cell::Cell;
 use super::{Surface, SurfaceError};
 
 /// Terms of equations that are evaluated for one path: some seconds.
-const MOST_TERMS: f64 = 5e8;
+const MOST_TERMS: f64 = 2e8;
 /// Steps that are looked at while equal ones are sought; then each step is as long as the bounds allow.
 const MOST_TRIALS: usize = 20_000_000;
 

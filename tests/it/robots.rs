@@ -498,7 +498,7 @@ fn a_sheet_with_any_number_wrong_is_refused_or_makes_a_finite_arm() {
         (
             "a_mm = 270",
             "a_mm = 1000000",
-            "link 2 a_mm: found 1000000, expected a length in mm, within ±10,000",
+            "link 2 a_mm: found 1000000, expected a finite length in mm, within ±10,000",
         ),
         ("payload_kg = 3.0", "payload_kg = 1e9", "more than 0, up to 10,000 kg"),
         ("[0, 0.5, 1, 0, 0, 0]", "[0, 0.5, 1e-3, 0, 0, 0]", "joints.map: found a matrix of determinant"),
