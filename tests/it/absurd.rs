@@ -5,15 +5,16 @@ pub(crate) const NUMBERS: [&str; 6] = ["nan", "inf", "-inf", "1e308", "1e-308", 
 
 /// Every text that differs from a TOML text in one number, with the line and the number that was put there. Numbers in
 /// strings and comments stay.
-pub(crate) fn each(text: &str) -> Vec<(String, String)> {
+pub(crate) fn each(text: &str) -> impl Iterator<Item = (String, String)> {
     let places = places(text);
     assert!(!places.is_empty());
-    let with = |(from, to): (usize, usize), number: &str| {
+    places.into_iter().flat_map(move |(from, to)| {
         let line = text[..from].matches('\n').count() + 1;
-        let said = format!("line {line}: {} for {}", number, &text[from..to]);
-        (said, format!("{}{number}{}", &text[..from], &text[to..]))
-    };
-    places.into_iter().flat_map(|place| NUMBERS.map(|number| with(place, number))).collect()
+        NUMBERS.map(move |number| {
+            let said = format!("line {line}: {number} for {}", &text[from..to]);
+            (said, format!("{}{number}{}", &text[..from], &text[to..]))
+        })
+    })
 }
 
 /// Where numbers stand: after `=`, `[` or `,`, outside strings and comments.
@@ -44,6 +45,6 @@ fn places(text: &str) -> Vec<(usize, usize)> {
 #[test]
 fn numbers_are_found_where_they_stand() {
     let text = "a2 = 1.5 # 3\n\"4\" = \"5\"\n[b6]\nc = [7, -8e1]\n";
-    let found: Vec<String> = each(text).iter().step_by(NUMBERS.len()).map(|m| m.0.clone()).collect();
+    let found: Vec<String> = each(text).step_by(NUMBERS.len()).map(|m| m.0).collect();
     assert_eq!(found, ["line 1: nan for 1.5", "line 4: nan for 7", "line 4: nan for -8e1"]);
 }

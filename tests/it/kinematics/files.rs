@@ -90,7 +90,11 @@ fn whole() -> Model {
 /// A model with every key that a file may have.
 fn complete() -> Estimated {
     let model = whole();
-    let order = arm_parameters(&model);
+    // The rows of a covariance are alike: two links stand for six.
+    let order: Vec<Parameter> = arm_parameters(&model)
+        .into_iter()
+        .filter(|p| !matches!(p, Parameter::Link { joint: 2.., .. }))
+        .collect();
     let n = order.len();
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let half = DMatrix::from_fn(n, n, |_, _| random.random_range(-1e-3..1e-3));
@@ -149,8 +153,8 @@ fn a_model_with_any_number_wrong_is_refused_or_computes_finite_numbers() {
     let text = complete().to_toml().unwrap();
     assert!(Estimated::from_toml(&text).is_ok());
     let refused: usize = absurd::each(&text)
-        .par_iter()
-        .map(|(said, text)| match Estimated::from_toml(text) {
+        .par_bridge()
+        .map(|(said, text)| match Estimated::from_toml(&text) {
             Err(message) => {
                 assert!(
                     message.contains("expected") || message.contains("not a truegrind model"),
@@ -173,14 +177,14 @@ fn a_model_with_any_number_wrong_is_refused_or_computes_finite_numbers() {
         })
         .sum();
     // NaN, infinities and 1e308 have no place anywhere but in what is not computed with.
-    assert!(refused * 6 >= absurd::each(&text).len() * 4 - 12, "{refused} refused");
+    assert!(refused * 6 >= absurd::each(&text).count() * 4 - 12, "{refused} refused");
 }
 
 #[test]
 fn an_actual_arm_with_any_number_wrong_is_refused_or_computes_finite_numbers() {
     let text = toml::to_string(&ArmFile::from(&whole())).unwrap();
-    absurd::each(&text).par_iter().for_each(|(said, text)| {
-        let Ok(file) = toml::from_str::<ArmFile>(text) else { return };
+    absurd::each(&text).par_bridge().for_each(|(said, text)| {
+        let Ok(file) = toml::from_str::<ArmFile>(&text) else { return };
         let Ok(model) = file.model() else { return };
         assert!(!said.contains("nan") && !said.contains("inf") && !said.contains("1e308"), "{said}");
         let flange = model.forward(&Joints::repeat(0.3), &Condition::default());

@@ -247,7 +247,7 @@ fn a_recipe_with_any_number_wrong_is_refused_or_gives_finite_rows() {
     ] {
         let text = format!("robot = \"abb-irb-120\"\nseed = 5\n[poses]\n{poses}{rest}");
         try_measure(&text).unwrap();
-        crate::absurd::each(&text).par_iter().for_each(|(said, text)| match try_measure(text) {
+        crate::absurd::each(&text).par_bridge().for_each(|(said, text)| match try_measure(&text) {
             Err(error) => assert!(!error.to_string().is_empty()),
             Ok(simulation) => {
                 assert!(!simulation.csv.contains("NaN") && !simulation.csv.contains("inf"), "{said}");

@@ -297,7 +297,7 @@ fn a_file_with_any_number_wrong_is_refused_or_gives_a_finite_path() {
     use truegrind::surface::{SurfaceFile, sample};
     for shipped in [&sample::BLADE, &sample::DOME, &sample::SADDLE] {
         let text = std::str::from_utf8(shipped.bytes).unwrap();
-        crate::absurd::each(text).par_iter().for_each(|(said, text)| {
+        crate::absurd::each(text).par_bridge().for_each(|(said, text)| {
             let none = |_: &str| Err::<Vec<u8>, _>("no mesh");
             let Ok(file) = SurfaceFile::read("s.toml", text.as_bytes(), none) else { return };
             assert!(!said.contains("nan") && !said.contains("inf"), "{said}");
