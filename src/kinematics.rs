@@ -10,6 +10,7 @@
 //! *estimated* (nominal plus what was identified) and *actual* (known only in a simulation). Lengths are mm, angles
 //! rad, joint angles are the controller's unless a name says otherwise.
 
+pub mod bounds;
 pub mod link;
 pub mod condition;
 pub mod effect;

@@ -6,3 +6,4 @@ pub mod difference;
 pub mod statistics;
 pub mod tail;
 pub mod radial;
+pub mod spectral;

@@ -76,6 +76,48 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
     Err(RobotError::Unknown { name: name.to_owned(), known: catalogue().join(", ") })
 }
 
+/// Refuses a nominal arm that goes by a name of the catalogue and is not that arm. A name that the catalogue has not is
+/// nobody's business.
+///
+/// # Errors
+/// A sentence that says where the two differ first.
+pub fn agrees(name: &str, nominal: &Model) -> Result<(), String> {
+    let plain =
+        |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+    let wanted = plain(name);
+    let mut different = None;
+    for (file, text) in FILES {
+        let Ok(content) = read(text, file) else { continue };
+        for sheet in content.robot {
+            // The maker's own designation is as good as the catalogue's name.
+            if wanted.is_empty() || (plain(&sheet.name) != wanted && plain(&sheet.model) != wanted) {
+                continue;
+            }
+            let Ok(known) = Robot::new(sheet, file) else { continue };
+            match validation::difference(nominal, &known.model) {
+                None => return Ok(()),
+                Some(place) => different = Some(place),
+            }
+        }
+    }
+    different.map_or(Ok(()), |place| {
+        Err(format!(
+            "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give \
+             an arm of your own a name of its own"
+        ))
+    })
+}
+
+/// Refuses a nominal arm whose links are not those of another of the same name.
+///
+/// # Errors
+/// A sentence that says where the two differ first.
+pub fn same(nominal: &Model, stated: &Model) -> Result<(), String> {
+    validation::difference(nominal, stated).map_or(Ok(()), |place| {
+        Err(format!("the two have one name and are not one arm: {place}; give the robot that the model was identified for"))
+    })
+}
+
 /// An arm from a user's own file, which holds exactly one `[[robot]]`. `file` is named in errors.
 pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
     let mut sheets = read(text, file)?.robot;

@@ -18,6 +18,7 @@
 //! [`mesh`], [`sampling`] (how far apart passes and points may be), [`path`] (passes, tool frames, links),
 //! [`file`](mod@file) (the TOML file that states all of it), [`sample`] (the files that ship).
 
+mod budget;
 pub mod error;
 pub mod expression;
 pub mod equation;
@@ -111,6 +112,16 @@ impl Surface {
             Surface::Parametric(surface) => surface.contact(plan),
             Surface::Implicit(surface) => surface.contact(plan),
             Surface::Mesh(surface) => surface.contact(plan),
+        }
+    }
+
+    /// What a call of [`Surface::contact`] costs, in terms of an equation.
+    pub(crate) fn look_cost(&self) -> f64 {
+        match self {
+            Surface::Explicit(surface) => surface.look_cost(),
+            Surface::Parametric(surface) => surface.look_cost(),
+            Surface::Implicit(surface) => surface.look_cost(),
+            Surface::Mesh(surface) => surface.look_cost(),
         }
     }
 

@@ -47,6 +47,7 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let arm = Estimated::from_toml(&text).map_err(|e| {
         anyhow!("{argument}: {}; a model file is what `truegrind identify -o` writes", e.trim_end())
     })?;
+    robots::agrees(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
     if arm.verdict.status == Judgement::Fail {
         bail!(
             "{argument}: the fit behind this model failed ({}); it is not used",
@@ -97,6 +98,8 @@ pub(super) fn nominal(model: &NamedModel, robot_name: Option<&str>) -> anyhow::R
                         arm.robot
                     );
                 }
+                robots::same(&arm.nominal, &robot.model)
+                    .map_err(|e| anyhow!("--robot {stated}, model {name}: {e}"))?;
             }
             Ok((arm.robot.clone(), arm.nominal.clone()))
         }

@@ -166,6 +166,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 /// Nobody measures more poses by one plan.
 const MOST_POSES: usize = 2000;
 
+/// And no choice is better for more than this.
+const MOST_CANDIDATES: usize = 100_000;
+
 fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
     let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
     for (name, value) in [
@@ -194,6 +197,18 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
     }
     if arguments.poses > MOST_POSES {
         bail!("--poses {}: expected at most {MOST_POSES}; some 50 to 100 are usual", arguments.poses);
+    }
+    for (name, count) in [
+        ("--repeats", arguments.repeats),
+        ("--both-sides", arguments.both_sides),
+        ("--warm-up", arguments.warm_up),
+    ] {
+        if count > MOST_POSES {
+            bail!("{name} {count}: expected at most {MOST_POSES}");
+        }
+    }
+    if arguments.candidates > MOST_CANDIDATES {
+        bail!("--candidates {}: expected at most {MOST_CANDIDATES}; 2000 are usual", arguments.candidates);
     }
     let box_mm = match &arguments.box_mm {
         None => None,

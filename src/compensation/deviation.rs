@@ -199,6 +199,10 @@ fn best_motion(pairs: &[Pair]) -> Option<Pose> {
     let (to, from) = (mean(|p| p.0), mean(|p| p.1));
     let spread: Matrix3<f64> =
         pairs.iter().map(|p| (p.1.coords - from) * (p.0.coords - to).transpose()).sum();
+    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    if !spread.iter().all(|v| v.abs() < 1e100) {
+        return None;
+    }
     let svd = SVD::new(spread, true, true);
     let (u, v) = (svd.u?, svd.v_t?.transpose());
     let sign = (v * u.transpose()).determinant().signum();

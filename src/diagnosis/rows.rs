@@ -97,7 +97,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
             let mut observed = logged.clone();
             for ((&i, row), covariance) in good.iter().zip(&kept.rows).zip(covariances) {
                 observed.dataset.rows[i].joints = row.joints;
-                observed.angles[i] = covariance;
+                observed.angles.set(i, covariance);
             }
             (observed, Ok(report))
         }

@@ -12,6 +12,7 @@ use super::finding::NotTestable;
 use super::rows::Prepared;
 use super::selection::{Scored, scale_beside_growth};
 use crate::kinematics::effect::Effect;
+use crate::math::spectral;
 use crate::measurement::dataset::Dataset;
 
 /// Peak rotation of a joint that an effect of practical size has (rad).
@@ -140,6 +141,6 @@ fn smallest_rad(scored: &Scored) -> Option<f64> {
     }
     let k = scaled.len();
     let per_peak = nalgebra::DMatrix::from_fn(k, k, |a, b| information[(a, b)] / (scaled[a] * scaled[b]));
-    let least = per_peak.symmetric_eigen().eigenvalues.min().max(1e-12);
+    let least = spectral::symmetric(per_peak)?.eigenvalues.min().max(1e-12);
     Some((VISIBLE / least).sqrt())
 }

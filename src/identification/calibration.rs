@@ -147,12 +147,16 @@ impl Calibration {
 
     /// The same task with other weights, one for each row.
     pub fn reweighted(&self, weights: &[Weight]) -> Self {
-        let mut out = self.clone();
+        self.clone().weighted(weights)
+    }
+
+    /// This task itself with other weights, one for each row.
+    pub fn weighted(mut self, weights: &[Weight]) -> Self {
         for (i, w) in weights.iter().enumerate().take(self.rows) {
-            out.columns.per_mm[i] = w.per_mm;
-            out.columns.per_rad[i] = w.per_rad;
+            self.columns.per_mm[i] = w.per_mm;
+            self.columns.per_rad[i] = w.per_rad;
         }
-        out
+        self
     }
 
     /// Weight of a row.
@@ -281,6 +285,9 @@ const BLOCK_LANES: usize = 64;
 
 /// Groups of eight rows that one thread passes over where the pass costs much: few, so that threads end together.
 const COST_LANES: usize = 16;
+
+/// Rows from which their columns are made on all threads; fewer are not worth the call.
+const MANY_ROWS: usize = 8192;
 
 /// Parameters with which such a buffer stays there.
 const FEW: usize = 64;
@@ -488,7 +495,12 @@ impl Columns {
         let n = dataset.rows.len();
         let padded = n.div_ceil(WIDTH) * WIDTH;
         let row = |i: usize| &dataset.rows[i.min(n.saturating_sub(1))];
-        let column = |value: &dyn Fn(usize) -> f64| (0..padded).map(value).collect::<Vec<f64>>();
+        let column = |value: &(dyn Fn(usize) -> f64 + Sync)| -> Vec<f64> {
+            if padded < MANY_ROWS {
+                return (0..padded).map(value).collect();
+            }
+            (0..padded).into_par_iter().map(value).collect()
+        };
         if n == 0 {
             return Self::default();
         }

@@ -64,10 +64,7 @@ pub struct Observed {
 impl Observed {
     /// The rows at `indices`.
     pub fn subset(&self, indices: &[usize]) -> Self {
-        Self {
-            dataset: self.dataset.subset(indices),
-            angles: indices.iter().map(|&i| self.angles[i]).collect(),
-        }
+        Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }
     }
 }
 
@@ -126,12 +123,17 @@ pub fn fit(
     let mut model = start.model.clone();
     let mut frames = start.frames.clone();
     let mut evaluations = Evaluations::default();
-    let (mut last, mut rounds) = (None, Vec::with_capacity(ROUNDS));
+    let (mut last, mut rounds): (Option<(Calibration, Estimate)>, _) = (None, Vec::with_capacity(ROUNDS));
     for _ in 0..ROUNDS {
         let weights =
             rounding::weights(&observed.dataset, &model, &frames, &observed.angles, sigma_mm, sigma_rad);
-        let task =
-            Calibration::new(&observed.dataset, start.model, start.frames, parameters, &priors, &weights);
+        // Only the weights change from round to round.
+        let task = match last.take() {
+            Some((task, _)) => task.weighted(&weights),
+            None => {
+                Calibration::new(&observed.dataset, start.model, start.frames, parameters, &priors, &weights)
+            }
+        };
         let estimate = solver.solve(&task, &x, seed);
         evaluations.residuals += estimate.evaluations.residuals;
         evaluations.jacobians += estimate.evaluations.jacobians;
@@ -229,6 +231,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
     let (mut model, mut frames) = (start.model.clone(), start.frames.clone());
     let mut scaled = vec![0.0; n];
     let mut sigma = 0.1;
+    let mut before: Option<Calibration> = None;
     for _ in 0..ROBUST_ROUNDS {
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
         let weights: Vec<Weight> = base
@@ -236,7 +239,10 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
             .zip(&factor)
             .map(|(w, f)| Weight { per_mm: w.per_mm * f, per_rad: w.per_rad * f })
             .collect();
-        let task = Calibration::new(dataset, start.model, start.frames, &parameters, &priors, &weights);
+        let task = match before.take() {
+            Some(task) => task.weighted(&weights),
+            None => Calibration::new(dataset, start.model, start.frames, &parameters, &priors, &weights),
+        };
         let estimate = solver.solve(&task, &x, 0);
         let moved: f64 = estimate
             .x
@@ -257,6 +263,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
         for (f, s) in factor.iter_mut().zip(&scaled) {
             *f = 1.0 / (1.0 + (s / CAUCHY).powi(2)).sqrt();
         }
+        before = Some(task);
         if moved < 1e-3 {
             break;
         }

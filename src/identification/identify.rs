@@ -12,7 +12,9 @@ use crate::identification::fit::{
     Fitted, Observed, Outliers, Start, arm_parameters, errors_on, fit, frame_parameters, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
-use crate::identification::rounding::{NotSharpened, Sharpening, logged_covariance, sharpen};
+use crate::identification::rounding::{
+    AngleCovariance, NotSharpened, Sharpening, logged_covariance, sharpen,
+};
 use crate::identification::solver::{Family, Solver};
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
@@ -24,7 +26,7 @@ use crate::kinematics::estimated::{
 use crate::kinematics::model::{Joints, Model};
 use crate::kinematics::parameter::{Parameter, link_parameters};
 use crate::kinematics::region::Region;
-use crate::math::statistics::{ErrorSummary, median};
+use crate::math::statistics::{ErrorSummary, largest, median};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, Split};
 
@@ -140,9 +142,14 @@ pub fn identify(
     let prepared = options.solver.prepared(nominal, dataset);
     let nominal = &prepared;
     let start = Start { model: nominal, frames };
-    let kept: Vec<usize> =
-        (0..dataset.rows.len()).filter(|i| outliers.rows.iter().all(|(o, _)| o != i)).collect();
-    let observed = observed.subset(&kept);
+    let observed = if outliers.rows.is_empty() {
+        observed
+    } else {
+        let mut set_aside = vec![false; dataset.rows.len()];
+        outliers.rows.iter().for_each(|(i, _)| set_aside[*i] = true);
+        let kept: Vec<usize> = (0..dataset.rows.len()).filter(|&i| !set_aside[i]).collect();
+        observed.subset(&kept)
+    };
     let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
@@ -276,7 +283,9 @@ pub fn observe(
 ) -> (Observed, Result<Sharpening, NotSharpened>) {
     let mut rows = dataset.clone();
     match if wanted { sharpen(&mut rows, nominal) } else { Err(NotSharpened::Nothing) } {
-        Ok((report, angles)) => (Observed { dataset: rows, angles }, Ok(report)),
+        Ok((report, angles)) => {
+            (Observed { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
+        }
         Err(why) => {
             let angles = logged_covariance(dataset);
             (Observed { dataset: rows, angles }, Err(why))
@@ -442,10 +451,11 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
         .par_iter()
         .map(|q| {
             let q = Joints::from_fn(|i, _| q[i].to_radians());
-            estimated.position_covariance(&posed, &q, &target).trace().max(0.0).sqrt()
+            let variance = estimated.position_covariance(&posed, &q, &target).trace();
+            if variance <= 0.0 { 0.0 } else { variance.sqrt() }
         })
         .collect();
-    region.sigma_mm = sigmas.into_iter().fold(0.0, f64::max);
+    region.sigma_mm = largest(sigmas);
     estimated.region = region;
     estimated
 }

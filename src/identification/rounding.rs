@@ -15,13 +15,54 @@ use crate::kinematics::jacobian::joint_jacobian;
 use crate::kinematics::model::Model;
 use crate::measurement::dataset::{Dataset, Sensor};
 
-/// Covariance of the joint angles of each row (rad²).
-pub type AngleCovariance = Vec<Matrix6<f64>>;
+/// Covariance of the joint angles of each row (rad²): one for all rows until some have their own.
+#[derive(Debug, Clone)]
+pub struct AngleCovariance {
+    rows: usize,
+    common: Matrix6<f64>,
+    /// One for each row; empty where all are alike.
+    own: Vec<Matrix6<f64>>,
+}
+
+impl AngleCovariance {
+    /// One covariance for each row.
+    pub fn each(own: Vec<Matrix6<f64>>) -> Self {
+        Self { rows: own.len(), common: Matrix6::zeros(), own }
+    }
+
+    /// Of row `i`.
+    pub fn of(&self, i: usize) -> &Matrix6<f64> {
+        self.own.get(i).unwrap_or(&self.common)
+    }
+
+    /// Gives row `i` a covariance of its own.
+    pub fn set(&mut self, i: usize, covariance: Matrix6<f64>) {
+        if self.own.is_empty() {
+            self.own = vec![self.common; self.rows];
+        }
+        self.own[i] = covariance;
+    }
+
+    /// The rows at `indices`.
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        let own =
+            if self.own.is_empty() { Vec::new() } else { indices.iter().map(|&i| self.own[i]).collect() };
+        Self { rows: indices.len(), common: self.common, own }
+    }
+
+    /// Whether no row's angles are in doubt.
+    fn silent(&self) -> bool {
+        match self.own.as_slice() {
+            [] => self.common.trace() == 0.0,
+            own => own.iter().all(|p| p.trace() == 0.0),
+        }
+    }
+}
 
 /// Angles as they are logged: h²/12 on the diagonal, 0 where no rounding shows.
 pub fn logged_covariance(dataset: &Dataset) -> AngleCovariance {
     let variance = dataset.angle_step_rad.map_or(0.0, |h| h * h / 12.0);
-    vec![Matrix6::identity() * variance; dataset.rows.len()]
+    AngleCovariance { rows: dataset.rows.len(), common: Matrix6::identity() * variance, own: Vec::new() }
 }
 
 /// What sharpening did.
@@ -60,7 +101,7 @@ pub enum NotSharpened {
 pub fn sharpen(
     dataset: &mut Dataset,
     nominal: &Model,
-) -> Result<(Sharpening, AngleCovariance), NotSharpened> {
+) -> Result<(Sharpening, Vec<Matrix6<f64>>), NotSharpened> {
     let (Some(step), true) = (dataset.angle_step_rad, dataset.rows.iter().all(|r| r.readout_mm.is_some()))
     else {
         return Err(NotSharpened::Nothing);
@@ -138,8 +179,7 @@ pub fn weights(
     sigma_mm: f64,
     sigma_rad: f64,
 ) -> Vec<Weight> {
-    let silent = angles.iter().all(|p| p.trace() == 0.0);
-    if silent {
+    if angles.silent() {
         return vec![Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 / sigma_rad }; dataset.rows.len()];
     }
     let shares = angle_shares(dataset, model, frames, angles);
@@ -159,13 +199,17 @@ pub fn angle_shares(
     frames: &Frames,
     angles: &AngleCovariance,
 ) -> Vec<(f64, f64)> {
+    if angles.silent() {
+        return vec![(0.0, 0.0); dataset.rows.len()];
+    }
     let still = Condition::default();
     let posed = model.under(&still);
     dataset
         .rows
         .iter()
-        .zip(angles)
-        .map(|(row, covariance)| {
+        .enumerate()
+        .map(|(i, row)| {
+            let covariance = angles.of(i);
             if covariance.trace() == 0.0 {
                 return (0.0, 0.0);
             }

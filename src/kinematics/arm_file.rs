@@ -3,7 +3,9 @@
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::bounds::{self, LENGTH_MM, SPEED_DEG_S, TWIST_DEG, Unfit, shown};
 use super::effect::Effect;
+use super::effect::bounds::effects;
 use super::link::{Link, LinkModel};
 use super::model::{Body, Limits, Model};
 use crate::math::se3::Pose;
@@ -91,6 +93,7 @@ impl ArmFile {
     /// # Errors
     /// A sentence that names the key when a list has the wrong length or a number cannot be used.
     pub fn model(&self) -> Result<Model, String> {
+        self.check().map_err(|unfit| unfit.to_string())?;
         let count = self.link.len();
         let links: Vec<Link> = self
             .link
@@ -115,19 +118,7 @@ impl ArmFile {
         };
         let [w, i, j, k] = self.flange_wxyz;
         let quaternion = Quaternion::new(w, i, j, k);
-        if (quaternion.norm() - 1.0).abs() > 1e-3 {
-            return Err(format!("`flange_wxyz`: its norm is {}, expected 1", quaternion.norm()));
-        }
         let gravity = Vector3::from(self.gravity);
-        if (gravity.norm() - 1.0).abs() > 1e-3 {
-            return Err(format!("`gravity`: its norm is {}, expected a unit vector", gravity.norm()));
-        }
-        if let Some(effect) = self.effect.iter().find(|e| e.joint().is_some_and(|j| j > 5)) {
-            return Err(format!(
-                "`effect` {}: its joint is above 5 (joints count from 0 here)",
-                effect.name()
-            ));
-        }
         Ok(Model {
             links,
             joint_map: Matrix6::from_fn(|i, j| self.joint_map[i][j]),
@@ -144,5 +135,32 @@ impl ArmFile {
             gravity: gravity.normalize(),
             effects: self.effect.clone(),
         })
+    }
+
+    /// Refuses numbers that no arm has; whatever passes is finite.
+    fn check(&self) -> Result<(), Unfit> {
+        bounds::joint_map(&self.joint_map)?;
+        bounds::joint_ranges(&self.min_deg, &self.max_deg)?;
+        SPEED_DEG_S.check_all("speed_deg_s", self.speed_deg_s.iter().flatten())?;
+        LENGTH_MM.check_all("flange_mm", &self.flange_mm)?;
+        for (key, values) in [("gravity", &self.gravity[..]), ("flange_wxyz", &self.flange_wxyz[..])] {
+            let length = values.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if !((length - 1.0).abs() <= 1e-3) {
+                return Err(Unfit::new(key, format!("a length of {}", shown(length)), "a length of 1"));
+            }
+        }
+        for (i, link) in self.link.iter().enumerate() {
+            let key = |name: &str| format!("link {} {name}", i + 1);
+            for (name, value) in [("a_mm", link.a_mm), ("d_mm", link.d_mm)] {
+                LENGTH_MM.check(|| key(name), value)?;
+            }
+            let turns =
+                [("alpha_deg", link.alpha_deg), ("theta_deg", link.theta_deg), ("beta_deg", link.beta_deg)];
+            for (name, value) in turns {
+                TWIST_DEG.check(|| key(name), value)?;
+            }
+        }
+        bounds::bodies(self.body.as_deref().unwrap_or_default())?;
+        effects(&self.effect)
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The circumstances of one pose. A circumstance that is not known is `None`, and effects that need it stand still.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(default, deny_unknown_fields)]
 pub struct Condition {
     /// Time since the arm was switched on (h).
     pub time_h: Option<f64>,

@@ -13,6 +13,7 @@ pub mod coupling;
 pub mod backlash;
 pub mod thermal;
 pub mod smooth;
+pub mod bounds;
 
 use nalgebra::{Matrix6, Vector3};
 use serde::{Deserialize, Serialize};

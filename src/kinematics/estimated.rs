@@ -3,6 +3,8 @@
 //! The TOML file of an estimated arm is complete: it holds the nominal arm too, so a program can be rewritten from it
 //! alone.
 
+mod checks;
+
 use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -204,6 +206,11 @@ fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
     out
 }
 
+/// √v of a variance that rounding may have taken below 0; not a number of what is none.
+fn root(variance: f64) -> f64 {
+    if variance > 0.0 || variance.is_nan() { variance.sqrt() } else { 0.0 }
+}
+
 impl Estimated {
     /// Covariance of the position of a point on the flange (mm²), 3 × 3 in the base.
     pub fn position_covariance(
@@ -282,7 +289,7 @@ impl Estimated {
                 #[inline(always)]
                 || quadratic(self.covariance.as_slice(), &velocities),
             );
-            out.extend(variance.0[..block.len()].iter().map(|v| v.max(0.0).sqrt()));
+            out.extend(variance.0[..block.len()].iter().map(|v| root(*v)));
         }
         out
     }
@@ -323,10 +330,11 @@ impl Estimated {
         Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
     }
 
-    /// Reads the file.
+    /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
+    /// parameters are the arm's.
     ///
     /// # Errors
-    /// A sentence that says what in the file cannot be used.
+    /// A sentence that says what in the file cannot be used: key, what was found, what was expected.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let file: ModelFile = toml::from_str(text).map_err(|e| format!("not a truegrind model: {e}"))?;
         if file.schema != SCHEMA {
@@ -347,7 +355,7 @@ impl Estimated {
             return Err(format!("`covariance.lower`: expected {n} rows of 1 to {n} numbers"));
         }
         let covariance = DMatrix::from_fn(n, n, |i, j| file.covariance.lower[i.max(j)][i.min(j)]);
-        Ok(Self {
+        let model = Self {
             robot: file.robot,
             nominal: file.nominal.model().map_err(|e| format!("`nominal`: {e}"))?,
             model: file.estimated.model().map_err(|e| format!("`estimated`: {e}"))?,
@@ -361,7 +369,9 @@ impl Estimated {
             verdict: file.verdict,
             region: file.region,
             condition: file.condition,
-        })
+        };
+        checks::check(&model).map_err(|unfit| unfit.to_string())?;
+        Ok(model)
     }
 }
 

@@ -31,6 +31,7 @@ use super::chain::End;
 use super::condition::Condition;
 use super::model::{Joints, Limits, Model, Posed};
 use crate::math::se3::Pose;
+use crate::math::spectral;
 
 pub use self::solution::{InverseError, Singularity, SingularityDistances, Solution};
 pub use self::structure::Branch;
@@ -123,9 +124,11 @@ impl<'a> Inverse<'a> {
     }
 
     /// Smallest singular value of the 6 × 6 Jacobian of the flange, translations divided by [`Inverse::length_mm`],
-    /// with respect to the rotations of the joints (couplings and slopes of effects not counted).
+    /// with respect to the rotations of the joints (couplings and slopes of effects not counted). Not a number where the
+    /// joints are not.
     pub fn smallest_singular_value(&self, joints: &Joints) -> f64 {
-        newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm).singular_values().min()
+        let jacobian = newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm);
+        spectral::singular_values(&jacobian).map_or(f64::NAN, |values| values.min())
     }
 
     /// The solution on the branch of `seed`, each joint on the turn nearest to it. The fast way along a path.

@@ -36,9 +36,14 @@ impl ErrorSummary {
             mean_absolute: values.iter().map(|e| e.abs()).sum::<f64>() / n,
             mean,
             standard_deviation: if values.len() > 1 { (spread / (n - 1.0)).sqrt() } else { 0.0 },
-            max: values.iter().fold(0.0, |m, e| e.abs().max(m)),
+            max: largest(values.iter().map(|e| e.abs())),
         }
     }
+}
+
+/// The largest of some sizes; 0 of none, and not a number where one of them is none: an error that is not known is not 0.
+pub fn largest(sizes: impl IntoIterator<Item = f64>) -> f64 {
+    sizes.into_iter().fold(0.0, |most: f64, size| if size.is_nan() || size > most { size } else { most })
 }
 
 /// Mean and standard deviation (n − 1) of a list, such as one figure over ten splits.

@@ -6,6 +6,7 @@
 //! CSV may be separated by comma, semicolon or tab; with semicolon or tab a decimal comma is understood. Of a
 //! workbook the first sheet that has the columns is read, or the one named.
 
+mod archive;
 pub mod cell;
 pub mod csv;
 pub mod xlsx;

@@ -77,6 +77,10 @@ pub struct CableRegistration {
 /// The rotation nearest to a matrix, proper in any case (Umeyama 1991, eq. 43). `None` when the matrix leaves more
 /// than one direction open.
 fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
+    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    if !matrix.iter().all(|v| v.abs() < 1e100) {
+        return None;
+    }
     let svd = matrix.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let s = svd.singular_values;
@@ -266,6 +270,9 @@ fn shah(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<UnitQu
         sum += m.matrix().transpose().kronecker(&f.matrix().transpose());
     }
     // sum · vec(R_B) = n · vec(R_T), columns stacked.
+    if !sum.iter().all(|v| v.is_finite()) {
+        return None;
+    }
     let eigen = SymmetricEigen::new(sum.transpose() * sum);
     let v: SVector<f64, 9> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let matrix = Matrix3::from_column_slice(v.as_slice());

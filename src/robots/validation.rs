@@ -8,6 +8,9 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
+use crate::kinematics::bounds::{
+    self, Bound, DIRECTION, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, SPEED_DEG_S, TWIST_DEG, Unfit,
+};
 use crate::kinematics::link::LinkModel;
 use crate::kinematics::model::Model;
 
@@ -31,6 +34,10 @@ impl Fault {
         remedy: &'static str,
     ) -> Self {
         Self { key: key.into(), found: found.to_string(), expected, remedy }
+    }
+
+    fn of_number(unfit: Unfit, remedy: &'static str) -> Self {
+        Self::new(unfit.key, unfit.found, unfit.expected, remedy)
     }
 
     pub(super) fn of(self, file: &str, robot: &str) -> RobotError {
@@ -62,7 +69,8 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
     if sheet.link.len() != 6 {
         return Err(link_count(sheet.link.len()));
     }
-    finite(sheet)?;
+    bounded(sheet).map_err(|unfit| Fault::of_number(unfit, "correct the number"))?;
+    performance(sheet).map_err(|unfit| Fault::of_number(unfit, "leave the key out where it is not known"))?;
     units(sheet)?;
     links(&sheet.link)?;
     joints(sheet)?;
@@ -70,70 +78,60 @@ pub(super) fn check(sheet: &DataSheet) -> Result<Vec<String>, Fault> {
     Ok(warnings(sheet))
 }
 
-fn finite(sheet: &DataSheet) -> Result<(), Fault> {
-    let mut numbers: Vec<(String, f64)> = Vec::new();
+/// Every number is finite and such as an arm has.
+fn bounded(sheet: &DataSheet) -> Result<(), Unfit> {
     for (i, link) in sheet.link.iter().enumerate() {
-        for (key, value) in link_numbers(link) {
-            numbers.push((format!("link {} {key}", i + 1), value));
+        let key = |name: &str| format!("link {} {name}", i + 1);
+        for (name, value) in [("a_mm", link.a_mm), ("d_mm", link.d_mm)] {
+            LENGTH_MM.check(|| key(name), value)?;
+        }
+        let turns =
+            [("alpha_deg", link.alpha_deg), ("theta_deg", link.theta_deg), ("beta_deg", link.beta_deg)];
+        for (name, value) in turns {
+            TWIST_DEG.check(|| key(name), value)?;
         }
     }
     let joints = &sheet.joints;
-    let mut push = |key: &str, values: &[f64]| numbers.extend(values.iter().map(|&v| (key.to_owned(), v)));
-    for (key, values) in [
-        ("joints.min_deg", &joints.min_deg),
-        ("joints.max_deg", &joints.max_deg),
-        ("joints.speed_deg_s", &joints.speed_deg_s),
-    ] {
-        push(key, values.as_ref().map_or(&[], |v| v.as_slice()));
-    }
-    push("joints.map", joints.map.as_ref().map_or(&[], |rows| rows.as_flattened()));
-    push("mounting.gravity", &sheet.mounting.gravity);
-    push("mounting.plate_mm", &sheet.mounting.plate_mm);
+    JOINT_DEG.check_all("joints.min_deg", joints.min_deg.iter().flatten())?;
+    JOINT_DEG.check_all("joints.max_deg", joints.max_deg.iter().flatten())?;
+    TURNS.check_all("joints.map", joints.map.iter().flatten().flatten())?;
+    DIRECTION.check_all("mounting.gravity", &sheet.mounting.gravity)?;
+    LENGTH_MM.check_all("mounting.plate_mm", &sheet.mounting.plate_mm)?;
     if let Some(masses) = &sheet.masses {
-        push("masses.mass_kg", &masses.mass_kg);
-        push("masses.centre_mm", masses.centre_mm.as_flattened());
+        LENGTH_MM.check_all("masses.centre_mm", masses.centre_mm.as_flattened())?;
     }
     if let Some(flange) = &sheet.flange {
-        push("flange.position_mm", &flange.position_mm);
-        push("flange.quaternion_wxyz", &flange.quaternion_wxyz);
-    }
-    for (key, value) in [
-        ("payload_kg", sheet.payload_kg),
-        ("reach_mm", sheet.reach_mm),
-        ("repeatability_mm", sheet.repeatability_mm),
-    ] {
-        push(key, value.as_slice());
-        if value.is_some_and(|value| value <= 0.0) {
-            return Err(Fault::new(
-                key,
-                value.unwrap_or_default(),
-                "more than 0",
-                "leave the key out where it is not known",
-            ));
-        }
+        LENGTH_MM.check_all("flange.position_mm", &flange.position_mm)?;
+        DIRECTION.check_all("flange.quaternion_wxyz", &flange.quaternion_wxyz)?;
     }
     for pose in &sheet.published {
-        push("published.joints_deg", &pose.joints_deg);
-        push("published.position_mm", pose.position_mm.as_ref().map_or(&[], |v| v.as_slice()));
-        push("published.radius_mm", pose.radius_mm.as_slice());
-        push("published.quaternion_wxyz", pose.quaternion_wxyz.as_ref().map_or(&[], |v| v.as_slice()));
-        push("published.tolerance_mm", &[pose.tolerance_mm]);
+        JOINT_DEG.check_all("published.joints_deg", &pose.joints_deg)?;
+        PLACE_MM.check_all("published.position_mm", pose.position_mm.iter().flatten())?;
+        PLACE_MM.check_all("published.radius_mm", &pose.radius_mm)?;
+        DIRECTION.check_all("published.quaternion_wxyz", pose.quaternion_wxyz.iter().flatten())?;
+        MISS_MM.check(|| "published.tolerance_mm".to_owned(), pose.tolerance_mm)?;
     }
-    match numbers.into_iter().find(|(_, value)| !value.is_finite()) {
-        Some((key, value)) => Err(Fault::new(key, value, "a finite number", "correct the number")),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
-fn link_numbers(link: &LinkSheet) -> [(&'static str, f64); 5] {
-    [
-        ("a_mm", link.a_mm),
-        ("d_mm", link.d_mm),
-        ("alpha_deg", link.alpha_deg),
-        ("theta_deg", link.theta_deg),
-        ("beta_deg", link.beta_deg),
-    ]
+/// What a data sheet need not say; where it does, above 0.
+fn performance(sheet: &DataSheet) -> Result<(), Unfit> {
+    for (key, bound, value) in [
+        ("payload_kg", LOAD_KG, sheet.payload_kg),
+        ("reach_mm", REACH_MM, sheet.reach_mm),
+        ("repeatability_mm", TOLERANCE_MM, sheet.repeatability_mm),
+    ] {
+        bound.check_all(key, &value)?;
+    }
+    SPEED_DEG_S.check_all("joints.speed_deg_s", sheet.joints.speed_deg_s.iter().flatten())?;
+    MASS_KG.check_all("masses.mass_kg", sheet.masses.iter().flat_map(|masses| &masses.mass_kg))
 }
+
+const TURNS: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
+const LOAD_KG: Bound = Bound::new(f64::MIN_POSITIVE, 1e4, "more than 0, up to 10,000 kg");
+const REACH_MM: Bound = Bound::new(f64::MIN_POSITIVE, 2e4, "more than 0, up to 20,000 mm");
+const MISS_MM: Bound = Bound::new(0.0, 100.0, "a length from 0 to 100 mm");
+const TOLERANCE_MM: Bound = Bound::new(f64::MIN_POSITIVE, 100.0, "more than 0, up to 100 mm");
 
 /// Radians for degrees, metres for millimetres.
 fn units(sheet: &DataSheet) -> Result<(), Fault> {
@@ -263,14 +261,6 @@ fn joints(sheet: &DataSheet) -> Result<(), Fault> {
             ));
         }
     }
-    if let Some(speed) = joints.speed_deg_s.iter().flatten().find(|&&speed| speed <= 0.0) {
-        return Err(Fault::new(
-            "joints.speed_deg_s",
-            speed,
-            "more than 0",
-            "leave the key out where it is not known",
-        ));
-    }
     if let Some(rows) = &joints.map {
         let map = Matrix6::from_fn(|row, column| rows[row][column]);
         if map.determinant().abs() < 1e-6 {
@@ -281,6 +271,12 @@ fn joints(sheet: &DataSheet) -> Result<(), Fault> {
                 "each row says which controller angles turn that link, with sign",
             ));
         }
+        bounds::joint_map(rows).map_err(|unfit| {
+            Fault::of_number(
+                Unfit { key: "joints.map".to_owned(), ..unfit },
+                "each row says which controller angles turn that link, with sign",
+            )
+        })?;
     }
     Ok(())
 }
@@ -298,7 +294,7 @@ fn mounting(sheet: &DataSheet) -> Result<(), Fault> {
     let poses = sheet.published.iter().filter_map(|pose| pose.quaternion_wxyz);
     for (key, wxyz) in flange.chain(poses.map(|wxyz| ("published.quaternion_wxyz", wxyz))) {
         let norm = wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if (norm - 1.0).abs() > 1e-3 {
+        if !((norm - 1.0).abs() <= 1e-3) {
             return Err(Fault::new(
                 key,
                 format!("{} of length {norm:.4}", numbers(&wxyz)),
@@ -306,14 +302,6 @@ fn mounting(sheet: &DataSheet) -> Result<(), Fault> {
                 "correct the quaternion",
             ));
         }
-    }
-    if let Some(mass) = sheet.masses.iter().flat_map(|masses| masses.mass_kg).find(|&mass| mass < 0.0) {
-        return Err(Fault::new(
-            "masses.mass_kg",
-            mass,
-            "0 or more",
-            "leave [robot.masses] out where not known",
-        ));
     }
     Ok(())
 }
@@ -354,6 +342,35 @@ fn warnings(sheet: &DataSheet) -> Vec<String> {
     out
 }
 
+/// Links may differ by this from those of the catalogue, after degrees and back (mm and rad).
+const SAME: f64 = 1e-6;
+
+/// Where a nominal arm differs from another of the same name: the first number that does.
+pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
+    for (i, (a, b)) in found.links.iter().zip(&known.links).enumerate() {
+        if a.model != b.model {
+            return Some(format!("link {} is of another kind", i + 1));
+        }
+        for (name, a, b) in [
+            ("a_mm", a.a_mm, b.a_mm),
+            ("d_mm", a.d_mm, b.d_mm),
+            ("alpha_deg", a.alpha_rad.to_degrees(), b.alpha_rad.to_degrees()),
+            ("theta_deg", a.theta_rad.to_degrees(), b.theta_rad.to_degrees()),
+            ("beta_deg", a.beta_rad.to_degrees(), b.beta_rad.to_degrees()),
+        ] {
+            if !((a - b).abs() <= SAME) {
+                return Some(format!("link {} {name} is {a:.6}, not {b:.6}", i + 1));
+            }
+        }
+    }
+    if !((found.joint_map - known.joint_map).amax() <= SAME) {
+        return Some("the joint map is another one".to_owned());
+    }
+    let flange = found.flange.inv_mul(&known.flange);
+    let apart = flange.translation.vector.norm().max(flange.rotation.angle());
+    (!(apart <= SAME)).then(|| "the flange sits elsewhere".to_owned())
+}
+
 /// How far a model is from a published pose: of the point (mm), and of the orientation (rad) where one is published.
 pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
     let q = Vector6::from(pose.joints_deg.map(f64::to_radians));
@@ -386,7 +403,7 @@ pub(super) fn check_published(sheet: &DataSheet, model: &Model) -> Result<(), Fa
             ));
         }
         let (distance, turn) = deviation(pose, model);
-        if distance > pose.tolerance_mm {
+        if !(distance <= pose.tolerance_mm) {
             return Err(Fault::new(
                 key(),
                 format!("the links miss it by {distance:.3} mm"),
@@ -394,7 +411,7 @@ pub(super) fn check_published(sheet: &DataSheet, model: &Model) -> Result<(), Fa
                 "check lengths, signs in joints.map and the offsets theta_deg",
             ));
         }
-        if let Some(turn) = turn.filter(|&turn| turn > 1e-4) {
+        if let Some(turn) = turn.filter(|&turn| !(turn <= 1e-4)) {
             return Err(Fault::new(
                 key(),
                 format!("an orientation {:.3}° off", turn.to_degrees()),

@@ -32,6 +32,9 @@ pub use implicit::Implicit;
 /// and for the starting points of Newton's method.
 const LATTICE: usize = 40;
 
+/// What a look costs beside the terms of the equation.
+const AROUND: f64 = 20.0;
+
 /// z as a function of x and y. Outward is up, +z.
 #[derive(Debug, Clone)]
 pub struct Explicit {
@@ -57,7 +60,12 @@ impl Explicit {
     }
 
     pub(crate) fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
-        self.jet(plan).contact(plan)
+        let (z, slope) = (self.z.value(&plan), self.z.gradient(&plan));
+        self.with(plan, z, slope, [Vector3::zeros(); 3]).contact(plan)
+    }
+
+    pub(crate) fn look_cost(&self) -> f64 {
+        AROUND + self.z.terms().iter().sum::<f64>()
     }
 
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
@@ -69,11 +77,16 @@ impl Explicit {
     }
 
     fn jet(&self, plan: [f64; 2]) -> Jet {
-        let (first, second) = (self.z.gradient(&plan), self.z.hessian(&plan));
+        let (z, first, second) = (self.z.value(&plan), self.z.gradient(&plan), self.z.hessian(&plan));
+        let bend = [(0, 0), (0, 1), (1, 1)].map(|entry| Vector3::new(0.0, 0.0, second[entry]));
+        self.with(plan, z, first, bend)
+    }
+
+    fn with(&self, plan: [f64; 2], z: f64, first: Vector3<f64>, second: [Vector3<f64>; 3]) -> Jet {
         Jet {
-            point: Point3::new(plan[0], plan[1], self.z.value(&plan)),
+            point: Point3::new(plan[0], plan[1], z),
             first: [Vector3::new(1.0, 0.0, first[0]), Vector3::new(0.0, 1.0, first[1])],
-            second: [(0, 0), (0, 1), (1, 1)].map(|entry| Vector3::new(0.0, 0.0, second[entry])),
+            second,
             outward: 1.0,
         }
     }
@@ -110,7 +123,11 @@ impl Parametric {
     }
 
     pub(crate) fn contact(&self, plan: [f64; 2]) -> Option<Contact> {
-        self.jet(plan).contact(plan)
+        self.flat(plan).contact(plan)
+    }
+
+    pub(crate) fn look_cost(&self) -> f64 {
+        AROUND + self.coordinates.iter().flat_map(Expression::terms).sum::<f64>()
     }
 
     pub(crate) fn foot(&self, point: &Point3<f64>) -> Option<Foot> {
@@ -122,13 +139,21 @@ impl Parametric {
     }
 
     fn jet(&self, plan: [f64; 2]) -> Jet {
+        let second = self.coordinates.each_ref().map(|c| c.hessian(&plan));
+        Jet {
+            second: [(0, 0), (0, 1), (1, 1)].map(|entry| Vector3::from_fn(|row, _| second[row][entry])),
+            ..self.flat(plan)
+        }
+    }
+
+    /// The point and its tangents alone, which is all that a contact takes.
+    fn flat(&self, plan: [f64; 2]) -> Jet {
         let values = self.coordinates.each_ref().map(|c| c.value(&plan));
         let first = self.coordinates.each_ref().map(|c| c.gradient(&plan));
-        let second = self.coordinates.each_ref().map(|c| c.hessian(&plan));
         Jet {
             point: Point3::from(values),
             first: [0, 1].map(|i| Vector3::from_fn(|row, _| first[row][i])),
-            second: [(0, 0), (0, 1), (1, 1)].map(|entry| Vector3::from_fn(|row, _| second[row][entry])),
+            second: [Vector3::zeros(); 3],
             outward: if self.flipped { -1.0 } else { 1.0 },
         }
     }

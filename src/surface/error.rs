@@ -131,6 +131,15 @@ pub enum SurfaceError {
         /// The largest number of points.
         limit: usize,
     },
+    /// A path that takes too long to find.
+    #[error(
+        "the path would take more than {terms:e} terms of the equation, or as much of a mesh, to find; take a larger chord \
+         error, step or step-over, a simpler equation, fewer waves or fewer triangles above each other"
+    )]
+    TooMuchWork {
+        /// Most terms that are evaluated.
+        terms: f64,
+    },
     /// No curve of the pattern meets the surface.
     #[error("no pass of the pattern meets the surface; check that the domain lies over the surface")]
     NoPass,

@@ -66,6 +66,7 @@ pub struct Expression {
     text: String,
     /// Which of the named variables occur, in the alphabetical order in which exmex wants their values.
     used: Vec<usize>,
+    terms: Terms,
     /// Boxed, for it keeps much on the spot: some 20 kB.
     value: Box<FlatEx<f64>>,
     first: Vec<FlatEx<f64>>,
@@ -105,7 +106,7 @@ impl Expression {
             });
         }
         let written = whole.written();
-        on_ample_stack(|| Self::differentiated(text, variables, &written)).unwrap_or_else(|| {
+        on_ample_stack(|| Self::differentiated(text, variables, &written, terms)).unwrap_or_else(|| {
             Err(ExpressionError {
                 text: text.to_owned(),
                 column: 1,
@@ -116,7 +117,12 @@ impl Expression {
     }
 
     /// `written` is `text` with every pair of parentheses.
-    fn differentiated(text: &str, variables: &[&str], written: &str) -> Result<Self, ExpressionError> {
+    fn differentiated(
+        text: &str,
+        variables: &[&str],
+        written: &str,
+        terms: Terms,
+    ) -> Result<Self, ExpressionError> {
         // The grammar admits only what exmex knows, so a refusal here names the whole text.
         let refused = |e: exmex::ExError| ExpressionError {
             text: text.to_owned(),
@@ -140,12 +146,17 @@ impl Expression {
             .map(|(i, k)| first[i].clone().partial(k))
             .collect::<Result<Vec<_>, _>>()
             .map_err(refused)?;
-        Ok(Self { text: text.to_owned(), used, value: Box::new(value), first, second })
+        Ok(Self { text: text.to_owned(), used, terms, value: Box::new(value), first, second })
     }
 
     /// The text as it was given.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Terms of the value and of all first derivatives together, as the rules of differentiation write them.
+    pub(crate) fn terms(&self) -> [f64; 2] {
+        [self.terms.value, self.terms.first * self.used.len() as f64]
     }
 
     /// Value at `at`, one number per variable; NaN or infinite where the expression has no value.

@@ -73,6 +73,10 @@ pub const ZONES: [&str; 15] = [
 ];
 /// A frame that is nearer to its parent than this, but not at it, is taken to be stated in metres.
 const NEAREST_MM: f64 = 2.0;
+/// And none is farther away (mm).
+const FARTHEST_MM: f64 = 1e6;
+/// No speed [mm/s], mass (kg), radius (mm) or unit (mm) is more.
+const MOST: f64 = 1e6;
 
 /// How a tool or work-object frame was obtained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -160,10 +164,14 @@ impl SurfaceFile {
         let tool = report.tool(stated.tool)?;
         let path = report.path(&stated.path, &stated.surface, &tool)?;
         let motion = &stated.path;
-        let speed_mm_s = report.positive("path.speed_mm_s", motion.speed_mm_s, "a speed above 0 in mm/s")?;
+        let speed_mm_s = report.positive(
+            "path.speed_mm_s",
+            motion.speed_mm_s,
+            "a speed above 0 in mm/s, up to 1,000,000",
+        )?;
         let travel = motion.travel_speed_mm_s.unwrap_or(100.0);
         let travel_speed_mm_s =
-            report.positive("path.travel_speed_mm_s", travel, "a speed above 0 in mm/s")?;
+            report.positive("path.travel_speed_mm_s", travel, "a speed above 0 in mm/s, up to 1,000,000")?;
         let zone = motion.zone.clone().unwrap_or_else(|| "z1".to_owned());
         if !ZONES.contains(&zone.as_str()) {
             let expected = format!("one of {}", ZONES.join(", "));
@@ -311,7 +319,7 @@ impl Reporter<'_> {
     }
 
     fn positive(&self, key: &str, value: f64, expected: &str) -> Result<f64, SurfaceError> {
-        if value.is_finite() && value > 0.0 {
+        if (f64::MIN_POSITIVE..=MOST).contains(&value) {
             Ok(value)
         } else {
             Err(self.value(key, value.to_string(), expected, "correct the number"))
@@ -419,7 +427,7 @@ impl Reporter<'_> {
         let unit_mm = self.positive(
             "surface.unit_mm",
             stated.unit_mm.unwrap_or(1.0),
-            "the length of the file's unit in mm",
+            "the length of the file's unit in mm, above 0, up to 1,000,000",
         )?;
         let bytes = resolve(name).map_err(|error| {
             let found = format!("`{name}`, which cannot be read ({error})");
@@ -450,14 +458,20 @@ impl Reporter<'_> {
     fn tool(&self, stated: StatedTool) -> Result<Tool, SurfaceError> {
         self.name("tool.name", &stated.name)?;
         let frame = self.frame("tool", stated.position_mm, stated.quaternion, stated.rpy_deg)?;
-        let mass_kg = self.positive("tool.mass_kg", stated.mass_kg, "a mass above 0 in kg")?;
-        if !stated.cog_mm.iter().all(|c| c.is_finite()) {
+        let mass_kg =
+            self.positive("tool.mass_kg", stated.mass_kg, "a mass above 0 in kg, up to 1,000,000")?;
+        if !stated.cog_mm.iter().all(|c| c.abs() <= FARTHEST_MM) {
             let found = format!("{:?}", stated.cog_mm);
-            return Err(self.value("tool.cog_mm", found, "three finite numbers in mm", "correct the number"));
+            return Err(self.value(
+                "tool.cog_mm",
+                found,
+                "three finite numbers in mm, within ±1,000,000",
+                "correct the number",
+            ));
         }
         let radius_mm = stated
             .radius_mm
-            .map(|radius| self.positive("tool.radius_mm", radius, "a radius above 0 in mm"))
+            .map(|radius| self.positive("tool.radius_mm", radius, "a radius above 0 in mm, up to 1,000,000"))
             .transpose()?;
         Ok(Tool {
             name: stated.name,
@@ -479,7 +493,7 @@ impl Reporter<'_> {
         let key = |key: &str| format!("{table}.{key}");
         let position = Vector3::from(position_mm);
         let away = position.norm();
-        if !away.is_finite() || (away > 0.0 && away < NEAREST_MM) {
+        if !(away <= FARTHEST_MM) || (away > 0.0 && away < NEAREST_MM) {
             let found = format!("{position_mm:?}");
             let remedy = "state millimetres; if these are metres, multiply them by 1000";
             return Err(self.value(&key("position_mm"), found, "a position in mm", remedy));

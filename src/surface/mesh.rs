@@ -30,6 +30,8 @@ use super::{Contact, Domain, Foot, SurfaceError, Tessellation};
 const CREASE_RAD: f64 = std::f64::consts::FRAC_PI_6;
 /// A mesh smaller than this is taken to be in metres or inches.
 const SMALLEST_MM: f64 = 2.0;
+/// No workpiece is larger: a kilometre.
+const LARGEST_MM: f64 = 1e6;
 
 /// A surface of triangles, wound counter-clockwise seen from outside.
 #[derive(Clone)]
@@ -45,6 +47,8 @@ pub struct Mesh {
     open_vertices: Vec<bool>,
     /// A length over which neighbouring facets are told apart: twice the mean edge.
     scale_mm: f64,
+    /// How many boxes around triangles a vertical ray meets on average.
+    stacked: f64,
 }
 
 impl std::fmt::Debug for Mesh {
@@ -131,6 +135,12 @@ impl Mesh {
                 "STL has no unit: state unit_mm = 1000 for a file in metres, 25.4 for inches",
             ));
         }
+        if !(across <= LARGEST_MM && low.amax().max(high.amax()) <= LARGEST_MM) {
+            return Err(wrong(
+                format!("is {across:e} mm across or lies as far away"),
+                "check unit_mm, and that every vertex belongs to the part",
+            ));
+        }
         // The very border is missed by a vertical ray after rounding, so the domain ends just inside it.
         let inside = |from: f64, to: f64| [from + 1e-9 * (to - from), to - 1e-9 * (to - from)];
         let whole = Domain { first: inside(low.x, high.x), second: inside(low.y, high.y) };
@@ -145,8 +155,17 @@ impl Mesh {
         let edges = facets.iter().flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])]);
         let edge_mm = edges.map(|(a, b)| (vertices[a as usize] - vertices[b as usize]).norm()).sum::<f64>();
         let scale_mm = 2.0 * edge_mm / (3 * facets.len()) as f64;
-        let mesh =
-            Self { triangles, domain, facet_normals, corner_normals, open_edges, open_vertices, scale_mm };
+        let stacked = stacked(&vertices, &facets, &whole);
+        let mesh = Self {
+            triangles,
+            domain,
+            facet_normals,
+            corner_normals,
+            open_edges,
+            open_vertices,
+            scale_mm,
+            stacked,
+        };
         let hits = domain.lattice(40).filter_map(|plan| mesh.seen_from_above(plan)).count();
         if hits == 0 {
             return Err(wrong(
@@ -186,6 +205,11 @@ impl Mesh {
             self.triangles.project_local_point_and_get_location(DVec3::new(point.x, point.y, point.z), false);
         let away = point - point_of(projection.point);
         if projection.is_inside { -away.norm() } else { away.norm() }
+    }
+
+    /// A walk down the tree of boxes, and all that a vertical ray meets there.
+    pub(crate) fn look_cost(&self) -> f64 {
+        50.0 + 20.0 * (self.stacked + (self.triangle_count() as f64).log2())
     }
 
     pub(crate) fn domain(&self) -> Domain {
@@ -332,6 +356,22 @@ fn joined(vertices: &[Point3<f64>], facets: &[[u32; 3]], flipped: bool) -> (Vec<
 fn bounds(vertices: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     let start = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     vertices.iter().fold(start, |(low, high), v| (low.inf(&v.coords), high.sup(&v.coords)))
+}
+
+/// Mean number of triangles whose box stands over a place of the whole domain.
+fn stacked(vertices: &[Point3<f64>], facets: &[[u32; 3]], whole: &Domain) -> f64 {
+    let side = |[from, to]: [f64; 2]| (to - from).max(f64::MIN_POSITIVE);
+    let boxes = facets.iter().map(|facet| {
+        let corners = facet.map(|i| vertices[i as usize]);
+        let extent = |k: usize| {
+            let (low, high) = corners
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c[k]), high.max(c[k])));
+            high - low
+        };
+        (extent(0) / side(whole.first)).min(1.0) * (extent(1) / side(whole.second)).min(1.0)
+    });
+    boxes.sum()
 }
 
 fn facet_normal(vertices: &[Point3<f64>], facet: &[u32; 3]) -> Unit<Vector3<f64>> {

@@ -26,6 +26,7 @@ mod link;
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
+use super::budget::Budget;
 use super::sampling::{FINEST, Steps, Trace};
 use super::{Contact, Surface, SurfaceError};
 use crate::math::se3::Pose;
@@ -190,13 +191,13 @@ impl PathOptions {
     /// The option, its value and what would do.
     pub fn check(&self) -> Result<(), SurfaceError> {
         let refuse = |option, found, expected| Err(SurfaceError::Option { option, found, expected });
-        let positive = |value: f64| value.is_finite() && value > 0.0;
+        let positive = |value: f64| (f64::MIN_POSITIVE..=1e6).contains(&value);
         match self.spacing {
             Spacing::StepOver { step_over_mm } if !positive(step_over_mm) => {
-                return refuse("step_over_mm", step_over_mm, "a length above 0");
+                return refuse("step_over_mm", step_over_mm, "a length above 0, up to 1,000,000 mm");
             }
             Spacing::Scallop { tool_radius_mm, .. } if !positive(tool_radius_mm) => {
-                return refuse("tool_radius_mm", tool_radius_mm, "a length above 0");
+                return refuse("tool_radius_mm", tool_radius_mm, "a length above 0, up to 1,000,000 mm");
             }
             Spacing::Scallop { scallop_mm, tool_radius_mm }
                 if !positive(scallop_mm) || scallop_mm >= tool_radius_mm =>
@@ -207,7 +208,7 @@ impl PathOptions {
         }
         for (option, value) in [("max_step_mm", self.max_step_mm), ("chord_mm", self.chord_mm)] {
             if !positive(value) {
-                return refuse(option, value, "a length above 0");
+                return refuse(option, value, "a length above 0, up to 1,000,000 mm");
             }
         }
         for (option, value) in [("lead_deg", self.lead_rad), ("tilt_deg", self.tilt_rad)] {
@@ -215,8 +216,8 @@ impl PathOptions {
                 return refuse(option, value.to_degrees(), "an angle from -80 to 80 degrees");
             }
         }
-        if !(self.approach_mm.is_finite() && self.approach_mm >= 0.0) {
-            return refuse("approach_mm", self.approach_mm, "a height of 0 or more");
+        if !(0.0..=1e4).contains(&self.approach_mm) {
+            return refuse("approach_mm", self.approach_mm, "a height of 0 to 10,000 mm");
         }
         match self.tool_x {
             ToolX::Fixed(direction) if !(direction.norm() > 1e-9 && direction.norm().is_finite()) => {
@@ -258,17 +259,20 @@ struct Cut {
 /// [`PathOptions::LARGEST`] points, or a fixed direction of the tool's x axis that is along the tool.
 pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, SurfaceError> {
     options.check()?;
-    let curves = pattern::curves(surface, options)?;
+    let budget = Budget::of(surface);
+    let curves = pattern::curves(surface, options, &budget)?;
     // The chords of a few looks are no longer than the curve: what is refused here would surely be too long.
-    let least: f64 =
-        curves.iter().map(|curve| trace(surface, curve, curve.first_look() / 4)).map(total_mm).sum();
+    let mut least = 0.0;
+    for curve in &curves {
+        least += total_mm(trace(surface, curve, curve.first_look() / 4, &budget)?);
+    }
     if least / options.max_step_mm > PathOptions::LARGEST as f64 {
         return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
     }
     let mut passes = Vec::new();
     let mut count = 0;
     for curve in curves {
-        for pass in cuts(surface, &curve, options, PathOptions::LARGEST - count)? {
+        for pass in cuts(surface, &curve, options, PathOptions::LARGEST - count, &budget)? {
             count += pass.len() + 2;
             if count > PathOptions::LARGEST {
                 return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
@@ -279,14 +283,23 @@ pub fn over(surface: &Surface, options: &PathOptions) -> Result<Vec<PathPoint>, 
     if passes.is_empty() {
         return Err(SurfaceError::NoPass);
     }
-    joined(surface, options, &passes)
+    joined(surface, options, &passes, &budget)
 }
 
 /// The parts of a curve that lie on the surface, looked at in `looks` intervals.
-fn trace(surface: &Surface, curve: &pattern::Curve, looks: usize) -> Vec<Trace> {
+///
+/// # Errors
+/// A budget that does not hold as many looks.
+fn trace(
+    surface: &Surface,
+    curve: &pattern::Curve,
+    looks: usize,
+    budget: &Budget,
+) -> Result<Vec<Trace>, SurfaceError> {
+    budget.look(looks + 1)?;
     let domain = surface.domain();
     let point = |share: f64| surface.contact(domain.at(curve.place(share))).map(|c| c.position_mm);
-    Trace::runs(point, 0.0, 1.0, looks)
+    Ok(Trace::runs(point, 0.0, 1.0, looks))
 }
 
 fn total_mm(runs: Vec<Trace>) -> f64 {
@@ -299,17 +312,18 @@ fn cuts(
     curve: &pattern::Curve,
     options: &PathOptions,
     room: usize,
+    budget: &Budget,
 ) -> Result<Vec<Vec<Cut>>, SurfaceError> {
     let domain = surface.domain();
     let steps = Steps { max_step_mm: options.max_step_mm, chord_mm: options.chord_mm };
     let contact = |share: f64| surface.contact(domain.at(curve.place(share)));
-    let coarse = trace(surface, curve, curve.first_look());
+    let coarse = trace(surface, curve, curve.first_look(), budget)?;
     let gap_mm = coarse.iter().map(Trace::coarsest_mm).fold(0.0, f64::max);
     let finer = (8.0 * gap_mm / options.max_step_mm).ceil().max(1.0) as usize;
-    let mut looks = (curve.first_look() * finer).min(FINEST);
+    let mut looks = curve.first_look().saturating_mul(finer).min(FINEST);
     loop {
         let mut closest = usize::MAX;
-        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, looks)
+        let runs: Vec<(Trace, Vec<f64>)> = trace(surface, curve, looks, budget)?
             .into_iter()
             .map(|run| {
                 let (from, to) = (run.shares[0], run.shares[run.shares.len() - 1]);
@@ -317,7 +331,7 @@ fn cuts(
                 let ends: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
                 let mut shares = vec![from];
                 for piece in ends.windows(2) {
-                    let (divided, fewest) = run.between(piece[0], piece[1]).divided(&steps);
+                    let (divided, fewest) = run.between(piece[0], piece[1]).divided(&steps, room, budget);
                     closest = closest.min(fewest);
                     shares.extend(&divided[1..]);
                 }
@@ -328,10 +342,11 @@ fn cuts(
             return Err(SurfaceError::TooLong { limit: PathOptions::LARGEST });
         }
         // Steps of fewer than four looks are judged too coarsely: the chord error needs more, within reason.
-        if closest < 4 && looks < FINEST.min(64 * curve.first_look() * finer) {
+        if closest < 4 && looks < FINEST.min((64 * curve.first_look()).saturating_mul(finer)) {
             looks *= 2;
             continue;
         }
+        budget.look(LOOKS_PER_CUT * runs.iter().map(|(_, shares)| shares.len()).sum::<usize>())?;
         return Ok(runs
             .iter()
             .map(|(run, shares)| {
@@ -341,6 +356,9 @@ fn cuts(
             .collect());
     }
 }
+
+/// Looks at the surface that one point of a path takes.
+const LOOKS_PER_CUT: usize = 5;
 
 /// The contact at a share of a curve with the direction of the curve there.
 fn cut(
@@ -379,6 +397,7 @@ fn joined(
     surface: &Surface,
     options: &PathOptions,
     passes: &[Vec<Cut>],
+    budget: &Budget,
 ) -> Result<Vec<PathPoint>, SurfaceError> {
     let mut points: Vec<PathPoint> = Vec::new();
     let height_mm = options.approach_mm;
@@ -407,7 +426,7 @@ fn joined(
         if let (Some(before), Some(cut)) =
             (points.last().copied(), pass.checked_sub(1).and_then(|p| passes[p].last()))
         {
-            for stop in link::over(surface, &cut.contact, &first.contact, height_mm) {
+            for stop in link::over(surface, &cut.contact, &first.contact, height_mm, budget)? {
                 points.push(PathPoint {
                     position_mm: stop.position_mm,
                     normal: stop.normal,

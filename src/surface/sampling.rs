@@ -23,6 +23,8 @@
 
 use nalgebra::Point3;
 
+use super::budget::Budget;
+
 /// In how many places a curve is looked at, at most.
 pub const FINEST: usize = 1 << 20;
 
@@ -124,19 +126,28 @@ impl Trace {
 
     /// Shares that divide the curve so that both bounds hold: equally long steps where that takes at most a third
     /// more of them, else each step as long as the bounds allow. The second number says over how few looked-at
-    /// intervals a step extends: below four the curve should be looked at more closely.
-    pub(crate) fn divided(&self, steps: &Steps) -> (Vec<f64>, usize) {
+    /// intervals a step extends: below four the curve should be looked at more closely. Where more than `room` steps are
+    /// needed, as many as were found to be too many.
+    pub(crate) fn divided(&self, steps: &Steps, room: usize, budget: &Budget) -> (Vec<f64>, usize) {
         let mut breaks = vec![0];
-        while breaks[breaks.len() - 1] + 1 < self.points.len() {
+        while breaks[breaks.len() - 1] + 1 < self.points.len() && breaks.len() <= room + 1 {
             let from = breaks[breaks.len() - 1];
             breaks.push(self.farthest(from, steps));
         }
         let needed = breaks.len() - 1;
         let fewest = breaks.windows(2).rev().skip(1).map(|w| w[1] - w[0]).min().unwrap_or(usize::MAX);
-        for count in needed..=needed + needed / 3 {
-            let shares: Vec<f64> =
-                (0..=count).map(|i| self.share_at(self.length_mm() * i as f64 / count as f64)).collect();
-            if shares.windows(2).all(|w| self.holds(w[0], w[1], steps)) {
+        let equal = if needed > room { 0 } else { needed / 3 + 1 };
+        for count in needed..needed + equal {
+            let share = |i: usize| self.share_at(self.length_mm() * i as f64 / count as f64);
+            let mut shares = vec![share(0)];
+            while shares.len() <= count {
+                let (from, to) = (shares[shares.len() - 1], share(shares.len()));
+                if !(budget.try_step() && self.holds(from, to, steps)) {
+                    break;
+                }
+                shares.push(to);
+            }
+            if shares.len() > count {
                 return (shares, fewest);
             }
         }

@@ -1,6 +1,7 @@
 //! Tests of `kinematics`, and of the mathematics below it.
 
 mod arms;
+mod files;
 mod batch;
 mod effect;
 mod forward;

@@ -3,6 +3,7 @@
 // A test that cannot go on panics, and one without its data says so.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
+mod absurd;
 mod program;
 mod surface;
 mod estimation;

@@ -471,3 +471,39 @@ fn counts_and_names_are_checked() {
         assert!(message.contains(needle), "{message}");
     }
 }
+
+/// The class: a number of a data sheet that no arm has goes into the nominal model.
+#[test]
+fn a_sheet_with_any_number_wrong_is_refused_or_makes_a_finite_arm() {
+    let text = "[[robot]]\nname = \"mine\"\npayload_kg = 3.0\nreach_mm = 580.0\nrepeatability_mm = 0.01\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 0\nd_mm = 290\nalpha_deg = -90\ntheta_deg = 0\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 270\nd_mm = 0\nalpha_deg = 0\ntheta_deg = -90\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 70\nd_mm = 0\nalpha_deg = -90\ntheta_deg = 0\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 0\nd_mm = 302\nalpha_deg = 90\ntheta_deg = 0\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 0\nd_mm = 0\nalpha_deg = -90\ntheta_deg = 0\n\
+        [[robot.link]]\nmodel = \"dh\"\na_mm = 0\nd_mm = 72\nalpha_deg = 0\ntheta_deg = 180\n\
+        [robot.joints]\nmap = [[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0.5, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 0, -1, 0], [0, 0, 0, 0, 0, 1]]\n\
+        min_deg = [-165, -110, -110, -160, -120, -400]\nmax_deg = [165, 110, 70, 160, 120, 400]\nspeed_deg_s = [250, 250, 250, 320, 320, 420]\n\
+        [robot.flange]\nposition_mm = [1, 2, 3]\nquaternion_wxyz = [0.6, 0.0, 0.8, 0.0]\n\
+        [robot.mounting]\ngravity = [0, 0, -1]\nplate_mm = [0, 0, 5]\n\
+        [robot.masses]\nmass_kg = [1, 2, 3, 4, 5, 6]\ncentre_mm = [[1, 2, 30], [1, 2, 3], [1, 2, 3], [1, 2, 3], [1, 2, 3], [1, 2, 3]]\n";
+    truegrind::robots::parse(text, "mine.toml").unwrap();
+    for (said, text) in crate::absurd::each(text) {
+        let Ok(robot) = truegrind::robots::parse(&text, "mine.toml") else { continue };
+        assert!(!["nan", "inf", "1e308"].iter().any(|number| said.contains(number)), "{said}");
+        let flange = robot.model.forward(&nalgebra::Vector6::repeat(0.3), &Default::default());
+        assert!(flange.translation.vector.iter().all(|v| v.is_finite()), "{said}");
+    }
+    for (from, to, words) in [
+        (
+            "a_mm = 270",
+            "a_mm = 1000000",
+            "link 2 a_mm: found 1000000, expected a finite length in mm, within ±10,000",
+        ),
+        ("payload_kg = 3.0", "payload_kg = 1e9", "more than 0, up to 10,000 kg"),
+        ("[0, 0.5, 1, 0, 0, 0]", "[0, 0.5, 1e-3, 0, 0, 0]", "joints.map: found a matrix of determinant"),
+    ] {
+        let error = truegrind::robots::parse(&text.replace(from, to), "mine.toml").unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}

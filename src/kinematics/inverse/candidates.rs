@@ -9,6 +9,7 @@ use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::kinematics::model::{Joints, Limits};
 use crate::math::se3::Pose;
+use crate::math::spectral;
 
 /// Solutions nearer than this are one (rad).
 const SAME_RAD: f64 = 1e-6;
@@ -319,7 +320,7 @@ impl Search<'_, '_> {
         let arm = &self.inverse.arm;
         let jacobian =
             newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_slopes(root);
-        let svd = jacobian.svd(false, true);
+        let Some(svd) = spectral::decomposed(&jacobian, true) else { return };
         let Some(directions) = svd.v_t else { return };
         for k in (0..6).filter(|&k| svd.singular_values[k] < NEARLY_SINGULAR) {
             let direction = directions.row(k).transpose();

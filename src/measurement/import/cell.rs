@@ -50,17 +50,19 @@ impl fmt::Display for Cell {
 pub struct Line {
     /// Line of a text file or row of a sheet, from 1, as an editor or spreadsheet shows it.
     pub number: usize,
-    /// The cells.
+    /// The cells, up to the last one that the file holds.
     pub cells: Vec<Cell>,
 }
 
 /// A CSV file or one sheet of a workbook, header included.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
     /// Name of the sheet, in a workbook.
     pub sheet: Option<String>,
     /// The rows.
     pub rows: Vec<Line>,
+    /// Columns up to the last one in which any row of a sheet has a cell; 0 for a text table, whose lines say it themselves.
+    pub width: usize,
     /// What was passed over on the way: blank lines that the format itself hides.
     pub blank_lines: usize,
     /// Columns that the format counts as used though nothing stands in them.

@@ -32,7 +32,7 @@ pub fn table(file: &str, bytes: &[u8]) -> Result<Table, ImportError> {
         rows.push(Line { number, cells });
     }
     let blank_lines = text.lines().filter(|l| l.trim().is_empty()).count();
-    Ok(Table { sheet: None, rows, blank_lines, blank_columns: 0, decimal_comma })
+    Ok(Table { sheet: None, rows, width: 0, blank_lines, blank_columns: 0, decimal_comma })
 }
 
 /// Line numbers as an editor counts them; the reader of the format does not count blank lines it skips.

@@ -57,6 +57,16 @@ pub enum ImportError {
         /// What the reader of the format says.
         message: String,
     },
+    /// More than is read, or than can be true.
+    #[error("{place}: found {found}; expected {expected}; save the table alone in a new workbook, or as CSV")]
+    TooLarge {
+        /// The file or sheet.
+        place: Place,
+        /// What is there.
+        found: Box<str>,
+        /// What would be read.
+        expected: Box<str>,
+    },
     /// Nothing in it.
     #[error("{place}: found no rows; expected a header line and one row for each measured pose")]
     Empty {

@@ -46,7 +46,8 @@ pub(super) fn dataset(
         return Err(ImportError::Empty { place: reader.place() });
     }
     let headed = reader.header.cells.iter().filter(|c| !c.is_empty()).count();
-    let nameless = (reader.header.cells.len() - headed).max(unnamed) + table.blank_columns;
+    let width = reader.header.cells.len().max(table.width);
+    let nameless = (width - headed).max(unnamed) + table.blank_columns;
     if nameless > 0 {
         notes.push(format!("{nameless} column(s) without a header skipped"));
     }

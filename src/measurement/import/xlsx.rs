@@ -1,14 +1,32 @@
-//! Workbooks: XLSX, and what else calamine opens (XLS, XLSB, ODS).
+//! Workbooks: XLSX, read cell by cell, so that a table takes the memory of its cells and not of the rectangle around them.
+//!
+//! What a workbook may ask for is bounded before it is believed: what its parts unpack to ([`super::archive`]), the sheets
+//! that share a part, the cells of all sheets together with the empty ones to the left of each, and their text. The old
+//! binary workbooks (XLS, XLSB) and ODS are told apart and refused: their reader sets memory aside for whatever
+//! rectangle a file claims.
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use calamine::{Data, Dimensions, Reader, Sheets, Xlsx, open_workbook_auto_from_rs};
+use calamine::{Data, DataRef, Dimensions, Reader, Xlsx, XlsxError};
 
+use super::archive::{self, Refusal};
 use super::cell::{Cell, Line, Table};
 use super::csv::number;
 use super::error::{ImportError, Place};
 
-/// Whether the bytes are a workbook: a zip archive (XLSX, XLSB, ODS) or an OLE container (XLS).
+/// Rows and columns of a sheet.
+const SHEET: (u32, u32) = (1 << 20, 1 << 14);
+/// Cells of all sheets, empty ones to the left of a used one and blank lines between used ones counted in: 400,000 rows of
+/// forty columns.
+const MOST_CELLS: usize = 16_000_000;
+/// Text of all cells (bytes): one string may be shared by any number of them.
+const MOST_TEXT: usize = 128 << 20;
+/// How often the largest part may be read again by sheets that share it, in shares of what may be unpacked at all.
+const SHARED: u64 = 4;
+
+/// Whether the bytes are a workbook: a zip archive (XLSX, XLSB, ODS) or an OLE container (XLS, or XLSX with a password).
 pub fn is_workbook(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\xd0\xcf\x11\xe0")
 }
@@ -16,43 +34,113 @@ pub fn is_workbook(bytes: &[u8]) -> bool {
 /// All sheets of a workbook, in its order.
 pub fn tables(file: &str, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     let fail = |message: String| ImportError::Format { place: Place::file(file), message };
-    let mut workbook = match open_workbook_auto_from_rs(Cursor::new(bytes)) {
-        Ok(workbook) => workbook,
-        // The other formats are tried in vain; what is wrong with an archive only the XLSX reader says.
-        Err(error) => match Xlsx::new(Cursor::new(bytes)) {
-            Ok(workbook) => Sheets::Xlsx(workbook),
-            Err(archive) if bytes.starts_with(b"PK") => return Err(fail(archive.to_string())),
-            Err(_) => return Err(fail(error.to_string())),
-        },
-    };
-    let mut out = Vec::new();
-    for sheet in workbook.sheet_names().to_vec() {
-        let range = workbook.worksheet_range(&sheet).map_err(|e| fail(format!("sheet {sheet}: {e}")))?;
-        let (top, left) = range.start().unwrap_or((0, 0));
-        let rows = range
-            .rows()
-            .enumerate()
-            .map(|(i, cells)| {
-                // Keep the columns where the user sees them, though the range starts at the first used cell.
-                let mut line = vec![Cell::Empty; left as usize];
-                line.extend(cells.iter().map(cell));
-                Line { number: top as usize + i + 1, cells: line }
-            })
-            .collect();
-        // What was once typed into and cleared, or only formatted, is inside the sheet's own extent but not in the range.
-        let extent = match &mut workbook {
-            Sheets::Xlsx(book) => book.worksheet_cells_reader(&sheet).map(|r| r.dimensions()).ok(),
-            _ => None,
-        };
-        let (blank_lines, blank_columns) = match (extent, range.end()) {
-            (Some(Dimensions { end, .. }), Some((row, column))) => {
-                (end.0.saturating_sub(row) as usize, end.1.saturating_sub(column) as usize)
-            }
-            _ => (0, 0),
-        };
-        out.push(Table { sheet: Some(sheet), rows, blank_lines, blank_columns, decimal_comma: false });
+    if !bytes.starts_with(b"PK") {
+        return Err(fail("this is an XLS workbook, or an XLSX workbook with a password".to_owned()));
     }
-    Ok(out)
+    let unpacked = archive::unpacked(bytes).map_err(|refusal| match refusal {
+        Refusal::Broken(message) => fail(message),
+        Refusal::Large { found, expected } => {
+            ImportError::TooLarge { place: Place::file(file), found: found.into(), expected: expected.into() }
+        }
+    })?;
+    // The reader of the format still indexes by numbers of the file in places and then panics.
+    let read = catch_unwind(AssertUnwindSafe(|| {
+        let mut workbook = Xlsx::new(Cursor::new(bytes)).map_err(|e| fail(e.to_string()))?;
+        let names = workbook.sheet_names();
+        if names.len() as u64 > SHARED * unpacked.allowed / unpacked.largest.max(1) {
+            return Err(ImportError::TooLarge {
+                place: Place::file(file),
+                found: format!("{} sheets beside a part of {} bytes", names.len(), unpacked.largest).into(),
+                expected: "sheets with parts of their own".into(),
+            });
+        }
+        let mut room = Room { cells: MOST_CELLS, text: MOST_TEXT };
+        names.iter().map(|name| table(file, &mut workbook, name, &mut room)).collect()
+    }));
+    read.unwrap_or_else(|_| Err(fail("a number in it contradicts another".to_owned())))
+}
+
+/// What is left of the bounds.
+struct Room {
+    cells: usize,
+    text: usize,
+}
+
+impl Room {
+    /// Takes `count` cells and `text` bytes.
+    fn take(&mut self, place: &Place, count: usize, text: usize) -> Result<(), ImportError> {
+        let (Some(cells), Some(text)) = (self.cells.checked_sub(count), self.text.checked_sub(text)) else {
+            return Err(ImportError::TooLarge {
+                place: place.clone(),
+                found: format!(
+                    "more than {MOST_CELLS} cells (the empty ones before a used one counted in) or {} MB of text",
+                    MOST_TEXT >> 20
+                )
+                .into(),
+                expected: "one table that begins at the upper left of its sheet".into(),
+            });
+        };
+        (self.cells, self.text) = (cells, text);
+        Ok(())
+    }
+}
+
+/// One sheet, its lines up to their last used cell.
+fn table(
+    file: &str,
+    workbook: &mut Xlsx<Cursor<&[u8]>>,
+    sheet: &str,
+    room: &mut Room,
+) -> Result<Table, ImportError> {
+    let place = Place { sheet: Some(sheet.into()), ..Place::file(file) };
+    let fail = |e: XlsxError| ImportError::Format {
+        place: Place::file(file),
+        message: format!("sheet {sheet}: {e}"),
+    };
+    let mut found = Table { sheet: Some(sheet.to_owned()), ..Table::default() };
+    let mut cells = match workbook.worksheet_cells_reader(sheet) {
+        Ok(cells) => cells,
+        // A sheet of charts or of macros.
+        Err(XlsxError::NotAWorksheet(_)) => return Ok(found),
+        Err(e) => return Err(fail(e)),
+    };
+    let Dimensions { end, .. } = cells.dimensions();
+    let mut lines: BTreeMap<u32, Vec<Cell>> = BTreeMap::new();
+    while let Some(next) = cells.next_cell().map_err(fail)? {
+        if next.get_value() == &DataRef::Empty {
+            continue;
+        }
+        let (row, column) = next.get_position();
+        if row >= SHEET.0 || column >= SHEET.1 {
+            return Err(ImportError::TooLarge {
+                place,
+                found: format!("a cell in row {}, column {}", u64::from(row) + 1, u64::from(column) + 1)
+                    .into(),
+                expected: format!("at most {} rows and {} columns", SHEET.0, SHEET.1).into(),
+            });
+        }
+        let value = cell(&Data::from(next.get_value().clone()));
+        let text = if let Cell::Text(text) = &value { text.len() } else { 0 };
+        let line = lines.entry(row).or_default();
+        let column = column as usize;
+        room.take(&place, (column + 1).saturating_sub(line.len()), text)?;
+        if line.len() <= column {
+            line.resize(column + 1, Cell::Empty);
+        }
+        line[column] = value;
+        found.width = found.width.max(column + 1);
+    }
+    let (Some((&first, _)), Some((&last, _))) = (lines.first_key_value(), lines.last_key_value()) else {
+        return Ok(found);
+    };
+    room.take(&place, (last - first) as usize, 0)?;
+    found.rows = (first..=last)
+        .map(|row| Line { number: row as usize + 1, cells: lines.remove(&row).unwrap_or_default() })
+        .collect();
+    // What was once typed into and cleared, or only formatted, is inside the sheet's own extent but has no value.
+    found.blank_lines = end.0.min(SHEET.0 - 1).saturating_sub(last) as usize;
+    found.blank_columns = (end.1.min(SHEET.1 - 1) as usize + 1).saturating_sub(found.width);
+    Ok(found)
 }
 
 fn cell(data: &Data) -> Cell {

@@ -11,6 +11,8 @@ use crate::measurement::sensor::Rig;
 
 /// Draws for each pose before the recipe counts as impossible.
 const TRIES: usize = 10_000;
+/// But no more than this in all, or than a hundred for each pose where that is more.
+const MOST_TRIES: usize = 5_000_000;
 
 /// One row to be measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +101,8 @@ fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>,
             let mut rng = stream(recipe.seed, Stream::Poses);
             let mut poses = Vec::with_capacity(*count);
             let mut tries = 0;
-            while poses.len() < *count && tries < TRIES * count {
+            let most = (TRIES * count).min(MOST_TRIES.max(100 * count));
+            while poses.len() < *count && tries < most {
                 tries += 1;
                 let q = Joints::from_fn(|j, _| low[j] + (high[j] - low[j]) * rng.random::<f64>());
                 if seen(&q) {

@@ -37,6 +37,8 @@
 //! sigma_mm = 0.02
 //! ```
 
+mod checks;
+
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +49,7 @@ use crate::kinematics::model::Body;
 use crate::math::se3::Pose;
 use crate::measurement::sensor::{Rig, Sight};
 
+pub use self::checks::MOST_ROWS;
 pub use super::fault::Fault as SensorFault;
 
 /// A stated arm, measured in a stated way.
@@ -392,52 +395,5 @@ impl Recipe {
             let line = text.get(..start).unwrap_or_default().matches('\n').count() + 1;
             RecipeError::Syntax { file: file.into(), line, message: error.message().replace('\n', " ") }
         })
-    }
-
-    /// Checks what the types leave open.
-    pub fn check(&self) -> Result<(), RecipeError> {
-        let wrong = |key: &str, found: String, expected| {
-            Err(RecipeError::Invalid { key: key.into(), found, expected })
-        };
-        let joints = self.arm.link.iter().map(|l| ("arm.link.joint", l.joint));
-        let effects = self.arm.effect.iter().filter_map(|e| e.joint().map(|j| ("arm.effect.joint", j)));
-        if let Some((key, joint)) = joints.chain(effects).find(|(_, j)| *j > 5) {
-            return wrong(key, joint.to_string(), "a joint from 0 to 5");
-        }
-        if let Some(bodies) = self.arm.body.as_ref().filter(|b| b.len() != 6) {
-            return wrong("arm.body", format!("{} bodies", bodies.len()), "six");
-        }
-        if let SensorSetup::Cable { outlets_mm, zeros_mm, .. } = &self.sensor
-            && (outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len())
-        {
-            let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
-            return wrong("sensor.outlets_mm", found, "one outlet at least, and no more zeros than outlets");
-        }
-        if let Some(dof) = self.noise.student_t.filter(|dof| dof.is_nan() || *dof <= 2.0) {
-            return wrong("noise.student_t", dof.to_string(), "more than 2 degrees of freedom");
-        }
-        let sigmas = [
-            ("noise.sigma_mm", self.noise.sigma_mm),
-            ("noise.per_metre_mm", self.noise.per_metre_mm),
-            ("noise.sigma_deg", self.noise.sigma_deg),
-            ("noise.joints_deg", self.noise.joints_deg),
-        ];
-        if let Some((key, value)) = sigmas.iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
-            return wrong(key, value.to_string(), "a standard deviation, 0 or more");
-        }
-        let steps = [
-            ("rounding.angles_deg", self.rounding.angles_deg),
-            ("rounding.readout_mm", self.rounding.readout_mm),
-            ("rounding.reading_mm", self.rounding.reading_mm),
-        ];
-        if let Some((key, Some(step))) =
-            steps.iter().find(|(_, s)| s.is_some_and(|s| !(s > 0.0 && s.is_finite())))
-        {
-            return wrong(key, step.to_string(), "a step above 0");
-        }
-        if self.circumstances.temperature.is_some() && self.circumstances.hours.is_none() {
-            return wrong("circumstances.temperature", "no hours".into(), "`hours` beside a temperature");
-        }
-        Ok(())
     }
 }

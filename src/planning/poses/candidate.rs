@@ -106,7 +106,7 @@ pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (V
             if low < high { random.random_range(low..high) } else { 0.5 * (low + high) }
         });
         let singularity = inverse.smallest_singular_value(&joints);
-        if singularity < bounds.min_singularity {
+        if !(singularity >= bounds.min_singularity) {
             passed.singular += 1;
             continue;
         }

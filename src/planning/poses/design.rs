@@ -14,10 +14,11 @@
 //! Departures: priors inside M (Bayesian D-optimality, Chaloner and Verdinelli 1995), exchange of one pose at a time.
 //! Checked against: all pairs of a small set by brute force, and random sets, in the tests.
 
-use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
 
 use super::rows::Told;
+use crate::math::spectral;
 
 /// What makes a set of poses good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,7 +104,7 @@ impl Design<'_> {
         let told = self.told;
         if self.index == Index::O1 {
             let total = &told.readings * told.readings.transpose();
-            let eigen = SymmetricEigen::new(total);
+            let eigen = spectral::symmetric(total)?;
             let largest = eigen.eigenvalues.max();
             let kept: Vec<usize> = (0..eigen.eigenvalues.len())
                 .filter(|&k| eigen.eigenvalues[k] > DETERMINED * largest)

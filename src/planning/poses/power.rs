@@ -8,7 +8,7 @@
 //! Signal Processing II, section 7.7).
 //! Checked against: the drop of the fitted cost when the effect is put into simulated readings.
 
-use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix};
 
 use super::rival::{Suspect, coupling, effects_of, harmonic, thermal};
 use super::rows::jacobian;
@@ -17,6 +17,7 @@ use crate::kinematics::condition::Condition;
 use crate::kinematics::effect::Effect;
 use crate::kinematics::model::Model;
 use crate::kinematics::parameter::Parameter;
+use crate::math::spectral;
 use crate::measurement::dataset::{Row, Sensor};
 
 /// An effect with the smallest size that the rows decide.
@@ -92,7 +93,7 @@ pub(super) fn decidable(
             let shown = a.columns.tr_mul(&a.columns) - xr.tr_mul(&factor.solve(&xr));
             // By its own symmetry, not by rounding.
             let shown = (&shown + shown.transpose()) * 0.5;
-            let weakest = SymmetricEigen::new(shown).eigenvalues.min();
+            let weakest = spectral::symmetric(shown).map_or(f64::NAN, |eigen| eigen.eigenvalues.min());
             let size = (options.decisive / weakest).sqrt();
             let shows = size * a.to_shows;
             let known = weakest > 0.0 && shows.is_finite() && shows < ABSURD;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-use super::{LATTICE, direction};
+use super::{AROUND, LATTICE, direction};
 use crate::surface::expression::Expression;
 use crate::surface::{Contact, Domain, Foot, SurfaceError};
 
@@ -63,6 +63,12 @@ impl Implicit {
 
     pub(crate) fn domain(&self) -> Domain {
         self.domain
+    }
+
+    /// All slices, and some steps of Newton's method.
+    pub(crate) fn look_cost(&self) -> f64 {
+        let [value, first] = self.f.terms();
+        AROUND + Self::SLICES as f64 * value + 8.0 * (value + first)
     }
 
     /// The first zero from above, found slice by slice, then by bisection and Newton's method together.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::surface::{Contact, Surface};
+use crate::surface::budget::Budget;
+use crate::surface::{Contact, Surface, SurfaceError};
 
 /// How often a link is halved, at most.
 const HALVINGS: usize = 6;
@@ -25,7 +26,16 @@ pub(crate) fn lifted(contact: &Contact, height_mm: f64) -> Point3<f64> {
 /// The points between the two lifted ends of a link that keep its straight pieces at least half the height above
 /// the surface. None are needed over a flat surface; over a dome, the link follows it. Where there is no surface
 /// below, nothing is in the way.
-pub(crate) fn over(surface: &Surface, from: &Contact, to: &Contact, height_mm: f64) -> Vec<Stop> {
+///
+/// # Errors
+/// A budget that does not hold as many looks.
+pub(crate) fn over(
+    surface: &Surface,
+    from: &Contact,
+    to: &Contact,
+    height_mm: f64,
+    budget: &Budget,
+) -> Result<Vec<Stop>, SurfaceError> {
     let below = |share: f64| {
         let plan = [0, 1].map(|i| from.plan[i] * (1.0 - share) + to.plan[i] * share);
         surface.contact(plan)
@@ -35,6 +45,7 @@ pub(crate) fn over(surface: &Surface, from: &Contact, to: &Contact, height_mm: f
     let mut stops = vec![start, end];
     for _ in 0..HALVINGS {
         let mut closer = vec![start];
+        budget.look(LOOKS * (stops.len() - 1))?;
         for pair in stops.windows(2) {
             let (a, b) = (pair[0], pair[1]);
             let clear = (1..LOOKS).all(|i| {
@@ -55,5 +66,5 @@ pub(crate) fn over(surface: &Surface, from: &Contact, to: &Contact, height_mm: f
         }
         stops = closer;
     }
-    stops[1..stops.len() - 1].to_vec()
+    Ok(stops[1..stops.len() - 1].to_vec())
 }

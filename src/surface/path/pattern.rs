@@ -8,6 +8,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Along, PathOptions, Pattern, Spacing, Traverse};
+use crate::surface::budget::Budget;
 use crate::surface::sampling::{self, interpolated};
 use crate::surface::{Contact, Surface, SurfaceError};
 
@@ -103,9 +104,14 @@ impl Curve {
 /// The curves of a pattern over a surface, in the order of cutting.
 ///
 /// # Errors
-/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, or a pattern that nowhere
+/// A hollow into which the tool does not fit, more than [`PathOptions::LARGEST`] passes, more looks than the budget has, or a pattern that nowhere
 /// meets the surface.
-pub(crate) fn curves(surface: &Surface, options: &PathOptions) -> Result<Vec<Curve>, SurfaceError> {
+pub(crate) fn curves(
+    surface: &Surface,
+    options: &PathOptions,
+    budget: &Budget,
+) -> Result<Vec<Curve>, SurfaceError> {
+    budget.look((ACROSS + 1) * (ALONG + 3))?;
     let family = match options.pattern {
         Pattern::Raster => Family::Lines(options.along),
         Pattern::Spiral => Family::Ellipses,

@@ -220,3 +220,45 @@ fn several_outlets_are_told_apart() {
     assert_eq!((data.rows.len(), data.anchors(), data.sensor), (20, 2, Sensor::Cable));
     assert_eq!((data.rows[0].anchor, data.rows[1].anchor), (0, 1));
 }
+
+/// The class: a recipe's number that is none, or that asks for more than anyone measures, gives NaN in a file that says
+/// nothing of it, or a run that does not end.
+#[test]
+fn a_recipe_with_any_number_wrong_is_refused_or_gives_finite_rows() {
+    use rayon::prelude::*;
+    let effects = "[[arm.effect]]\neffect = \"gear-eccentricity\"\njoint = 0\norder = 1.0\nsine_rad = 3e-4\ncosine_rad = 1e-4\n\
+        [[arm.effect]]\neffect = \"thermal-drift\"\ngrowth = 1e-4\ntime_constant_h = 1.5\ngrowth_per_k = 1e-5\nreference_c = 20\n";
+    let rest = format!(
+        "{SIX}[noise]\nsigma_mm = 0.02\nper_metre_mm = 0.01\nsigma_deg = 0.01\nstudent_t = 5.0\njoints_deg = 0.001\n\
+         [rounding]\nangles_deg = 0.01\nreading_mm = 0.001\n\
+         [view]\nbox_mm = [[-900, -900, -900], [900, 900, 1500]]\ndistance_mm = [100, 9000]\ntilt_deg = 179\n\
+         [circumstances]\nhours = 4.0\npayload_kg = [1.0, 2.0]\npayload_centre_mm = [1, 2, 30]\n\
+         temperature = {{ start_c = 20, end_c = 30, time_constant_h = 1.5 }}\n\
+         [arm.random]\nseed = 7\na_mm = 0.3\nd_mm = 0.3\nalpha_deg = 0.03\nbeta_deg = 0.03\ntheta_deg = 0.1\n\
+         [[arm.link]]\njoint = 1\na_mm = 0.1\ntheta_deg = 0.2\n{effects}\
+         [[fault]]\nfault = \"sensor-frame-shift\"\nrows = [2, 3]\nshift_mm = [1, 2, 3]\nturn_deg = [1, 2, 3]\n\
+         [[fault]]\nfault = \"sensor-scale\"\nerror = 0.001\n\
+         [[fault]]\nfault = \"outliers\"\nrow_list = [1, 4]\nsize_mm = 5\n\
+         [[fault]]\nfault = \"payload-change\"\nrows = [1, 2]\npayload_kg = 3\n"
+    );
+    for poses in [
+        "kind = \"random\"\ncount = 5\nmargin_deg = 4\nmin_deg = [-90, -90, -60, -90, -90, -90]\nmax_deg = [90, 90, 60, 90, 90, 90]\nrepeats = 2\n",
+        "kind = \"grid\"\nmin_deg = [-40, -30, -20, 10, 20, 30]\nmax_deg = [40, 30, 20, 60, 70, 80]\nsteps = [2, 1, 2, 1, 1, 1]\n",
+    ] {
+        let text = format!("robot = \"abb-irb-120\"\nseed = 5\n[poses]\n{poses}{rest}");
+        try_measure(&text).unwrap();
+        crate::absurd::each(&text).par_bridge().for_each(|(said, text)| match try_measure(&text) {
+            Err(error) => assert!(!error.to_string().is_empty()),
+            Ok(simulation) => {
+                assert!(!simulation.csv.contains("NaN") && !simulation.csv.contains("inf"), "{said}");
+            }
+        });
+    }
+    for (from, to) in
+        [("count = 5", "count = 1000000000000"), ("repeats = 2", "repeats = 9000000000000000000")]
+    {
+        let text = random(5, CABLE).replace("count = 5\n", "count = 5\nrepeats = 2\n").replace(from, to);
+        let error = try_measure(&text).unwrap_err().to_string();
+        assert!(error.contains("at most 1,000,000 rows in all"), "{error}");
+    }
+}

@@ -14,29 +14,40 @@ use Cell::{Blank, Number, Text};
 
 /// An XLSX file of named sheets, the first row of each at `top` (from 1).
 fn workbook(sheets: &[(&str, usize, Vec<Vec<Cell>>)]) -> Vec<u8> {
+    let bodies: Vec<(&str, String)> = sheets
+        .iter()
+        .map(|(name, top, rows)| {
+            let mut body = String::new();
+            for (r, row) in rows.iter().enumerate() {
+                body += &format!("<row r=\"{}\">", r + top);
+                for (c, cell) in row.iter().enumerate() {
+                    let at = format!("{}{}", char::from(b'A' + c as u8), r + top);
+                    body += &match cell {
+                        Blank => String::new(),
+                        Number(v) => format!("<c r=\"{at}\"><v>{v}</v></c>"),
+                        Text(t) => format!("<c r=\"{at}\" t=\"inlineStr\"><is><t>{t}</t></is></c>"),
+                    };
+                }
+                body += "</row>";
+            }
+            (*name, body)
+        })
+        .collect();
+    packed(&bodies, None)
+}
+
+/// An XLSX file of sheets with stated rows, and of shared strings as stated.
+fn packed(sheets: &[(&str, String)], strings: Option<&str>) -> Vec<u8> {
     const MAIN: &str = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     const OFFICE: &str = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
     const PACKAGE: &str = "http://schemas.openxmlformats.org/package/2006/relationships";
     let (mut list, mut relations, mut files) = (String::new(), String::new(), Vec::new());
-    for (i, (name, top, rows)) in sheets.iter().enumerate() {
+    for (i, (name, body)) in sheets.iter().enumerate() {
         list += &format!("<sheet name=\"{name}\" sheetId=\"{0}\" r:id=\"rId{0}\"/>", i + 1);
         relations += &format!(
             "<Relationship Id=\"rId{0}\" Type=\"{OFFICE}/worksheet\" Target=\"worksheets/sheet{0}.xml\"/>",
             i + 1
         );
-        let mut body = String::new();
-        for (r, row) in rows.iter().enumerate() {
-            body += &format!("<row r=\"{}\">", r + top);
-            for (c, cell) in row.iter().enumerate() {
-                let at = format!("{}{}", char::from(b'A' + c as u8), r + top);
-                body += &match cell {
-                    Blank => String::new(),
-                    Number(v) => format!("<c r=\"{at}\"><v>{v}</v></c>"),
-                    Text(t) => format!("<c r=\"{at}\" t=\"inlineStr\"><is><t>{t}</t></is></c>"),
-                };
-            }
-            body += "</row>";
-        }
         files.push((
             format!("xl/worksheets/sheet{}.xml", i + 1),
             format!("<worksheet xmlns=\"{MAIN}\"><sheetData>{body}</sheetData></worksheet>"),
@@ -57,6 +68,9 @@ fn workbook(sheets: &[(&str, usize, Vec<Vec<Cell>>)]) -> Vec<u8> {
         "xl/_rels/workbook.xml.rels".into(),
         format!("<Relationships xmlns=\"{PACKAGE}\">{relations}</Relationships>"),
     ));
+    if let Some(strings) = strings {
+        files.push(("xl/sharedStrings.xml".into(), strings.to_owned()));
+    }
     archive(&files)
 }
 
@@ -160,5 +174,70 @@ fn numbers_stored_as_text_are_numbers_and_other_text_is_not() {
         let wanted =
             format!("rows.xlsx, sheet Sheet1, row 3, column L: found {found}; expected a finite number");
         assert!(error.starts_with(&wanted), "{error}");
+    }
+}
+
+/// Rows of a sheet that can be read, and then whatever is wrong.
+fn with_rows(more: &str) -> String {
+    let mut body = String::new();
+    for (r, cells) in [header(), row(500.0), row(501.5)].iter().enumerate() {
+        body += &format!("<row r=\"{}\">", r + 1);
+        for (c, cell) in cells.iter().enumerate() {
+            let at = format!("{}{}", char::from(b'A' + c as u8), r + 1);
+            body += &match cell {
+                Text(t) => format!("<c r=\"{at}\" t=\"inlineStr\"><is><t>{t}</t></is></c>"),
+                Number(v) => format!("<c r=\"{at}\"><v>{v}</v></c>"),
+                Blank => String::new(),
+            };
+        }
+        body += "</row>";
+    }
+    body + more
+}
+
+/// The class: a workbook of a few kilobytes that claims a size. A claim is never believed: what is held is bounded by the
+/// cells that are there, and a sheet that asks for more than that is refused by name.
+#[test]
+fn a_workbook_that_claims_a_size_is_read_by_its_cells_or_refused_by_name() {
+    let cell = |at: &str| with_rows(&format!("<row><c r=\"{at}\"><v>1</v></c></row>"));
+    // One cell far away, with nothing above it, is a column without a header.
+    let far = read(&packed(&[("S", cell("XFD1048576"))], None), None).unwrap();
+    assert_eq!(far.rows.len(), 2);
+    for at in ["ZZZZ1", "A1048577", "A4294967295", "XFE2"] {
+        let error = read(&packed(&[("S", cell(at))], None), None).unwrap_err();
+        assert!(error.contains("expected at most 1048576 rows and 16384 columns"), "{at}: {error}");
+    }
+    for at in ["A0", "A-1", "", "1A", "Ä7", "A99999999999999999999", "ZZZZZZZZZZZZ9"] {
+        assert!(read(&packed(&[("S", cell(at))], None), None).is_err(), "{at}");
+    }
+    let left: String =
+        (1..3000).map(|r| format!("<row r=\"{r}\"><c r=\"XFD{r}\"><v>1</v></c></row>")).collect();
+    let error = read(&packed(&[("S", left)], None), None).unwrap_err();
+    assert!(error.contains("sheet S: found more than 16000000 cells"), "{error}");
+    for claim in ["uniqueCount=\"4294967295\"", "uniqueCount = '99999999999999999999'"] {
+        let strings = format!("<sst count=\"1\" {claim}><si><t>x</t></si></sst>");
+        let error = read(&packed(&[("S", with_rows(""))], Some(&strings)), None).unwrap_err();
+        assert!(error.contains("shared strings in a part of"), "{error}");
+    }
+    let fine = "<sst count=\"1\" uniqueCount=\"1\"><si><t>x</t></si></sst>";
+    assert!(read(&packed(&[("S", with_rows(""))], Some(fine)), None).is_ok());
+    // One long string in every cell.
+    let long = format!("<sst><si><t>{}</t></si></sst>", "x".repeat(1 << 20));
+    let cells: String =
+        (1..200).map(|r| format!("<row r=\"{r}\"><c r=\"A{r}\" t=\"s\"><v>0</v></c></row>")).collect();
+    let error = read(&packed(&[("S", cells)], Some(&long)), None).unwrap_err();
+    assert!(error.contains("128 MB of text"), "{error}");
+}
+
+#[test]
+fn what_is_no_xlsx_workbook_is_refused_by_name() {
+    let error = read(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1 and nothing else", None).unwrap_err();
+    assert!(error.contains("an XLS workbook, or an XLSX workbook with a password"), "{error}");
+    let whole = packed(&[("S", with_rows(""))], None);
+    for end in (4..whole.len()).step_by(97) {
+        assert!(read(&whole[..end], None).is_err());
+    }
+    for broken in ["<row", "<c r=\"A9\"><v>", "</sheetData></row></worksheet>", "&#xFFFFFFFF;"] {
+        let _ = read(&packed(&[("S", with_rows(broken))], None), None);
     }
 }

@@ -288,3 +288,24 @@ fn damaged_samples_never_panic() {
         }
     }
 }
+
+/// The class: a surface file of a few lines that asks for hours or for all memory. Each number of each file that ships is
+/// put wrong in turn; the file or its path is refused, or the path is finite.
+#[test]
+fn a_file_with_any_number_wrong_is_refused_or_gives_a_finite_path() {
+    use rayon::prelude::*;
+    use truegrind::surface::{SurfaceFile, sample};
+    for shipped in [&sample::BLADE, &sample::DOME, &sample::SADDLE] {
+        let text = std::str::from_utf8(shipped.bytes).unwrap();
+        crate::absurd::each(text).par_bridge().for_each(|(said, text)| {
+            let none = |_: &str| Err::<Vec<u8>, _>("no mesh");
+            let Ok(file) = SurfaceFile::read("s.toml", text.as_bytes(), none) else { return };
+            assert!(!said.contains("nan") && !said.contains("inf"), "{said}");
+            let Ok(points) = file.points() else { return };
+            for point in points {
+                assert!(point.position_mm.iter().all(|v| v.is_finite()), "{said}");
+                assert!(point.orientation.coords.iter().all(|v| v.is_finite()), "{said}");
+            }
+        });
+    }
+}

@@ -396,3 +396,39 @@ fn what_gives_no_path_is_refused() {
         Err(SurfaceError::Hollow { tool_mm: 5000.0, .. })
     ));
 }
+
+/// What takes too long is refused by a count of work, not by a clock: the chord error of an atom, a wave of a thousand
+/// periods, triangles all over each other.
+#[test]
+fn a_path_that_would_take_hours_is_refused_by_name() {
+    let fine = PathOptions { chord_mm: 1e-9, ..Default::default() };
+    assert!(matches!(path::over(&ball(), &fine), Err(SurfaceError::TooLong { .. })));
+    let spiral = PathOptions { pattern: Pattern::Spiral, ..fine };
+    assert!(matches!(path::over(&ball(), &spiral), Err(SurfaceError::TooLong { .. })));
+    let dust = PathOptions { chord_mm: 1e-300, max_step_mm: 1e-3, ..Default::default() };
+    assert!(matches!(path::over(&wave(), &dust), Err(SurfaceError::TooLong { .. })));
+    let waves = implicit("z - sin(1000*x)*cos(1000*y)", square(45.0), [-20.0, 20.0]);
+    let found = path::over(&waves, &PathOptions::default());
+    assert!(
+        matches!(found, Err(SurfaceError::TooMuchWork { .. } | SurfaceError::TooLong { .. })),
+        "{:?}",
+        found.map(|p| p.len())
+    );
+}
+
+#[test]
+fn triangles_all_over_each_other_are_refused_by_name() {
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    let vertices: Vec<Point3<f64>> = (0..9_000)
+        .map(|_| Point3::new(0.0, 0.0, 0.0).map(|_: f64| random.random_range(-60.0..60.0)))
+        .collect();
+    let facets = (0..3_000).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let noise = truegrind::surface::Mesh::new(vertices, facets, &Default::default()).unwrap();
+    let found = path::over(&Surface::Mesh(noise), &PathOptions { max_step_mm: 0.05, ..Default::default() });
+    assert!(
+        matches!(found, Err(SurfaceError::TooMuchWork { .. } | SurfaceError::TooLong { .. })),
+        "{:?}",
+        found.map(|p| p.len())
+    );
+}

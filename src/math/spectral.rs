@@ -1,0 +1,32 @@
+//! Singular values and eigenvalues in a bounded number of steps, whatever the numbers are: the iteration of the library
+//! never ends on one that is not finite unless it is told when.
+
+use nalgebra::{DMatrix, Dyn, Matrix6, SVD, SymmetricEigen, U6, Vector6};
+
+/// Steps after which an iteration is given up, for each row; some two or three are needed.
+const MOST_STEPS: usize = 200;
+
+/// What the library's own iterations stop at.
+const PRECISION: f64 = 5.0 * f64::EPSILON;
+
+/// Singular values, largest first; `None` for a matrix that is not finite.
+pub fn singular_values(matrix: &Matrix6<f64>) -> Option<Vector6<f64>> {
+    decomposed(matrix, false).map(|svd| svd.singular_values)
+}
+
+/// Singular values, largest first, and with `directions` the rows of Vᵀ; `None` for a matrix that is not finite.
+pub fn decomposed(matrix: &Matrix6<f64>, directions: bool) -> Option<SVD<f64, U6, U6>> {
+    if !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    SVD::try_new(*matrix, false, directions, PRECISION, 6 * MOST_STEPS)
+}
+
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` for one that is not finite.
+pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    if !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let most = MOST_STEPS * matrix.nrows().max(1);
+    SymmetricEigen::try_new(matrix, f64::EPSILON, most)
+}
