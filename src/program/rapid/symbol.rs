@@ -4,6 +4,7 @@
 //! of routines hide others. What a file assigns, or hands to something that may assign it, is marked: its initial
 //! value then says nothing about its value at a motion, or only about the components that nothing assigns.
 
+mod acts;
 mod change;
 
 use std::collections::{HashMap, HashSet};

@@ -55,6 +55,8 @@ pub struct Reach {
     pub waits: bool,
     /// Whether it may grip something else (GripLoad).
     pub grips: bool,
+    /// Whether it does more than answer: it changes what others see, moves, writes, waits, reads devices, raises.
+    pub acts: bool,
     /// The switches that statements in it, or in what it calls, set: at some time, not at its end alone.
     pub sets: States,
 }
@@ -94,6 +96,7 @@ struct Found {
     moves: bool,
     waits: bool,
     grips: bool,
+    acts: bool,
     /// Of which types data is changed by a name that is computed; `None` for any type.
     by_name: Vec<Option<Vec<u8>>>,
     /// The calls that set a switch or call a routine of the program.
@@ -122,6 +125,7 @@ impl Found {
         self.moves |= next.moves;
         self.waits |= next.waits;
         self.grips |= next.grips;
+        self.acts |= next.acts;
         self.by_name.extend(next.by_name);
         self.cycles |= next.cycles;
         self.sets = self.sets.or(next.sets);
@@ -342,7 +346,7 @@ impl Symbols {
                 continue;
             }
             if kind == Syntax::Call && self.moves_only(tree, unit.scope, node) {
-                found.moves = true;
+                (found.moves, found.acts) = (true, true);
                 node += 1;
                 continue;
             }
@@ -359,6 +363,7 @@ impl Symbols {
                 Syntax::While => found.waits = true,
                 _ => {}
             }
+            found.acts |= self.acts_itself(tree, unit.scope, node);
             node += 1;
         }
         found.late.sort_unstable();
@@ -537,8 +542,12 @@ impl Symbols {
         for (found, unit) in all.iter().zip(&self.units) {
             let Some(routine) = unit.routine else { continue };
             let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
-            let changes = found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
+            let changes: Vec<u32> =
+                found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
+            // A parameter by reference is data of the caller.
+            let written = self.routines[routine as usize].written.iter().any(Option::is_some);
             let mut reach = Reach {
+                acts: found.acts || found.unknown || written || !changes.is_empty(),
                 changes,
                 anything: found.unknown,
                 moves: found.moves,
@@ -555,7 +564,8 @@ impl Symbols {
                 let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
                 let said = |reach: &Reach| {
-                    (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.grips, reach.sets)
+                    let Reach { anything, moves, waits, grips, acts, sets, .. } = *reach;
+                    (reach.changes.len(), anything, moves, waits, (grips, acts), sets)
                 };
                 let before = said(&reach);
                 for &called in &all[unit as usize].late {
@@ -569,6 +579,7 @@ impl Symbols {
                     reach.moves |= other.moves;
                     reach.waits |= other.waits;
                     reach.grips |= other.grips;
+                    reach.acts |= other.acts;
                     reach.sets = reach.sets.or(other.sets);
                     reach.changes.extend_from_slice(&other.changes);
                     if reach.changes.len() > 4 * REACH {
