@@ -61,10 +61,31 @@ pub(super) enum Event {
     Lost(u8),
     /// Position and orientation are not known from here on.
     Unknown,
-    /// The place where the tool stands gets these values (G92).
-    Shift([Option<f64>; 3]),
+    /// The place where the tool stands gets these values (G92); of the axes that are named some may not be known.
+    Shift {
+        /// The values (mm), where value and place are known.
+        stated: [Option<f64>; 3],
+        /// The axes that are named.
+        named: [bool; 3],
+    },
     /// The shift of these axes ends, or is said whole: wherever the tool stands.
     Placed([bool; 3]),
+    /// The same in a block that may be skipped.
+    MaybePlaced([bool; 3]),
+    /// A shift that was kept holds again (G92.3).
+    Restored,
+    /// As [`Event::Unknown`], at a place that can be reached from elsewhere, or from which another place can.
+    Join,
+    /// Another place of the file can be reached from here.
+    Jump,
+    /// Something that stays counts from where the tool stands in these axes (bits as for [`Event::Lost`]): an origin is set by a
+    /// word that is not followed, or a position is read.
+    Held {
+        /// The axes.
+        axes: u8,
+        /// Whether a position is read, and no origin set.
+        read: bool,
+    },
 }
 
 /// How a motion is written.
@@ -439,6 +460,7 @@ impl<'t, 's> Lister<'t, 's> {
             self.state.mode = Mode::Lost(Reason::UnknownFlow);
         }
         self.contour_of(said);
+        self.position_read(said);
         let values = self.values(said);
         let before = self.found.forgotten;
         self.effect(said);
@@ -510,7 +532,9 @@ impl<'t, 's> Lister<'t, 's> {
             _ => false,
         };
         // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
-        self.branched |= said.m.iter().any(|m| matches!(m, 46 | 96 | 99));
+        if said.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
+            self.parts();
+        }
         if self.dialect == Dialect::Heidenhain && said.m.contains(&129) {
             // It acts at the end of its block.
             self.tip(false, false);
@@ -563,6 +587,11 @@ fn is_axis(letter: u8) -> bool {
     b"XYZABCIJKRUVWEF".contains(&letter.to_ascii_uppercase())
 }
 
+/// The axes that a block names, as bits.
+fn named_axes(said: &Said<'_>) -> u8 {
+    said.axes.iter().chain(&said.abc).enumerate().fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
+}
+
 /// The name of an axis, with or without the I of an increment.
 fn is_axis_name(name: &[u8]) -> bool {
     match name {
@@ -570,6 +599,9 @@ fn is_axis_name(name: &[u8]) -> bool {
         _ => false,
     }
 }
+
+/// All axes, for the same and for [`Event::Held`].
+const EVERYWHERE: u8 = POSITION | ORIENTATION;
 
 /// All of X, Y and Z, for [`Event::Lost`].
 const POSITION: u8 = 7;

@@ -204,7 +204,7 @@ impl Lister<'_, '_> {
             let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
             match &*keyword {
                 b"CALL" => self.subprogram(said, "O call"),
-                b"IF" => self.branched = true,
+                b"IF" => self.parts(),
                 b"SUB" => {
                     let passed = self.state.clone();
                     self.forget();
@@ -218,7 +218,7 @@ impl Lister<'_, '_> {
                     self.ended = false;
                     self.frame_index = None;
                     self.tool_index.clear();
-                    self.events.push(Event::Unknown);
+                    self.events.push(Event::Join);
                 }
                 _ => self.forget(),
             }
@@ -246,7 +246,7 @@ impl Lister<'_, '_> {
             }
             (b"IF", _) => {
                 // A jump may go away; what stands here holds where it does not.
-                self.branched = true;
+                self.parts();
                 true
             }
             (
@@ -258,7 +258,7 @@ impl Lister<'_, '_> {
                 true
             }
             _ if name.starts_with(b"GOTO") => {
-                self.branched = true;
+                self.parts();
                 true
             }
             _ if name.starts_with(b"REPEAT") => {

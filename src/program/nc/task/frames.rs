@@ -272,12 +272,21 @@ impl Lister<'_, '_> {
                 let Some(name) = name else { return self.frames_assigned() };
                 self.state_offset(said, &name);
             }
-            Some(20.0) => match p.and_then(named).filter(|_| linux) {
-                Some(name) => self.offset_is(&name, None),
-                None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
-                None => self.frames_assigned(),
-            },
-            Some(1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0) => self.tools_assigned(),
+            Some(20.0) => {
+                self.held_here(super::named_axes(said));
+                match p.and_then(named).filter(|_| linux) {
+                    Some(name) => self.offset_is(&name, None),
+                    None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
+                    None => self.frames_assigned(),
+                }
+            }
+            Some(number @ (1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0)) => {
+                if linux && (number == 10.0 || number == 11.0) {
+                    // A length with which the tool would stand there.
+                    self.held_here(super::named_axes(said));
+                }
+                self.tools_assigned();
+            }
             None if said.p.is_some() && said.l.is_none() => self.tools_assigned(),
             // Parameters of the control, or what is not known.
             _ => self.deny(said, "G10", Reason::UnknownWord),
