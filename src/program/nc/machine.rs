@@ -240,7 +240,31 @@ pub(super) struct State {
     pub(super) previous: Option<u32>,
 }
 
+/// What the numbers of a straight block mean: a block that is put in before another is read with what held before that one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Meaning {
+    unit_mm: f64,
+    tip: (bool, bool),
+    radius: bool,
+    feed_per_minute: bool,
+    turned: u32,
+    programmable: Option<Pose>,
+    spin_absolute: bool,
+}
+
 impl State {
+    pub(super) fn meaning(&self) -> Meaning {
+        Meaning {
+            unit_mm: self.unit_mm,
+            tip: (self.tip, self.vector_words),
+            radius: self.radius,
+            feed_per_minute: self.feed_per_minute,
+            turned: self.turned,
+            programmable: self.programmable,
+            spin_absolute: self.spin_absolute,
+        }
+    }
+
     pub(super) fn start(frame: &str, tool: &str) -> State {
         State {
             mode: Mode::Unset,

@@ -22,7 +22,7 @@ use std::sync::Arc as Shared;
 use super::arc::Arc;
 use super::dialect::Dialect;
 use super::expression::{Variable, literal};
-use super::machine::{Group, Mode, State, Turn};
+use super::machine::{Group, Meaning, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
@@ -200,6 +200,8 @@ pub(super) struct Lister<'t, 's> {
     ended: bool,
     /// Whether synchronised actions may set variables.
     actions: bool,
+    /// What numbers and words meant before the block that is being followed.
+    meaning: Meaning,
     /// What held before the subprogram that is being passed.
     passed: Option<State>,
     /// Whether tools come in with M6.
@@ -313,6 +315,7 @@ impl<'t, 's> Lister<'t, 's> {
             skipping: false,
             ended: false,
             actions: false,
+            meaning: Meaning::default(),
             passed: None,
             changes_tools: false,
             calls_program: false,
@@ -463,6 +466,7 @@ impl<'t, 's> Lister<'t, 's> {
         self.position_read(said);
         let values = self.values(said);
         let before = self.found.forgotten;
+        self.meaning = self.state.meaning();
         self.effect(said);
         self.assign(values, self.found.forgotten != before);
     }

@@ -9,7 +9,7 @@ mod change;
 
 use std::collections::{HashMap, HashSet};
 
-pub(super) use self::change::resumes;
+pub(super) use self::change::{places, resumes};
 pub use self::change::{Change, Ends, How, Reach};
 use super::instruction;
 use super::modal::States;

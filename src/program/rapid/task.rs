@@ -758,6 +758,12 @@ impl Visitor for Lister<'_, '_> {
         }
     }
 
+    fn placed_from(&mut self, previous: Option<u32>) {
+        if let Some(motion) = previous.filter(|_| !self.silent) {
+            self.listing.motions[motion as usize].left.get_or_insert(Reason::BeforeDisplacement);
+        }
+    }
+
     fn cycled(&mut self, modal: States) {
         for at in 0..self.mains.len() {
             self.called(CallSite { routine: self.mains[at], modal });
