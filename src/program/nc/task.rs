@@ -16,7 +16,7 @@ mod names;
 mod survey;
 mod words;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
 use super::arc::Arc;
@@ -26,7 +26,7 @@ use super::machine::{Group, Meaning, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
-use super::setup::{Setup, Statement, statement};
+use super::setup::{self, Setup, Statement, statement};
 use super::syntax::{Belongs, NcTree, Word};
 use super::token::Token;
 use crate::program::motion::{Frame, Listing, Motion, MotionKind, OpaqueRegion, Place, Reason};
@@ -183,8 +183,11 @@ pub(super) struct Lister<'t, 's> {
     dialect: Dialect,
     setup: &'t Setup,
     angles: Option<Angles>,
-    tools: Vec<(String, Frame)>,
-    frames: Vec<(String, Frame)>,
+    /// Tools and work offsets as setup and comments state them, by name.
+    tools: HashMap<String, Frame>,
+    frames: HashMap<String, Frame>,
+    /// Variables that the file sets before here.
+    ever_set: HashSet<Variable>,
     state: State,
     /// What the file sets; found while it is followed.
     found: doubt::Found,
@@ -217,7 +220,7 @@ pub(super) struct Lister<'t, 's> {
     /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
     foreign: bool,
     /// Contours that cycles of lathes read, from block to block.
-    contours: Vec<(u64, u64)>,
+    contours: HashMap<u64, u64>,
     /// The block that ends the contour which is being read.
     contour: Option<u64>,
     /// Names that the file declares (Siemens).
@@ -305,8 +308,9 @@ impl<'t, 's> Lister<'t, 's> {
             dialect,
             setup,
             angles: setup.angles,
-            tools: Vec::new(),
-            frames: Vec::new(),
+            tools: HashMap::new(),
+            frames: HashMap::new(),
+            ever_set: HashSet::new(),
             state,
             found: doubt::Found::default(),
             whole: None,
@@ -323,7 +327,7 @@ impl<'t, 's> Lister<'t, 's> {
             repeats: false,
             called: false,
             foreign: false,
-            contours: Vec::new(),
+            contours: HashMap::new(),
             contour: None,
             declared: BTreeSet::new(),
             whole_numbers: BTreeSet::new(),
@@ -425,11 +429,21 @@ impl<'t, 's> Lister<'t, 's> {
             }
             match statement(self.tree.text(token)) {
                 Some(Statement::Angles(angles)) => self.angles = self.setup.angles.or(Some(angles)),
-                Some(Statement::Tool(name, frame)) => self.tools.push((name, frame)),
-                Some(Statement::Frame(name, frame)) => self.frames.push((name, frame)),
+                Some(Statement::Tool(name, frame)) => {
+                    self.tools.insert(setup::plain(&name), frame);
+                }
+                Some(Statement::Frame(name, frame)) => {
+                    self.frames.insert(setup::plain(&name), frame);
+                }
                 None => {}
             }
         }
+        // What is known beside the program goes before.
+        let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
+            list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
+        };
+        self.tools.extend(beside(&self.setup.tools));
+        self.frames.extend(beside(&self.setup.frames));
     }
 
     // ---- blocks ----
@@ -482,7 +496,7 @@ impl<'t, 's> Lister<'t, 's> {
         if self.is_action(said) {
             // What it sets, it sets at any time from here on.
             self.actions = true;
-            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
+            self.state.variables.lose(Reason::Variable);
             self.forget();
             return;
         }

@@ -41,7 +41,7 @@ impl Lister<'_, '_> {
         let Some(number) = number else { return };
         if self.contour == Some(number) {
             self.contour = Some(u64::MAX);
-        } else if let Some(&(_, last)) = self.contours.iter().find(|(first, _)| *first == number) {
+        } else if let Some(&last) = self.contours.get(&number) {
             self.contour = Some(if last == number { u64::MAX } else { last });
         }
     }
@@ -113,13 +113,18 @@ impl Lister<'_, '_> {
                 _ if self.dialect == Dialect::LinuxCnc => {}
                 Some(name) => {
                     let now = if moves { Err(Reason::Variable) } else { value };
-                    self.state.variables.insert(name.clone(), now);
+                    self.set_variable(name.clone(), now);
                 }
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+                None => self.state.variables.lose(Reason::Variable),
             }
             values.push((name, value));
         }
         values
+    }
+
+    pub(super) fn set_variable(&mut self, name: Variable, value: Worth) {
+        self.ever_set.insert(name.clone());
+        self.state.variables.insert(name, value);
     }
 
     /// After the block its variables have their values, but where the way has parted in it.
@@ -128,10 +133,10 @@ impl Lister<'_, '_> {
             match name {
                 Some(name) => {
                     let value = if parted { Err(Reason::UnknownFlow) } else { value };
-                    self.state.variables.insert(name, value);
+                    self.set_variable(name, value);
                 }
                 // Any of them.
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+                None => self.state.variables.lose(Reason::Variable),
             }
         }
     }

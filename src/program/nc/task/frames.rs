@@ -347,7 +347,7 @@ impl Lister<'_, '_> {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             None => {
-                self.setup.tool(name).or_else(|| setup::find(&self.tools, name)).ok_or(Reason::ToolUnknown)
+                self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown)
             }
         }
     }
@@ -359,9 +359,9 @@ impl Lister<'_, '_> {
             Some(None) => Err(Reason::Assigned),
             // Without a settable offset Siemens counts from the base.
             None => self
-                .setup
-                .frame(name)
-                .or_else(|| setup::find(&self.frames, name))
+                .frames
+                .get(&setup::plain(name))
+                .copied()
                 .or_else(|| (name == "G500").then_some(Frame::IDENTITY))
                 .ok_or(Reason::WorkObjectUnknown),
         }

@@ -439,9 +439,9 @@ impl<'s> Lister<'_, 's> {
         let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
         let value: Worth = self.evaluated((equal + 1, word.end));
         if matches!(&*set, b"Q" | b"QL" | b"QR") {
-            self.state.variables.insert(numbered(&set, number), value);
+            self.set_variable(numbered(&set, number), value);
         } else {
-            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
+            self.state.variables.lose(Reason::Variable);
         }
     }
 }
