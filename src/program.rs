@@ -4,6 +4,7 @@
 //! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
 //! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
 //! - [`rewrite`]: what shall change, whatever the language, and what became of it.
+//! - [`shared`]: maps of which copies cost nothing, for what is known where ways part and meet.
 //! - [`draft`]: a program that does not exist yet, for a dialect to write.
 //! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
 //! - [`nc`]: G-code of five-axis machines: the same.
@@ -28,6 +29,7 @@
 //! ```
 
 pub mod tree;
+pub mod shared;
 pub mod edit;
 pub mod diff;
 pub mod motion;

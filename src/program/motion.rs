@@ -636,6 +636,16 @@ reasons! {
         NoJointForm => "the instruction has no form with joint targets",
         /// The new value is of a kind that the instruction does not take.
         WrongKind => "the new value is not of the kind that the instruction takes",
+        /// The expression of the target does more than answer.
+        SideEffect => "the target's expression calls a function that does more than answer: it must stay as it is written",
+        /// A number that no controller can hold.
+        NumberRange => "a number here is beyond what the controller can hold",
+        /// What comes after counts from where it ends.
+        BeforeDisplacement => "a displacement (PDispOn) is counted from where this ends",
+        /// NC: an origin is set where it ends.
+        BeforeOrigin => "a block that stays counts from an origin that is set where this ends (G92, G10 L20, PRESETON)",
+        /// NC: increments are counted from where it ends.
+        BeforeIncrement => "a block that stays counts from where this ends (an increment, a position that is read)",
         /// NC: an axis has no value yet.
         PositionUnknown => "an axis has no value: none is stated since the start, a reference return, or a change of frame or tool",
         /// NC: nothing has said how the tool is turned.

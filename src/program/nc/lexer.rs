@@ -25,6 +25,8 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
     let mut before = Token::LineEnd;
     // Whether the line before is a comment that goes on (Heidenhain).
     let mut goes_on = false;
+    // Up to here no pointed bracket closes: it is looked for once in a line.
+    let mut open_to = 0;
     while at < source.len() {
         let rest = &source[at..];
         let (kind, length) = match rest[0] {
@@ -40,7 +42,10 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
             b'*' if dialect == Dialect::Heidenhain && begins_block(&source[..at]) => {
                 (Token::Comment, to_line_end(rest, cr))
             }
-            _ => token(rest, dialect, line_begins, before, cr),
+            b'<' if dialect == Dialect::LinuxCnc && matches!(before, Token::Hash | Token::Address) => {
+                pointed(source, at, &mut open_to)
+            }
+            _ => token(rest, dialect, line_begins, cr),
         };
         goes_on = match kind {
             Token::Comment => {
@@ -66,7 +71,7 @@ pub fn lex(source: &[u8], dialect: Dialect) -> Tree<'_, Token, Syntax> {
 
 /// The first token and its length.
 #[inline]
-fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bool) -> (Token, usize) {
+fn token(rest: &[u8], dialect: Dialect, line_begins: bool, cr: bool) -> (Token, usize) {
     let second = rest.get(1).copied().unwrap_or(0);
     let two = |wanted: u8, both: Token, single: Token| if second == wanted { (both, 2) } else { (single, 1) };
     match rest[0] {
@@ -85,13 +90,6 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         b'(' if dialect.paren_comments() => (Token::Comment, paren_comment(rest)),
         b'"' => (Token::String, quoted(rest, b'"')),
         b'\'' => (Token::String, quoted(rest, b'\'')),
-        b'<' if dialect == Dialect::LinuxCnc && matches!(before, Token::Hash | Token::Address) => {
-            let end = rest.iter().position(|&byte| matches!(byte, b'>' | b'\n' | b'\r'));
-            match end.filter(|&end| rest[end] == b'>') {
-                Some(end) => (Token::Name, end + 1),
-                None => (Token::Less, 1),
-            }
-        }
         b'+' => (Token::Plus, 1),
         b'-' => (Token::Minus, 1),
         // The end of a block on old tapes.
@@ -112,6 +110,22 @@ fn token(rest: &[u8], dialect: Dialect, line_begins: bool, before: Token, cr: bo
         b':' => (Token::Colon, 1),
         b'#' => (Token::Hash, 1),
         _ => (Token::Unknown, 1),
+    }
+}
+
+/// A name in pointed brackets, or one that does not close on its line.
+fn pointed(source: &[u8], at: usize, open_to: &mut usize) -> (Token, usize) {
+    let rest = &source[at..];
+    if at >= *open_to {
+        let end = rest.iter().position(|&byte| matches!(byte, b'>' | b'\n' | b'\r'));
+        if let Some(end) = end.filter(|&end| rest[end] == b'>') {
+            return (Token::Name, end + 1);
+        }
+        *open_to = at + end.unwrap_or(rest.len());
+    }
+    match rest.get(1) {
+        Some(b'>') => (Token::NotEqual, 2),
+        _ => (Token::Less, 1),
     }
 }
 

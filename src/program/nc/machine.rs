@@ -1,13 +1,12 @@
 //! The modal state of a control: what a block changes, and what therefore holds in it.
 
-use std::collections::BTreeMap;
-
 use super::arc::Plane;
 use super::dialect::Dialect;
 use super::expression::{Variable, Worth};
 use super::orientation::Angles;
 use crate::math::se3::Pose;
 use crate::program::motion::{Frame, Reason};
+use crate::program::shared::Map;
 
 /// What the last word of the motion group said.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,45 +103,97 @@ pub(super) const ALL_BUT_PLANE: u32 = ((1 << GROUPS) - 1) & !(1 << Group::Plane 
 /// Frames that the program itself sets, by name; `None` where what it sets is not known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Assigned {
-    pub(super) by_name: BTreeMap<String, Option<Frame>>,
+    by_name: Map<String, Option<Frame>>,
+    /// Those that have been set to what is not known any more, besides.
+    lost: Map<String, ()>,
     /// Whether any other may have been set too.
-    pub(super) all: bool,
+    all: bool,
 }
 
 impl Assigned {
     /// What the program has set for a name, if it has or may have.
     pub(super) fn of(&self, name: &str) -> Option<Option<Frame>> {
-        match self.by_name.get(&name.to_ascii_uppercase()) {
+        let name = name.to_ascii_uppercase();
+        match self.by_name.get(&name) {
             Some(frame) => Some(*frame),
-            None => self.all.then_some(None),
+            None => (self.all || self.lost.contains_key(&name)).then_some(None),
         }
     }
 
     pub(super) fn set(&mut self, name: &str, frame: Option<Frame>) {
-        self.by_name.insert(name.to_ascii_uppercase(), frame);
+        let name = name.to_ascii_uppercase();
+        self.lost.insert(name.clone(), ());
+        self.by_name.insert(name, frame);
     }
 
     /// Any of them may have been set to anything.
     pub(super) fn lose_all(&mut self) {
-        self.by_name.clear();
+        self.by_name = Map::new();
         self.all = true;
     }
 
     /// What holds where the way may have gone either way.
     fn joined(&mut self, other: &Assigned) {
-        let names: Vec<String> = self.by_name.keys().chain(other.by_name.keys()).cloned().collect();
-        for name in names {
-            if self.by_name.get(&name) != other.by_name.get(&name) {
-                self.by_name.insert(name, None);
-            }
-        }
+        let agree = |a: Option<&Option<Frame>>, b: Option<&Option<Frame>>| {
+            if a == b { a.copied() } else { Some(None) }
+        };
+        self.by_name = self.by_name.joined(&other.by_name, &agree);
+        self.lost = self.lost.joined(&other.lost, &|_, _| Some(()));
         self.all |= other.all;
     }
 
     /// What holds where the way may have come from anywhere in the file.
     fn forget(&mut self, any: bool) {
-        self.by_name.values_mut().for_each(|frame| *frame = None);
+        // Each of them stays among those that are lost.
+        self.by_name = Map::new();
         self.all |= any;
+    }
+}
+
+/// What variables hold; a copy shares it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Variables {
+    known: Map<Variable, Worth>,
+    /// Why the others that have ever been set are not known.
+    lost: Reason,
+}
+
+impl Default for Variables {
+    fn default() -> Self {
+        Variables { known: Map::new(), lost: Reason::Variable }
+    }
+}
+
+impl Variables {
+    /// What a variable holds; `set`: whether anything has ever set it.
+    pub(super) fn get(&self, name: &Variable, set: impl FnOnce() -> bool) -> Worth {
+        match self.known.get(name) {
+            Some(value) => *value,
+            None if self.lost != Reason::Variable && set() => Err(self.lost),
+            None => Err(Reason::Variable),
+        }
+    }
+
+    pub(super) fn insert(&mut self, name: Variable, value: Worth) {
+        self.known.insert(name, value);
+    }
+
+    /// None of them is known any more.
+    pub(super) fn lose(&mut self, because: Reason) {
+        *self = Variables { known: Map::new(), lost: because };
+    }
+
+    /// What both ways leave.
+    fn join(&mut self, other: &Variables) {
+        let (a_lost, b_lost) = (Err(self.lost), Err(other.lost));
+        let lost = if self.lost == other.lost { self.lost } else { Reason::UnknownFlow };
+        let agree = |a: Option<&Worth>, b: Option<&Worth>| {
+            let (a, b) = (a.unwrap_or(&a_lost), b.unwrap_or(&b_lost));
+            let value = if a == b { *a } else { Err(Reason::UnknownFlow) };
+            (value != Err(lost)).then_some(value)
+        };
+        self.known = self.known.joined(&other.known, &agree);
+        self.lost = lost;
     }
 }
 
@@ -230,7 +281,7 @@ pub(super) struct State {
     pub(super) exact_stop_holds: bool,
     /// The centre of the last CC (Heidenhain).
     pub(super) pole: [Worth; 2],
-    pub(super) variables: BTreeMap<Variable, Worth>,
+    pub(super) variables: Variables,
     /// Groups whose state is not known, one bit each.
     pub(super) uncertain: u32,
     /// Groups that a word has set which these readers do not know, and why.
@@ -240,7 +291,31 @@ pub(super) struct State {
     pub(super) previous: Option<u32>,
 }
 
+/// What the numbers of a straight block mean: a block that is put in before another is read with what held before that one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Meaning {
+    unit_mm: f64,
+    tip: (bool, bool),
+    radius: bool,
+    feed_per_minute: bool,
+    turned: u32,
+    programmable: Option<Pose>,
+    spin_absolute: bool,
+}
+
 impl State {
+    pub(super) fn meaning(&self) -> Meaning {
+        Meaning {
+            unit_mm: self.unit_mm,
+            tip: (self.tip, self.vector_words),
+            radius: self.radius,
+            feed_per_minute: self.feed_per_minute,
+            turned: self.turned,
+            programmable: self.programmable,
+            spin_absolute: self.spin_absolute,
+        }
+    }
+
     pub(super) fn start(frame: &str, tool: &str) -> State {
         State {
             mode: Mode::Unset,
@@ -282,7 +357,7 @@ impl State {
             exact_stop: false,
             exact_stop_holds: false,
             pole: [Err(Reason::PositionUnknown); 2],
-            variables: BTreeMap::new(),
+            variables: Variables::default(),
             uncertain: 0,
             obscure: 0,
             because: Reason::UnknownWord,
@@ -305,9 +380,7 @@ impl State {
         (self.abc, self.rpy, self.vector, self.spin) = ([flow; 3], [flow; 3], [flow; 3], flow);
         self.feed = flow;
         self.pole = [flow; 2];
-        for value in self.variables.values_mut() {
-            *value = flow;
-        }
+        self.variables.lose(Reason::UnknownFlow);
         self.uncertain |= !constant & ((1 << GROUPS) - 1);
         self.previous = None;
     }
@@ -333,7 +406,7 @@ impl State {
         self.before_cycle = self.mode;
         self.feed = Err(because);
         self.pole = [Err(because); 2];
-        self.variables.values_mut().for_each(|value| *value = Err(because));
+        self.variables.lose(because);
         self.obscure = (1 << GROUPS) - 1;
         self.because = because;
         self.next_tool = None;
@@ -446,12 +519,7 @@ impl State {
         if (self.centre_absolute, self.feed_per_minute) != (other.centre_absolute, other.feed_per_minute) {
             self.uncertain |= 1 << Group::Plane as u32;
         }
-        let keys: Vec<Variable> = self.variables.keys().chain(other.variables.keys()).cloned().collect();
-        for key in keys {
-            if self.variables.get(&key) != other.variables.get(&key) {
-                self.variables.insert(key, Err(Reason::UnknownFlow));
-            }
-        }
+        self.variables.join(&other.variables);
         if self.previous != other.previous {
             self.previous = None;
         }

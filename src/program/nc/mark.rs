@@ -57,8 +57,8 @@ pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
     let source = tree.source();
     let mut place = 0;
     let mut at = 0;
+    let last = if source.contains(&b'\n') { b'\n' } else { b'\r' };
     while at < source.len() {
-        let last = if source.contains(&b'\n') { b'\n' } else { b'\r' };
         let end = source[at..].iter().position(|&byte| byte == last).map_or(source.len(), |end| at + end + 1);
         let line = source[at..end].trim_ascii();
         let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line);

@@ -8,6 +8,7 @@
 mod again;
 mod arcs;
 mod ends;
+mod origins;
 mod pen;
 mod slots;
 
@@ -55,8 +56,12 @@ impl Task<'_> {
         let mut edits = vec![Edits::new(); self.trees.len()];
         let mut rounds = 0;
         while !wanted.is_empty() {
-            let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
             edits.iter_mut().for_each(|edits| *edits = Edits::new());
+            let fixed = self.fixed_ends(changes, &mut wanted, &mut outcomes);
+            if self.keep_origins(&fixed, &mut wanted, &mut outcomes) {
+                // What is refused now stays, and with it what it hangs on.
+                continue;
+            }
             let mut follower = Follower {
                 task: self,
                 options,
@@ -68,14 +73,16 @@ impl Task<'_> {
             for event in &self.events {
                 match *event {
                     Event::Start => follower.now = Now::default(),
-                    Event::Unknown => {
+                    Event::Unknown | Event::Join => {
                         // A shift that is set where the tool stands elsewhere stays where it is.
                         let Now { straightened, moved, .. } = follower.now;
                         follower.now = Now { straightened, moved, ..Now::default() };
                     }
                     Event::Lost(axes) => follower.now.lose(axes),
-                    Event::Shift(stated) => follower.now.shift_at(stated),
+                    Event::Shift { stated, .. } => follower.now.shift_at(stated),
                     Event::Placed(axes) => follower.now.place(axes),
+                    // Nothing has moved there: the motions that end there stay.
+                    Event::MaybePlaced(_) | Event::Restored | Event::Held { .. } | Event::Jump => {}
                     Event::Motion(motion) => {
                         let index = wanted.get(&motion).copied();
                         let outcome = follower.motion(motion, index.map(|index| &changes[index]));

@@ -38,13 +38,13 @@ impl Setup {
 }
 
 /// The last frame of a name: in any case, T08 is T8, `G54.1 P1` is G54.1P1.
-pub(super) fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
+fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
     let name = plain(name);
     list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
 }
 
 /// A name in upper case without blanks, and its number without leading zeros.
-fn plain(name: &str) -> String {
+pub(super) fn plain(name: &str) -> String {
     let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
     match name.strip_prefix('T') {
         Some(digits) if !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()) => {

@@ -16,17 +16,17 @@ mod names;
 mod survey;
 mod words;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
 use super::arc::Arc;
 use super::dialect::Dialect;
 use super::expression::{Variable, literal};
-use super::machine::{Group, Mode, State, Turn};
+use super::machine::{Group, Meaning, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
-use super::setup::{Setup, Statement, statement};
+use super::setup::{self, Setup, Statement, statement};
 use super::syntax::{Belongs, NcTree, Word};
 use super::token::Token;
 use crate::program::motion::{Frame, Listing, Motion, MotionKind, OpaqueRegion, Place, Reason};
@@ -61,10 +61,31 @@ pub(super) enum Event {
     Lost(u8),
     /// Position and orientation are not known from here on.
     Unknown,
-    /// The place where the tool stands gets these values (G92).
-    Shift([Option<f64>; 3]),
+    /// The place where the tool stands gets these values (G92); of the axes that are named some may not be known.
+    Shift {
+        /// The values (mm), where value and place are known.
+        stated: [Option<f64>; 3],
+        /// The axes that are named.
+        named: [bool; 3],
+    },
     /// The shift of these axes ends, or is said whole: wherever the tool stands.
     Placed([bool; 3]),
+    /// The same in a block that may be skipped.
+    MaybePlaced([bool; 3]),
+    /// A shift that was kept holds again (G92.3).
+    Restored,
+    /// As [`Event::Unknown`], at a place that can be reached from elsewhere, or from which another place can.
+    Join,
+    /// Another place of the file can be reached from here.
+    Jump,
+    /// Something that stays counts from where the tool stands in these axes (bits as for [`Event::Lost`]): an origin is set by a
+    /// word that is not followed, or a position is read.
+    Held {
+        /// The axes.
+        axes: u8,
+        /// Whether a position is read, and no origin set.
+        read: bool,
+    },
 }
 
 /// How a motion is written.
@@ -162,8 +183,11 @@ pub(super) struct Lister<'t, 's> {
     dialect: Dialect,
     setup: &'t Setup,
     angles: Option<Angles>,
-    tools: Vec<(String, Frame)>,
-    frames: Vec<(String, Frame)>,
+    /// Tools and work offsets as setup and comments state them, by name.
+    tools: HashMap<String, Frame>,
+    frames: HashMap<String, Frame>,
+    /// Variables that the file sets before here.
+    ever_set: HashSet<Variable>,
     state: State,
     /// What the file sets; found while it is followed.
     found: doubt::Found,
@@ -179,6 +203,8 @@ pub(super) struct Lister<'t, 's> {
     ended: bool,
     /// Whether synchronised actions may set variables.
     actions: bool,
+    /// What numbers and words meant before the block that is being followed.
+    meaning: Meaning,
     /// What held before the subprogram that is being passed.
     passed: Option<State>,
     /// Whether tools come in with M6.
@@ -194,7 +220,7 @@ pub(super) struct Lister<'t, 's> {
     /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
     foreign: bool,
     /// Contours that cycles of lathes read, from block to block.
-    contours: Vec<(u64, u64)>,
+    contours: HashMap<u64, u64>,
     /// The block that ends the contour which is being read.
     contour: Option<u64>,
     /// Names that the file declares (Siemens).
@@ -282,8 +308,9 @@ impl<'t, 's> Lister<'t, 's> {
             dialect,
             setup,
             angles: setup.angles,
-            tools: Vec::new(),
-            frames: Vec::new(),
+            tools: HashMap::new(),
+            frames: HashMap::new(),
+            ever_set: HashSet::new(),
             state,
             found: doubt::Found::default(),
             whole: None,
@@ -292,6 +319,7 @@ impl<'t, 's> Lister<'t, 's> {
             skipping: false,
             ended: false,
             actions: false,
+            meaning: Meaning::default(),
             passed: None,
             changes_tools: false,
             calls_program: false,
@@ -299,7 +327,7 @@ impl<'t, 's> Lister<'t, 's> {
             repeats: false,
             called: false,
             foreign: false,
-            contours: Vec::new(),
+            contours: HashMap::new(),
             contour: None,
             declared: BTreeSet::new(),
             whole_numbers: BTreeSet::new(),
@@ -401,11 +429,21 @@ impl<'t, 's> Lister<'t, 's> {
             }
             match statement(self.tree.text(token)) {
                 Some(Statement::Angles(angles)) => self.angles = self.setup.angles.or(Some(angles)),
-                Some(Statement::Tool(name, frame)) => self.tools.push((name, frame)),
-                Some(Statement::Frame(name, frame)) => self.frames.push((name, frame)),
+                Some(Statement::Tool(name, frame)) => {
+                    self.tools.insert(setup::plain(&name), frame);
+                }
+                Some(Statement::Frame(name, frame)) => {
+                    self.frames.insert(setup::plain(&name), frame);
+                }
                 None => {}
             }
         }
+        // What is known beside the program goes before.
+        let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
+            list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
+        };
+        self.tools.extend(beside(&self.setup.tools));
+        self.frames.extend(beside(&self.setup.frames));
     }
 
     // ---- blocks ----
@@ -439,8 +477,10 @@ impl<'t, 's> Lister<'t, 's> {
             self.state.mode = Mode::Lost(Reason::UnknownFlow);
         }
         self.contour_of(said);
+        self.position_read(said);
         let values = self.values(said);
         let before = self.found.forgotten;
+        self.meaning = self.state.meaning();
         self.effect(said);
         self.assign(values, self.found.forgotten != before);
     }
@@ -456,7 +496,7 @@ impl<'t, 's> Lister<'t, 's> {
         if self.is_action(said) {
             // What it sets, it sets at any time from here on.
             self.actions = true;
-            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
+            self.state.variables.lose(Reason::Variable);
             self.forget();
             return;
         }
@@ -510,7 +550,9 @@ impl<'t, 's> Lister<'t, 's> {
             _ => false,
         };
         // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
-        self.branched |= said.m.iter().any(|m| matches!(m, 46 | 96 | 99));
+        if said.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
+            self.parts();
+        }
         if self.dialect == Dialect::Heidenhain && said.m.contains(&129) {
             // It acts at the end of its block.
             self.tip(false, false);
@@ -563,6 +605,11 @@ fn is_axis(letter: u8) -> bool {
     b"XYZABCIJKRUVWEF".contains(&letter.to_ascii_uppercase())
 }
 
+/// The axes that a block names, as bits.
+fn named_axes(said: &Said<'_>) -> u8 {
+    said.axes.iter().chain(&said.abc).enumerate().fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
+}
+
 /// The name of an axis, with or without the I of an increment.
 fn is_axis_name(name: &[u8]) -> bool {
     match name {
@@ -570,6 +617,9 @@ fn is_axis_name(name: &[u8]) -> bool {
         _ => false,
     }
 }
+
+/// All axes, for the same and for [`Event::Held`].
+const EVERYWHERE: u8 = POSITION | ORIENTATION;
 
 /// All of X, Y and Z, for [`Event::Lost`].
 const POSITION: u8 = 7;

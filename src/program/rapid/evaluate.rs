@@ -96,6 +96,8 @@ pub struct Evaluator<'a, 's> {
     initial: RefCell<HashMap<u32, Value>>,
     /// How many functions of the program the expression has led through.
     functions: Cell<u32>,
+    /// Whether a function of the program was given what is not known: it may fail where the function never asks for it.
+    doubtful: Cell<bool>,
     /// What is known where a declaration stands.
     nothing: Known,
 }
@@ -109,12 +111,19 @@ impl<'a, 's> Evaluator<'a, 's> {
             elements: RefCell::default(),
             initial: RefCell::default(),
             functions: Cell::new(0),
+            doubtful: Cell::new(false),
             nothing: Known::new(),
         }
     }
 
     fn tree(&self, file: u32) -> &'a RapidTree<'s> {
         &self.trees[file as usize]
+    }
+
+    /// Whether the target that was asked for last is worth what it is only as long as nothing fails: a function of the program
+    /// was given what is not known, and did not look at it.
+    pub fn was_doubtful(&self) -> bool {
+        self.doubtful.get()
     }
 
     /// A target argument: its value and where its numbers stand.
@@ -125,6 +134,7 @@ impl<'a, 's> Evaluator<'a, 's> {
         joints: bool,
     ) -> (Result<TargetValue, Reason>, Source) {
         let tree = self.tree(context.file);
+        self.doubtful.set(false);
         match argument {
             Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
                 if let Some(value) = literal_target(tree.node_text(node), joints) {
@@ -579,7 +589,9 @@ impl<'a, 's> Evaluator<'a, 's> {
             };
             let (Some(parameter), Some(value)) = (parameter, argument.value) else { return unknown };
             let Some(id) = self.symbols.find(found.scope, home.text(parameter.name)) else { return unknown };
-            known.insert(id, self.value(Context { depth: context.depth + 1, ..context }, value));
+            let given = self.value(Context { depth: context.depth + 1, ..context }, value);
+            self.doubtful.set(self.doubtful.get() || !given.is_known() && !is_plain_place(tree, value));
+            known.insert(id, given);
         }
         let depth = context.depth + 1;
         match self.value(Context { file: found.file, scope: found.scope, known: &known, depth }, returned) {
@@ -604,6 +616,17 @@ impl<'a, 's> Evaluator<'a, 's> {
         let size = expressions(self.tree(symbol.file), data.dimensions?).nth(at)?;
         let size = self.value(self.at(context, symbol.scope, symbol.file), size).number().ok()?;
         Some(Value::Number(size))
+    }
+}
+
+/// Whether an expression is a name or a component of one: it is read and cannot fail.
+fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
+    match expression {
+        Child::Token(_) => true,
+        Child::Node(node) => {
+            tree.nodes[node as usize].kind == Syntax::Place
+                && parts(tree, node).all(|part| matches!(part, Child::Token(_)))
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use super::evaluate::{Context, Evaluator, Known};
 use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
 use super::predefined;
-use super::symbol::{Unit, What, resumes};
+use super::symbol::{Unit, What, places, resumes};
 use super::syntax::{Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
 use super::value::Value;
@@ -99,6 +99,8 @@ pub(super) trait Visitor {
     fn called_late(&mut self, modal: States);
     /// A call of a routine that is in none of the files, which may call those that are.
     fn called_outside(&mut self, modal: States);
+    /// A displacement is counted from where the robot stands: where this motion has ended.
+    fn placed_from(&mut self, previous: Option<u32>);
     /// The next cycle begins at main with the switches as they stand here.
     fn cycled(&mut self, modal: States);
 }
@@ -434,6 +436,9 @@ impl Walk<'_, '_, '_> {
         let own = symbols.routine(self.unit.scope, name).is_some();
         if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.then(sets);
+            if places(tree, node, name) {
+                self.visitor.placed_from(state.previous);
+            }
             // One that also moves.
             state.previous = motion.or(state.previous);
             if !sets.leaves(Which::Displacement) {
@@ -493,6 +498,9 @@ impl Walk<'_, '_, '_> {
         if self.resumes {
             // It may have been left anywhere by an error, and be called once more.
             self.may_set(sets, state);
+        }
+        if called.iter().any(|routine| symbols.routines[*routine as usize].reach.places) {
+            self.visitor.placed_from(state.previous);
         }
         let mut exit = States::NONE;
         for &routine in called {

@@ -47,6 +47,17 @@ pub fn only_reads(name: &[u8]) -> bool {
     effect(name) == Some(Effect::Reads)
 }
 
+/// Whether it is a function that computes and does no more: asked once, twice or never, nothing else is changed.
+pub fn only_answers(name: &[u8]) -> bool {
+    let mut buffer = [0_u8; 16];
+    let Some(folded) = buffer.get_mut(..name.len()) else { return false };
+    for (to, &byte) in folded.iter_mut().zip(name) {
+        *to = fold(byte);
+    }
+    let folded = &*folded;
+    ANSWERERS.binary_search_by(|function| function.as_bytes().cmp(folded)).is_ok()
+}
+
 const fn writes(required: &'static [usize], optional: &'static [&'static str]) -> Written {
     Written { required, optional, later: false }
 }
@@ -157,6 +168,87 @@ pub const MOVERS: &[(&str, Option<Reason>)] = &[
     ("stepbwdpath", Some(Reason::NoTarget)),
     ("stopmovereset", None),
     ("storepath", None),
+];
+
+/// Functions of numbers, texts, positions and frames that do nothing but compute, in order.
+pub const ANSWERERS: &[&str] = &[
+    "abs",
+    "absdnum",
+    "acos",
+    "acosdnum",
+    "asin",
+    "asindnum",
+    "atan",
+    "atan2",
+    "atan2dnum",
+    "atandnum",
+    "bitand",
+    "bitanddnum",
+    "bitcheck",
+    "bitcheckdnum",
+    "bitlsh",
+    "bitlshdnum",
+    "bitneg",
+    "bitnegdnum",
+    "bitor",
+    "bitordnum",
+    "bitrsh",
+    "bitrshdnum",
+    "bitxor",
+    "bitxordnum",
+    "bytetostr",
+    "calcrobt",
+    "cos",
+    "cosdnum",
+    "crossprod",
+    "dectohex",
+    "defframe",
+    "dim",
+    "distance",
+    "dnumtonum",
+    "dnumtostr",
+    "dotprod",
+    "eulerzyx",
+    "exp",
+    "hextodec",
+    "max",
+    "maxdnum",
+    "min",
+    "mindnum",
+    "mirpos",
+    "norient",
+    "numtodnum",
+    "numtostr",
+    "offs",
+    "orientzyx",
+    "poseinv",
+    "posemult",
+    "posevect",
+    "pow",
+    "powdnum",
+    "present",
+    "quatmult",
+    "reltool",
+    "round",
+    "rounddnum",
+    "sin",
+    "sindnum",
+    "sqrt",
+    "sqrtdnum",
+    "strfind",
+    "strlen",
+    "strmap",
+    "strmatch",
+    "strmemb",
+    "strorder",
+    "strpart",
+    "strtobyte",
+    "tan",
+    "tandnum",
+    "trunc",
+    "truncdnum",
+    "valtostr",
+    "vectmagn",
 ];
 
 /// Those that only read, in order.

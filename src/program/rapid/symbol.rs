@@ -4,11 +4,12 @@
 //! of routines hide others. What a file assigns, or hands to something that may assign it, is marked: its initial
 //! value then says nothing about its value at a motion, or only about the components that nothing assigns.
 
+mod acts;
 mod change;
 
 use std::collections::{HashMap, HashSet};
 
-pub(super) use self::change::resumes;
+pub(super) use self::change::{places, resumes};
 pub use self::change::{Change, Ends, How, Reach};
 use super::instruction;
 use super::modal::States;

@@ -134,6 +134,10 @@ struct Lister<'a, 's> {
     outside: Vec<States>,
     /// The routines named main.
     mains: Vec<u32>,
+    /// Whether a target of the motion that is being read may not be replaced: its expression does more than answer.
+    acting: bool,
+    /// Whether the initial value of a declaration does more than answer.
+    acting_initials: HashMap<u32, bool>,
     /// Targets written out as numbers, whose values are read last, on all threads.
     literals: Vec<Literal>,
 }
@@ -184,6 +188,8 @@ impl<'a, 's> Lister<'a, 's> {
             late: vec![States::NONE; symbols.units.len()],
             outside: vec![States::NONE; symbols.units.len()],
             mains: Vec::new(),
+            acting: false,
+            acting_initials: HashMap::new(),
             literals: Vec::new(),
         }
     }
@@ -400,6 +406,9 @@ impl<'a, 's> Lister<'a, 's> {
         let tree = &self.trees[unit.file as usize];
         let context = Context::new(unit.file, unit.scope, &state.known);
         let (value, source) = self.evaluator.target(context, argument, joints);
+        self.acting |= self.evaluator.was_doubtful()
+            || self.symbols.acts(tree, unit.scope, argument)
+            || matches!(source, Source::Symbol(symbol) | Source::Element(symbol, _) if self.begins_acting(symbol));
         let (first, end) = tokens_of(tree, argument);
         let origin = match source {
             Source::Inline => Origin::Inline,
@@ -435,6 +444,17 @@ impl<'a, 's> Lister<'a, 's> {
         }
     }
 
+    /// Whether the initial value of data does more than answer.
+    fn begins_acting(&mut self, symbol: u32) -> bool {
+        let (trees, symbols) = (self.trees, self.symbols);
+        *self.acting_initials.entry(symbol).or_insert_with(|| {
+            let found = &symbols.symbols[symbol as usize];
+            let What::Data(data) = &found.what else { return false };
+            let initial = |value| symbols.acts(&trees[found.file as usize], found.scope, value);
+            data.value.is_some_and(initial)
+        })
+    }
+
     fn declaration(&mut self, symbol: u32) -> u32 {
         if let Some(&index) = self.declarations.get(&symbol) {
             return index;
@@ -467,6 +487,7 @@ impl<'a, 's> Lister<'a, 's> {
         let tree = &self.trees[unit.file as usize];
         let instruction: &Instruction = &INSTRUCTIONS[known];
         let mut motion = self.motion(unit, node, state, around);
+        self.acting = false;
         motion.instruction = self.name_of(known);
         motion.kind = instruction.kind;
         let count = arguments(tree, node).filter(|argument| !argument.optional).count();
@@ -548,18 +569,20 @@ impl<'a, 's> Lister<'a, 's> {
         } else {
             self.listing.left_by_frames(&motion)
         };
+        // Whatever is written in place of an expression that acts, or instead of the circle point, would act no more.
+        motion.left = motion.left.or(self.acting.then_some(Reason::SideEffect));
         motion
     }
 
-    /// Whether an argument is a function of the program, or one that is not known: it may do more than answer, and would be
-    /// asked once more for each target that is put in.
+    /// Whether an argument calls a function of the program, or one that does more than compute: it would be asked once more
+    /// for each target that is put in.
     fn asks(&self, unit: Unit, node: u32) -> bool {
         let tree = &self.trees[unit.file as usize];
         let nodes = node..node + tree.nodes[node as usize].size;
         let mut functions = nodes.filter(|&node| tree.nodes[node as usize].kind == Syntax::Function);
         functions.any(|function| {
             let name = tree.text(tree.nodes[function as usize].first);
-            self.symbols.routine(unit.scope, name).is_some() || predefined::effect(name).is_none()
+            self.symbols.routine(unit.scope, name).is_some() || !predefined::only_answers(name)
         })
     }
 
@@ -732,6 +755,12 @@ impl Visitor for Lister<'_, '_> {
         if !self.silent {
             let outside = &mut self.outside[self.unit as usize];
             *outside = outside.or(modal);
+        }
+    }
+
+    fn placed_from(&mut self, previous: Option<u32>) {
+        if let Some(motion) = previous.filter(|_| !self.silent) {
+            self.listing.motions[motion as usize].left.get_or_insert(Reason::BeforeDisplacement);
         }
     }
 

@@ -33,6 +33,15 @@ impl Value {
         }
     }
 
+    /// Whether all of it is known.
+    pub fn is_known(&self) -> bool {
+        match self {
+            Value::List(list) => list.iter().all(Value::is_known),
+            Value::Unknown(_) => false,
+            _ => true,
+        }
+    }
+
     /// The number.
     pub fn number(&self) -> Result<f64, Reason> {
         match self {

@@ -45,9 +45,11 @@ impl Now {
 
     pub(super) fn shift_at(&mut self, stated: [Option<f64>; 3]) {
         for (axis, _) in stated.iter().enumerate().filter(|(_, stated)| stated.is_some()) {
-            if let (Some(now), Some(meant)) = (self.position[axis], self.meant[axis]) {
-                self.moved[axis] = now - meant;
-            }
+            self.moved[axis] = match (self.position[axis], self.meant[axis]) {
+                (Some(now), Some(meant)) if !now.is_nan() => now - meant,
+                // It stands where the original says.
+                _ => 0.0,
+            };
         }
     }
 }

@@ -94,7 +94,7 @@ impl Task<'_> {
 
     /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,
     /// in which it must end there, that it takes from the motion before.
-    fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
+    pub(super) fn start_axes(&self, index: usize, stays: bool, held: u8) -> u8 {
         let (motion, written) = (&self.listing.motions[index], &self.written[index]);
         let own = match self.needs(index, stays) {
             Needs::Nothing => 0,

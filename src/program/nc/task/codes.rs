@@ -50,7 +50,10 @@ impl Lister<'_, '_> {
                     self.turn_only(Group::Diameter, !matches!(&*name, b"DIAMOF"));
                 }
                 b"TOFRAME" | b"TOFRAMEX" | b"TOFRAMEY" | b"TOFRAMEZ" | b"TOROT" | b"TOROTX" | b"TOROTY"
-                | b"TOROTZ" => self.turn(Group::ToolFrame, true),
+                | b"TOROTZ" => {
+                    self.held_here(super::EVERYWHERE);
+                    self.turn(Group::ToolFrame, true);
+                }
                 b"TOROTOF" => self.turn(Group::ToolFrame, false),
                 b"PAROT" => self.turn(Group::PartFrame, true),
                 b"PAROTOF" => self.turn(Group::PartFrame, false),
@@ -77,7 +80,11 @@ impl Lister<'_, '_> {
                 b"TOFF" | b"FTOCON" | b"FTOCOF" | b"TOFFON" | b"TOFFOF" | b"PUTFTOC" | b"PUTFTOCF"
                 | b"TOWSTD" | b"TOWMCS" | b"TOWWCS" | b"TOWBCS" | b"TOWTCS" | b"TOWKCS" | b"TCOABS"
                 | b"TCOFR" | b"TCOFRX" | b"TCOFRY" | b"TCOFRZ" => self.tool_assigned(),
-                b"GEOAX" | b"PRESETON" | b"PRESETONS" => self.frames_assigned(),
+                b"GEOAX" => self.frames_assigned(),
+                b"PRESETON" | b"PRESETONS" => {
+                    self.held_here(super::EVERYWHERE);
+                    self.frames_assigned();
+                }
                 _ => match word.belongs {
                     Belongs::Arguments { .. } if HARMLESS.iter().any(|known| word.is(known)) => {}
                     Belongs::Arguments { .. } if is_cycle(&name) => {
@@ -229,6 +236,10 @@ impl Lister<'_, '_> {
                 150 | 160 if !siemens => self.turn(Group::Polar, code == 160),
                 500 if self.limits_spindle(said) => return true,
                 500 | 510 if !siemens => {
+                    if code == 510 && said.axes.contains(&None) {
+                        // Centres that are left out are where the tool stands.
+                        self.held_here(super::POSITION);
+                    }
                     self.turn(Group::Scale, code == 510);
                     return true;
                 }
@@ -237,6 +248,9 @@ impl Lister<'_, '_> {
                     return true;
                 }
                 680..=689 => {
+                    if !siemens && said.axes.iter().flatten().count() < 2 {
+                        self.held_here(super::POSITION);
+                    }
                     self.turn(Group::Rotation, true);
                     return true;
                 }
@@ -440,8 +454,13 @@ impl Lister<'_, '_> {
                     self.set_offset(said);
                     return true;
                 }
-                // A pole: no motion.
-                1100 | 1110 | 1120 if siemens => return true,
+                // A pole: no motion. That of G110 counts from where the tool stands.
+                1100 | 1110 | 1120 if siemens => {
+                    if code == 1100 {
+                        self.held_here(super::POSITION);
+                    }
+                    return true;
+                }
                 120 | 130 | 470 | 1500 => {
                     self.gone(said, code, Reason::Cycle);
                     return true;
@@ -504,7 +523,7 @@ impl Lister<'_, '_> {
                             self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
                         }
                     }
-                    self.events.push(Event::Placed(said.axes.map(|axis| axis.is_some())));
+                    self.placed(said.axes.map(|axis| axis.is_some()));
                     self.rotary(said, |_, value| value == Ok(0.0));
                     self.set_any(Group::Shift);
                     return true;
@@ -534,7 +553,7 @@ impl Lister<'_, '_> {
                 921 | 922 => {
                     self.state.shift = [Ok(0.0); 3];
                     self.state.preset = false;
-                    self.events.push(Event::Placed([true; 3]));
+                    self.placed([true; 3]);
                     self.set_any(Group::Shift);
                     if self.state.turned & 1 << Group::Rotary as u32 != 0 {
                         self.turn(Group::Rotary, false);
@@ -547,6 +566,7 @@ impl Lister<'_, '_> {
                     }
                 }
                 923 => {
+                    self.events.push(Event::Restored);
                     self.state.shift = [Err(Reason::Variable); 3];
                     self.doubt(Group::Rotary, Reason::Variable);
                     if either {
@@ -625,8 +645,24 @@ impl Lister<'_, '_> {
         let abc = self.state.abc;
         self.state.preset = true;
         self.set_any(Group::Shift);
-        self.events.push(Event::Shift(stated));
+        let named = said.axes.map(|axis| axis.is_some());
+        // Angles are counted from how the tool is turned here.
+        let turned = super::named_axes(said) & super::ORIENTATION;
+        if turned != 0 {
+            self.held_here(turned);
+        }
+        if self.skipping {
+            self.held_here(super::named_axes(said));
+            self.events.push(Event::MaybePlaced(named));
+        } else {
+            self.events.push(Event::Shift { stated, named });
+        }
         self.rotary(said, |axis, value| value.is_ok() && abc[axis] == value);
+    }
+
+    /// The shift of these axes is said whole.
+    fn placed(&mut self, axes: [bool; 3]) {
+        self.events.push(if self.skipping { Event::MaybePlaced(axes) } else { Event::Placed(axes) });
     }
 
     /// A motion to where the text does not tell.

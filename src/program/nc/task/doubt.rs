@@ -1,7 +1,10 @@
 //! What is not certain: default-deny for words that are not known, and what still holds where ways meet.
 
 use super::super::dialect::Dialect;
+use super::super::expression::literal;
 use super::super::machine::{GROUPS, Group, Mode};
+use super::super::syntax::Belongs;
+use super::super::token::Token;
 use super::{Event, Lister, Said};
 use crate::program::motion::Reason;
 
@@ -119,14 +122,73 @@ impl Lister<'_, '_> {
             }
         }
         self.state.forget(constant, assigns);
-        self.events.push(Event::Unknown);
+        self.events.push(Event::Join);
+    }
+
+    /// The way parts: it may go on elsewhere in the file.
+    pub(super) fn parts(&mut self) {
+        self.branched = true;
+        self.events.push(Event::Jump);
+    }
+
+    /// Something that is not followed counts from where the tool stands.
+    pub(super) fn held_here(&mut self, axes: u8) {
+        self.events.push(Event::Held { axes, read: false });
+    }
+
+    /// A block that reads where the tool stands: what it makes of that moves with it.
+    pub(super) fn position_read(&mut self, said: &Said<'_>) {
+        let reads = said.words.iter().any(|word| match word.belongs {
+            Belongs::Expression { first, end } | Belongs::Arguments { first, end } => {
+                (first..end).any(|token| self.is_position(token, end))
+            }
+            _ => false,
+        });
+        if reads {
+            self.events.push(Event::Held { axes: super::EVERYWHERE, read: true });
+        }
+    }
+
+    /// Whether a token begins the name of a position that the control keeps.
+    fn is_position(&self, token: u32, end: u32) -> bool {
+        match self.tree.kind(token) {
+            Some(Token::Hash) => match self.tree.kind(token + 1) {
+                Some(Token::Number) => {
+                    let number = literal(self.tree.text(token + 1)).unwrap_or(0.0);
+                    // Ends of blocks, machine and work positions, where a probe touched; LinuxCNC: 5420 on.
+                    matches!(number as u32, 5001..=5120 | 5420..=5428)
+                }
+                // The number is worked out: it may be one of them where it is near.
+                Some(Token::BracketOpen) => {
+                    let near = |token: u32| {
+                        let number = literal(self.tree.text(token)).unwrap_or(0.0);
+                        self.tree.kind(token) == Some(Token::Number) && (4900.0..5500.0).contains(&number)
+                    };
+                    (token + 2..end).take_while(|&token| self.tree.kind(token) != Some(Token::BracketClose)).any(near)
+                }
+                Some(Token::Name) => {
+                    let name = self.tree.text(token + 1).to_ascii_uppercase();
+                    matches!(&*name, [b'<', b'_', b'X'..=b'Z' | b'A'..=b'C', b'>'])
+                        || name.starts_with(b"<_ABS_")
+                        || name.starts_with(b"<_ABSOLUTE")
+                }
+                _ => false,
+            },
+            Some(Token::Name) if self.dialect == Dialect::Siemens => {
+                let name = self.tree.text(token).to_ascii_uppercase();
+                [&b"$AA_I"[..], b"$AA_M", b"$AA_ETRANS", b"$P_EP", b"$VA_I", b"$AC_P"]
+                    .iter()
+                    .any(|begin| name.starts_with(begin))
+            }
+            _ => false,
+        }
     }
 
     /// The begin of a file that others call: everything is as they have left it.
     pub(super) fn enter(&mut self) {
         self.state.forget(0, (false, false));
         self.state.next_tool = Some("T?".to_owned());
-        self.events.push(Event::Unknown);
+        self.events.push(Event::Join);
     }
 
     /// After the machine has gone where the text does not tell.

@@ -41,7 +41,7 @@ impl Lister<'_, '_> {
         let Some(number) = number else { return };
         if self.contour == Some(number) {
             self.contour = Some(u64::MAX);
-        } else if let Some(&(_, last)) = self.contours.iter().find(|(first, _)| *first == number) {
+        } else if let Some(&last) = self.contours.get(&number) {
             self.contour = Some(if last == number { u64::MAX } else { last });
         }
     }
@@ -113,13 +113,18 @@ impl Lister<'_, '_> {
                 _ if self.dialect == Dialect::LinuxCnc => {}
                 Some(name) => {
                     let now = if moves { Err(Reason::Variable) } else { value };
-                    self.state.variables.insert(name.clone(), now);
+                    self.set_variable(name.clone(), now);
                 }
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+                None => self.state.variables.lose(Reason::Variable),
             }
             values.push((name, value));
         }
         values
+    }
+
+    pub(super) fn set_variable(&mut self, name: Variable, value: Worth) {
+        self.ever_set.insert(name.clone());
+        self.state.variables.insert(name, value);
     }
 
     /// After the block its variables have their values, but where the way has parted in it.
@@ -128,10 +133,10 @@ impl Lister<'_, '_> {
             match name {
                 Some(name) => {
                     let value = if parted { Err(Reason::UnknownFlow) } else { value };
-                    self.state.variables.insert(name, value);
+                    self.set_variable(name, value);
                 }
                 // Any of them.
-                None => self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable)),
+                None => self.state.variables.lose(Reason::Variable),
             }
         }
     }
@@ -204,7 +209,7 @@ impl Lister<'_, '_> {
             let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
             match &*keyword {
                 b"CALL" => self.subprogram(said, "O call"),
-                b"IF" => self.branched = true,
+                b"IF" => self.parts(),
                 b"SUB" => {
                     let passed = self.state.clone();
                     self.forget();
@@ -218,7 +223,7 @@ impl Lister<'_, '_> {
                     self.ended = false;
                     self.frame_index = None;
                     self.tool_index.clear();
-                    self.events.push(Event::Unknown);
+                    self.events.push(Event::Join);
                 }
                 _ => self.forget(),
             }
@@ -246,7 +251,7 @@ impl Lister<'_, '_> {
             }
             (b"IF", _) => {
                 // A jump may go away; what stands here holds where it does not.
-                self.branched = true;
+                self.parts();
                 true
             }
             (
@@ -258,7 +263,7 @@ impl Lister<'_, '_> {
                 true
             }
             _ if name.starts_with(b"GOTO") => {
-                self.branched = true;
+                self.parts();
                 true
             }
             _ if name.starts_with(b"REPEAT") => {

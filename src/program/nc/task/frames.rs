@@ -272,12 +272,21 @@ impl Lister<'_, '_> {
                 let Some(name) = name else { return self.frames_assigned() };
                 self.state_offset(said, &name);
             }
-            Some(20.0) => match p.and_then(named).filter(|_| linux) {
-                Some(name) => self.offset_is(&name, None),
-                None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
-                None => self.frames_assigned(),
-            },
-            Some(1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0) => self.tools_assigned(),
+            Some(20.0) => {
+                self.held_here(super::named_axes(said));
+                match p.and_then(named).filter(|_| linux) {
+                    Some(name) => self.offset_is(&name, None),
+                    None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
+                    None => self.frames_assigned(),
+                }
+            }
+            Some(number @ (1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0)) => {
+                if linux && (number == 10.0 || number == 11.0) {
+                    // A length with which the tool would stand there.
+                    self.held_here(super::named_axes(said));
+                }
+                self.tools_assigned();
+            }
             None if said.p.is_some() && said.l.is_none() => self.tools_assigned(),
             // Parameters of the control, or what is not known.
             _ => self.deny(said, "G10", Reason::UnknownWord),
@@ -338,7 +347,7 @@ impl Lister<'_, '_> {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             None => {
-                self.setup.tool(name).or_else(|| setup::find(&self.tools, name)).ok_or(Reason::ToolUnknown)
+                self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown)
             }
         }
     }
@@ -350,9 +359,9 @@ impl Lister<'_, '_> {
             Some(None) => Err(Reason::Assigned),
             // Without a settable offset Siemens counts from the base.
             None => self
-                .setup
-                .frame(name)
-                .or_else(|| setup::find(&self.frames, name))
+                .frames
+                .get(&setup::plain(name))
+                .copied()
                 .or_else(|| (name == "G500").then_some(Frame::IDENTITY))
                 .ok_or(Reason::WorkObjectUnknown),
         }

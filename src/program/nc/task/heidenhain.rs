@@ -50,6 +50,11 @@ impl<'s> Lister<'_, 's> {
                 false
             }
             b"CC" => {
+                let whole = |axis: usize| said.axes[axis].is_some_and(|index| said.words[index].name.len() == 1);
+                if said.axes.iter().all(Option::is_none) || !(0..2).all(|axis| whole(axis) || said.axes[axis].is_none()) {
+                    // The pole is where the tool stands, or counts from there.
+                    self.held_here(super::POSITION);
+                }
                 for axis in 0..2 {
                     self.state.pole[axis] = match said.axes[axis] {
                         None => self.state.position[axis],
@@ -151,7 +156,7 @@ impl<'s> Lister<'_, 's> {
                 self.forget();
                 self.state.mode = Mode::Lost(Reason::UnknownFlow);
             }
-            b"LBL" => {}
+            b"LBL" => self.parts(),
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(said, "CALL");
             }
@@ -181,11 +186,19 @@ impl<'s> Lister<'_, 's> {
                 // FN 25 sets a datum, FN 17 any data of the control.
                 match number_of_function(&text) {
                     Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
-                    Some(25) => return self.frames_assigned(),
+                    Some(25) => {
+                        self.held_here(super::EVERYWHERE);
+                        return self.frames_assigned();
+                    }
+                    Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
+                        self.events.push(super::Event::Held { axes: super::EVERYWHERE, read: true });
+                    }
                     _ => {}
                 }
                 // FN 9 to FN 12 jump: what is set from here on may be passed over.
-                self.branched |= words.contains(&&b"GOTO"[..]);
+                if words.contains(&&b"GOTO"[..]) {
+                    self.parts();
+                }
                 self.parameter(first);
             }
             b"BEGIN" | b"END" => {
@@ -426,9 +439,9 @@ impl<'s> Lister<'_, 's> {
         let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
         let value: Worth = self.evaluated((equal + 1, word.end));
         if matches!(&*set, b"Q" | b"QL" | b"QR") {
-            self.state.variables.insert(numbered(&set, number), value);
+            self.set_variable(numbered(&set, number), value);
         } else {
-            self.state.variables.values_mut().for_each(|value| *value = Err(Reason::Variable));
+            self.state.variables.lose(Reason::Variable);
         }
     }
 }

@@ -5,6 +5,7 @@
 //! (M96, M97, M19 R); Heidenhain iTNC 530 (M99, M104, M114, M142, M144).
 
 use super::super::dialect::Dialect;
+use super::super::machine::{Assigned, State, Variables};
 use super::{Lister, Said};
 use crate::program::motion::Reason;
 
@@ -86,7 +87,14 @@ impl Lister<'_, '_> {
                 89 if heidenhain => self.state.modal_call = Some(Reason::Cycle),
                 70 | 73 if linux => {
                     self.state.kept = None;
-                    self.state.kept = Some(Box::new(self.state.clone()));
+                    // Neither variables nor work offsets and tools come back.
+                    let kept = State {
+                        variables: Variables::default(),
+                        frames: Assigned::default(),
+                        tools: Assigned::default(),
+                        ..self.state.clone()
+                    };
+                    self.state.kept = Some(Box::new(kept));
                 }
                 71 if linux => self.state.kept = None,
                 72 if linux => self.restore(),

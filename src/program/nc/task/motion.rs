@@ -249,16 +249,20 @@ impl Lister<'_, '_> {
         if cut && motion.left.is_none() {
             motion.left = Some(Reason::NotFollowed);
         }
+        // The words of this block that change what numbers mean come after a block that is put in before it.
+        let alike = self.meaning == self.state.meaning();
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
         let insertable = kind == MotionKind::Linear
             && !said.others
             && !heidenhain
             && !said.skippable
             && !motion.timed
+            && alike
             && !begins_something(said)
             && before.start.iter().all(Option::is_some);
         motion.insertable = insertable;
         motion.straightens = arc.is_some()
+            && alike
             && !begins_something(said)
             && !heidenhain
             && !said.skippable

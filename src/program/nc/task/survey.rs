@@ -166,7 +166,7 @@ impl Lister<'_, '_> {
         if block.cycle
             && let (Some(p), Some(q)) = (block.p, block.q)
         {
-            self.contours.push((p, q));
+            self.contours.entry(p).or_insert(q);
         }
     }
 

@@ -10,6 +10,9 @@ use super::{Lister, Said, code, is_axis, is_axis_name};
 use crate::program::motion::Reason;
 use crate::program::tree::Node;
 
+/// A block of more words is not read: controls take some hundred characters.
+const BLOCK_WORDS: u32 = 1000;
+
 impl<'s> Lister<'_, 's> {
     pub(super) fn gather(&mut self, node: u32, said: &mut Said<'s>) {
         let mut words = std::mem::take(&mut said.words);
@@ -21,6 +24,11 @@ impl<'s> Lister<'_, 's> {
         let kind = self.tree.nodes[node as usize].kind;
         said.skippable = kind == Syntax::Skippable;
         said.opaque = kind == Syntax::Opaque;
+        if self.tree.nodes[node as usize].size > BLOCK_WORDS {
+            // No control takes a block of so many words.
+            (said.opaque, said.obscure) = (true, true);
+            return;
+        }
         for child in self.tree.child_nodes(node) {
             if self.tree.nodes[child as usize].kind == Syntax::Opaque {
                 let Node { first, end, .. } = self.tree.nodes[child as usize];
@@ -221,7 +229,7 @@ impl<'s> Lister<'_, 's> {
 
     pub(super) fn evaluated(&self, range: (u32, u32)) -> Worth {
         let variables = |name: &Variable| -> Worth {
-            self.state.variables.get(name).copied().unwrap_or(Err(Reason::Variable))
+            self.state.variables.get(name, || self.ever_set.contains(name))
         };
         let mut reader = Reader::new(self.tree, self.dialect, range, &variables);
         match reader.expression() {

@@ -55,6 +55,10 @@ pub struct Reach {
     pub waits: bool,
     /// Whether it may grip something else (GripLoad).
     pub grips: bool,
+    /// Whether it does more than answer: it changes what others see, moves, writes, waits, reads devices, raises.
+    pub acts: bool,
+    /// Whether it counts a displacement from where the robot stands (PDispOn without \ExeP).
+    pub places: bool,
     /// The switches that statements in it, or in what it calls, set: at some time, not at its end alone.
     pub sets: States,
 }
@@ -94,6 +98,8 @@ struct Found {
     moves: bool,
     waits: bool,
     grips: bool,
+    acts: bool,
+    places: bool,
     /// Of which types data is changed by a name that is computed; `None` for any type.
     by_name: Vec<Option<Vec<u8>>>,
     /// The calls that set a switch or call a routine of the program.
@@ -122,6 +128,8 @@ impl Found {
         self.moves |= next.moves;
         self.waits |= next.waits;
         self.grips |= next.grips;
+        self.acts |= next.acts;
+        self.places |= next.places;
         self.by_name.extend(next.by_name);
         self.cycles |= next.cycles;
         self.sets = self.sets.or(next.sets);
@@ -342,7 +350,7 @@ impl Symbols {
                 continue;
             }
             if kind == Syntax::Call && self.moves_only(tree, unit.scope, node) {
-                found.moves = true;
+                (found.moves, found.acts) = (true, true);
                 node += 1;
                 continue;
             }
@@ -359,6 +367,7 @@ impl Symbols {
                 Syntax::While => found.waits = true,
                 _ => {}
             }
+            found.acts |= self.acts_itself(tree, unit.scope, node);
             node += 1;
         }
         found.late.sort_unstable();
@@ -404,6 +413,7 @@ impl Symbols {
             [] => {
                 found.moves |= predefined::displaces(name).is_some();
                 found.cycles |= predefined::begins_cycle(name);
+                found.places |= places(tree, node, name);
                 found.waits |= predefined::waits(name);
                 found.grips |= predefined::grips(name);
                 // What it writes may be data of any routine's caller.
@@ -537,13 +547,18 @@ impl Symbols {
         for (found, unit) in all.iter().zip(&self.units) {
             let Some(routine) = unit.routine else { continue };
             let outside = |symbol: u32| self.symbols[symbol as usize].scope != unit.scope;
-            let changes = found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
+            let changes: Vec<u32> =
+                found.changes.iter().map(|change| change.symbol).filter(|&s| outside(s)).collect();
+            // A parameter by reference is data of the caller.
+            let written = self.routines[routine as usize].written.iter().any(Option::is_some);
             let mut reach = Reach {
+                acts: found.acts || found.unknown || written || !changes.is_empty(),
                 changes,
                 anything: found.unknown,
                 moves: found.moves,
                 waits: found.waits,
                 grips: found.grips,
+                places: found.places,
                 sets: found.sets,
             };
             reach.settle();
@@ -555,7 +570,8 @@ impl Symbols {
                 let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
                 let said = |reach: &Reach| {
-                    (reach.changes.len(), reach.anything, reach.moves, reach.waits, reach.grips, reach.sets)
+                    let Reach { anything, moves, waits, grips, acts, places, sets, .. } = *reach;
+                    (reach.changes.len(), anything, moves, waits, (grips, acts, places), sets)
                 };
                 let before = said(&reach);
                 for &called in &all[unit as usize].late {
@@ -569,6 +585,8 @@ impl Symbols {
                     reach.moves |= other.moves;
                     reach.waits |= other.waits;
                     reach.grips |= other.grips;
+                    reach.acts |= other.acts;
+                    reach.places |= other.places;
                     reach.sets = reach.sets.or(other.sets);
                     reach.changes.extend_from_slice(&other.changes);
                     if reach.changes.len() > 4 * REACH {
@@ -801,6 +819,12 @@ impl Symbols {
         let symbol = self.scopes[scope as usize].names.get(&folded(name))?;
         Some(self.symbols[*symbol as usize].name)
     }
+}
+
+/// Whether a call counts a displacement from where the robot stands: PDispOn without the point to which it has gone.
+pub(in crate::program::rapid) fn places(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> bool {
+    let executed = |argument: Argument| argument.name.is_some_and(|name| same_name(tree.text(name), b"ExeP"));
+    same_name(name, b"PDispOn") && !arguments(tree, call).any(executed)
 }
 
 /// How an assignment to this place changes its data.
