@@ -1,6 +1,7 @@
 //! From an estimated arm and a program to a program that the real arm runs right.
 //!
-//! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
+//! - [`cell`]: where tools and work objects come from; [`taught`]: those that were taught, under a better arm;
+//!   [`mounting`]: the two of a motion, as told and as they are.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`rewrite`]: plans the rewrite of a program; [`why`]: the closed list of reasons.
 //! - [`untouched`]: the plan that changes nothing, for the nominal arm.
@@ -11,6 +12,7 @@
 pub mod deviation;
 pub mod cell;
 pub mod mounting;
+pub mod taught;
 pub mod payload;
 pub mod why;
 pub mod rewrite;

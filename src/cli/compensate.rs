@@ -12,12 +12,14 @@ use truegrind::compensation::deviation::{After, PathReport, Status};
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::precision::single_precision;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan, plan};
+use truegrind::compensation::taught::contradictions;
 use truegrind::compensation::untouched::untouched;
 use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::Model;
 use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, MotionKind, Reason};
+use truegrind::program::motion::{Listing, Mark, MotionKind, Reason};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::{Language, Program};
 use truegrind::program::rewrite::{Outcome, RewriteOptions};
@@ -91,6 +93,10 @@ impl CellArguments {
             None => Cell::default(),
         };
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
+        let cell = match &surface {
+            Some(surface) => cell.with_surface(surface).map_err(anyhow::Error::msg)?,
+            None => cell,
+        };
         let mut condition = model.map(|m| m.condition).unwrap_or_default();
         condition.payload_kg = self.payload.or(condition.payload_kg);
         if let Some(text) = &self.payload_centre {
@@ -99,6 +105,14 @@ impl CellArguments {
             condition.payload_centre_mm = in_last.coords.into();
         }
         Ok((cell, surface, condition))
+    }
+}
+
+/// Nothing is corrected or judged where the cell file and the program contradict each other.
+pub(super) fn agreed(listing: &Listing, cell: &Cell, nominal: &Model) -> anyhow::Result<()> {
+    match contradictions(listing, cell, nominal).as_slice() {
+        [] => Ok(()),
+        found => bail!("{}", found.join("; ")),
     }
 }
 
@@ -485,6 +499,9 @@ fn rewritten(
     let marked = already(shop, &program, programs, &mut notes)?;
     if marked.iter().all(|marked| *marked) {
         return Ok(nothing_left(notes));
+    }
+    if let Some(corrector) = shop.corrector {
+        agreed(listing, &shop.cell, &corrector.arm.nominal)?;
     }
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
     let mut planned = match shop.corrector {

@@ -26,10 +26,12 @@ use super::machine::{Group, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
-use super::setup::{Setup, Statement, statement};
+use super::setup::{self, Setup, Stated, Statement, held, statement};
 use super::syntax::{Belongs, NcTree, Word};
 use super::token::Token;
-use crate::program::motion::{Frame, Listing, Motion, MotionKind, OpaqueRegion, Place, Reason};
+use crate::program::motion::{
+    Frame, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
+};
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -400,12 +402,41 @@ impl<'t, 's> Lister<'t, 's> {
                 continue;
             }
             match statement(self.tree.text(token)) {
-                Some(Statement::Angles(angles)) => self.angles = self.setup.angles.or(Some(angles)),
-                Some(Statement::Tool(name, frame)) => self.tools.push((name, frame)),
-                Some(Statement::Frame(name, frame)) => self.frames.push((name, frame)),
-                None => {}
+                Ok(Some(Statement::Angles(angles))) => self.angles = self.setup.angles.or(Some(angles)),
+                Ok(Some(Statement::Tool(stated))) => self.stated(token, stated, true),
+                Ok(Some(Statement::Frame(stated))) => self.stated(token, stated, false),
+                Ok(None) => {}
+                Err(()) => self.unread_comment(token),
             }
         }
+        let tool = |(name, frame): &(String, Frame)| {
+            let value = frame.within_reach().map(held);
+            Tool { name: name.clone(), value, place: None }
+        };
+        let stated = self.tools.iter().filter(|(name, _)| self.setup.tool(name).is_none()).map(tool);
+        let tools: Vec<Tool> = self.setup.tools.iter().map(tool).chain(stated).collect();
+        self.listing.declared_tools.extend(tools);
+    }
+
+    /// A tool or work offset that a comment states. One that was stated before with another frame is known no more.
+    fn stated(&mut self, token: u32, Stated { number, name, frame }: Stated, tool: bool) {
+        let list = if tool { &mut self.tools } else { &mut self.frames };
+        if setup::find(list, &number).is_some_and(|before| before != frame) {
+            list.retain(|(other, _)| !setup::same(other, &number));
+            self.unread_comment(token);
+            return;
+        }
+        list.push((number.clone(), frame));
+        self.listing.labels.push((number, name));
+    }
+
+    /// A comment that was meant for this program and cannot be used is listed, not passed over.
+    fn unread_comment(&mut self, token: u32) {
+        self.listing.opaque.push(OpaqueRegion {
+            place: self.place(token),
+            span: self.tree.span(token, token + 1),
+            reason: OpaqueReason::Unexpected,
+        });
     }
 
     // ---- blocks ----
