@@ -32,7 +32,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     targets.extend(arguments.arm.as_deref());
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
-    let simulation = simulation(&text, &arguments.recipe.display().to_string(), arguments.seed)?;
+    let name = arguments.recipe.display().to_string();
+    let about = Recipe::parse(&text, &name)?.about;
+    let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);
     eprintln!(
         "{} rows, sensor {:?}, written to {}",
@@ -40,6 +42,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         simulation.sensor(),
         arguments.output.display()
     );
+    if !about.is_empty() {
+        eprintln!("{about}");
+    }
     batch.add(&arguments.output, simulation.csv);
     if let Some(path) = &arguments.arm {
         batch.add(path, arm_text(&simulation.actual)?);

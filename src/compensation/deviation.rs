@@ -199,6 +199,9 @@ fn best_motion(pairs: &[Pair]) -> Option<Pose> {
     let (to, from) = (mean(|p| p.0), mean(|p| p.1));
     let spread: Matrix3<f64> =
         pairs.iter().map(|p| (p.1.coords - from) * (p.0.coords - to).transpose()).sum();
+    if !spread.iter().all(|v| v.is_finite()) {
+        return None;
+    }
     let svd = SVD::new(spread, true, true);
     let (u, v) = (svd.u?, svd.v_t?.transpose());
     let sign = (v * u.transpose()).determinant().signum();

@@ -455,7 +455,8 @@ fn work<'a>(
         Worked { change, outcome, point, passage: None }
     };
     if let Some(reason) = motion.left {
-        return finish(outcome, Status::Left, Some(Why::Program(reason)), None, None);
+        let why = Why::Program(reason);
+        return finish(outcome, unchanged(why), Some(why), None, None);
     }
     let targets = solved.of(index);
     let point = match targets.last() {
@@ -471,8 +472,7 @@ fn work<'a>(
     let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
     let unknown = errors().find(|why| matches!(why, Why::Program(_)));
     if let Some(why) = unknown.or_else(|| errors().next()) {
-        let status = if matches!(why, Why::Program(_)) { Status::Left } else { Status::Refused };
-        return finish(outcome, status, Some(why), None, point);
+        return finish(outcome, unchanged(why), Some(why), None, point);
     }
     let good: Vec<&Solved> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
     if good.is_empty() {
@@ -508,6 +508,15 @@ fn work<'a>(
     let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
+fn unchanged(why: Why) -> Status {
+    match why {
+        Why::Program(Reason::BeyondReach) => Status::Refused,
+        Why::Program(_) => Status::Left,
+        _ => Status::Refused,
+    }
 }
 
 /// Whether a motion is of a kind that is rewritten at all.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The circumstances of one pose. A circumstance that is not known is `None`, and effects that need it stand still.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[serde(default)]
 pub struct Condition {
     /// Time since the arm was switched on (h).

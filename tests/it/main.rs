@@ -19,3 +19,4 @@ mod visual;
 mod command;
 mod programs;
 mod layers;
+mod keys;

@@ -296,6 +296,9 @@ impl Search<'_, '_> {
         let arm = &self.inverse.arm;
         let jacobian =
             newton::scaled_jacobian(arm, root, self.inverse.kernel.length_mm) * arm.rotation_slopes(root);
+        if !jacobian.iter().all(|v| v.is_finite()) {
+            return;
+        }
         let svd = jacobian.svd(false, true);
         let Some(directions) = svd.v_t else { return };
         for k in (0..6).filter(|&k| svd.singular_values[k] < NEARLY_SINGULAR) {
