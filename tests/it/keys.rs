@@ -67,8 +67,9 @@ fn at<'v>(value: &'v mut Value, way: &[Step]) -> &'v mut Value {
 /// Values that a user might have meant instead.
 fn others(value: &Value) -> Vec<Value> {
     match value {
-        Value::Float(x) => vec![Value::Float(x * 1.01 + 0.37), Value::Float(x * 3.0 + 50.0)],
-        Value::Integer(n) => vec![Value::Integer(n + 1), Value::Integer(n * 3 + 50)],
+        // A little, much, and so little that a range no longer holds what it should.
+        Value::Float(x) => [x * 1.01 + 0.37, x * 3.0 + 50.0, x / 5.0].map(Value::Float).to_vec(),
+        Value::Integer(n) => [n + 1, n * 3 + 50, n / 5].map(Value::Integer).to_vec(),
         Value::Boolean(b) => vec![Value::Boolean(!b)],
         Value::String(text) => match WORDS.iter().find(|words| words.contains(&text.as_str())) {
             Some(words) => {
