@@ -1,6 +1,7 @@
 //! From an estimated arm and a program to a program that the real arm runs right.
 //!
-//! - [`cell`]: where tools and work objects come from; [`mounting`]: the two of a motion, as told and as they are.
+//! - [`cell`]: where tools and work objects come from; [`taught`]: those that were taught, under a better arm;
+//!   [`mounting`]: the two of a motion, as told and as they are.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`compensate`]: the main job, from a program that was read to its new bytes.
 //! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
@@ -13,6 +14,7 @@
 pub mod deviation;
 pub mod cell;
 pub mod mounting;
+pub mod taught;
 pub mod payload;
 pub mod why;
 pub mod rewrite;

@@ -13,12 +13,14 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan};
+use truegrind::compensation::taught::contradictions;
 use truegrind::compensation::untouched::untouched;
 use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
+use truegrind::kinematics::model::Model;
 use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, Reason};
+use truegrind::program::motion::{Listing, Mark, Reason};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::{Language, Program};
 use truegrind::program::rewrite::RewriteOptions;
@@ -94,6 +96,10 @@ impl CellArguments {
             None => Cell::default(),
         };
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
+        let cell = match &surface {
+            Some(surface) => cell.with_surface(surface).map_err(anyhow::Error::msg)?,
+            None => cell,
+        };
         let mut condition = model.map(|m| m.condition).unwrap_or_default();
         condition.payload_kg = self.payload.or(condition.payload_kg);
         if let Some(text) = &self.payload_centre {
@@ -102,6 +108,14 @@ impl CellArguments {
             condition.payload_centre_mm = in_last.coords.into();
         }
         Ok((cell, surface, condition))
+    }
+}
+
+/// Nothing is corrected or judged where the cell file and the program contradict each other.
+pub(super) fn agreed(listing: &Listing, cell: &Cell, nominal: &Model) -> anyhow::Result<()> {
+    match contradictions(listing, cell, nominal).as_slice() {
+        [] => Ok(()),
+        found => bail!("{}", found.join("; ")),
     }
 }
 

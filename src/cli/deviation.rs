@@ -17,7 +17,7 @@ use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
 use truegrind::surface::SurfaceFile;
 
-use super::compensate::CellArguments;
+use super::compensate::{CellArguments, agreed};
 use super::defect::isolated;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
@@ -148,6 +148,11 @@ impl Shop<'_> {
         let programs = Programs::read(&job.paths)?;
         let task = programs.task(self.setup);
         let original = self.originals.map(|original| original.task(self.setup));
+        for runner in self.runners {
+            for program in original.iter().chain([&task]) {
+                agreed(program.listing(), self.cell, &runner.nominal)?;
+            }
+        }
         let name = match &job.under {
             // Below a folder the same name may be there more than once.
             Some(under) if job.paths.len() == 1 => {

@@ -33,7 +33,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     targets.extend(arguments.arm.as_deref());
     Batch::check(&[&arguments.recipe], &targets)?;
     let text = files::read_text(&arguments.recipe)?;
-    let simulation = simulation(&text, &arguments.recipe.display().to_string(), arguments.seed)?;
+    let name = arguments.recipe.display().to_string();
+    let about = Recipe::parse(&text, &name)?.about;
+    let simulation = simulation(&text, &name, arguments.seed)?;
     let mut batch = Batch::sparing([&arguments.recipe]);
     let (rows, sensor) = (simulation.rows.len(), simulation.sensor());
     batch.add(&arguments.output, simulation.csv);
@@ -42,6 +44,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     batch.write()?;
     tell(format_args!("{rows} rows, sensor {sensor:?}, written to {}", arguments.output.display()));
+    if !about.is_empty() {
+        tell(format_args!("{about}"));
+    }
     Ok(Ending::Done)
 }
 

@@ -22,7 +22,7 @@ use truegrind::surface::SurfaceFile;
 use truegrind::visual::measured::Residuals;
 use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
 
-use super::compensate::CellArguments;
+use super::compensate::{CellArguments, agreed};
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::programs::Programs;
@@ -278,6 +278,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     };
     let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
     let task = programs.task(&programs::setup(&cell, robot));
+    agreed(task.listing(), &cell, &nominal)?;
     let program = programs.name();
     let acting =
         Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };

@@ -393,21 +393,11 @@ pub fn taught_cell(
         })
         .collect::<Result<Vec<[f64; 6]>, InverseError>>()?;
     Ok(Cell {
-        tool: vec![CellFrame {
-            name: tool.to_owned(),
-            origin: FrameOrigin::Metrology,
-            teaching_deg: Vec::new(),
-            taught_with: None,
-            position_mm: None,
-            quaternion_wxyz: None,
-        }],
+        tool: vec![CellFrame::of(tool, FrameOrigin::Metrology)],
         wobj: vec![CellFrame {
-            name: work_object.to_owned(),
-            origin: FrameOrigin::Taught,
             teaching_deg,
             taught_with: Some(tool.to_owned()),
-            position_mm: None,
-            quaternion_wxyz: None,
+            ..CellFrame::of(work_object, FrameOrigin::Taught)
         }],
         external: Vec::new(),
     })

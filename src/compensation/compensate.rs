@@ -6,11 +6,14 @@
 
 use std::collections::BTreeMap;
 
+use thiserror::Error;
+
 use super::cell::Cell;
 use super::cut::Cuts;
 use super::deviation::Status;
 use super::precision::single_precision;
 use super::rewrite::{Options, Plan, plan_without};
+use super::taught::contradictions;
 use super::undeclared;
 use super::why::Why;
 use crate::kinematics::estimated::Estimated;
@@ -35,18 +38,33 @@ impl Compensated {
     }
 }
 
+/// Why nothing was corrected.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CompensateError {
+    /// Cell file and program contradict each other: sentences that name both.
+    #[error("{0}")]
+    Cell(String),
+    /// Edits of one file overlap: a defect of the dialect, of which nothing must be written.
+    #[error(transparent)]
+    Edits(#[from] EditError),
+}
+
 /// Corrects a program so that the estimated arm follows it. `mark` is written into every file in which something changes.
 ///
 /// # Errors
-/// Where edits of one file overlap: a defect of the dialect, of which nothing must be written.
+/// [`CompensateError`].
 pub fn compensate(
     program: &Program<'_>,
     arm: &Estimated,
     cell: &Cell,
     options: &Options,
     mark: Option<Mark>,
-) -> Result<Compensated, EditError> {
+) -> Result<Compensated, CompensateError> {
     let listing = program.listing();
+    let found = contradictions(listing, cell, &arm.nominal);
+    if !found.is_empty() {
+        return Err(CompensateError::Cell(found.join("; ")));
+    }
     let partial = options.cuts == Cuts::Partial;
     let mark = mark.map(|mark| Mark { partial, ..mark });
     let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };

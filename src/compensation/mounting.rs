@@ -2,8 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cell::{Cell, FrameOrigin, taught_frame, taught_tcp};
+use super::cell::FrameOrigin;
+use super::taught::{RealObject, RealTool, TaughtFrame, Teaching, taught_frame, taught_tcp};
 use crate::kinematics::estimated::{Carried, Estimated};
+use crate::kinematics::inverse::Inverse;
 use crate::kinematics::model::{Joints, Posed};
 use crate::math::se3::{Pose, difference};
 use crate::program::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
@@ -62,104 +64,101 @@ pub struct Mounted {
     pub notes: Vec<String>,
 }
 
+/// What a mounting is worked out from.
+pub(super) struct Mounts<'a> {
+    pub(super) teaching: Teaching<'a>,
+    pub(super) knowledge: Option<&'a Estimated>,
+    /// A typical joint vector, at which the effect of an unknown origin is estimated.
+    pub(super) usual: Joints,
+}
+
 /// Works out a mounting from the program's values and the cell's knowledge.
 ///
-/// `nominal` and `estimated` are the two arms; `usual` is a typical joint vector, at which an unknown origin's effect
-/// is estimated.
-pub fn mount(
-    tool: (&Tool, &ToolValue),
-    object: (&WorkObject, &WorkObjectValue),
-    cell: &Cell,
-    nominal: &Posed<'_>,
-    estimated: &Posed<'_>,
-    knowledge: Option<&Estimated>,
-    usual: &Joints,
-) -> Mounted {
+/// # Errors
+/// What the cell file says and the program does not bear out.
+pub(super) fn mount(
+    (tool, tool_value): (&Tool, &ToolValue),
+    (object, object_value): (&WorkObject, &WorkObjectValue),
+    with: &Mounts<'_>,
+) -> Result<Mounted, String> {
     let told = Mounting {
-        tool: tool.1.frame.pose(),
-        object: object.1.user_frame.pose() * object.1.object_frame.pose(),
-        holds_part: object.1.robhold,
+        tool: tool_value.frame.pose(),
+        object: object_value.user_frame.pose() * object_value.object_frame.pose(),
+        holds_part: object_value.robhold,
     };
-    let mut real = told;
-    let mut notes = Vec::new();
-    let mut carried = None;
-    let radians = |deg: &[[f64; 6]]| -> Vec<Joints> {
-        deg.iter().map(|q| Joints::from_fn(|i, _| q[i].to_radians())).collect()
-    };
-    let name = &tool.0.name;
-    let built_in = |name: &str| name.eq_ignore_ascii_case("tool0") || name.eq_ignore_ascii_case("wobj0");
-    match cell.tool(name) {
-        Some(frame) if frame.origin == FrameOrigin::Metrology => {}
-        Some(frame) => match taught_tcp(estimated, &radians(&frame.teaching_deg)) {
-            Some(tcp) => {
-                let shift = (tcp - told.tool.translation.vector).norm();
-                real.tool.translation.vector = tcp;
-                notes.push(format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"));
-            }
-            None => notes.push(format!(
-                "tool {name} was taught, but its teaching points are not given (or too much alike): taken as it \
-                 stands; {}",
-                tool_estimate(&told, nominal, estimated, usual)
-            )),
-        },
-        None if built_in(name) => {}
-        None => notes.push(format!(
+    let teaching = &with.teaching;
+    let real_tool = teaching.tool(tool, tool_value)?;
+    let real_object = teaching.object(object, object_value)?;
+    let real = Mounting { tool: real_tool.pose, object: real_object.pose, ..told };
+    let notes =
+        [tool_note(tool, &real_tool, &told, with), object_note(object, &real, &told, &real_object, with)];
+    // A frame on the flange stays with the arm: it has no place of its own in the base.
+    let taught = real_object.taught.filter(|_| !told.holds_part);
+    let carried = taught.zip(with.knowledge).and_then(|(t, k)| carried_frame(k, teaching.estimated, &t));
+    Ok(Mounted { told, real, carried, notes: notes.into_iter().flatten().collect() })
+}
+
+fn built_in(name: &str) -> bool {
+    name.eq_ignore_ascii_case("tool0") || name.eq_ignore_ascii_case("wobj0")
+}
+
+/// What was assumed of a tool.
+fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -> Option<String> {
+    let name = &tool.name;
+    match with.teaching.cell.tool_of(tool, with.teaching.listing) {
+        Some(frame) if frame.origin == FrameOrigin::Metrology => None,
+        Some(_) => Some(match real.moved_mm {
+            Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
+            None => format!(
+                "tool {name} was taught, but its teaching points are not given: taken as it stands; {}",
+                tool_estimate(told, with)
+            ),
+        }),
+        None if built_in(name) => None,
+        None => Some(format!(
             "tool {name}: origin not stated, taken as metrology (true as it stands); {}",
-            tool_estimate(&told, nominal, estimated, usual)
+            tool_estimate(told, with)
         )),
     }
-    let name = &object.0.name;
-    match cell.wobj(name) {
-        Some(frame) if frame.origin == FrameOrigin::Metrology => {}
-        Some(frame) if frame.teaching_deg.len() >= 3 => {
-            let teaching = radians(&frame.teaching_deg);
-            let tcp = Point3::from(real.tool.translation.vector);
-            let points = std::array::from_fn(|i| estimated.forward(&teaching[i]) * tcp);
-            match taught_frame(&points) {
-                Some(pose) => {
-                    // What the program displaces was not taught: it comes on top.
-                    let within = object.0.displacement.map_or_else(Pose::identity, |frame| frame.pose());
-                    let pose = pose * within;
-                    let shift = (pose.translation.vector - told.object.translation.vector).norm();
-                    let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
-                    real.object = pose;
-                    carried = knowledge
-                        .and_then(|k| carried_frame(k, estimated, &teaching, &points, &pose, &real.tool));
-                    notes.push(format!(
-                        "work object {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"
-                    ));
-                }
-                None => notes.push(format!(
-                    "work object {name} was taught with three points in line: taken as it stands"
-                )),
-            }
+}
+
+/// What was assumed of a work object.
+fn object_note(
+    object: &WorkObject,
+    real: &Mounting,
+    told: &Mounting,
+    found: &RealObject,
+    with: &Mounts<'_>,
+) -> Option<String> {
+    let name = &object.name;
+    match with.teaching.cell.wobj_of(object, with.teaching.listing) {
+        Some(frame) if frame.origin == FrameOrigin::Metrology => None,
+        Some(_) if found.taught.is_some() => {
+            let shift = (real.object.translation.vector - told.object.translation.vector).norm();
+            let turn = real.object.rotation.angle_to(&told.object.rotation).to_degrees();
+            Some(format!(
+                "work object {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"
+            ))
         }
-        Some(_) => notes.push(format!(
+        Some(_) => Some(format!(
             "work object {name} was taught, but its teaching points are not given: taken as it stands; {}",
-            object_estimate(&told, nominal, estimated, usual)
+            object_estimate(told, with)
         )),
-        None if built_in(name) => {}
-        None => notes.push(format!(
+        None if built_in(name) => None,
+        None => Some(format!(
             "work object {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
-            object_estimate(&told, nominal, estimated, usual)
+            object_estimate(told, with)
         )),
     }
-    Mounted { told, real, carried, notes }
 }
 
 /// How a frame through three taught points moves with each parameter of the arm: the points' velocities, carried
 /// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
-fn carried_frame(
-    knowledge: &Estimated,
-    estimated: &Posed<'_>,
-    teaching: &[Joints],
-    points: &[Point3<f64>; 3],
-    frame: &Pose,
-    tool: &Pose,
-) -> Option<Carried> {
+fn carried_frame(knowledge: &Estimated, estimated: &Posed<'_>, taught: &TaughtFrame) -> Option<Carried> {
     const STEP: f64 = 1e-4;
-    let jacobians: Vec<_> =
-        teaching.iter().take(3).map(|q| knowledge.position_jacobian(estimated, q, tool)).collect();
+    let TaughtFrame { pointer, joints, points, frame } = taught;
+    let tip = Pose::translation(pointer.real.x, pointer.real.y, pointer.real.z);
+    let jacobians = joints.map(|q| knowledge.position_jacobian(estimated, &q, &tip));
     let twists = (0..knowledge.order.len())
         .map(|k| {
             let moved_by = |step: f64| {
@@ -174,10 +173,20 @@ fn carried_frame(
     Some(Carried { origin_mm: frame.translation.vector, twists })
 }
 
-/// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model.
-fn tool_estimate(told: &Mounting, nominal: &Posed<'_>, estimated: &Posed<'_>, usual: &Joints) -> String {
+/// Said where no typical pose shows it.
+const NOT_TOLD: &str = "how far it would move had it been taught cannot be told here";
+
+/// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A tool that
+/// stands is touched once with the middle of the flange.
+fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+    let (nominal, estimated, usual) = (with.teaching.nominal, with.teaching.estimated, &with.usual);
+    if told.holds_part {
+        let flange = |arm: &Posed<'_>| arm.forward(usual).translation.vector;
+        let shift = (flange(estimated) - flange(nominal)).norm();
+        return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
+    }
     let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
-    let inverse = crate::kinematics::inverse::Inverse::new(nominal.model, &nominal.condition, nominal.model);
+    let inverse = Inverse::new(nominal.model, &nominal.condition, nominal.model);
     let at = nominal.forward(usual) * told.tool;
     let teaching: Vec<Joints> = turns
         .iter()
@@ -187,25 +196,27 @@ fn tool_estimate(told: &Mounting, nominal: &Posed<'_>, estimated: &Posed<'_>, us
         })
         .collect();
     match taught_tcp(estimated, &teaching) {
-        Some(tcp) if teaching.len() >= 3 => {
+        Some(tcp) => {
             let shift = (tcp - told.tool.translation.vector).norm();
             format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm")
         }
-        _ => "how far it would move had it been taught cannot be told here".to_owned(),
+        None => NOT_TOLD.to_owned(),
     }
 }
 
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
-fn object_estimate(told: &Mounting, nominal: &Posed<'_>, estimated: &Posed<'_>, usual: &Joints) -> String {
-    let inverse = crate::kinematics::inverse::Inverse::new(nominal.model, &nominal.condition, nominal.model);
-    let orientation = (nominal.forward(usual) * told.tool).rotation;
+fn object_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
+    let (nominal, estimated, usual) = (with.teaching.nominal, with.teaching.estimated, &with.usual);
+    let inverse = Inverse::new(nominal.model, &nominal.condition, nominal.model);
+    let orientation = told.target_of(&nominal.forward(usual)).rotation;
     let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]
         .iter()
         .filter_map(|[x, y]| {
-            let point = told.object * Point3::new(*x, *y, 0.0);
-            let pose = Pose::from_parts(point.coords.into(), orientation) * told.tool.inverse();
-            let joints = inverse.solve_near(&pose, usual).ok()?.joints;
-            Some(estimated.forward(&joints) * Point3::from(told.tool.translation.vector))
+            let target = Pose::from_parts(Vector3::new(*x, *y, 0.0).into(), orientation);
+            let joints = inverse.solve_near(&told.flange_for(&target), usual).ok()?.joints;
+            let tip = Point3::from(told.tool.translation.vector);
+            let flange = estimated.forward(&joints);
+            Some(if told.holds_part { flange.inverse() * tip } else { flange * tip })
         })
         .collect();
     match <[Point3<f64>; 3]>::try_from(touched).ok().and_then(|p| taught_frame(&p)) {
@@ -214,6 +225,6 @@ fn object_estimate(told: &Mounting, nominal: &Posed<'_>, estimated: &Posed<'_>, 
             let turn = pose.rotation.angle_to(&told.object.rotation).to_degrees();
             format!("had it been taught with this arm, it would move by about {shift:.2} mm and {turn:.3}°")
         }
-        None => "how far it would move had it been taught cannot be told here".to_owned(),
+        None => NOT_TOLD.to_owned(),
     }
 }

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use super::cell::{Carries, Cell};
-use super::mounting::{Mounted, Mounting, mount};
+use super::mounting::{Mounted, Mounting, Mounts, mount};
 use super::rewrite::{Arms, configured};
+use super::taught::Teaching;
 use super::why::Why;
 use crate::kinematics::model::Joints;
 use crate::math::se3::Pose;
@@ -17,7 +18,7 @@ pub(super) struct Mountings {
     pub(super) list: Vec<Mounted>,
     /// External axes that carry the base.
     base: [bool; 6],
-    /// What was assumed of external axes.
+    /// What was assumed of external axes, and what the cell file contradicts.
     assumed: Vec<String>,
 }
 
@@ -40,18 +41,21 @@ impl Mountings {
                 out.places.insert((tool, object), Err(Why::Program(reason)));
                 continue;
             };
-            let nominal = arms.nominal.arm();
             let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
-            out.list.push(mount(
-                (t, tv),
-                (o, ov),
-                cell,
-                nominal,
-                arms.estimated.arm(),
-                arms.knowledge,
-                &usual,
-            ));
-            out.places.insert((tool, object), Ok(out.list.len() - 1));
+            let teaching =
+                Teaching { nominal: arms.nominal.arm(), estimated: arms.estimated.arm(), cell, listing };
+            let found = match mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, usual })
+            {
+                Ok(mounted) => {
+                    out.list.push(mounted);
+                    Ok(out.list.len() - 1)
+                }
+                Err(fault) => {
+                    out.assumed.push(fault);
+                    Err(Why::Contradicted)
+                }
+            };
+            out.places.insert((tool, object), found);
         }
         out.external_axes(listing, arms, cell);
         out
@@ -111,8 +115,8 @@ impl Mountings {
     }
 
     pub(super) fn notes(&self) -> Vec<String> {
-        let mut out: Vec<String> = self.assumed.clone();
-        for note in self.list.iter().flat_map(|m| &m.notes) {
+        let mut out: Vec<String> = Vec::new();
+        for note in self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes)) {
             if !out.contains(note) {
                 out.push(note.clone());
             }

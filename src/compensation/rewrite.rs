@@ -284,14 +284,14 @@ fn obstacle(
 ) -> Option<(Status, Why)> {
     let motion = &listing.motions[index as usize];
     if let Some(reason) = motion.left {
-        return Some((Status::Left, Why::Program(reason)));
+        let why = Why::Program(reason);
+        return Some((unchanged(why), why));
     }
     let targets = solved.of(index as usize);
     let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
     let unknown = errors().find(|why| matches!(why, Why::Program(_)));
     if let Some(why) = unknown.or_else(|| errors().next()) {
-        let status = if matches!(why, Why::Program(_)) { Status::Left } else { Status::Refused };
-        return Some((status, why));
+        return Some((unchanged(why), why));
     }
     if targets.is_empty() {
         return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
@@ -584,6 +584,15 @@ fn work<'a>(
     let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
+fn unchanged(why: Why) -> Status {
+    match why {
+        Why::Program(Reason::BeyondReach) => Status::Refused,
+        Why::Program(_) => Status::Left,
+        _ => Status::Refused,
+    }
 }
 
 /// Whether a motion is of a kind that is rewritten at all.

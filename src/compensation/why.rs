@@ -15,6 +15,9 @@ pub enum Why {
         /// Its place among the external axes, 0-based.
         axis: usize,
     },
+    /// The cell file says of its tool or work object what the program does not bear out
+    /// ([`contradictions`](super::taught::contradictions) says what).
+    Contradicted,
     /// A joint target states joints, not a pose; rewritten only when asked.
     JointTarget,
     /// The new numbers are the old ones, to the decimals that are written; said once the program is rewritten.
@@ -127,6 +130,7 @@ impl Why {
         match self {
             Why::Program(reason) => reason.text(),
             Why::MovingBase { .. } => "an external axis carries the robot's base",
+            Why::Contradicted => "cell file and program contradict each other",
             Why::JointTarget => "a joint target",
             Why::Same => "nothing to change",
             Why::Inverse(InverseError::Unreachable { .. }) => "out of reach",
@@ -164,6 +168,9 @@ impl fmt::Display for Why {
             Why::Same => f.write_str("its numbers are right to the last decimal that is written"),
             Why::JointTarget => {
                 f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
+            }
+            Why::Contradicted => {
+                f.write_str("what the cell file says of its tool or work object and what the program says do not agree")
             }
             Why::MovingBase { axis } => write!(
                 f,

@@ -33,6 +33,7 @@ impl Limits {
 
 /// Mass of one link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Body {
     /// Mass (kg).
     pub mass_kg: f64,

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Summary of the sizes of errors, in the unit of the input (mm everywhere in truegrind).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ErrorSummary {
     /// Number of values.
     pub count: usize,

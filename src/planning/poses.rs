@@ -218,7 +218,7 @@ fn quality(told: &Told, chosen: &[usize], options: &Options) -> Option<Quality> 
     let rest: Vec<usize> = (0..told.rows()).filter(|i| !chosen.contains(i)).collect();
     let all: Vec<usize> = (0..told.rows()).collect();
     let pool = if rest.is_empty() { &all } else { &rest };
-    let judges: Vec<usize> = pool.iter().copied().step_by(pool.len().div_ceil(JUDGES)).collect();
+    let judges: Vec<usize> = pool.iter().copied().step_by(pool.len().div_ceil(JUDGES).max(1)).collect();
     let of = |set: &[usize]| -> Option<(f64, f64)> {
         let information = told.information(set);
         let sigma = told.reading_sigma(&information, &judges)? * options.noise.reading_mm;

@@ -42,6 +42,10 @@ pub struct Place {
     pub column: u32,
 }
 
+/// A coordinate of a frame or target beyond this (mm) is no place that an arm has to do with, nor is a joint angle beyond
+/// it (°).
+pub const FARTHEST_MM: f64 = 1e6;
+
 /// A frame as a program writes it: position and scalar-first quaternion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -63,6 +67,16 @@ impl Frame {
             Translation3::new(px, py, pz),
             UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
         )
+    }
+
+    /// Itself, where an arm can have to do with it.
+    ///
+    /// # Errors
+    /// [`Reason::BeyondReach`] for a coordinate beyond [`FARTHEST_MM`], or one that is no number.
+    pub fn within_reach(self) -> Result<Frame, Reason> {
+        let near = self.position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+        let turned = self.quaternion.iter().all(|part| part.is_finite());
+        if near && turned { Ok(self) } else { Err(Reason::BeyondReach) }
     }
 
     /// The frame of a rigid motion.
@@ -461,6 +475,11 @@ pub struct Listing {
     pub declarations: Vec<Declaration>,
     /// Tools that motions use.
     pub tools: Vec<Tool>,
+    /// Tools that are declared in the files, or stated beside them, whether motions use them or not: a work object may
+    /// have been taught with one that this program never moves.
+    pub declared_tools: Vec<Tool>,
+    /// How comments of an NC program call its numbered tools and work offsets: number (`T1`, `G54`), name.
+    pub labels: Vec<(String, String)>,
     /// Work objects that motions use.
     pub work_objects: Vec<WorkObject>,
     /// Speeds that motions use.
@@ -480,6 +499,12 @@ pub struct Listing {
 }
 
 impl Listing {
+    /// How comments of an NC program call a tool or work offset.
+    pub fn labels_of(&self, number: &str) -> impl Iterator<Item = &str> {
+        let here = self.labels.iter().filter(move |(other, _)| super::nc::setup::same(other, number));
+        here.map(|(_, label)| label.as_str())
+    }
+
     /// The tool of a motion.
     pub fn tool(&self, motion: &Motion) -> Option<&Tool> {
         motion.tool.and_then(|index| self.tools.get(index as usize))
@@ -495,6 +520,7 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
+            Some(Err(Reason::BeyondReach)) => return Some(Reason::BeyondReach),
             Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
@@ -505,6 +531,7 @@ impl Listing {
             Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
             Some(Ok(_)) => None,
             Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
+            Some(Err(Reason::BeyondReach)) => Some(Reason::BeyondReach),
             Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),
@@ -586,6 +613,8 @@ reasons! {
         WrongShape => "value has not the shape that the instruction needs",
         /// A quaternion that is far from norm 1.
         BadQuaternion => "quaternion is not of length 1 (off by more than 0.1)",
+        /// A number that no arm can hold.
+        BeyondReach => "a number beyond what any arm can hold (1,000,000 mm or degrees, 1,000,000 kg)",
         /// A robot axis says 9E9.
         UndefinedJoint => "a robot axis of the joint target is undefined (9E9)",
         /// A placeholder stands for the argument.

@@ -42,9 +42,9 @@
 //! | `work_object.name`, `tool.name` | names of wobjdata and tooldata | required |
 //! | `….position_mm` | of the frame in the robot's base; of the TCP in the flange | required |
 //! | `….quaternion` or `….rpy_deg` | w, x, y, z; or roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll) | no rotation |
-//! | `….origin` | `metrology` or `taught` | not known |
+//! | `….origin` | `metrology` or `taught`: with `--surface` it counts as that of a cell file, which must not say otherwise | not known |
 //! | `tool.mass_kg`, `cog_mm` | mass, and centre of gravity in the flange | required |
-//! | `tool.radius_mm` | radius where the tool touches | required by `scallop_mm` alone |
+//! | `tool.radius_mm` | radius where the tool touches; `step_over_mm` is at most twice as much | required by `scallop_mm` alone |
 //! | `path.pattern` | `raster`, `spiral`, `contour` | required |
 //! | `path.step_over_mm` or `path.scallop_mm` | distance of passes, or height of the cusp between them | one is required |
 //! | `path.along` | direction of a raster: `x` or `y`, of a parametric surface `u` or `v` | the first |
@@ -562,6 +562,11 @@ impl Reporter<'_> {
             }
         };
         let spacing = match (stated.step_over_mm, stated.scallop_mm, tool.radius_mm) {
+            (Some(step), None, Some(radius)) if step > 2.0 * radius => {
+                let expected = format!("at most {} mm, twice tool.radius_mm", 2.0 * radius);
+                let remedy = "make it smaller: the passes would leave strips between them";
+                return Err(self.value("path.step_over_mm", step.to_string(), expected, remedy));
+            }
             (Some(step_over_mm), None, _) => Spacing::StepOver { step_over_mm },
             (None, Some(scallop_mm), Some(tool_radius_mm)) => Spacing::Scallop { scallop_mm, tool_radius_mm },
             (None, Some(_), None) => {

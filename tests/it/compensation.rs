@@ -6,6 +6,7 @@ mod payload;
 mod play;
 mod reasons;
 mod singular;
+mod taught;
 
 use nalgebra::{DMatrix, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -245,14 +246,7 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
             std::array::from_fn(|i| q[i].to_degrees())
         })
         .collect();
-    let frame = |name: &str, origin, teaching_deg| CellFrame {
-        name: name.into(),
-        origin,
-        teaching_deg,
-        taught_with: None,
-        position_mm: None,
-        quaternion_wxyz: None,
-    };
+    let frame = |name: &str, origin, teaching_deg| CellFrame { teaching_deg, ..CellFrame::of(name, origin) };
     let cell = Cell {
         tool: vec![frame("tSpindle", FrameOrigin::Metrology, Vec::new())],
         wobj: vec![frame("wobjBlade", FrameOrigin::Taught, teaching_deg)],

@@ -20,3 +20,4 @@ mod visual;
 mod command;
 mod programs;
 mod layers;
+mod keys;

@@ -396,4 +396,41 @@ impl Recipe {
             RecipeError::Syntax { file: file.into(), line, message: error.message().replace('\n', " ") }
         })
     }
+
+    /// Whether each key has what gives it a meaning.
+    fn check_company(&self) -> Result<(), RecipeError> {
+        let wrong = |key: &str, found: &str, expected| {
+            Err(RecipeError::Invalid { key: key.into(), found: found.into(), expected })
+        };
+        let cable = matches!(self.sensor, SensorSetup::Cable { .. });
+        if self.noise.sigma_deg != 0.0 && !matches!(self.sensor, SensorSetup::Pose { .. }) {
+            return wrong(
+                "noise.sigma_deg",
+                "a sensor without orientation",
+                "sensor.kind = \"pose\", or no sigma_deg",
+            );
+        }
+        if self.rounding.readout_mm.is_some() && !self.readout {
+            return wrong("rounding.readout_mm", "no read-out", "readout = true beside it");
+        }
+        for fault in &self.fault {
+            match fault {
+                Fault::SensorZeroShift { .. } | Fault::CableSag { .. } if !cable => {
+                    return wrong("fault", "a fault of cables", "sensor.kind = \"cable\" beside it");
+                }
+                Fault::SensorFrameShift { turn_deg, .. } if cable && *turn_deg != [0.0; 3] => {
+                    return wrong(
+                        "fault.turn_deg",
+                        "a cable",
+                        "shift_mm alone: an outlet has no orientation",
+                    );
+                }
+                Fault::ReadoutMismatch { .. } if !self.readout => {
+                    return wrong("fault", "readout-mismatch without a read-out", "readout = true beside it");
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
 }

@@ -10,7 +10,7 @@
 
 use super::dialect::Dialect;
 use super::orientation::Angles;
-use crate::program::motion::{Frame, ToolValue};
+use crate::program::motion::{FARTHEST_MM, Frame, ToolValue};
 
 /// What is known beside the program. What is given here goes before what the program's comments say.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,6 +43,11 @@ fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
     list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
 }
 
+/// Whether two names are one: in any case, T08 is T8.
+pub fn same(one: &str, other: &str) -> bool {
+    plain(one) == plain(other)
+}
+
 /// A name in upper case without blanks, and its number without leading zeros.
 pub(super) fn plain(name: &str) -> String {
     let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
@@ -66,39 +71,49 @@ pub(super) enum Statement {
     /// `angles wpr`
     Angles(Angles),
     /// `tool T1 name [[…],[…]]`
-    Tool(String, Frame),
+    Tool(Stated),
     /// `frame G54 name [[…],[…]]`
-    Frame(String, Frame),
+    Frame(Stated),
 }
 
-/// Reads a comment as a statement of a frame, tool or convention.
-pub(super) fn statement(comment: &[u8]) -> Option<Statement> {
+/// A tool or work offset that a comment states.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stated {
+    /// As blocks call it: `T1`, `G54`.
+    pub(super) number: String,
+    /// As people call it, and a cell file may.
+    pub(super) name: String,
+    pub(super) frame: Frame,
+}
+
+/// Reads a comment as a statement of a frame, tool or convention; an error where it begins as one and cannot be read.
+pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, ()> {
     // Nearly every comment is turned away here.
     let text = comment.trim_ascii();
     let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"(")).unwrap_or(text).trim_ascii();
     if text.len() < 12 || !text[..10].eq_ignore_ascii_case(b"truegrind ") {
-        return None;
+        return Ok(None);
     }
-    let text = std::str::from_utf8(text).ok()?;
-    let text = text.strip_suffix(')').unwrap_or(text);
+    let text = String::from_utf8_lossy(text);
+    let text = text.strip_suffix(')').unwrap_or(&text);
     // `frame G54.1 P1 name [[` has a name of two words.
     let (head, tail) = text.split_at(text.find("[[").unwrap_or(text.len()));
     let words: Vec<&str> = head.split_ascii_whitespace().skip(1).collect();
-    let what = words.first()?.to_ascii_lowercase();
+    let Some(what) = words.first().map(|what| what.to_ascii_lowercase()) else { return Ok(None) };
     if what == "angles" {
-        return Angles::of(words.get(1)?).map(Statement::Angles);
+        let [_, angles] = words[..] else { return Err(()) };
+        return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or(());
     }
-    let name = match words[1..] {
-        [name, _] => name.to_owned(),
-        [name, number, _] => format!("{name} {number}"),
-        _ => return None,
+    if !matches!(&*what, "tool" | "frame") {
+        return Ok(None);
+    }
+    let (number, name) = match words[1..] {
+        [number, name] => (number.to_owned(), name),
+        [first, second, name] => (format!("{first} {second}"), name),
+        _ => return Err(()),
     };
-    let frame = frame(tail)?;
-    match &*what {
-        "tool" => Some(Statement::Tool(name, frame)),
-        "frame" => Some(Statement::Frame(name, frame)),
-        _ => None,
-    }
+    let stated = Stated { number, name: name.to_owned(), frame: frame(tail).ok_or(())? };
+    Ok(Some(if what == "tool" { Statement::Tool(stated) } else { Statement::Frame(stated) }))
 }
 
 /// `[[x,y,z],[q1,q2,q3,q4]]`
@@ -111,6 +126,7 @@ fn frame(text: &str) -> Option<Frame> {
     }
     let [x, y, z, w, i, j, k] = numbers;
     let square = w * w + i * i + j * j + k * k;
-    (found == 7 && (square - 1.0).abs() < 1e-3)
+    let near = [x, y, z].iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+    (found == 7 && near && (square - 1.0).abs() < 1e-3)
         .then_some(Frame { position_mm: [x, y, z], quaternion: [w, i, j, k] })
 }

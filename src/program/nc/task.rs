@@ -26,10 +26,12 @@ use super::machine::{Group, Meaning, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
-use super::setup::{self, Setup, Statement, statement};
+use super::setup::{self, Setup, Stated, Statement, held, statement};
 use super::syntax::{Belongs, NcTree, Word};
 use super::token::Token;
-use crate::program::motion::{Frame, Listing, Motion, MotionKind, OpaqueRegion, Place, Reason};
+use crate::program::motion::{
+    Frame, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
+};
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -423,27 +425,69 @@ impl<'t, 's> Lister<'t, 's> {
 
     /// Frames, tools and conventions that comments state.
     fn comments(&mut self) {
+        let (mut tools, mut frames) = (Vec::new(), Vec::new());
         for token in 0..self.tree.len() as u32 {
             if self.tree.kind(token) != Some(Token::Comment) {
                 continue;
             }
             match statement(self.tree.text(token)) {
-                Some(Statement::Angles(angles)) => self.angles = self.setup.angles.or(Some(angles)),
-                Some(Statement::Tool(name, frame)) => {
-                    self.tools.insert(setup::plain(&name), frame);
-                }
-                Some(Statement::Frame(name, frame)) => {
-                    self.frames.insert(setup::plain(&name), frame);
-                }
-                None => {}
+                Ok(Some(Statement::Angles(angles))) => self.angles = self.setup.angles.or(Some(angles)),
+                Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
+                Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
+                Ok(None) => {}
+                Err(()) => self.unread_comment(token),
             }
         }
+        let tool = |(name, frame): &(String, Frame)| {
+            let value = frame.within_reach().map(held);
+            Tool { name: name.clone(), value, place: None }
+        };
+        self.tools = self.stated(&tools);
+        self.frames = self.stated(&frames);
+        let told = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
+        let kept = told.filter(|(name, _)| {
+            self.tools.contains_key(&setup::plain(name)) && self.setup.tool(name).is_none()
+        });
+        let declared: Vec<Tool> =
+            self.setup.tools.iter().cloned().chain(kept).map(|one| tool(&one)).collect();
+        self.listing.declared_tools.extend(declared);
+        let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
+        self.listing.labels.extend(labels);
         // What is known beside the program goes before.
         let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
             list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
         };
         self.tools.extend(beside(&self.setup.tools));
         self.frames.extend(beside(&self.setup.frames));
+    }
+
+    /// Tools or work offsets that comments state, by plain name. One that is stated with two frames is not known.
+    fn stated(&mut self, all: &[(u32, Stated)]) -> HashMap<String, Frame> {
+        let mut found: HashMap<String, Frame> = HashMap::new();
+        let mut contradicted = Vec::new();
+        for (token, stated) in all {
+            let name = setup::plain(&stated.number);
+            match found.get(&name) {
+                Some(before) if *before != stated.frame => {
+                    self.unread_comment(*token);
+                    contradicted.push(name);
+                }
+                _ => drop(found.insert(name, stated.frame)),
+            }
+        }
+        for name in &contradicted {
+            found.remove(name);
+        }
+        found
+    }
+
+    /// A comment that was meant for this program and cannot be used is listed, not passed over.
+    fn unread_comment(&mut self, token: u32) {
+        self.listing.opaque.push(OpaqueRegion {
+            place: self.place(token),
+            span: self.tree.span(token, token + 1),
+            reason: OpaqueReason::Unexpected,
+        });
     }
 
     // ---- blocks ----
@@ -607,7 +651,11 @@ fn is_axis(letter: u8) -> bool {
 
 /// The axes that a block names, as bits.
 fn named_axes(said: &Said<'_>) -> u8 {
-    said.axes.iter().chain(&said.abc).enumerate().fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
+    said.axes
+        .iter()
+        .chain(&said.abc)
+        .enumerate()
+        .fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
 }
 
 /// The name of an axis, with or without the I of an increment.

@@ -9,8 +9,8 @@ mod change;
 
 use std::collections::{HashMap, HashSet};
 
-pub(super) use self::change::{places, resumes};
 pub use self::change::{Change, Ends, How, Reach};
+pub(super) use self::change::{places, resumes};
 use super::instruction;
 use super::modal::States;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};

@@ -75,6 +75,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<Statemen
     lister.put_literals(&literals);
     lister.settle_modal();
     lister.other_uses();
+    lister.declared_tools();
     (lister.listing, lister.statements)
 }
 

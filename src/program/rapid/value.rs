@@ -1,7 +1,8 @@
 //! Values of RAPID expressions as far as the text tells them, and the shapes of the predefined types.
 
 use crate::program::motion::{
-    Frame, JointTarget, Reason, RobTarget, SpeedValue, TargetValue, ToolValue, WorkObjectValue, ZoneValue,
+    FARTHEST_MM, Frame, JointTarget, Reason, RobTarget, SpeedValue, TargetValue, ToolValue, WorkObjectValue,
+    ZoneValue,
 };
 
 /// A value, whole or in part.
@@ -85,6 +86,7 @@ impl Value {
     pub fn frame(&self) -> Result<Frame, Reason> {
         let [position, rotation] = self.list(2)? else { return Err(Reason::WrongShape) };
         let frame = Frame { position_mm: position.numbers()?, quaternion: rotation.numbers()? };
+        within_reach(&frame.position_mm)?;
         usable(&frame.quaternion)?;
         Ok(frame)
     }
@@ -108,12 +110,10 @@ impl Value {
     pub fn tool(&self) -> Result<ToolValue, Reason> {
         let [robhold, frame, load] = self.list(3)? else { return Err(Reason::WrongShape) };
         let load = load.list(6)?;
-        Ok(ToolValue {
-            robhold: robhold.boolean()?,
-            frame: frame.frame()?,
-            mass_kg: load[0].number()?,
-            centre_of_gravity_mm: load[1].numbers()?,
-        })
+        let (mass_kg, centre_of_gravity_mm) = (load[0].number()?, load[1].numbers()?);
+        within_reach(&[mass_kg])?;
+        within_reach(&centre_of_gravity_mm)?;
+        Ok(ToolValue { robhold: robhold.boolean()?, frame: frame.frame()?, mass_kg, centre_of_gravity_mm })
     }
 
     /// A wobjdata.
@@ -163,6 +163,11 @@ pub fn usable(quaternion: &[f64; 4]) -> Result<(), Reason> {
     if (square - 1.0).abs() <= 0.1 { Ok(()) } else { Err(Reason::BadQuaternion) }
 }
 
+/// Whether numbers (mm, °, kg) are such as an arm can hold.
+pub fn within_reach(numbers: &[f64]) -> Result<(), Reason> {
+    if numbers.iter().all(|number| number.abs() <= FARTHEST_MM) { Ok(()) } else { Err(Reason::BeyondReach) }
+}
+
 fn external(values: [f64; 6]) -> [Option<f64>; 6] {
     values.map(|value| (value.abs() < NOT_CONNECTED).then_some(value))
 }
@@ -174,6 +179,7 @@ pub fn cartesian_target(
     conf: [f64; 4],
     axes: [f64; 6],
 ) -> Result<TargetValue, Reason> {
+    within_reach(&position_mm)?;
     usable(&quaternion)?;
     let conf = conf.map(|value| value.round() as i32);
     Ok(TargetValue::Cartesian(RobTarget { position_mm, quaternion, conf, external: external(axes) }))
@@ -184,6 +190,7 @@ pub fn joint_target(robot_deg: [f64; 6], axes: [f64; 6]) -> Result<TargetValue, 
     if robot_deg.iter().any(|angle| angle.abs() >= NOT_CONNECTED) {
         return Err(Reason::UndefinedJoint);
     }
+    within_reach(&robot_deg)?;
     Ok(TargetValue::Joint(JointTarget { robot_deg, external: external(axes) }))
 }
 

@@ -19,6 +19,8 @@ fn name(why: &Why) -> &'static str {
     match why {
         Why::Program(_) => "program",
         Why::MovingBase { .. } => "moving base",
+        // Only with a cell file (tests/it/compensation/taught.rs).
+        Why::Contradicted => "contradicted",
         // Only where a program is rewritten (tests/it/programs.rs).
         Why::Same => "same",
         Why::JointTarget => "joint target",

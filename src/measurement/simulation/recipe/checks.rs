@@ -56,7 +56,7 @@ impl Recipe {
             STEP.check_all(key, &step)?;
         }
         faults(&self.fault)?;
-        Ok(())
+        self.check_company()
     }
 
     fn check_arm(&self) -> Result<(), Unfit> {

@@ -346,9 +346,7 @@ impl Lister<'_, '_> {
         match self.state.tools.of(name) {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
-            None => {
-                self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown)
-            }
+            None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
         }
     }
 
@@ -373,7 +371,11 @@ impl Lister<'_, '_> {
         if let Some(&index) = self.tool_index.get(&name) {
             return index;
         }
-        let tool = Tool { name: name.clone(), value: self.tool_value(&name).map(held), place: None };
+        let tool = Tool {
+            name: name.clone(),
+            value: self.tool_value(&name).and_then(Frame::within_reach).map(held),
+            place: None,
+        };
         let index = intern(&mut self.listing.tools, tool);
         self.tool_index.insert(name, index);
         index
@@ -390,7 +392,8 @@ impl Lister<'_, '_> {
         let name = self.state.frame.clone();
         let stated = if self.state.stale { Err(Reason::Assigned) } else { self.frame_value(&name) };
         let within = self.state.programmable.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
-        let value = stated.map(|user_frame| WorkObjectValue {
+        let near = stated.and_then(Frame::within_reach).and_then(|user| Ok((user, within.within_reach()?)));
+        let value = near.map(|(user_frame, within)| WorkObjectValue {
             robhold: false,
             fixed: true,
             mechanical_unit: String::new(),

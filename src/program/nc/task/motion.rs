@@ -8,8 +8,8 @@ use super::super::expression::Worth;
 use super::super::machine::{ALL_BUT_PLANE, Group, Mode, Turn};
 use super::{Event, Lister, Needs, Said, Written};
 use crate::program::motion::{
-    Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed, SpeedValue,
-    Switch, TargetValue, Zone, ZoneValue,
+    FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
+    SpeedValue, Switch, TargetValue, Zone, ZoneValue,
 };
 
 impl Lister<'_, '_> {
@@ -194,6 +194,9 @@ impl Lister<'_, '_> {
         let rotation = self.state.rotation(self.angles);
         let target = |position: [Worth; 3], turn: Result<nalgebra::UnitQuaternion<f64>, Reason>| {
             let position_mm = [position[0]?, position[1]?, position[2]?];
+            if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
+                return Err(Reason::BeyondReach);
+            }
             let q = turn?;
             let quaternion = [q.w, q.i, q.j, q.k];
             Ok(TargetValue::Cartesian(RobTarget {

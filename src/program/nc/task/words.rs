@@ -228,9 +228,8 @@ impl<'s> Lister<'_, 's> {
     }
 
     pub(super) fn evaluated(&self, range: (u32, u32)) -> Worth {
-        let variables = |name: &Variable| -> Worth {
-            self.state.variables.get(name, || self.ever_set.contains(name))
-        };
+        let variables =
+            |name: &Variable| -> Worth { self.state.variables.get(name, || self.ever_set.contains(name)) };
         let mut reader = Reader::new(self.tree, self.dialect, range, &variables);
         match reader.expression() {
             Ok(value) if reader.at >= range.1 => value,

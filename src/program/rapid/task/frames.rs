@@ -3,8 +3,8 @@
 use super::super::flow::{DISPLACEMENT, State};
 use super::Lister;
 use crate::program::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
-use crate::program::rapid::evaluate::Context;
-use crate::program::rapid::symbol::Unit;
+use crate::program::rapid::evaluate::{Context, Known};
+use crate::program::rapid::symbol::{Unit, What};
 use crate::program::rapid::syntax::{text_of, tokens_of};
 use crate::program::rapid::token::{Token, display};
 use crate::program::rapid::value::{Value, built_in};
@@ -86,6 +86,25 @@ impl<'s> Lister<'_, 's> {
             self.tools.put(unit.scope, text, index);
         }
         index
+    }
+
+    /// The tools that the files declare, whether motions use them or not.
+    pub(super) fn declared_tools(&mut self) {
+        let known = Known::default();
+        for (id, symbol) in (0..).zip(&self.symbols.symbols) {
+            let What::Data(data) = &symbol.what else { continue };
+            if *symbol.type_name != *b"tooldata" || data.dimensions.is_some() {
+                continue;
+            }
+            let context = Context::new(symbol.file, symbol.scope, &known);
+            let tree = &self.trees[symbol.file as usize];
+            let tool = Tool {
+                name: display(tree.text(symbol.name)),
+                value: self.evaluator.symbol_value(context, id).tool(),
+                place: Some(self.place(symbol.file, symbol.name)),
+            };
+            self.listing.declared_tools.push(tool);
+        }
     }
 
     /// The work object of a motion, with the displacement in it that the text tells.

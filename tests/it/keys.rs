@@ -1,0 +1,229 @@
+//! Every key of every file is used, or it is an error.
+//!
+//! The class of fault: a key that is documented, read without complaint, and looked at by nobody (`taught_with` of a cell
+//! file, `origin` of a surface file). Here each key of a complete sample is changed and taken away in turn, and something
+//! that a user sees must change, or the file must be refused. A value that is one of a list of words is exchanged for the
+//! others, so that a spelling mistake does not count as use.
+
+use toml::{Table, Value};
+use truegrind::compensation::cell::Cell;
+use truegrind::kinematics::arm_file::ArmFile;
+use truegrind::measurement::simulation::recipe::Recipe;
+use truegrind::planning::toolpath::toolpath;
+use truegrind::program::rapid::writer;
+use truegrind::report::format::markdown;
+use truegrind::report::robots as view;
+use truegrind::surface::{SurfaceFile, sample};
+
+/// Words of which one may stand for another.
+const WORDS: [&[&str]; 13] = [
+    &["metrology", "taught"],
+    &["uframe", "oframe"],
+    &["base", "other"],
+    &["a", "b"],
+    &["tPointer", "tGrind"],
+    &["raster", "spiral", "contour"],
+    &["zigzag", "one-way"],
+    &["fixed", "feed"],
+    &["x", "y"],
+    &["u", "v"],
+    &["fine", "z0", "z1", "z5"],
+    &["unknown", "sequence", "random"],
+    &["rapid", "krl", "fanuc"],
+];
+
+/// A way to a value: keys, and places in lists of tables.
+type Way = Vec<Step>;
+
+#[derive(Debug, Clone)]
+enum Step {
+    Key(String),
+    Place(usize),
+}
+
+fn ways(value: &Value, way: &Way, out: &mut Vec<Way>) {
+    match value {
+        Value::Table(table) => {
+            for (key, inner) in table {
+                ways(inner, &[way.clone(), vec![Step::Key(key.clone())]].concat(), out);
+            }
+        }
+        Value::Array(list) if list.iter().any(Value::is_table) => {
+            for (place, inner) in list.iter().enumerate() {
+                ways(inner, &[way.clone(), vec![Step::Place(place)]].concat(), out);
+            }
+        }
+        _ => out.push(way.clone()),
+    }
+}
+
+fn at<'v>(value: &'v mut Value, way: &[Step]) -> &'v mut Value {
+    way.iter().fold(value, |value, step| match step {
+        Step::Key(key) => &mut value[key.as_str()],
+        Step::Place(place) => &mut value[*place],
+    })
+}
+
+/// Values that a user might have meant instead.
+fn others(value: &Value) -> Vec<Value> {
+    match value {
+        // A little, much, and so little that a range no longer holds what it should.
+        Value::Float(x) => [x * 1.01 + 0.37, x * 3.0 + 50.0, x / 5.0].map(Value::Float).to_vec(),
+        Value::Integer(n) => [n + 1, n * 3 + 50, n / 5].map(Value::Integer).to_vec(),
+        Value::Boolean(b) => vec![Value::Boolean(!b)],
+        Value::String(text) => match WORDS.iter().find(|words| words.contains(&text.as_str())) {
+            Some(words) => {
+                words.iter().filter(|word| *word != text).map(|word| Value::String((*word).into())).collect()
+            }
+            None => vec![Value::String(format!("{text}x"))],
+        },
+        Value::Array(list) => list.first().map_or_else(Vec::new, |first| {
+            let changed = |other: Value| Value::Array([vec![other], list[1..].to_vec()].concat());
+            others(first).into_iter().map(changed).collect()
+        }),
+        _ => Vec::new(),
+    }
+}
+
+/// The keys of a file that nobody reads. `seen`: what a user sees of the file, or why it is refused.
+pub(crate) fn unread(text: &str, seen: impl Fn(&str) -> Result<String, String>) -> Vec<String> {
+    let whole = Value::Table(text.parse::<Table>().unwrap());
+    let written = |value: &Value| toml::to_string(value).unwrap();
+    let before = seen(&written(&whole)).unwrap();
+    let mut all = Vec::new();
+    ways(&whole, &Vec::new(), &mut all);
+    assert!(all.len() > 5, "{text}");
+    let read = |way: &Way| {
+        let changed = others(at(&mut whole.clone(), way)).into_iter().any(|other| {
+            let mut new = whole.clone();
+            *at(&mut new, way) = other;
+            seen(&written(&new)).map_or(true, |after| after != before)
+        });
+        let mut without = whole.clone();
+        let Some((Step::Key(last), above)) = way.split_last() else { return changed };
+        at(&mut without, above).as_table_mut().unwrap().remove(last);
+        changed || seen(&written(&without)).is_ok_and(|after| after != before)
+    };
+    all.iter().filter(|way| !read(way)).map(|way| format!("{way:?}")).collect()
+}
+
+#[test]
+fn every_key_of_a_surface_file_is_read() {
+    let sheet = truegrind::robots::load("abb-irb-120").unwrap().model;
+    for shipped in sample::ALL {
+        let seen = |text: &str| -> Result<String, String> {
+            let read = SurfaceFile::read("s.toml", text.as_bytes(), |name| match name {
+                "plate.stl" => Ok(sample::PLATE_STL.to_vec()),
+                _ => Err("there is none"),
+            });
+            let file = read.map_err(|error| error.to_string())?;
+            let path = toolpath(&file, &sheet, "abb-irb-120").map_err(|error| error.to_string())?;
+            let program = writer::write(&path.draft).map_err(|error| error.to_string())?;
+            let cell = Cell::default().with_surface(&file)?;
+            Ok(format!("{}{cell:?}", String::from_utf8_lossy(&program)))
+        };
+        // Coarser, so that it does not take long.
+        let text = String::from_utf8_lossy(shipped.bytes).into_owned();
+        let mut coarse: Table = text.parse().unwrap();
+        for (frame, origin) in [("tool", "taught"), ("work_object", "metrology")] {
+            coarse[frame]
+                .as_table_mut()
+                .unwrap()
+                .insert("origin".to_owned(), Value::String(origin.to_owned()));
+        }
+        let path = coarse["path"].as_table_mut().unwrap();
+        path.insert("max_step_mm".to_owned(), Value::Float(20.0));
+        path.insert("lead_deg".to_owned(), Value::Float(2.0));
+        if let Some(step) = path.get_mut("step_over_mm") {
+            *step = Value::Float(25.0);
+            // It bounds the step, and has no other use there.
+            let mut narrow = coarse.clone();
+            narrow["tool"].as_table_mut().unwrap().insert("radius_mm".to_owned(), Value::Float(12.0));
+            let refused = seen(&toml::to_string(&narrow).unwrap()).unwrap_err();
+            assert!(refused.contains("path.step_over_mm"), "{refused}");
+            coarse["tool"].as_table_mut().unwrap().remove("radius_mm");
+        } else {
+            path.insert("scallop_mm".to_owned(), Value::Float(1.0));
+        }
+        let found = unread(&toml::to_string(&coarse).unwrap(), seen);
+        assert_eq!(found, Vec::<String>::new(), "{}", shipped.file);
+    }
+}
+
+#[test]
+fn every_key_of_a_recipe_is_read() {
+    let seen = |text: &str| -> Result<String, String> {
+        let recipe = Recipe::parse(text, "r.toml").map_err(|error| error.to_string())?;
+        let resolve = |name: &str| truegrind::robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+        let simulation = recipe.simulate(resolve).map_err(|error| error.to_string())?;
+        // `simulate` prints what it is about, and writes the arm.
+        let arm = toml::to_string(&ArmFile::from(&simulation.actual)).unwrap();
+        Ok(recipe.about + &simulation.csv + &arm)
+    };
+    for text in
+        [include_str!("../data/irb120-cable.toml"), include_str!("../data/irb120-rounded.toml"), RECIPE]
+    {
+        let text = text.replace("count = 300", "count = 40");
+        assert_eq!(unread(&text, seen), Vec::<String>::new());
+    }
+}
+
+/// With what the shipped recipes do not have.
+const RECIPE: &str = r#"
+robot = "abb-irb-120"
+seed = 4
+readout = true
+poses = { kind = "random", count = 12, repeats = 2, margin_deg = 10.0 }
+[[arm.link]]
+joint = 1
+a_mm = 0.4
+d_mm = 0.2
+alpha_deg = 0.02
+beta_deg = 0.03
+theta_deg = 0.1
+[[arm.effect]]
+effect = "thermal-drift"
+growth = 1e-4
+time_constant_h = 0.7
+growth_per_k = 1e-5
+reference_c = 20.0
+[circumstances]
+hours = 3.0
+temperature = { start_c = 20.0, end_c = 31.0, time_constant_h = 0.8 }
+payload_kg = [1.0, 2.0]
+[sensor]
+kind = "pose"
+frame = { position_mm = [900.0, 100.0, 300.0], wxyz = [0.8, 0.0, 0.0, 0.6] }
+target = { position_mm = [10.0, 0.0, 30.0], wxyz = [0.6, 0.8, 0.0, 0.0] }
+[noise]
+sigma_mm = 0.02
+per_metre_mm = 0.01
+sigma_deg = 0.01
+student_t = 4.0
+[rounding]
+readout_mm = 0.1
+[[fault]]
+fault = "readout-mismatch"
+row_list = [3, 4]
+shift_mm = [0.0, 2.0, 0.0]
+[[fault]]
+fault = "outliers"
+row_list = [6]
+size_mm = 5.0
+"#;
+
+#[test]
+fn every_key_of_a_robot_file_is_read() {
+    let all: Table = include_str!("../../src/robots/abb.toml").parse().unwrap();
+    let one = &all["robot"][0];
+    let text = toml::to_string(&Value::Table(Table::from_iter([(
+        "robot".to_owned(),
+        Value::Array(vec![one.clone()]),
+    )])))
+    .unwrap();
+    let seen = |text: &str| -> Result<String, String> {
+        let robot = truegrind::robots::parse(text, "r.toml").map_err(|error| error.to_string())?;
+        Ok(format!("{}{:?}", markdown::document(&view::document(&robot)), robot.model))
+    };
+    assert_eq!(unread(&text, seen), Vec::<String>::new());
+}
