@@ -18,4 +18,5 @@ pub mod model;
 pub mod nc;
 pub mod outcome;
 pub mod rapid;
+pub mod report;
 pub mod under_test;
