@@ -45,7 +45,8 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
         Control::Heidenhain => ["G54", "PRESET1", "PRESET2", "PRESET3", "PRESET5"],
     };
     let frame = |at: usize| {
-        let turn = if at == 2 { [0.0, 0.0, 30.0] } else { [0.0; 3] };
+        // Turned about so that axis 6 of a tool that points down is near 0, where there is one way to stand.
+        let turn = if at == 2 { [0.0, 0.0, 210.0] } else { [0.0, 0.0, 180.0] };
         (names[at].to_owned(), plain(std::array::from_fn(|axis| centre[axis] + shifts[at][axis]), turn))
     };
     let angles = [Angles::Wpr, Angles::Wpr, Angles::Abc, Angles::Rxyz][rng.random_range(0..4)];
@@ -62,7 +63,7 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
 fn reached(case: &Case) -> [f64; 3] {
     let links = &case.arm.nominal;
     let reach = links[0].a + links[1].a + links[3].d;
-    let down = plain([0.0; 3], [180.0, 0.0, 0.0]).rotation;
+    let down = plain([0.0; 3], [180.0, 0.0, 180.0]).rotation;
     let fits = |x: f64, z: f64| {
         [-60.0, 60.0].iter().all(|by| {
             let at = Pose::from_parts(nalgebra::Translation3::new(x + by, *by, z + 60.0 + by), down);

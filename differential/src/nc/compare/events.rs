@@ -6,7 +6,7 @@ use super::Pair;
 use super::follow::Follower;
 use crate::arm::{Pose, difference};
 use crate::nc::machine::{Event, Move, Say};
-use crate::outcome::{Disagreement, Tally};
+use crate::outcome::{Dialect, Disagreement, Tally};
 use crate::under_test::{Row, Status};
 
 /// How far a place may be from where it is written to be: four decimals of a millimetre, five of a degree and of an inch
@@ -85,8 +85,10 @@ impl Judge<'_> {
                     return self.wrong(line + 1, "path", format!("{a} -> {b}"));
                 }
                 if let (Some((at, chain)), Some((now, chain_now))) = (begin, begin_now) {
-                    let all = [true; 3];
-                    if let Some(off) = apart(*chain, *at, *chain_now, *now, all, LEFT_MM) {
+                    // A cycle, a probe or a call begins where the tool stands; a curve is another where its start is.
+                    let curve = ["CIP", "CT", "G5", "POLY"].iter().any(|word| a.contains(word));
+                    let bound = if curve { LEFT_MM } else { 3.0 * self.most + 0.05 };
+                    if let Some(off) = apart(*chain, *at, *chain_now, *now, [true; 3], bound) {
                         self.wrong(line + 1, "path-begins-elsewhere", format!("{a}: {off}"));
                     }
                 }
@@ -136,7 +138,12 @@ impl Judge<'_> {
         let _ = tool;
         self.tally.corrected += 1;
         self.most = self.most.max(difference(&wanted, &given).0);
-        let (mm, rad) = difference(&real, &wanted);
+        let (mm, mut rad) = difference(&real, &wanted);
+        if self.pair.dialect == Dialect::Heidenhain && old.angles == [None; 3] {
+            // TX TY TZ tell the axis of the tool and no turn about it.
+            let axis = nalgebra::Vector3::z();
+            rad = (real.rotation * axis).angle(&(wanted.rotation * axis));
+        }
         let sigma = if self.pair.case.play { 2.0 * row.sigma_mm.unwrap_or(0.0) } else { 0.0 };
         let more = row.after_mm.unwrap_or(0.0) + sigma;
         if mm > WRITTEN_MM + more || rad > WRITTEN_RAD + more / 100.0 {

@@ -50,7 +50,7 @@ impl Heidenhain<'_> {
             _ => self.line_or_arc(line, kind, words, &beside)?,
         }
         if beside.cycle {
-            self.machine.elsewhere(format!("cycle of {line}"), true);
+            self.machine.elsewhere("cycle that is called by M99", true);
         }
         if beside.control_off {
             self.machine.tip = false;
@@ -69,8 +69,9 @@ impl Heidenhain<'_> {
         if !words.moves() {
             return Ok(());
         }
-        if beside.machine || beside.normal {
-            self.machine.elsewhere(line, beside.normal);
+        let along_normal = beside.normal && words.vector == [None; 3];
+        if beside.machine || along_normal {
+            self.machine.elsewhere(line, along_normal);
             return Ok(());
         }
         self.machine.mode = match kind {

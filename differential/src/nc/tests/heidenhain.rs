@@ -119,5 +119,5 @@ fn what_stands_beside_a_path_acts() {
     assert_eq!(found[1].tool.unwrap().translation.vector.z, 90.0);
     let z = found[2].turns[1].unwrap() * nalgebra::Vector3::z();
     assert!((z.z + 1.0).abs() < 1e-12);
-    assert_eq!(others(Heidenhain, "L X+1 M8\nL X+2 M99"), ["M8", "cycle of L X+2 M99"]);
+    assert_eq!(others(Heidenhain, "L X+1 M8\nL X+2 M99"), ["M8", "cycle that is called by M99"]);
 }
