@@ -45,8 +45,9 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
         Control::Heidenhain => ["G54", "PRESET1", "PRESET2", "PRESET3", "PRESET5"],
     };
     let frame = |at: usize| {
-        // Turned about so that axis 6 of a tool that points down is near 0, where there is one way to stand.
-        let turn = if at == 2 { [0.0, 0.0, 210.0] } else { [0.0, 0.0, 180.0] };
+        // Where axes 1 and 6 of a tool that points down are near 45° and axis 4 near 0: a program says no configuration,
+        // and there is no other that is as near to the zero of all axes.
+        let turn = if at == 2 { [0.0, 0.0, 160.0] } else { [0.0, 0.0, 180.0] };
         (names[at].to_owned(), plain(std::array::from_fn(|axis| centre[axis] + shifts[at][axis]), turn))
     };
     let angles = [Angles::Wpr, Angles::Wpr, Angles::Abc, Angles::Rxyz][rng.random_range(0..4)];
@@ -66,17 +67,25 @@ fn reached(case: &Case) -> [f64; 3] {
     let down = plain([0.0; 3], [180.0, 0.0, 180.0]).rotation;
     let fits = |x: f64, z: f64| {
         [-60.0, 60.0].iter().all(|by| {
-            let at = Pose::from_parts(nalgebra::Translation3::new(x + by, *by, z + 60.0 + by), down);
+            let [out, side] = beside(x + by);
+            let at = Pose::from_parts(nalgebra::Translation3::new(out, side, z + 60.0 + by), down);
             case.arm.nominal_inverse(&at, None).iter().any(|q| q[4] > 0.1)
         })
     };
     for (out, up) in [(0.7, 0.44), (0.65, 0.4), (0.6, 0.4), (0.6, 0.5), (0.75, 0.3)] {
         let (x, z) = ((out * reach).round(), (up * reach).round());
         if fits(x, z) {
-            return [x, 0.0, z];
+            let [out, side] = beside(x);
+            return [out, side, z];
         }
     }
-    [(0.7 * reach).round(), 0.0, (0.44 * reach).round()]
+    let [out, side] = beside((0.7 * reach).round());
+    [out, side, (0.44 * reach).round()]
+}
+
+/// A distance from the arm's axis 1, half way between x and y (mm).
+fn beside(distance: f64) -> [f64; 2] {
+    [(distance * std::f64::consts::FRAC_1_SQRT_2).round(); 2]
 }
 
 /// The program of a seed.

@@ -22,7 +22,7 @@ pub struct Follower<'c> {
 impl<'c> Follower<'c> {
     /// An arm of which nothing is known.
     pub fn new(case: &'c Case) -> Follower<'c> {
-        Follower { case, joints: None, approach: [0; 6], last: [0.0, 0.3, 0.2, 0.0, 1.0, 0.0] }
+        Follower { case, joints: None, approach: [0; 6], last: [0.8, 0.3, 0.2, 0.0, 1.0, 0.8] }
     }
 
     /// The arm goes where nothing tells.
