@@ -1,0 +1,254 @@
+//! Two runs, event by event.
+
+use nalgebra::Point3;
+
+use super::Pair;
+use super::follow::Follower;
+use crate::arm::{Pose, difference};
+use crate::nc::machine::{Event, Move, Say};
+use crate::outcome::{Dialect, Disagreement, Tally};
+use crate::under_test::{Row, Status};
+
+/// How far a place may be from where it is written to be: four decimals of a millimetre, five of a degree and of an inch
+/// on a tool of 0.3 m, and the remainder of the solution.
+const WRITTEN_MM: f64 = 0.03;
+/// The same for the turn of the tool (rad).
+const WRITTEN_RAD: f64 = 3e-4;
+/// What is left goes where it went, but for the rounding of words that are said again (mm, °).
+const LEFT_MM: f64 = 2e-3;
+const LEFT_DEG: f64 = 1e-3;
+
+/// Compares the runs; the second may have motions that were put in.
+pub fn compare(pair: &Pair<'_>, before: &[Event], after: &[Event], whole: bool) -> Tally {
+    let mut judge = Judge {
+        pair,
+        tally: Tally::default(),
+        arm: Follower::new(pair.case),
+        arm_before: Follower::new(pair.case),
+        most: 0.0,
+    };
+    let mut old = before.iter();
+    for new in after {
+        let put_in = !matches!(new, Event::Note(_)) && pair.origin(new).is_none();
+        if put_in {
+            if let Event::Move(done) = new {
+                judge.arm.go(done);
+            }
+            continue;
+        }
+        let Some(old) = old.next() else {
+            if whole {
+                judge.wrong(0, "more-events", format!("{new:?}"));
+            }
+            return judge.tally;
+        };
+        judge.event(old, new);
+        if !judge.tally.disagreements.is_empty() {
+            return judge.tally;
+        }
+    }
+    if let Some(old) = old.next() {
+        judge.wrong(0, "fewer-events", format!("{old:?}"));
+    }
+    judge.tally
+}
+
+struct Judge<'j> {
+    pair: &'j Pair<'j>,
+    tally: Tally,
+    arm: Follower<'j>,
+    arm_before: Follower<'j>,
+    /// The largest correction so far (mm).
+    most: f64,
+}
+
+impl Judge<'_> {
+    fn wrong(&mut self, line: usize, kind: &'static str, text: String) {
+        let Pair { dialect, seed, .. } = *self.pair;
+        self.tally.disagreements.push(Disagreement { dialect, seed, line, kind, text });
+    }
+
+    fn event(&mut self, old: &Event, new: &Event) {
+        match (old, new) {
+            (Event::Move(old), Event::Move(new)) => {
+                if self.pair.origins.get(new.line).copied().flatten() != Some(old.line) {
+                    return self.wrong(old.line + 1, "order", format!("line {} instead", new.line + 1));
+                }
+                self.tally.executed += 1;
+                self.motion(old, new);
+            }
+            (Event::Note(a), Event::Note(b)) if a == b => {}
+            (Event::Elsewhere(line, a, begin), Event::Elsewhere(_, b, begin_now)) => {
+                self.arm.lost();
+                self.arm_before.lost();
+                if a != b {
+                    return self.wrong(line + 1, "path", format!("{a} -> {b}"));
+                }
+                if let (Some((at, chain)), Some((now, chain_now))) = (begin, begin_now) {
+                    // A cycle, a probe or a call begins where the tool stands; a curve is another where its start is.
+                    let curve = ["CIP", "CT", "G5", "POLY"].iter().any(|word| a.contains(word));
+                    let bound = if curve { LEFT_MM } else { 3.0 * self.most + 0.05 };
+                    if let Some(off) = apart(*chain, *at, *chain_now, *now, [true; 3], bound) {
+                        self.wrong(line + 1, "path-begins-elsewhere", format!("{a}: {off}"));
+                    }
+                }
+            }
+            _ => self.wrong(0, "events", format!("{old:?} -> {new:?}")),
+        }
+    }
+
+    fn rows(&self, line: usize) -> Vec<&Row> {
+        self.pair.done.rows.iter().filter(|row| row.line == line + 1).collect()
+    }
+
+    fn motion(&mut self, old: &Move, new: &Move) {
+        let line = old.line + 1;
+        if (old.mode, &old.state) != (new.mode, &new.state) {
+            let text = format!("{:?} {} -> {:?} {}", old.mode, old.state, new.mode, new.state);
+            return self.wrong(line, "state", text);
+        }
+        let rows: Vec<Row> = self.rows(old.line).into_iter().cloned().collect();
+        let changed = rows.iter().find(|row| matches!(row.status, Status::Changed | Status::Flagged));
+        self.arm_before.go(old);
+        let real = self.arm.go(new);
+        let told = old.pose().zip(new.pose()).zip(old.tool);
+        let Some(row) = changed else {
+            if rows.iter().any(|row| row.status == Status::Refused) {
+                self.tally.refused += 1;
+            } else {
+                self.tally.left += 1;
+            }
+            let reason = rows.iter().find_map(|row| row.reason.clone()).unwrap_or_default();
+            return self.left(old, new, &reason);
+        };
+        let Some(((wanted, given), tool)) = told else {
+            let text = format!(
+                "changed, but where it goes is not told: {:?} {:?} {}",
+                old.to, old.angles, old.state
+            );
+            return self.wrong(line, "unknown-changed", text);
+        };
+        if old.tool.map(|t| t.translation) != new.tool.map(|t| t.translation) {
+            return self.wrong(line, "tool", format!("{:?} {:?}", old.tool, new.tool));
+        }
+        let Some(real) = real else {
+            self.tally.unreachable += 1;
+            return;
+        };
+        let _ = tool;
+        self.tally.corrected += 1;
+        self.most = self.most.max(difference(&wanted, &given).0);
+        let (mm, mut rad) = difference(&real, &wanted);
+        if self.pair.dialect == Dialect::Heidenhain && old.angles == [None; 3] {
+            // TX TY TZ tell the axis of the tool and no turn about it.
+            let axis = nalgebra::Vector3::z();
+            rad = (real.rotation * axis).angle(&(wanted.rotation * axis));
+        }
+        let sigma = if self.pair.case.play { 2.0 * row.sigma_mm.unwrap_or(0.0) } else { 0.0 };
+        let more = row.after_mm.unwrap_or(0.0) + sigma;
+        if mm > WRITTEN_MM + more || rad > WRITTEN_RAD + more / 100.0 {
+            let before = self.arm.at(&wanted, &tool).map_or(0.0, |pose| difference(&pose, &wanted).0);
+            let text = format!(
+                "{mm:.4} mm and {rad:.6} rad from where it shall be (before {before:.3} mm; stated {:?}): {:?} -> {:?}, {:?} -> {:?}",
+                row.after_mm, old.to, new.to, old.angles, new.angles
+            );
+            return self.wrong(line, "wrong-place", text);
+        }
+        self.changed_arc(old, new);
+    }
+
+    /// An arc that was changed keeps to the way that was meant.
+    fn changed_arc(&mut self, old: &Move, new: &Move) {
+        let (Some(was), line) = (old.arc, old.line + 1) else { return };
+        let Some(now) = new.arc else {
+            return self.wrong(line, "arc-lost", format!("{was:?} {:?} {:?}", new.from, new.to));
+        };
+        let mismatch = (now.radii[0] - now.radii[1]).abs() - (was.radii[0] - was.radii[1]).abs();
+        if mismatch > 3e-3 {
+            return self.wrong(line, "arc-radii", format!("{was:?} -> {now:?}"));
+        }
+        let slack = 0.02 + 4.0 * self.most.max(0.1) / was.radii[0].max(0.1);
+        if was.sweep.signum() != now.sweep.signum() || (was.sweep - now.sweep).abs() > slack.min(0.8) {
+            return self.wrong(line, "arc-sweep", format!("{was:?} -> {now:?}"));
+        }
+        if let (Some(wanted), Some(given), Some(tool)) = (old.mid(), new.mid(), old.tool) {
+            let real = self.arm.at(&given, &tool).map(|pose| difference(&pose, &wanted).0);
+            let raw = self.arm.at(&wanted, &tool).map(|pose| difference(&pose, &wanted).0);
+            if let (Some(real), Some(raw)) = (real, raw)
+                && real > raw + 0.05
+            {
+                let text = format!("half way {real:.3} mm off, before {raw:.3}: {was:?} -> {now:?}");
+                self.wrong(line, "arc-middle", text);
+            }
+        }
+    }
+
+    /// A motion that is left goes where it always went; what it does not say, where its start is not known, goes on from
+    /// where the motion before it ended.
+    fn left(&mut self, old: &Move, new: &Move, reason: &str) {
+        let line = old.line + 1;
+        let free = goes_on(reason);
+        let stated = old.words.place.map(|say| matches!(say, Some(Say::To(_))) || !free);
+        if let Some(off) = apart(old.chain, old.to, new.chain, new.to, stated, LEFT_MM) {
+            return self.wrong(line, "left-moved", format!("{off} ({reason})"));
+        }
+        for (axis, say) in old.words.turn.iter().enumerate() {
+            let (Some(a), Some(b)) = (old.angles[axis], new.angles[axis]) else { continue };
+            let off = (a - b).abs();
+            if off > LEFT_DEG && (matches!(say, Some(Say::To(_))) || !free) {
+                return self.wrong(
+                    line,
+                    "left-turned",
+                    format!("{:?} -> {:?} ({reason})", old.angles, new.angles),
+                );
+            }
+            if off > 3.0 {
+                return self.wrong(line, "left-turned-far", format!("{:?} -> {:?}", old.angles, new.angles));
+            }
+        }
+        let bound = 3.0 * self.most + 0.05;
+        if let Some(off) = apart(old.chain, old.to, new.chain, new.to, [true; 3], bound) {
+            return self.wrong(line, "left-moved-far", format!("{off} ({reason})"));
+        }
+        if let (Some(was), Some(now)) = (old.arc, new.arc) {
+            let moved = apart(old.chain, was.mid, new.chain, now.mid, [true; 3], 5e-3);
+            if let Some(off) = moved.filter(|_| !free || stated == [true; 3]) {
+                self.wrong(line, "left-arc-moved", format!("half way {off}: {was:?} -> {now:?} ({reason})"));
+            } else if (was.sweep - now.sweep).abs() > 1.0 {
+                self.wrong(line, "left-arc-sweep", format!("{was:?} -> {now:?} ({reason})"));
+            }
+        } else if old.arc.is_some() != new.arc.is_some() {
+            self.wrong(line, "left-arc-known", format!("{:?} -> {:?} ({reason})", old.arc, new.arc));
+        }
+    }
+}
+
+/// Whether a motion is left because its start is not known, so that axes that it does not say go on from the motion
+/// before it.
+fn goes_on(reason: &str) -> bool {
+    ["known only at run time", "has no value", "is not stated", "calls", "may be skipped", "not known"]
+        .iter()
+        .any(|part| reason.contains(part))
+        || reason.is_empty()
+}
+
+/// How far two places are apart, in the coordinates of the first, if more than `bound` in one of the axes asked for.
+fn apart(
+    chain: Option<Pose>,
+    at: [Option<f64>; 3],
+    chain_now: Option<Pose>,
+    now: [Option<f64>; 3],
+    asked: [bool; 3],
+    bound: f64,
+) -> Option<String> {
+    let mut there = now;
+    if let (Some(chain), Some(chain_now), [Some(x), Some(y), Some(z)]) = (chain, chain_now, now) {
+        let moved = chain.inverse() * chain_now * Point3::new(x, y, z);
+        there = [Some(moved.x), Some(moved.y), Some(moved.z)];
+    }
+    let far = |axis: usize| match (at[axis], there[axis]) {
+        (Some(a), Some(b)) => asked[axis] && (a - b).abs() > bound,
+        _ => false,
+    };
+    (0..3).any(far).then(|| format!("{at:?} -> {there:?}"))
+}

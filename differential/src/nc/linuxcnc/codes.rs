@@ -1,0 +1,291 @@
+//! What the words of a LinuxCNC block do, in its order of execution: feed, spindle, tool, length, coordinates, distance,
+//! shifts, motion.
+
+use super::super::arc::Circle;
+use super::super::machine::{Mode, Say, Turn, Words};
+use super::super::setting::{Pose, plain};
+use super::{Block, LinuxCnc};
+
+const AXES: [char; 3] = ['X', 'Y', 'Z'];
+
+impl LinuxCnc<'_> {
+    pub fn recount(&mut self) {
+        let frame = self.frames.get(&self.frame).copied();
+        let [x, y, z] = self.shift;
+        let chain = frame.zip(x).zip(y).zip(z).map(|(((frame, x), y), z)| frame * Pose::translation(x, y, z));
+        self.machine.recount(chain);
+    }
+
+    pub(super) fn act(&mut self, block: &Block) -> Result<(), String> {
+        if let Some(feed) = block.get('F') {
+            self.machine.feed = format!("{feed}");
+        }
+        if let Some(speed) = block.get('S') {
+            self.machine.note(format!("S{speed}"));
+        }
+        if let Some(tool) = block.get('T') {
+            self.waiting = Some(tool as i32);
+        }
+        self.switches(block)?;
+        for &code in &block.codes {
+            let machine = &mut self.machine;
+            match code {
+                170 | 180 | 190 => machine.plane = (code / 10) as u8,
+                200 => machine.unit = 25.4,
+                210 => machine.unit = 1.0,
+                400 | 410 | 420 => machine.side = (code / 10) as u8,
+                901 => self.arcs_absolute = true,
+                911 => self.arcs_absolute = false,
+                610 | 611 | 640 => machine.note(format!("G{code}")),
+                _ => {}
+            }
+        }
+        self.lengths_of_tools(block);
+        self.offsets(block)?;
+        for &code in &block.codes {
+            match code {
+                900 => self.machine.absolute = true,
+                910 => self.machine.absolute = false,
+                _ => {}
+            }
+        }
+        if block.has(40) {
+            self.machine.note(format!("wait {:?}", block.get('P')));
+        }
+        if self.shifts(block)? {
+            return Ok(());
+        }
+        self.motion(block);
+        Ok(())
+    }
+
+    fn switches(&mut self, block: &Block) -> Result<(), String> {
+        for &switch in &block.switches {
+            self.machine.note(format!("M{switch}"));
+            match switch {
+                6 => {
+                    if let Some(tool) = self.waiting {
+                        self.spindle = format!("T{tool}");
+                        self.machine.tool = Some(self.spindle.clone());
+                        self.machine.note(self.spindle.clone());
+                    }
+                    self.machine.lost();
+                }
+                61 => {
+                    self.spindle = format!("T{}", block.get('Q').ok_or("Q")?);
+                    self.machine.tool = Some(self.spindle.clone());
+                    self.machine.lost();
+                }
+                70 | 73 => {
+                    let m = &self.machine;
+                    let kept = (m.mode, m.plane, m.unit, m.absolute, self.arcs_absolute);
+                    let (feed, frame) = (m.feed.clone(), self.frame.clone());
+                    self.kept = Some((kept.0, kept.1, kept.2, kept.3, kept.4, feed, frame));
+                }
+                71 => self.kept = None,
+                72 => {
+                    if let Some((_, plane, unit, absolute, arcs, feed, frame)) = self.kept.clone() {
+                        let m = &mut self.machine;
+                        (m.plane, m.unit, m.absolute, m.feed) = (plane, unit, absolute, feed);
+                        self.arcs_absolute = arcs;
+                        if frame != self.frame {
+                            self.frame = frame;
+                            self.recount();
+                            self.machine.turn = Turn::Unknown;
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn lengths_of_tools(&mut self, block: &Block) {
+        if block.has(430) {
+            self.machine.tool = Some(match block.get('H') {
+                Some(number) if number != 0.0 => format!("T{number}"),
+                Some(_) => "T0".to_owned(),
+                None => self.spindle.clone(),
+            });
+            self.machine.lost();
+        }
+        if block.has(431) {
+            self.machine.tool = None;
+            self.machine.lost();
+        }
+        if block.has(490) {
+            self.machine.tool = Some(self.spindle.clone());
+            self.machine.lost();
+        }
+    }
+
+    fn offsets(&mut self, block: &Block) -> Result<(), String> {
+        for &code in &block.codes {
+            if (540..=593).contains(&code) && (code % 10 == 0 || code > 590) {
+                let name =
+                    if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G59.{}", code % 10) };
+                self.frame = name;
+                self.recount();
+                self.machine.turn = Turn::Unknown;
+            }
+        }
+        Ok(())
+    }
+
+    fn places(&self, block: &Block) -> [Option<f64>; 3] {
+        AXES.map(|letter| block.get(letter).map(|value| value * self.machine.unit))
+    }
+
+    /// G10, G92, G52, G28, G30, G53, probing and paths that are not followed; true where the block does nothing else.
+    fn shifts(&mut self, block: &Block) -> Result<bool, String> {
+        let places = self.places(block);
+        if block.has(100) {
+            self.set_offset(block, places);
+            return Ok(true);
+        }
+        if block.has(920) {
+            for (axis, place) in places.iter().enumerate() {
+                if let Some(place) = place {
+                    let zero = self.shift[axis].zip(self.machine.at[axis]);
+                    self.shift[axis] = zero.map(|(zero, at)| zero + at - place);
+                }
+            }
+            self.kept_shift = self.shift;
+            self.recount();
+            for (axis, place) in places.iter().enumerate() {
+                if place.is_some() && self.machine.at[axis].is_none() {
+                    self.machine.at[axis] = *place;
+                }
+            }
+            return Ok(true);
+        }
+        if block.has(520) {
+            for (axis, place) in places.iter().enumerate() {
+                if place.is_some() {
+                    self.shift[axis] = *place;
+                }
+            }
+            self.recount();
+            return Ok(true);
+        }
+        if block.has(921) || block.has(922) {
+            if block.has(921) {
+                self.kept_shift = [Some(0.0); 3];
+            } else {
+                self.kept_shift = self.shift;
+            }
+            self.shift = [Some(0.0); 3];
+            self.recount();
+        }
+        if block.has(923) {
+            self.shift = self.kept_shift;
+            self.recount();
+        }
+        for (code, begins) in [(280, false), (300, false), (530, false), (382, true), (383, true)] {
+            if block.has(code) {
+                self.mode_of(block);
+                self.machine.elsewhere(block.text.clone(), begins);
+                return Ok(true);
+            }
+        }
+        if let Some(code) = [50, 51, 330, 331, 810, 820, 830].iter().find(|code| block.has(**code)) {
+            self.machine.mode = Mode::Other(*code as u16);
+            self.machine.elsewhere(block.text.clone(), true);
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    fn set_offset(&mut self, block: &Block, places: [Option<f64>; 3]) {
+        let number = block.get('P').unwrap_or(0.0).round() as i32;
+        let name = match number {
+            0 => self.frame.clone(),
+            1..=6 => format!("G{}", 53 + number),
+            _ => format!("G59.{}", number - 6),
+        };
+        match block.get('L').map(|l| l.round() as i32) {
+            Some(2) => {
+                let Some(frame) = self.frames.get_mut(&name) else { return };
+                let mut at: [f64; 3] = frame.translation.vector.into();
+                for (axis, place) in places.iter().enumerate() {
+                    at[axis] = place.unwrap_or(at[axis]);
+                }
+                // R turns about Z.
+                *frame = match block.get('R') {
+                    Some(turn) => plain(at, [0.0, 0.0, turn]),
+                    None => Pose::from_parts(at.into(), frame.rotation),
+                };
+                if block.words.iter().any(|(letter, _)| "ABC".contains(*letter)) {
+                    self.frames.remove(&name);
+                }
+            }
+            Some(20) => {
+                // The offset becomes what makes the place here read so; where the tip is decides.
+                let [x, y, z] = self.machine.at;
+                let here = x.zip(y).zip(z).filter(|_| name == self.frame && self.shift == [Some(0.0); 3]);
+                match (here, self.frames.get_mut(&name)) {
+                    (Some(((x, y), z)), Some(frame)) => {
+                        let at = [x, y, z];
+                        let by: [f64; 3] =
+                            std::array::from_fn(|axis| places[axis].map_or(0.0, |place| at[axis] - place));
+                        *frame *= Pose::translation(by[0], by[1], by[2]);
+                    }
+                    _ => drop(self.frames.remove(&name)),
+                }
+            }
+            _ => {}
+        }
+        if name == self.frame {
+            self.recount();
+        }
+    }
+
+    fn mode_of(&mut self, block: &Block) {
+        for &code in &block.codes {
+            self.machine.mode = match code {
+                0 => Mode::Rapid,
+                10 => Mode::Line,
+                20 => Mode::Clockwise,
+                30 => Mode::Anticlockwise,
+                800 => Mode::Unset,
+                _ => continue,
+            };
+        }
+    }
+
+    fn motion(&mut self, block: &Block) {
+        self.mode_of(block);
+        let unit = self.machine.unit;
+        let absolute = self.machine.absolute;
+        let say = |value: f64| if absolute { Say::To(value) } else { Say::By(value) };
+        let mut words = Words { place: self.places(block).map(|place| place.map(say)), ..Words::default() };
+        words.turn = ['A', 'B', 'C'].map(|letter| block.get(letter).map(say));
+        let offsets = ['I', 'J', 'K'].map(|letter| block.get(letter).map(|value| value * unit));
+        if !words.moves() && offsets.iter().all(Option::is_none) {
+            return;
+        }
+        if matches!(self.machine.mode, Mode::Other(_)) {
+            self.machine.elsewhere(block.text.clone(), true);
+            return;
+        }
+        if matches!(self.machine.mode, Mode::Clockwise | Mode::Anticlockwise) {
+            if let Some(turns) = block.get('P') {
+                self.machine.note(format!("turns {turns}"));
+            }
+            words.circle = Some(match block.get('R') {
+                Some(radius) => Circle::Radius(radius * unit),
+                None => {
+                    let at = self.machine.at;
+                    let arcs_absolute = self.arcs_absolute;
+                    Circle::Centre(std::array::from_fn(|axis| {
+                        Some(if arcs_absolute { offsets[axis]? } else { at[axis]? + offsets[axis]? })
+                    }))
+                }
+            });
+        }
+        if words.moves() {
+            self.machine.go(words);
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Runs the original and the corrected program and compares what the arm does.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::course::{Course, Point, flange, same};
+use super::make::{self, Made};
+use super::run::{Event, Goal, Motion, Run, Stop};
+use crate::arm::{Arm, Circumstance, Pose, difference};
+use crate::model::{self, Case};
+use crate::outcome::{Disagreement, Dialect, Tally};
+use crate::under_test::{CorrectedTask, Edit, Row, Status, corrected_task};
+
+/// What random programs contain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Features {
+    /// Functions with effects as arguments.
+    pub effects: bool,
+    /// Frames that were taught.
+    pub taught: bool,
+    /// Targets near limits and singularities.
+    pub borders: bool,
+}
+
+impl Features {
+    /// Everything.
+    pub const ALL: Features = Features { effects: true, taught: true, borders: true };
+}
+
+/// Both programs of a seed, as they are given to the interpreter, with what was seen.
+#[derive(Debug)]
+pub struct Shown {
+    /// The original files.
+    pub original: Vec<(String, Vec<u8>)>,
+    /// The corrected files.
+    pub corrected: Vec<(String, Vec<u8>)>,
+    /// What became of each motion.
+    pub rows: Vec<Row>,
+    /// What was counted.
+    pub tally: Tally,
+}
+
+/// One random program: made, corrected, run, compared.
+pub fn run(seed: u64, features: Features) -> Tally {
+    shown(seed, features).tally
+}
+
+/// The same with both programs.
+pub fn shown(seed: u64, features: Features) -> Shown {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Frames that were taught are worked out for an arm that stands where it is told to, play and load apart.
+    let taught = features.taught && rng.random_bool(0.12);
+    let case = if taught { model::with(seed, false, false) } else { model::random(seed) };
+    let made = make::program(&mut rng, &case, features, taught);
+    compare(seed, &case, &made)
+}
+
+/// Compares a program with its correction.
+pub fn compare(seed: u64, case: &Case, made: &Made) -> Shown {
+    let tally = Tally { programs: 1, ..Tally::default() };
+    let mut out = Shown { original: made.files.clone(), corrected: Vec::new(), rows: Vec::new(), tally };
+    let files: Vec<(&str, &[u8])> = made.files.iter().map(|(name, text)| (name.as_str(), text.as_slice())).collect();
+    let wrong = |kind, text| Disagreement { dialect: Dialect::Rapid, seed, line: 0, kind, text };
+    let task = match corrected_task(&files, case, &made.cell, &made.options) {
+        Ok(task) => task,
+        Err(error) => {
+            out.tally.disagreements.push(wrong("error", error));
+            return out;
+        }
+    };
+    out.rows.clone_from(&task.rows);
+    out.corrected =
+        made.files.iter().zip(&task.files).map(|((name, _), file)| (name.clone(), file.bytes.clone())).collect();
+    let old: Vec<&[u8]> = files.iter().map(|file| file.1).collect();
+    let new: Vec<&[u8]> = task.files.iter().map(|file| file.bytes.as_slice()).collect();
+    let nothing = |_: usize, _: usize| false;
+    let inserted = |file: usize, at: usize| original_byte(&task.files[file].edits, at).is_none();
+    let (before, after) = match (Run::new(&old, seed, &nothing), Run::new(&new, seed, &inserted)) {
+        (Ok(before), Ok(after)) => (before, after),
+        (Err(error), _) => {
+            out.tally.disagreements.push(wrong("interpreter", error));
+            return out;
+        }
+        (_, Err(error)) => {
+            out.tally.disagreements.push(wrong("syntax", error));
+            return out;
+        }
+    };
+    let mut both = [before, after];
+    both.iter_mut().for_each(|run| run.main(made.cycles));
+    let [before, after] = both;
+    if let Some(Stop::Unknown(what)) = &before.ended {
+        out.tally.disagreements.push(wrong("interpreter", what.clone()));
+        return out;
+    }
+    let comparison = Comparison { seed, case, made, task: &task, tally: out.tally };
+    out.tally = comparison.run(&before, &after);
+    out
+}
+
+/// The byte of the original that became a byte of the corrected file; none for what was put in.
+fn original_byte(edits: &[Edit], at: usize) -> Option<usize> {
+    let mut shift = 0isize;
+    for edit in edits {
+        if at < edit.new.start {
+            break;
+        }
+        if at < edit.new.end {
+            return (at == edit.new.start && !edit.old.is_empty()).then_some(edit.old.start);
+        }
+        shift = edit.old.end as isize - edit.new.end as isize;
+    }
+    Some((at as isize + shift) as usize)
+}
+
+struct Comparison<'a> {
+    seed: u64,
+    case: &'a Case,
+    made: &'a Made,
+    task: &'a CorrectedTask,
+    tally: Tally,
+}
+
+impl Comparison<'_> {
+    fn wrong(&mut self, line: usize, kind: &'static str, text: String) {
+        let seed = self.seed;
+        self.tally.disagreements.push(Disagreement { dialect: Dialect::Rapid, seed, line, kind, text });
+    }
+
+    fn line(&self, at: (usize, usize)) -> usize {
+        1 + self.made.files[at.0].1[..at.1].iter().filter(|byte| **byte == b'\n').count()
+    }
+
+    fn row(&self, at: (usize, usize)) -> Option<&Row> {
+        self.task.rows.iter().find(|row| row.file == at.0 && row.statement.contains(&at.1))
+    }
+
+    fn run(mut self, before: &Run<'_>, after: &Run<'_>) -> Tally {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0x73696465);
+        let sides = std::array::from_fn(|_| if rng.random_bool(0.5) { 1 } else { -1 });
+        let mut courses = [Course::new(&self.case.arm, sides), Course::new(&self.case.arm, sides)];
+        let mut new = after.events.iter();
+        for old in &before.events {
+            let mut found = new.next();
+            // Motions that were put in.
+            while let Some(Event::Motion(motion)) = found {
+                let edits = &self.task.files[motion.at.0].edits;
+                if original_byte(edits, motion.at.1).is_some() {
+                    break;
+                }
+                courses[1].go(motion);
+                found = new.next();
+            }
+            match (old, found) {
+                (Event::Said(a), Some(Event::Said(b))) if a == b => {}
+                (Event::Motion(a), Some(Event::Motion(b))) => {
+                    let edits = &self.task.files[b.at.0].edits;
+                    if (b.at.0, original_byte(edits, b.at.1).unwrap_or(0)) != a.at {
+                        let line = self.line(a.at);
+                        self.wrong(line, "order", "another motion runs".to_owned());
+                        return self.tally;
+                    }
+                    self.motion(a, b, &mut courses);
+                }
+                (old, found) => {
+                    let at = if let Event::Motion(m) = old { self.line(m.at) } else { 0 };
+                    let text = format!("{old:?} became {found:?}; ended {:?}, {:?}", before.ended, after.ended);
+                    self.wrong(at, "events", text.chars().take(900).collect());
+                    return self.tally;
+                }
+            }
+        }
+        if new.any(|event| !matches!(event, Event::Motion(m) if original_byte(&self.task.files[m.at.0].edits, m.at.1).is_none())) {
+            self.wrong(0, "events", "more happens than before".to_owned());
+        }
+        if before.ended != after.ended {
+            self.wrong(0, "end", format!("{:?} became {:?}", before.ended, after.ended));
+        }
+        let (a, b) = (before.plain_data(), after.plain_data());
+        // What a correction wrote out is no longer read.
+        if let Some((name, a)) = a.iter().find(|(name, a)| b.get(*name).is_some_and(|b| b != *a)) {
+            self.wrong(0, "data", format!("{} = {a} became {}", name.1, b[name]));
+        }
+        self.tally
+    }
+
+    fn motion(&mut self, old: &Motion, new: &Motion, courses: &mut [Course<'_>; 2]) {
+        let line = self.line(old.at);
+        self.tally.executed += 1;
+        let told = courses[0].go(old);
+        let now = courses[1].go(new);
+        let row = self.row(old.at).cloned();
+        let unlike = |what: &str| format!("{what}: {old:?} became {new:?}");
+        let extra = !self.made.options.segments && old.goals.len() != new.goals.len();
+        if extra || old.rest != new.rest || old.load != new.load {
+            return self.wrong(line, "state", unlike("what stands behind the target"));
+        }
+        let tools = difference(&old.tool.2, &new.tool.2).0 + difference(&old.object.2, &new.object.2).0;
+        if old.tool.0 != new.tool.0 || (old.object.0 != new.object.0) || tools > 1e-9 {
+            return self.wrong(line, "state", unlike("tool or object"));
+        }
+        if old.monitored != new.monitored && matches!(new.goals[0], Goal::Pose { .. }) {
+            return self.wrong(line, "state", unlike("whether the configuration counts"));
+        }
+        if told.iter().any(|point| point.joints.is_none()) {
+            self.tally.unreachable += 1;
+            return;
+        }
+        let mut changed = false;
+        let offset = told.len() - now.len().min(told.len());
+        for (k, (goal, point)) in old.goals.iter().zip(&told).enumerate().skip(offset) {
+            changed |= self.goal(line, old, new, goal, (point, &now[k - offset]), k, row.as_ref());
+        }
+        if changed {
+            self.tally.corrected += 1;
+        } else if row.is_some_and(|row| row.status == Status::Refused) {
+            self.tally.refused += 1;
+        } else {
+            self.tally.left += 1;
+        }
+    }
+
+    /// Compares one goal; whether it was changed.
+    #[allow(clippy::too_many_arguments)]
+    fn goal(
+        &mut self,
+        line: usize,
+        old: &Motion,
+        new: &Motion,
+        goal: &Goal,
+        (told, now): (&Point, &Point),
+        index: usize,
+        row: Option<&Row>,
+    ) -> bool {
+        let intended = match goal {
+            Goal::Joints(q) => {
+                if !self.made.options.joint_targets {
+                    if new.goals[index] != *goal {
+                        self.wrong(line, "joints", format!("{goal:?} became {:?}", new.goals[index]));
+                    }
+                    return false;
+                }
+                self.case.arm.nominal_forward(q)
+            }
+            Goal::Pose { in_object, displaced, .. } => self.meant(old, in_object, displaced),
+        };
+        let kept = matches!((goal, &new.goals[index.min(new.goals.len() - 1)]), (Goal::Pose { .. }, Goal::Pose { .. }) | (Goal::Joints(_), Goal::Joints(_)));
+        let same_configuration = !new.monitored || told.joints == now.joints || now.joints.is_some();
+        if kept && same(&told.flange, &now.flange) && same_configuration {
+            return false;
+        }
+        let Some(joints) = now.joints else {
+            let text = format!("no joints in the written configuration: {:?}, told {:?}", new.goals, told.joints);
+            self.wrong(line, "configuration", text);
+            return true;
+        };
+        let arm = &self.case.arm;
+        let at = Circumstance { approach: now.approach, payload_kg: old.load.0, payload_centre_mm: old.load.1 };
+        let flange = arm.actual_forward(&joints, &at);
+        let tip = tip(old);
+        let (mm, rad) = difference(&(flange * tip), &(intended * tip));
+        let stated = row.and_then(|r| r.after_mm).unwrap_or(0.0) + 3.0 * row.and_then(|r| r.sigma_mm).unwrap_or(0.0);
+        let slack = self.slack(&joints, &now.doubt, &at, &tip);
+        let allowed_mm = 0.004 + 2.0 * stated + slack.0;
+        let allowed_rad = 1e-5 + slack.1 + if stated > 1e-3 { 6.0 * self.case.arm.play.iter().sum::<f64>() } else { 0.0 };
+        if slack.0 > 0.01 {
+            self.tally.open += 1;
+        }
+        if mm > allowed_mm || rad > allowed_rad {
+            let (was, _) = difference(
+                &(told.joints.map_or(flange, |q| arm.actual_forward(&q, &Circumstance { approach: told.approach, ..at })) * tip),
+                &(intended * tip),
+            );
+            let text = format!(
+                "goal {index} is off by {mm:.4} mm, {:.6}° (before {was:.4}, allowed {allowed_mm:.4}); stated {:?}; joints {:.3?}",
+                rad.to_degrees(),
+                row.map(|r| (r.status, r.reason.clone(), r.after_mm, r.sigma_mm)),
+                joints.map(f64::to_degrees)
+            );
+            self.wrong(line, "wrong", text);
+            return true;
+        }
+        if let Some(before) = told.joints {
+            let jump = (0..6).map(|j| (joints[j] - before[j]).abs()).fold(0.0, f64::max);
+            if jump > 0.1 {
+                let text = format!(
+                    "a joint moves by {:.1}°: {:.3?} became {:.3?}, {:?}",
+                    jump.to_degrees(),
+                    before.map(f64::to_degrees),
+                    joints.map(f64::to_degrees),
+                    row.map(|r| (r.status, r.reason.clone()))
+                );
+                self.wrong(line, "jump", text);
+            }
+        }
+        true
+    }
+
+    /// The flange that the program means: tools and objects that were taught stand where they really are.
+    fn meant(&self, motion: &Motion, in_object: &Pose, displaced: &Pose) -> Pose {
+        let mut real = motion.clone();
+        if let Some((_, tool)) = self.made.real_tools.iter().find(|t| t.0 == motion.tool.0) {
+            real.tool.2 = *tool;
+        }
+        if let Some((_, user, object)) = self.made.real_objects.iter().find(|t| t.0 == motion.object.0) {
+            (real.object.2, real.object.3) = (*user, *object);
+        }
+        flange(&real, in_object, displaced)
+    }
+
+    /// What play may do where the side is in doubt: mm at the tip, rad.
+    fn slack(&self, joints: &[f64; 6], doubt: &[bool; 6], at: &Circumstance, tip: &Pose) -> (f64, f64) {
+        let arm: &Arm = &self.case.arm;
+        let here = arm.actual_forward(joints, at) * tip;
+        let (mut mm, mut rad) = (0.0, 0.0);
+        for j in (0..6).filter(|j| doubt[*j] && arm.play[*j] != 0.0) {
+            let mut other = *at;
+            other.approach[j] = -at.approach[j];
+            let off = difference(&here, &(arm.actual_forward(joints, &other) * tip));
+            mm += 1.1 * off.0;
+            rad += 1.1 * off.1;
+        }
+        (mm, rad)
+    }
+}
+
+/// The point that counts, on the flange.
+fn tip(motion: &Motion) -> Pose {
+    if motion.tool.1 { motion.tool.2 } else { motion.object.2 * motion.object.3 }
+}
