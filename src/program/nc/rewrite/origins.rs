@@ -200,7 +200,9 @@ impl Task<'_> {
         let mut course = Course::default();
         let mut refused: Vec<(u32, Reason)> = Vec::new();
         let mut end = |course: &Course| {
-            for (gathered, reason) in course.ends().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement]) {
+            for (gathered, reason) in
+                course.ends().iter().zip([Reason::BeforeOrigin, Reason::BeforeIncrement])
+            {
                 let all = course.motions.clone().filter(|_| gathered.on_all);
                 refused.extend(gathered.on.iter().copied().chain(all).map(|motion| (motion, reason)));
             }
@@ -266,7 +268,8 @@ impl Task<'_> {
                     if linear {
                         course.hold_origin(axis);
                     }
-                    course.place[axis] = if linear && !returns { course.origin[axis] } else { Hangs::NOTHING };
+                    course.place[axis] =
+                        if linear && !returns { course.origin[axis] } else { Hangs::NOTHING };
                 }
                 (None, _) => {}
             }

@@ -164,7 +164,9 @@ impl Lister<'_, '_> {
                         let number = literal(self.tree.text(token)).unwrap_or(0.0);
                         self.tree.kind(token) == Some(Token::Number) && (4900.0..5500.0).contains(&number)
                     };
-                    (token + 2..end).take_while(|&token| self.tree.kind(token) != Some(Token::BracketClose)).any(near)
+                    (token + 2..end)
+                        .take_while(|&token| self.tree.kind(token) != Some(Token::BracketClose))
+                        .any(near)
                 }
                 Some(Token::Name) => {
                     let name = self.tree.text(token + 1).to_ascii_uppercase();

@@ -346,9 +346,7 @@ impl Lister<'_, '_> {
         match self.state.tools.of(name) {
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
-            None => {
-                self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown)
-            }
+            None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
         }
     }
 

@@ -50,8 +50,11 @@ impl<'s> Lister<'_, 's> {
                 false
             }
             b"CC" => {
-                let whole = |axis: usize| said.axes[axis].is_some_and(|index| said.words[index].name.len() == 1);
-                if said.axes.iter().all(Option::is_none) || !(0..2).all(|axis| whole(axis) || said.axes[axis].is_none()) {
+                let whole =
+                    |axis: usize| said.axes[axis].is_some_and(|index| said.words[index].name.len() == 1);
+                if said.axes.iter().all(Option::is_none)
+                    || !(0..2).all(|axis| whole(axis) || said.axes[axis].is_none())
+                {
                     // The pole is where the tool stands, or counts from there.
                     self.held_here(super::POSITION);
                 }
