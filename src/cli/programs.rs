@@ -32,6 +32,9 @@ pub(super) struct Grouping {
     /// All RAPID modules below a folder are one task, as in a controller's backup; without it each is a program of its own.
     #[arg(long)]
     together: bool,
+    /// A task list (.pgf) may name modules outside its own folder.
+    #[arg(long)]
+    outside: bool,
 }
 
 /// Where the files of one task are, before they are read.
@@ -87,6 +90,47 @@ fn listed(list: &Path, bytes: &[u8]) -> Vec<PathBuf> {
     task_list::modules(bytes).iter().map(|module| on_disk(folder, module)).collect()
 }
 
+/// Whether a task list may have this module read: a plain file that stands below the folder of the list, links followed;
+/// `outside`: anywhere.
+fn allowed(list: &Path, module: &Path, outside: bool) -> anyhow::Result<()> {
+    let found = std::fs::metadata(module);
+    if found.is_ok_and(|found| !found.is_file()) {
+        bail!(
+            "{}: named in {}, is no plain file: a folder, a device or a pipe is not read",
+            module.display(),
+            list.display()
+        );
+    }
+    let folder = list.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let below = match (module.canonicalize(), folder.canonicalize()) {
+        (Ok(module), Ok(folder)) => module.starts_with(folder),
+        // One that is not there: as it is written.
+        _ => module.strip_prefix(list.parent().unwrap_or(Path::new(""))).is_ok_and(|rest| {
+            rest.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+        }),
+    };
+    if !below && !outside {
+        bail!(
+            "{}: named in {}, stands outside the folder of that list: put it there, or allow it with --outside",
+            module.display(),
+            list.display()
+        );
+    }
+    Ok(())
+}
+
+/// A task list that may name modules anywhere: those stand for it.
+fn outside_of(list: &Path) -> anyhow::Result<Job> {
+    let modules = listed(list, &files::read(list)?);
+    for module in &modules {
+        allowed(list, module, true)?;
+    }
+    if modules.is_empty() {
+        bail!("{}: names no module", list.display());
+    }
+    Ok(Job { paths: modules, under: list.parent().map(Path::to_path_buf) })
+}
+
 /// A file that a controller's list names: its paths have backslashes, and it takes no notice of case. Where there is no
 /// such file, the name as it was written.
 fn on_disk(folder: &Path, name: &str) -> PathBuf {
@@ -113,7 +157,7 @@ fn on_disk(folder: &Path, name: &str) -> PathBuf {
 /// task list, an NC file and every program of a folder is a task of its own.
 pub(super) fn jobs(
     paths: &[PathBuf],
-    Grouping { each, together: as_one }: Grouping,
+    Grouping { each, together: as_one, outside }: Grouping,
 ) -> anyhow::Result<Vec<Job>> {
     let mut jobs = Vec::new();
     let mut together = Vec::new();
@@ -129,7 +173,9 @@ pub(super) fn jobs(
                 // An ending that says nothing: the file itself does.
                 Language::of(&name, &files::read(path).unwrap_or_default())
             }) == Language::Nc;
-        if alone {
+        if alone && outside && is_list(path) {
+            jobs.push(outside_of(path)?);
+        } else if alone {
             jobs.push(Job { paths: vec![path.clone()], under: None });
         } else {
             together.push(path.clone());
@@ -208,6 +254,7 @@ impl Programs {
             let bytes = files::read(path)?;
             if is_list(path) {
                 for place in listed(path, &bytes) {
+                    allowed(path, &place, false)?;
                     let module =
                         files::read(&place).with_context(|| format!("named in {}", path.display()))?;
                     files.push((place, module));

@@ -31,6 +31,31 @@ pub enum NewTarget {
     },
 }
 
+/// Beyond these no arm stands, and no control reads what would be written (mm, degrees).
+const FARTHEST_MM: f64 = 1e7;
+const FARTHEST_DEG: f64 = 1e6;
+
+impl NewTarget {
+    /// Whether a control can hold its numbers.
+    pub fn is_held(&self) -> bool {
+        match self {
+            NewTarget::Keep | NewTarget::Drop => true,
+            NewTarget::Cartesian { position_mm, quaternion, .. } => {
+                let square: f64 = quaternion.iter().map(|q| q * q).sum();
+                position_mm.iter().all(|x| x.abs() <= FARTHEST_MM) && (0.25..=4.0).contains(&square)
+            }
+            NewTarget::Joint { robot_deg } => robot_deg.iter().all(|angle| angle.abs() <= FARTHEST_DEG),
+        }
+    }
+}
+
+impl Change {
+    /// Whether a control can hold its numbers.
+    pub fn is_held(&self) -> bool {
+        self.targets.iter().chain(self.before.iter().map(|extra| &extra.target)).all(NewTarget::is_held)
+    }
+}
+
 /// A motion to put before another; it takes speed, tool, work object and the process arguments from that one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extra {

@@ -88,7 +88,12 @@ fn with_pose(target: &Value, pose: &Pose) -> Result<Value, Stop> {
 
 impl Run<'_> {
     /// A function of the controller.
-    pub(super) fn function(&mut self, name: &str, arguments: &[Argument], frame: &Frame) -> Result<Value, Stop> {
+    pub(super) fn function(
+        &mut self,
+        name: &str,
+        arguments: &[Argument],
+        frame: &Frame,
+    ) -> Result<Value, Stop> {
         if name == "present" {
             let Some(Argument::Plain(Expr::Place(place))) = arguments.first() else {
                 return Err(Stop::Unknown("Present of what is no parameter".into()));
@@ -97,14 +102,20 @@ impl Run<'_> {
         }
         if name == "dinput" || name == "testdi" {
             let up = self.chance("input") & 1 == 1;
-            return Ok(if name == "testdi" { Value::Truth(up) } else { Value::Number(f64::from(u8::from(up))) });
+            return Ok(if name == "testdi" {
+                Value::Truth(up)
+            } else {
+                Value::Number(f64::from(u8::from(up)))
+            });
         }
         let given = Given::of(arguments, self, frame);
         let mut v = Vec::new();
         for expr in &given.plain {
             v.push(self.value(expr, frame)?);
         }
-        let v = |index: usize| v.get(index).ok_or_else(|| Stop::Unknown(format!("{name}: an argument is missing")));
+        let v = |index: usize| {
+            v.get(index).ok_or_else(|| Stop::Unknown(format!("{name}: an argument is missing")))
+        };
         let number = |index: usize| -> Result<f64, Stop> { Ok(v(index)?.number()?) };
         Ok(match name {
             "offs" => {
@@ -131,7 +142,9 @@ impl Run<'_> {
             "poseinv" => Value::of_pose(&v(0)?.pose()?.inverse()),
             "posevect" => Value::of_vector(&(v(0)?.pose()? * nalgebra::Point3::from(v(1)?.vector()?)).coords),
             "orientzyx" => Value::of_turn(
-                &(about(Vector3::z(), number(0)?) * about(Vector3::y(), number(1)?) * about(Vector3::x(), number(2)?)),
+                &(about(Vector3::z(), number(0)?)
+                    * about(Vector3::y(), number(1)?)
+                    * about(Vector3::x(), number(2)?)),
             ),
             "norient" => Value::of_turn(&v(0)?.turn()?),
             "abs" => Value::Number(number(0)?.abs()),
@@ -223,7 +236,9 @@ impl Run<'_> {
             "singarea" | "softact" | "softdeact" | "cirpathmode" | "accset" | "velset" => {
                 let words = self.words(&given, frame)?;
                 let key = if name == "softdeact" { "softact" } else { name };
-                self.state.others.insert(key.to_owned(), if name == "softdeact" { String::new() } else { words });
+                self.state
+                    .others
+                    .insert(key.to_owned(), if name == "softdeact" { String::new() } else { words });
                 Ok(())
             }
             "tpwrite" | "waittime" | "setdo" | "set" | "reset" | "stop" | "isignaldi" | "waitdi" => {
@@ -257,7 +272,13 @@ impl Run<'_> {
         Ok(out)
     }
 
-    fn motion(&mut self, name: &str, given: &Given<'_>, at: (usize, usize), frame: &Frame) -> Result<(), Stop> {
+    fn motion(
+        &mut self,
+        name: &str,
+        given: &Given<'_>,
+        at: (usize, usize),
+        frame: &Frame,
+    ) -> Result<(), Stop> {
         let count = if name == "movec" { 2 } else { 1 };
         let mut goals = Vec::new();
         for index in 0..count {
@@ -312,16 +333,8 @@ impl Run<'_> {
             Way::Joint => self.state.monitor_joints,
             _ => self.state.monitor_lines,
         };
-        let motion = Motion {
-            at,
-            way,
-            goals,
-            tool: (tool_name, held, frame_of_tool),
-            object,
-            monitored,
-            load,
-            rest,
-        };
+        let motion =
+            Motion { at, way, goals, tool: (tool_name, held, frame_of_tool), object, monitored, load, rest };
         self.events.push(super::run::Event::Motion(Box::new(motion)));
         Ok(())
     }

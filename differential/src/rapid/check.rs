@@ -8,7 +8,7 @@ use super::make::{self, Made};
 use super::run::{Event, Goal, Motion, Run, Stop};
 use crate::arm::{Arm, Circumstance, Pose, difference};
 use crate::model::{self, Case};
-use crate::outcome::{Disagreement, Dialect, Tally};
+use crate::outcome::{Dialect, Disagreement, Tally};
 use crate::under_test::{CorrectedTask, Edit, Row, Status, corrected_task};
 
 /// What random programs contain.
@@ -59,7 +59,8 @@ pub fn shown(seed: u64, features: Features) -> Shown {
 pub fn compare(seed: u64, case: &Case, made: &Made) -> Shown {
     let tally = Tally { programs: 1, ..Tally::default() };
     let mut out = Shown { original: made.files.clone(), corrected: Vec::new(), rows: Vec::new(), tally };
-    let files: Vec<(&str, &[u8])> = made.files.iter().map(|(name, text)| (name.as_str(), text.as_slice())).collect();
+    let files: Vec<(&str, &[u8])> =
+        made.files.iter().map(|(name, text)| (name.as_str(), text.as_slice())).collect();
     let wrong = |kind, text| Disagreement { dialect: Dialect::Rapid, seed, line: 0, kind, text };
     let task = match corrected_task(&files, case, &made.cell, &made.options) {
         Ok(task) => task,
@@ -69,8 +70,12 @@ pub fn compare(seed: u64, case: &Case, made: &Made) -> Shown {
         }
     };
     out.rows.clone_from(&task.rows);
-    out.corrected =
-        made.files.iter().zip(&task.files).map(|((name, _), file)| (name.clone(), file.bytes.clone())).collect();
+    out.corrected = made
+        .files
+        .iter()
+        .zip(&task.files)
+        .map(|((name, _), file)| (name.clone(), file.bytes.clone()))
+        .collect();
     let old: Vec<&[u8]> = files.iter().map(|file| file.1).collect();
     let new: Vec<&[u8]> = task.files.iter().map(|file| file.bytes.as_slice()).collect();
     let nothing = |_: usize, _: usize| false;
@@ -164,7 +169,8 @@ impl Comparison<'_> {
                 }
                 (old, found) => {
                     let at = if let Event::Motion(m) = old { self.line(m.at) } else { 0 };
-                    let text = format!("{old:?} became {found:?}; ended {:?}, {:?}", before.ended, after.ended);
+                    let text =
+                        format!("{old:?} became {found:?}; ended {:?}, {:?}", before.ended, after.ended);
                     self.wrong(at, "events", text.chars().take(900).collect());
                     return self.tally;
                 }
@@ -244,31 +250,40 @@ impl Comparison<'_> {
             }
             Goal::Pose { in_object, displaced, .. } => self.meant(old, in_object, displaced),
         };
-        let kept = matches!((goal, &new.goals[index.min(new.goals.len() - 1)]), (Goal::Pose { .. }, Goal::Pose { .. }) | (Goal::Joints(_), Goal::Joints(_)));
+        let kept = matches!(
+            (goal, &new.goals[index.min(new.goals.len() - 1)]),
+            (Goal::Pose { .. }, Goal::Pose { .. }) | (Goal::Joints(_), Goal::Joints(_))
+        );
         let same_configuration = !new.monitored || told.joints == now.joints || now.joints.is_some();
         if kept && same(&told.flange, &now.flange) && same_configuration {
             return false;
         }
         let Some(joints) = now.joints else {
-            let text = format!("no joints in the written configuration: {:?}, told {:?}", new.goals, told.joints);
+            let text =
+                format!("no joints in the written configuration: {:?}, told {:?}", new.goals, told.joints);
             self.wrong(line, "configuration", text);
             return true;
         };
         let arm = &self.case.arm;
-        let at = Circumstance { approach: now.approach, payload_kg: old.load.0, payload_centre_mm: old.load.1 };
+        let at =
+            Circumstance { approach: now.approach, payload_kg: old.load.0, payload_centre_mm: old.load.1 };
         let flange = arm.actual_forward(&joints, &at);
         let tip = tip(old);
         let (mm, rad) = difference(&(flange * tip), &(intended * tip));
-        let stated = row.and_then(|r| r.after_mm).unwrap_or(0.0) + 3.0 * row.and_then(|r| r.sigma_mm).unwrap_or(0.0);
+        let stated =
+            row.and_then(|r| r.after_mm).unwrap_or(0.0) + 3.0 * row.and_then(|r| r.sigma_mm).unwrap_or(0.0);
         let slack = self.slack(&joints, &now.doubt, &at, &tip);
         let allowed_mm = 0.004 + 2.0 * stated + slack.0;
-        let allowed_rad = 1e-5 + slack.1 + if stated > 1e-3 { 6.0 * self.case.arm.play.iter().sum::<f64>() } else { 0.0 };
+        let allowed_rad =
+            1e-5 + slack.1 + if stated > 1e-3 { 6.0 * self.case.arm.play.iter().sum::<f64>() } else { 0.0 };
         if slack.0 > 0.01 {
             self.tally.open += 1;
         }
         if mm > allowed_mm || rad > allowed_rad {
             let (was, _) = difference(
-                &(told.joints.map_or(flange, |q| arm.actual_forward(&q, &Circumstance { approach: told.approach, ..at })) * tip),
+                &(told.joints.map_or(flange, |q| {
+                    arm.actual_forward(&q, &Circumstance { approach: told.approach, ..at })
+                }) * tip),
                 &(intended * tip),
             );
             let text = format!(

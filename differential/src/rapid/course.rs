@@ -171,7 +171,13 @@ impl<'a> Course<'a> {
         };
         let (a, b) = (tool(&from), tool(&to));
         let circle = (motion.way == Way::Arc)
-            .then(|| Arc::through(&a.translation.vector, &tool(&points[0].flange).translation.vector, &b.translation.vector))
+            .then(|| {
+                Arc::through(
+                    &a.translation.vector,
+                    &tool(&points[0].flange).translation.vector,
+                    &b.translation.vector,
+                )
+            })
             .flatten();
         let mut near = *start;
         const PIECES: usize = 24;
@@ -217,7 +223,8 @@ impl Arc {
         if !(square > 1e-9) {
             return None;
         }
-        let centre = a + (normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared()) / (2.0 * square);
+        let centre =
+            a + (normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared()) / (2.0 * square);
         let axis = Unit::new_normalize(normal);
         let spoke = a - centre;
         let end = b - centre;

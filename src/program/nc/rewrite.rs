@@ -135,6 +135,9 @@ impl Task<'_> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
         }
+        if !change.is_held() {
+            return Some(Reason::NumberRange);
+        }
         for new in &change.targets {
             if matches!(new, NewTarget::Joint { .. }) {
                 return Some(Reason::NoJointForm);

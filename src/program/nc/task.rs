@@ -578,6 +578,11 @@ impl<'t, 's> Lister<'t, 's> {
             let feed = self.worth(&said.words[index]).0;
             // A feed has no decimals on any control.
             let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
+            let feed = feed.and_then(|feed| match feed > 0.0 && feed < words::LARGEST {
+                true => Ok(feed),
+                // F0 and F-5 go nowhere, and what is too large is read as something else.
+                false => Err(Reason::NumberRange),
+            });
             self.state.feed = feed.map(|feed| feed * self.state.unit_mm / 60.0);
         }
         self.motion(said, machine);

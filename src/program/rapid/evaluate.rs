@@ -16,7 +16,7 @@ mod functions;
 mod types;
 
 use std::cell::{Cell, RefCell};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
@@ -30,10 +30,11 @@ use super::syntax::{
 use super::token::{Token, fold, folded, same_name};
 use super::value::{Value, built_in, cartesian_target, joint_target};
 use crate::program::motion::{Reason, Span, TargetValue};
+use crate::program::shared::Map;
 use crate::program::tree::Child;
 
 /// What the statements so far gave to data that the program assigns.
-pub type Known = BTreeMap<u32, Value>;
+pub type Known = Map<u32, Value>;
 
 /// How deeply constants may refer to constants.
 const REFERENCE_DEPTH: u32 = 32;
@@ -578,7 +579,7 @@ impl<'a, 's> Evaluator<'a, 's> {
             return unknown;
         }
         let mut known = context.known.clone();
-        known.retain(|&id, _| self.symbols.symbols.get(id as usize).is_none_or(|s| s.scope != found.scope));
+        self.symbols.declared_in(found.scope).for_each(|id| known.remove(&id));
         let mut required = parameters.iter().filter(|parameter| !parameter.optional);
         for argument in arguments(tree, node) {
             let parameter = match argument.name {

@@ -50,12 +50,8 @@ impl State {
         if !other.reached {
             return self;
         }
-        let mut known = Known::new();
-        for (key, value) in &self.known {
-            if let Some(other) = other.known.get(key) {
-                known.insert(*key, agreed(value, other));
-            }
-        }
+        let mut known =
+            self.known.joined(&other.known, &|a: Option<&Value>, b: Option<&Value>| Some(agreed(a?, b?)));
         // What one way alone tells is, where the ways join, as if no way told it.
         if self.known.contains_key(&DISPLACEMENT) != other.known.contains_key(&DISPLACEMENT) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));

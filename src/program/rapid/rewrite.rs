@@ -217,6 +217,9 @@ impl<'r, 's> Rewriter<'r, 's> {
         if let Some(reason) = motion.reason() {
             return Some(reason);
         }
+        if !change.is_held() {
+            return Some(Reason::NumberRange);
+        }
         let instruction = self.instruction(motion);
         for (target, new) in motion.targets.iter().zip(&change.targets) {
             let Ok(value) = &target.value else { continue };

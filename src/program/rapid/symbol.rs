@@ -6,8 +6,10 @@
 
 mod acts;
 mod change;
+mod named;
 
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 pub use self::change::{Change, Ends, How, Reach};
 pub(super) use self::change::{places, resumes};
@@ -153,7 +155,7 @@ pub struct Symbols {
     /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
     pub switches: Vec<Vec<u32>>,
     /// The routines that each unit may call by a computed name, in order.
-    pub late: Vec<Vec<u32>>,
+    pub late: Vec<Arc<[u32]>>,
     /// What they set.
     pub late_sets: Vec<States>,
     /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
@@ -260,7 +262,7 @@ impl Symbols {
 
     /// The routines that a unit may call by a computed name.
     pub fn late_of(&self, unit: Unit) -> &[u32] {
-        self.place_of(unit).and_then(|at| self.late.get(at)).map_or(&[], Vec::as_slice)
+        self.place_of(unit).and_then(|at| self.late.get(at)).map_or(&[], |late| late)
     }
 
     /// What the routines set that a unit may call by a computed name.
@@ -278,6 +280,11 @@ impl Symbols {
     /// Every declared name, in lower case.
     pub fn names(&self) -> impl Iterator<Item = &[u8]> {
         self.scopes.iter().flat_map(|scope| scope.names.keys().map(Vec::as_slice))
+    }
+
+    /// What is declared in a scope.
+    pub fn declared_in(&self, scope: u32) -> impl Iterator<Item = u32> {
+        self.scopes[scope as usize].names.values().copied()
     }
 
     /// A type name with aliases resolved.

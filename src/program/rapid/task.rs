@@ -4,7 +4,7 @@ mod frames;
 mod literals;
 mod uses;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -322,15 +322,19 @@ impl<'a, 's> Lister<'a, 's> {
                 *callee = callee.or(arriving);
             }
             let mut outside = States::NONE;
+            // Many units share one list of routines.
+            let mut late: BTreeMap<*const u32, (States, &[u32])> = BTreeMap::new();
             for unit in 0..units.len() {
                 let entry = entries[unit];
                 outside = outside.or(self.outside[unit].entered(entry));
-                let arriving = self.late[unit].entered(entry);
-                if arriving != States::NONE {
-                    for &routine in &symbols.late[unit] {
-                        let callee = &mut entries[unit_of(routine) as usize];
-                        *callee = callee.or(arriving);
-                    }
+                let called = &symbols.late[unit];
+                let arriving = &mut late.entry(called.as_ptr()).or_insert((States::NONE, called)).0;
+                *arriving = arriving.or(self.late[unit].entered(entry));
+            }
+            for (arriving, called) in late.into_values().filter(|(arriving, _)| *arriving != States::NONE) {
+                for &routine in called {
+                    let callee = &mut entries[unit_of(routine) as usize];
+                    *callee = callee.or(arriving);
                 }
             }
             for routine in symbols.routines.iter().filter(|routine| !routine.head.local) {
@@ -570,6 +574,10 @@ impl<'a, 's> Lister<'a, 's> {
         } else {
             self.listing.left_by_frames(&motion)
         };
+        let speed = self.listing.speed(&motion).map(|speed| &speed.value);
+        if speed == Some(&Err(Reason::NumberRange)) {
+            motion.left = motion.left.or(Some(Reason::NumberRange));
+        }
         // Whatever is written in place of an expression that acts, or instead of the circle point, would act no more.
         motion.left = motion.left.or(self.acting.then_some(Reason::SideEffect));
         motion

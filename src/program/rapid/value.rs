@@ -20,6 +20,14 @@ pub enum Value {
     Unknown(Reason),
 }
 
+/// The largest number of a controller: num is of single precision.
+pub const LARGEST: f64 = f32::MAX as f64;
+
+/// Whether a controller can hold these numbers.
+pub fn held(numbers: &[f64]) -> Result<(), Reason> {
+    if numbers.iter().all(|number| number.abs() <= LARGEST) { Ok(()) } else { Err(Reason::NumberRange) }
+}
+
 /// From this size on an external axis is "not connected" (9E9).
 const NOT_CONNECTED: f64 = 8.9e9;
 
@@ -86,6 +94,7 @@ impl Value {
     pub fn frame(&self) -> Result<Frame, Reason> {
         let [position, rotation] = self.list(2)? else { return Err(Reason::WrongShape) };
         let frame = Frame { position_mm: position.numbers()?, quaternion: rotation.numbers()? };
+        held(&frame.position_mm)?;
         within_reach(&frame.position_mm)?;
         usable(&frame.quaternion)?;
         Ok(frame)
@@ -136,6 +145,10 @@ impl Value {
     /// A speeddata.
     pub fn speed(&self) -> Result<SpeedValue, Reason> {
         let [tcp, orientation, linear, rotating] = self.numbers()?;
+        held(&[tcp, orientation, linear, rotating])?;
+        if tcp <= 0.0 {
+            return Err(Reason::NumberRange);
+        }
         Ok(SpeedValue {
             tcp_mm_s: tcp,
             orientation_deg_s: orientation,
@@ -179,6 +192,12 @@ pub fn cartesian_target(
     conf: [f64; 4],
     axes: [f64; 6],
 ) -> Result<TargetValue, Reason> {
+    held(&position_mm)?;
+    held(&quaternion)?;
+    held(&axes)?;
+    if !conf.iter().all(|value| value.abs() <= 8_388_608.0) {
+        return Err(Reason::NumberRange);
+    }
     within_reach(&position_mm)?;
     usable(&quaternion)?;
     let conf = conf.map(|value| value.round() as i32);
@@ -187,6 +206,8 @@ pub fn cartesian_target(
 
 /// A jointtarget of its numbers.
 pub fn joint_target(robot_deg: [f64; 6], axes: [f64; 6]) -> Result<TargetValue, Reason> {
+    held(&robot_deg)?;
+    held(&axes)?;
     if robot_deg.iter().any(|angle| angle.abs() >= NOT_CONNECTED) {
         return Err(Reason::UndefinedJoint);
     }

@@ -16,6 +16,7 @@ mod certain;
 mod blocks;
 mod frames;
 mod klartext;
+mod origins;
 mod m_words;
 mod stays;
 mod subprograms;

@@ -531,6 +531,8 @@ impl Lister<'_, '_> {
             && said.radius.is_none()
         {
             Some(Reason::CentreElsewhere)
+        } else if state.feed == Err(Reason::NumberRange) && mode != Mode::Rapid {
+            Some(Reason::NumberRange)
         } else {
             self.listing.left_by_frames(motion)
         }

@@ -10,6 +10,14 @@ use super::{Lister, Said, code, is_axis, is_axis_name};
 use crate::program::motion::Reason;
 use crate::program::tree::Node;
 
+/// A control holds no larger number in a word.
+pub(super) const LARGEST: f64 = 1e9;
+
+/// A value that a control can hold.
+fn held(value: Worth) -> Worth {
+    value.and_then(|value| if value.abs() < LARGEST { Ok(value) } else { Err(Reason::NumberRange) })
+}
+
 /// A block of more words is not read: controls take some hundred characters.
 const BLOCK_WORDS: u32 = 1000;
 
@@ -210,6 +218,7 @@ impl<'s> Lister<'_, 's> {
                 let counted = self.dialect == Dialect::Fanuc
                     && !self.tree.text(number).contains(&b'.')
                     && value != Ok(0.0);
+                let value = held(value);
                 (if counted { Err(Reason::AmbiguousNumber) } else { value }, increment)
             }
             Belongs::Expression { first, end } => {
@@ -232,7 +241,7 @@ impl<'s> Lister<'_, 's> {
             |name: &Variable| -> Worth { self.state.variables.get(name, || self.ever_set.contains(name)) };
         let mut reader = Reader::new(self.tree, self.dialect, range, &variables);
         match reader.expression() {
-            Ok(value) if reader.at >= range.1 => value,
+            Ok(value) if reader.at >= range.1 => held(value),
             _ => Err(Reason::WrongShape),
         }
     }

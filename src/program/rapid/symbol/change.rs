@@ -6,18 +6,20 @@
 //! Which routines of the files a computed name may call is told by the text at its beginning and end, and by the number
 //! of arguments.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::named::{Named, Names};
 use super::{Symbol, Symbols, Unit, What};
 use crate::program::motion::Reason;
 use crate::program::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
 use crate::program::rapid::modal::{States, setting};
 use crate::program::rapid::predefined::{self, Effect};
 use crate::program::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts, token_kind};
-use crate::program::rapid::token::{Token, fold, folded, same_name};
+use crate::program::rapid::token::{Token, folded, same_name};
 use crate::program::tree::Child;
 
 /// How a statement changes data.
@@ -107,9 +109,9 @@ struct Found {
     /// What they set by themselves.
     sets: States,
     /// The routines that it may call by a computed name.
-    late: Vec<u32>,
+    late: BTreeSet<Named>,
     /// The procedures that it has called while the robot moves.
-    interrupts: Vec<u32>,
+    interrupts: BTreeSet<Named>,
     /// Whether it begins the next cycle.
     cycles: bool,
 }
@@ -122,8 +124,6 @@ impl Found {
         self.switches.extend(next.switches);
         self.interrupts.extend(next.interrupts);
         self.late.extend(next.late);
-        self.late.sort_unstable();
-        self.late.dedup();
         self.unknown |= next.unknown;
         self.moves |= next.moves;
         self.waits |= next.waits;
@@ -192,9 +192,11 @@ impl Symbols {
                 (symbol.assigned, symbol.whole) = (true, true);
             }
         }
+        let mut names = Names::of(self, trees);
+        self.late = all.iter().map(|found| names.all(&found.late)).collect();
         self.interrupts = self.routines.iter().map(|routine| routine.head.kind == Syntax::Trap).collect();
         for found in &all {
-            for &routine in &found.interrupts {
+            for &routine in names.all(&found.interrupts).iter() {
                 self.interrupts[routine as usize] = true;
             }
             self.everything = self.everything.or(found.sets);
@@ -203,6 +205,7 @@ impl Symbols {
         let interrupting = (0..).zip(&self.interrupts).filter(|&(_, &interrupts)| interrupts);
         self.interrupting = interrupting.map(|(routine, _)| routine).collect();
         self.settle_reaches(&all);
+        self.late_sets = self.reached_late().into_iter().map(|(_, sets)| sets).collect();
         self.settle_volatile(trees, &all);
         let mut called = vec![false; all.len()];
         for &routine in all.iter().flat_map(|found| &found.calls) {
@@ -215,9 +218,6 @@ impl Symbols {
             };
             self.ends.push(if quiet { Ends::AsItBegins } else { Ends::Set { called: called[at] } });
             self.switches.push(found.switches);
-            let sets = found.late.iter().map(|&routine| self.routines[routine as usize].reach.sets);
-            self.late_sets.push(sets.fold(States::NONE, States::or));
-            self.late.push(found.late);
         }
     }
 
@@ -360,9 +360,9 @@ impl Symbols {
             match kind {
                 Syntax::LateCall => {
                     let name = parts(tree, node).nth(1);
-                    self.found_late(trees, tree, (node, name), &mut found);
+                    self.found_late(tree, (node, name), &mut found);
                 }
-                Syntax::Call | Syntax::Function => self.found_call(trees, unit, (node, kind), &mut found),
+                Syntax::Call | Syntax::Function => self.found_call(tree, unit, (node, kind), &mut found),
                 // It may wait for another task.
                 Syntax::While => found.waits = true,
                 _ => {}
@@ -370,20 +370,11 @@ impl Symbols {
             found.acts |= self.acts_itself(tree, unit.scope, node);
             node += 1;
         }
-        found.late.sort_unstable();
-        found.late.dedup();
         found
     }
 
     /// A call or function that does more than move the robot.
-    fn found_call(
-        &self,
-        trees: &[RapidTree<'_>],
-        unit: Unit,
-        (node, kind): (u32, Syntax),
-        found: &mut Found,
-    ) {
-        let tree = &trees[unit.file as usize];
+    fn found_call(&self, tree: &RapidTree<'_>, unit: Unit, (node, kind): (u32, Syntax), found: &mut Found) {
         let name = tree.text(tree.nodes[node as usize].first);
         let is_call = kind == Syntax::Call;
         let own = self.called(unit.scope, name);
@@ -395,8 +386,7 @@ impl Symbols {
             found.moves = true;
             if instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].also == Also::Calls) {
                 let name = arguments(tree, node).filter(|argument| !argument.optional).last();
-                let named = self.named_by(trees, tree, (name.and_then(|name| name.value), 0, false));
-                found.interrupts.extend(named);
+                found.interrupts.insert(Named::by(tree, (name.and_then(|name| name.value), 0, false)));
             }
             return;
         }
@@ -407,7 +397,7 @@ impl Symbols {
             }
             [] if is_call && predefined::calls_by_name(name) => {
                 let name = arguments(tree, node).find(|argument| !argument.optional);
-                self.found_late(trees, tree, (node, name.and_then(|name| name.value)), found);
+                self.found_late(tree, (node, name.and_then(|name| name.value)), found);
             }
             [] if predefined::effect(name).is_none() => (found.unknown, found.moves) = (true, true),
             [] => {
@@ -473,61 +463,14 @@ impl Symbols {
     }
 
     /// A call by a computed name.
-    fn found_late(
-        &self,
-        trees: &[RapidTree<'_>],
-        tree: &RapidTree<'_>,
-        (node, name): (u32, Option<Child>),
-        found: &mut Found,
-    ) {
+    fn found_late(&self, tree: &RapidTree<'_>, (node, name): (u32, Option<Child>), found: &mut Found) {
         (found.unknown, found.moves) = (true, true);
         found.switch(node);
         // CallByVar adds a number to the name that it is given.
         let numbered = tree.nodes[node as usize].kind == Syntax::Call;
         let given = arguments(tree, node).filter(|argument| !argument.optional).count();
         let given = if numbered { 0 } else { given };
-        found.late.extend(self.named_by(trees, tree, (name, given, numbered)));
-    }
-
-    /// The procedures of the files that take so many required arguments and may have a name that an expression of text
-    /// tells: wholly, or by how it begins and ends; `numbered` where a number is added to it.
-    fn named_by(
-        &self,
-        trees: &[RapidTree<'_>],
-        tree: &RapidTree<'_>,
-        (name, given, numbered): (Option<Child>, usize, bool),
-    ) -> Vec<u32> {
-        let text = |part: Child| match part {
-            Child::Token(token) if tree.kind(token) == Some(Token::String) => {
-                let text = tree.text(token);
-                text.get(1..text.len() - 1).map(folded)
-            }
-            _ => None,
-        };
-        let (mut begins, mut ends, mut whole) = (None, None, false);
-        match name {
-            Some(Child::Node(node)) if tree.nodes[node as usize].kind == Syntax::Binary => {
-                begins = parts(tree, node).next().and_then(text);
-                ends = parts(tree, node).last().and_then(text).filter(|_| !numbered);
-            }
-            Some(part) => {
-                begins = text(part);
-                whole = begins.is_some() && !numbered;
-            }
-            None => {}
-        }
-        let (begins, ends) = (begins.unwrap_or_default(), ends.unwrap_or_default());
-        let fits = |routine: &super::RoutineScope| {
-            let name = folded(trees[routine.file as usize].text(routine.head.name));
-            let module: Vec<u8> = routine.module.bytes().map(fold).collect();
-            let full = [&module[..], b":", &name[..]].concat();
-            let told = |name: &[u8]| {
-                if whole { *name == begins[..] } else { name.starts_with(&begins) && name.ends_with(&ends) }
-            };
-            let required = routine.head.parameters.iter().filter(|parameter| !parameter.optional).count();
-            routine.head.kind == Syntax::Proc && required == given && (told(&name) || told(&full))
-        };
-        (0..).zip(&self.routines).filter(|(_, routine)| fits(routine)).map(|(at, _)| at).collect()
+        found.late.insert(Named::by(tree, (name, given, numbered)));
     }
 
     /// Whether a call by this name is a motion instruction of the table.
@@ -540,6 +483,20 @@ impl Symbols {
         let name = tree.text(tree.nodes[node as usize].first);
         instruction::find(name).is_some_and(|known| INSTRUCTIONS[known].only_moves())
             && !(self.hides_instruction && self.routine(scope, name).is_some())
+    }
+
+    /// What the calls by computed names of each unit may bring about: whether they grip, and what they set.
+    fn reached_late(&self) -> Vec<(bool, States)> {
+        let mut known: HashMap<*const u32, (bool, States)> = HashMap::new();
+        let both = |late: &Arc<[u32]>| {
+            late.iter()
+                .map(|&routine| &self.routines[routine as usize].reach)
+                .fold((false, States::NONE), |(grips, sets), reach| {
+                    (grips || reach.grips, sets.or(reach.sets))
+                })
+        };
+        // Many units share one list.
+        self.late.iter().map(|late| *known.entry(late.as_ptr()).or_insert_with(|| both(late))).collect()
     }
 
     /// What a call of each routine may change, through what it calls.
@@ -566,6 +523,7 @@ impl Symbols {
         }
         loop {
             let mut grown = false;
+            let late = self.reached_late();
             for &unit in &self.callees_first {
                 let Some(routine) = self.units[unit as usize].routine else { continue };
                 let mut reach = std::mem::take(&mut self.routines[routine as usize].reach);
@@ -574,11 +532,9 @@ impl Symbols {
                     (reach.changes.len(), anything, moves, waits, (grips, acts, places), sets)
                 };
                 let before = said(&reach);
-                for &called in &all[unit as usize].late {
-                    let other = &self.routines[called as usize].reach;
-                    reach.grips |= other.grips;
-                    reach.sets = reach.sets.or(other.sets);
-                }
+                let (grips, sets) = late[unit as usize];
+                reach.grips |= grips;
+                reach.sets = reach.sets.or(sets);
                 for &called in &all[unit as usize].calls {
                     let other = &self.routines[called as usize].reach;
                     reach.anything |= other.anything;

@@ -7,7 +7,7 @@ use crate::program::rapid::evaluate::{Context, Known};
 use crate::program::rapid::symbol::{Unit, What};
 use crate::program::rapid::syntax::{text_of, tokens_of};
 use crate::program::rapid::token::{Token, display};
-use crate::program::rapid::value::{Value, built_in};
+use crate::program::rapid::value::{LARGEST, Value, built_in};
 use crate::program::tree::Child;
 
 impl<'s> Lister<'_, 's> {
@@ -45,6 +45,9 @@ impl<'s> Lister<'_, 's> {
     pub(super) fn overridden(&mut self, speed: u32, unit: Unit, state: &State, velocity: Child) -> u32 {
         let mut speed = self.listing.speeds[speed as usize].clone();
         match (&mut speed.value, self.evaluated(unit, state, velocity).number()) {
+            (speed @ Ok(_), Ok(velocity)) if !(velocity > 0.0 && velocity <= LARGEST) => {
+                *speed = Err(Reason::NumberRange);
+            }
             (Ok(value), Ok(velocity)) => value.tcp_mm_s = velocity,
             (value, Err(reason)) => *value = Err(reason),
             (Err(_), Ok(_)) => {}
