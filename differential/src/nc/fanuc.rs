@@ -257,6 +257,7 @@ impl<'s> Fanuc<'s> {
             let times = block.get('L').unwrap_or(1.0) as i32;
             let Some(&begin) = self.programs.get(&number) else {
                 self.machine.elsewhere(format!("call {number}"), true);
+                self.machine.lost();
                 return Ok(Some(Next::Line(at + 1)));
             };
             let own = macro_call.then(|| {

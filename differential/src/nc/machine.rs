@@ -231,11 +231,12 @@ impl<'s> Machine<'s> {
         self.trace.push(Event::Note(text.into()));
     }
 
-    /// A motion that is not followed. `begins` where it matters where it starts.
+    /// A motion that is not followed: it leaves the tip elsewhere, turned as it was. `begins` where it matters where it
+    /// starts.
     pub fn elsewhere(&mut self, text: impl Into<String>, begins: bool) {
         let start = begins.then_some((self.at, self.chain));
         self.trace.push(Event::Elsewhere(self.line, text.into(), start));
-        self.lost();
+        self.at = [None; 3];
     }
 
     /// A motion of lines and arcs.

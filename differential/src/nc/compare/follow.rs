@@ -64,6 +64,16 @@ impl<'c> Follower<'c> {
         Some(self.real(&joints) * tool)
     }
 
+    /// Where the tip would really be for a told pose in each of the ways in which the arm can stand at the pose that was
+    /// meant. A program says no configuration: which of them the arm stands in is not told where it begins or goes on
+    /// from what is not followed.
+    pub fn every_way(&self, meant: &Pose, told: &Pose, tool: &Pose) -> Vec<Pose> {
+        let back = tool.inverse();
+        let all = self.case.arm.nominal_inverse(&(meant * back), None);
+        let near = all.iter().filter_map(|joints| self.solve(&(told * back), joints));
+        near.map(|joints| self.real(&joints) * tool).collect()
+    }
+
     /// Where the tip would really be for a told pose, from the same sides.
     pub fn at(&self, pose: &Pose, tool: &Pose) -> Option<Pose> {
         let joints = self.solve(&(pose * tool.inverse()), &self.last)?;
@@ -87,17 +97,16 @@ fn shortly_before(done: &Move) -> Option<Pose> {
         at[axis] = from + (to - from) * share;
     }
     if let Some(arc) = done.arc {
-        let (a, b, _) = crate::nc::arc::axes(if done.state.contains(" G18 ") {
-            18
-        } else if done.state.contains(" G19 ") {
-            19
-        } else {
-            17
-        });
+        let (a, b, _) = crate::nc::arc::axes(plane_of(&done.state));
         let angle =
             (done.to[b]? - arc.centre[1]).atan2(done.to[a]? - arc.centre[0]) - arc.sweep * (1.0 - share);
         at[a] = arc.centre[0] + arc.radii[1] * angle.cos();
         at[b] = arc.centre[1] + arc.radii[1] * angle.sin();
     }
     Some(chain * Pose::from_parts(Translation3::new(at[0], at[1], at[2]), turn))
+}
+
+/// The plane that holds in a state.
+pub fn plane_of(state: &str) -> u8 {
+    [18, 19].into_iter().find(|plane| state.contains(&format!(" G{plane} "))).unwrap_or(17)
 }

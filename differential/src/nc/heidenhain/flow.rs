@@ -35,6 +35,7 @@ impl Heidenhain<'_> {
         }
         if line.starts_with("CALL PGM") {
             self.machine.elsewhere(line, true);
+            self.machine.lost();
             return Ok(Some(at + 1));
         }
         let number = line.strip_prefix("FN ").and_then(|rest| rest.split(':').next()).unwrap_or_default();

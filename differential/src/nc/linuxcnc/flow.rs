@@ -109,6 +109,7 @@ impl LinuxCnc<'_> {
         };
         let Some(begin) = self.lines.iter().position(is) else {
             self.machine.elsewhere(format!("call {label}"), true);
+            self.machine.lost();
             return Ok(at + 1);
         };
         let mut inner = HashMap::new();

@@ -142,7 +142,7 @@ fn change(m: &mut Maker) -> Vec<String> {
         11 => {
             // A frame that is told whole lies where others do.
             let [x, y, z] = m.centre;
-            let (number, turn) = (m.pick(&[1, 2, 3]), m.pick(&["", " R0", " R20"]));
+            let (number, turn) = (m.pick(&[1, 2, 3]), m.pick(&["", " R180", " R165"]));
             let (x, y, z) = (m.axis("X", x + 5.0), m.axis("Y", y), m.axis("Z", z + 10.0));
             one(format!("G10 L2 P{number} {x} {y} {z}{turn}"))
         }

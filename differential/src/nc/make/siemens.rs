@@ -162,7 +162,13 @@ fn change(m: &mut Maker) -> Vec<String> {
         19 => vec![format!("G41 {}", part(m)), format!("G40 {}", part(m))],
         20 => {
             let [x, y, z] = m.centre;
-            one(format!("$P_UIFR[{}]=CTRANS(X,{},Y,{},Z,{})", m.pick(&[1, 2]), x + 5.0, y, z + 10.0))
+            one(format!(
+                "$P_UIFR[{}]=CTRANS(X,{},Y,{},Z,{}):CROT(Z,180)",
+                m.pick(&[1, 2]),
+                x + 5.0,
+                y,
+                z + 10.0
+            ))
         }
         21 => one(m.pick(&["G18", "G19", "G17"]).into()),
         22 => one(m.pick(&["L100", "CYCLE81(50,0,2,-5)", "G33 Z5 K1"]).into()),

@@ -131,6 +131,7 @@ impl Siemens<'_> {
         }
         if let Some(Word::Letter('L', number)) = words.first() {
             self.machine.elsewhere(format!("call L{number}"), true);
+            self.machine.lost();
             return Ok(true);
         }
         Ok(false)
