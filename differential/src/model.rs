@@ -67,6 +67,9 @@ pub struct Case {
     pub play: bool,
     /// Whether joints yield under load.
     pub load: bool,
+    /// Whether a cut of which one motion stays is left as a whole, as programs are run; otherwise each motion is judged by
+    /// itself, which leaves less and so tries more of the analysis.
+    pub whole_cuts: bool,
 }
 
 /// A random arm.
@@ -127,7 +130,7 @@ fn made(rng: &mut ChaCha8Rng, play: bool, load: bool) -> Case {
         play: joints(play, 8e-4),
     };
     let model_toml = toml(&arm, sheet);
-    Case { arm, model_toml, robot: sheet.name, play, load }
+    Case { arm, model_toml, robot: sheet.name, play, load, whole_cuts: rng.random_bool(0.25) }
 }
 
 /// The model file.

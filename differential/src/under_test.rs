@@ -4,14 +4,15 @@ use std::ops::Range;
 
 use nalgebra::Point3;
 use truegrind::compensation::cell::Cell;
+use truegrind::compensation::compensate::{Compensated, compensate};
+use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::payload::Loads;
-use truegrind::compensation::rewrite::{self, Circles, Emit, plan};
+use truegrind::compensation::rewrite::{self, Circles, Emit};
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::program::motion::Mark;
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::reading::Program;
-use truegrind::program::rewrite::{Outcome, RewriteOptions};
 
 use crate::model::Case;
 
@@ -149,24 +150,12 @@ pub fn corrected_task(
         condition,
         loads: options.payload.is_none().then(|| Loads::of(&program)),
         points: false,
+        cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },
         ..rewrite::Options::default()
     };
-    let mut planned = plan(program.listing(), &estimated, &cell, &wanted);
-    let mark = Some(Mark { version: "0".to_owned(), model: "test".to_owned() });
-    let rewritten = program
-        .rewrite(&planned.changes, &RewriteOptions { mark, ..RewriteOptions::default() })
-        .map_err(|error| error.to_string())?;
-    for (change, outcome) in planned.changes.iter().zip(&rewritten.outcomes) {
-        let row = &mut planned.outcomes[change.motion as usize];
-        match outcome {
-            Outcome::Unchanged if row.status == Became::Changed => row.status = Became::Left,
-            Outcome::Refused(reason) => {
-                row.status = Became::Refused;
-                row.reason = Some(truegrind::compensation::why::Why::Program(*reason));
-            }
-            _ => {}
-        }
-    }
+    let mark = Some(Mark { version: "0".to_owned(), model: "test".to_owned(), partial: false });
+    let Compensated { plan: planned, rewritten } =
+        compensate(&program, &estimated, &cell, &wanted, mark).map_err(|error| error.to_string())?;
     let mut out = CorrectedTask { files: Vec::new(), rows: Vec::new() };
     for ((_, source), edits) in files.iter().zip(&rewritten.files) {
         let bytes = edits.edits.apply(source).map_err(|error| error.to_string())?;
