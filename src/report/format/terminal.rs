@@ -47,7 +47,7 @@ pub fn table(table: &Table, width: usize) -> String {
 /// that have nothing else below them.
 pub fn document(document: &Document, width: usize) -> String {
     let mut text = wrapped(&document.title, width, "");
-    text.push_str(&format!("{}\n", "═".repeat(length(&document.title).min(width))));
+    text.push_str(&format!("{}\n", "═".repeat(length(&visible::text(&document.title)).min(width))));
     if !document.subtitle.is_empty() {
         text.push_str(&wrapped(&document.subtitle, width, ""));
     }
@@ -82,7 +82,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
         Block::Heading(level, heading) => {
             text.push_str(&wrapped(heading, width, ""));
             if *level <= 2 {
-                text.push_str(&format!("{}\n", "─".repeat(length(heading).min(width))));
+                text.push_str(&format!("{}\n", "─".repeat(length(&visible::text(heading)).min(width))));
             }
         }
         Block::Paragraph(paragraph) => text.push_str(&wrapped(paragraph, width, "")),

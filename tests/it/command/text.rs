@@ -31,15 +31,19 @@ fn what_acts_without_showing_never_reaches_a_terminal_or_a_log() {
     let at = dir.path();
     fs::write(at.join("data.csv"), CABLE).unwrap();
     assert_eq!(truegrind(at, &["identify", "data.csv", "--robot", "abb-irb-120", "-o", "model.toml"]).0, 0);
-    let program = format!(
-        "MODULE m\n  ! {EVIL}\n  PROC main()\n    MoveL [[400,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,\
-         tool0; ! {EVIL}\n    Weird{EVIL} 1;\n  ENDPROC\nENDMODULE\n"
-    );
+    // What is no control character passes for the text of a program; with one it is taken for a binary file.
+    let program = |words: &str| {
+        format!(
+            "MODULE m\n  ! {words}\n  PROC main()\n    MoveL [[400,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,\
+             z1,tool0; ! {words}\n    Weird{words} 1;\n  ENDPROC\nENDMODULE\n"
+        )
+    };
     // Names of files.
     let name = format!("x{EVIL}.mod");
-    fs::write(at.join(&name), &program).unwrap();
+    fs::write(at.join(&name), program(EVIL)).unwrap();
     let told = run(at, &["compensate", &name, "--model", "model.toml", "--dry-run"]);
     assert!(told.contains(r"x\x1b[2J"), "{told}");
+    fs::write(at.join(&name), program("\u{202e}\u{2066}\u{200b}\u{feff}")).unwrap();
     run(
         at,
         &["compensate", &name, "--model", "model.toml", "-o", "out.mod", "--md", "p.md", "--html", "p.html"],

@@ -169,7 +169,7 @@ proptest! {
         let records: Vec<_> = reader.records().map(Result::unwrap).collect();
         prop_assert_eq!(records.len(), words.len());
         for ((record, word), number) in records.iter().zip(&words).zip(&numbers) {
-            let computed = word.len() > 1 && word.starts_with(['=', '+', '-', '@', '\r']) && word.parse::<f64>().is_err();
+            let computed = word.len() > 1 && word.starts_with(['=', '+', '-', '@', '\t', '\r']) && word.parse::<f64>().is_err();
             prop_assert_eq!(&record[0], &format!("{}{word}", if computed { "'" } else { "" }));
             if number.is_nan() {
                 prop_assert_eq!(&record[1], "");
