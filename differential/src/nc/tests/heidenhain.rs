@@ -85,7 +85,7 @@ fn coordinates_are_counted_from_presets_and_shifts() {
     goes(
         Heidenhain,
         &[
-            ("L Z+0 M91\nL X+1", &[[1.0, NAN, NAN]]),
+            ("L Z+0 M91\nL X+1", &[[1.0, 2.0, NAN]]),
             ("TOOL CALL 2 Z\nL X+1", &[[1.0, NAN, NAN]]),
             ("TOOL CALL S500\nL X+1", &[[1.0, 2.0, 3.0]]),
         ],
