@@ -159,7 +159,8 @@ impl Judge<'_> {
                 "{mm:.4} mm and {rad:.6} rad from where it shall be (before {before:.3} mm; stated {:?}): {:?} -> {:?}, {:?} -> {:?}",
                 row.after_mm, old.to, new.to, old.angles, new.angles
             );
-            return self.wrong(line, "wrong-place", text);
+            let kind = if self.pair.case.play { "wrong-place-with-play" } else { "wrong-place" };
+            return self.wrong(line, kind, text);
         }
         self.changed_arc(old, new);
     }

@@ -182,7 +182,7 @@ impl LinuxCnc<'_> {
             if block.has(code) {
                 self.mode_of(block);
                 let none = AXES.iter().all(|letter| block.get(*letter).is_none());
-                let named = AXES.map(|letter| begins || none || block.get(letter).is_some());
+                let named = AXES.map(|letter| none || block.get(letter).is_some());
                 self.machine.some_elsewhere(block.text.clone(), begins, named);
                 return Ok(true);
             }
