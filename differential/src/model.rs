@@ -111,7 +111,9 @@ fn made(rng: &mut ChaCha8Rng, play: bool, load: bool) -> Case {
         }
     });
     let mut joints = |on: bool, most: f64| {
-        std::array::from_fn(|_| if on && rng.random_bool(0.6) { rng.random_range(0.1..1.0) * most } else { 0.0 })
+        std::array::from_fn(
+            |_| if on && rng.random_bool(0.6) { rng.random_range(0.1..1.0) * most } else { 0.0 },
+        )
     };
     // The larger the arm the stiffer its joints.
     let stiff = (a2 / 270.0).powi(3);
@@ -130,7 +132,8 @@ fn made(rng: &mut ChaCha8Rng, play: bool, load: bool) -> Case {
 
 /// The model file.
 fn toml(arm: &Arm, sheet: &Sheet) -> String {
-    let errors = "count = 100\nrmse = 0.1\nmean_absolute = 0.1\nmean = 0.1\nstandard_deviation = 0.01\nmax = 0.2\n";
+    let errors =
+        "count = 100\nrmse = 0.1\nmean_absolute = 0.1\nmean = 0.1\nstandard_deviation = 0.01\nmax = 0.2\n";
     let mut out = format!(
         "schema = \"truegrind.model/1\"\nrobot = \"{}\"\n\n[provenance]\nfile = \"none\"\nsha256 = \"{}\"\nrows = 200\n\
          set_aside = []\nsensor = \"position\"\nmethod = \"lm\"\nseed = 0\nheld_out = 0.2\nsharpened = false\nversion = \
@@ -248,10 +251,15 @@ mod tests {
     #[test]
     fn actual_inverse_leads_back() {
         let case = with(5, true, true);
-        let at = Circumstance { approach: [1, -1, 0, 1, -1, 1], payload_kg: 2.0, payload_centre_mm: [0.0, 10.0, 50.0] };
+        let at = Circumstance {
+            approach: [1, -1, 0, 1, -1, 1],
+            payload_kg: 2.0,
+            payload_centre_mm: [0.0, 10.0, 50.0],
+        };
         let q = [0.3, 0.2, 0.1, 0.4, 0.8, -0.5];
         let flange = case.arm.actual_forward(&q, &at);
-        let found = case.arm.actual_inverse(&flange, &[0.31, 0.21, 0.1, 0.41, 0.79, -0.5], &at).expect("joints");
+        let found =
+            case.arm.actual_inverse(&flange, &[0.31, 0.21, 0.1, 0.41, 0.79, -0.5], &at).expect("joints");
         assert!((0..6).all(|j| (found[j] - q[j]).abs() < 1e-9));
     }
 }

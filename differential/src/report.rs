@@ -23,7 +23,8 @@ pub fn many(languages: &[Dialect], seed: u64, wanted: usize) -> Vec<(Dialect, Ta
             let mut tally = Tally::default();
             let mut next = seed;
             while tally.corrected < share && tally.programs < 1000 + 50 * share {
-                let batch: Vec<Tally> = (next..next + BATCH).into_par_iter().map(|seed| run(dialect, seed)).collect();
+                let batch: Vec<Tally> =
+                    (next..next + BATCH).into_par_iter().map(|seed| run(dialect, seed)).collect();
                 batch.into_iter().for_each(|one| tally.merge(one));
                 next += BATCH;
             }
@@ -55,7 +56,11 @@ pub fn one(dialect: Dialect, seed: u64) -> String {
             }
         }
         for row in &shown.rows {
-            let _ = writeln!(out, "file {} line {}: {:?} {:?} {:?} {:?}", row.file, row.line, row.status, row.reason, row.after_mm, row.sigma_mm);
+            let _ = writeln!(
+                out,
+                "file {} line {}: {:?} {:?} {:?} {:?}",
+                row.file, row.line, row.status, row.reason, row.after_mm, row.sigma_mm
+            );
         }
         let _ = writeln!(out, "{}", line("rapid", &shown.tally, 0.0));
         for disagreement in &shown.tally.disagreements {

@@ -193,7 +193,8 @@ pub fn corrected_task(
 
 /// Where edits stand in the old and in the new bytes.
 fn placed(edits: &truegrind::program::edit::Edits) -> Vec<Edit> {
-    let mut list: Vec<(Range<usize>, usize)> = edits.iter().map(|(range, text)| (range, text.len())).collect();
+    let mut list: Vec<(Range<usize>, usize)> =
+        edits.iter().map(|(range, text)| (range, text.len())).collect();
     list.sort_by_key(|(range, _)| (range.start, range.end));
     let mut shift = 0isize;
     let mut out = Vec::with_capacity(list.len());

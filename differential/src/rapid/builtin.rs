@@ -88,7 +88,12 @@ fn with_pose(target: &Value, pose: &Pose) -> Result<Value, Stop> {
 
 impl Run<'_> {
     /// A function of the controller.
-    pub(super) fn function(&mut self, name: &str, arguments: &[Argument], frame: &Frame) -> Result<Value, Stop> {
+    pub(super) fn function(
+        &mut self,
+        name: &str,
+        arguments: &[Argument],
+        frame: &Frame,
+    ) -> Result<Value, Stop> {
         if name == "present" {
             let Some(Argument::Plain(Expr::Place(place))) = arguments.first() else {
                 return Err(Stop::Unknown("Present of what is no parameter".into()));
@@ -97,14 +102,20 @@ impl Run<'_> {
         }
         if name == "dinput" || name == "testdi" {
             let up = self.chance("input") & 1 == 1;
-            return Ok(if name == "testdi" { Value::Truth(up) } else { Value::Number(f64::from(u8::from(up))) });
+            return Ok(if name == "testdi" {
+                Value::Truth(up)
+            } else {
+                Value::Number(f64::from(u8::from(up)))
+            });
         }
         let given = Given::of(arguments, self, frame);
         let mut v = Vec::new();
         for expr in &given.plain {
             v.push(self.value(expr, frame)?);
         }
-        let v = |index: usize| v.get(index).ok_or_else(|| Stop::Unknown(format!("{name}: an argument is missing")));
+        let v = |index: usize| {
+            v.get(index).ok_or_else(|| Stop::Unknown(format!("{name}: an argument is missing")))
+        };
         let number = |index: usize| -> Result<f64, Stop> { Ok(v(index)?.number()?) };
         Ok(match name {
             "offs" => {
@@ -131,7 +142,9 @@ impl Run<'_> {
             "poseinv" => Value::of_pose(&v(0)?.pose()?.inverse()),
             "posevect" => Value::of_vector(&(v(0)?.pose()? * nalgebra::Point3::from(v(1)?.vector()?)).coords),
             "orientzyx" => Value::of_turn(
-                &(about(Vector3::z(), number(0)?) * about(Vector3::y(), number(1)?) * about(Vector3::x(), number(2)?)),
+                &(about(Vector3::z(), number(0)?)
+                    * about(Vector3::y(), number(1)?)
+                    * about(Vector3::x(), number(2)?)),
             ),
             "norient" => Value::of_turn(&v(0)?.turn()?),
             "abs" => Value::Number(number(0)?.abs()),
@@ -223,7 +236,9 @@ impl Run<'_> {
             "singarea" | "softact" | "softdeact" | "cirpathmode" | "accset" | "velset" => {
                 let words = self.words(&given, frame)?;
                 let key = if name == "softdeact" { "softact" } else { name };
-                self.state.others.insert(key.to_owned(), if name == "softdeact" { String::new() } else { words });
+                self.state
+                    .others
+                    .insert(key.to_owned(), if name == "softdeact" { String::new() } else { words });
                 Ok(())
             }
             "tpwrite" | "waittime" | "setdo" | "set" | "reset" | "stop" | "isignaldi" | "waitdi" => {
@@ -257,7 +272,13 @@ impl Run<'_> {
         Ok(out)
     }
 
-    fn motion(&mut self, name: &str, given: &Given<'_>, at: (usize, usize), frame: &Frame) -> Result<(), Stop> {
+    fn motion(
+        &mut self,
+        name: &str,
+        given: &Given<'_>,
+        at: (usize, usize),
+        frame: &Frame,
+    ) -> Result<(), Stop> {
         let count = if name == "movec" { 2 } else { 1 };
         let mut goals = Vec::new();
         for index in 0..count {
@@ -296,7 +317,8 @@ impl Run<'_> {
         let object = (wobj.0, wobj.1.part(0)?.truth()?, wobj.1.part(3)?.pose()?, wobj.1.part(4)?.pose()?);
         let (own, grip) = (loaded(tool.part(2)?)?, self.state.grip);
         let grip_frame = if held { frame_of_tool } else { object.2 };
-        let mut load: Load = own.unwrap_or((0.0, [0.0; 3]));
+        let tool_load: Load = own.unwrap_or((0.0, [0.0; 3]));
+        let mut load = tool_load;
         if let Some((kg, centre)) = grip {
             let centre = grip_frame * nalgebra::Point3::from(centre);
             let whole = load.0 + kg;
@@ -312,16 +334,8 @@ impl Run<'_> {
             Way::Joint => self.state.monitor_joints,
             _ => self.state.monitor_lines,
         };
-        let motion = Motion {
-            at,
-            way,
-            goals,
-            tool: (tool_name, held, frame_of_tool),
-            object,
-            monitored,
-            load,
-            rest,
-        };
+        let motion =
+            Motion { at, way, goals, tool: (tool_name, held, frame_of_tool), object, monitored, load, tool_load, rest };
         self.events.push(super::run::Event::Motion(Box::new(motion)));
         Ok(())
     }

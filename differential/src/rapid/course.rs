@@ -110,9 +110,11 @@ impl<'a> Course<'a> {
         };
         let before = self.sides;
         let way = self.way(motion, &start, &end, points);
+        let mut turned = [false; 6];
         for q in way.iter().chain([&end]) {
             for j in 0..6 {
                 self.turn(j, q[j]);
+                turned[j] |= self.sides[j] != before[j];
             }
         }
         for j in 0..6 {
@@ -130,7 +132,7 @@ impl<'a> Course<'a> {
             point.doubt = self.doubt;
             if k + 1 < count {
                 // Somewhere on the arc.
-                (0..6).for_each(|j| point.doubt[j] |= before[j] != self.sides[j]);
+                (0..6).for_each(|j| point.doubt[j] |= turned[j]);
             }
         }
     }
@@ -171,7 +173,13 @@ impl<'a> Course<'a> {
         };
         let (a, b) = (tool(&from), tool(&to));
         let circle = (motion.way == Way::Arc)
-            .then(|| Arc::through(&a.translation.vector, &tool(&points[0].flange).translation.vector, &b.translation.vector))
+            .then(|| {
+                Arc::through(
+                    &a.translation.vector,
+                    &tool(&points[0].flange).translation.vector,
+                    &b.translation.vector,
+                )
+            })
             .flatten();
         let mut near = *start;
         const PIECES: usize = 24;
@@ -217,7 +225,8 @@ impl Arc {
         if !(square > 1e-9) {
             return None;
         }
-        let centre = a + (normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared()) / (2.0 * square);
+        let centre =
+            a + (normal.cross(&u) * v.norm_squared() + v.cross(&normal) * u.norm_squared()) / (2.0 * square);
         let axis = Unit::new_normalize(normal);
         let spoke = a - centre;
         let end = b - centre;

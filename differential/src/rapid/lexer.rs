@@ -16,8 +16,8 @@ pub enum Token {
 }
 
 const SIGNS: [&str; 29] = [
-    ":=", "<>", "<=", ">=", "<", ">", "=", "+", "-", "*", "/", "(", ")", "[", "]", "{", "}", ",", ";", ":", ".", "%",
-    "\\", "?", "|", "&", "@", "#", "!",
+    ":=", "<>", "<=", ">=", "<", ">", "=", "+", "-", "*", "/", "(", ")", "[", "]", "{", "}", ",", ";", ":",
+    ".", "%", "\\", "?", "|", "&", "@", "#", "!",
 ];
 
 fn letter(byte: u8) -> bool {
@@ -41,15 +41,22 @@ pub fn tokens(source: &[u8]) -> Result<Vec<(Token, usize)>, String> {
                 at += 1;
             }
         } else if letter(byte) {
-            while at < source.len() && (letter(source[at]) || source[at].is_ascii_digit() || source[at] == b'_') {
+            while at < source.len()
+                && (letter(source[at]) || source[at].is_ascii_digit() || source[at] == b'_')
+            {
                 at += 1;
             }
             let name = source[begin..at].iter().map(|b| char::from(b.to_ascii_lowercase())).collect();
             out.push((Token::Name(name), begin));
-        } else if byte.is_ascii_digit() || (byte == b'.' && source.get(at + 1).is_some_and(u8::is_ascii_digit)) {
+        } else if byte.is_ascii_digit()
+            || (byte == b'.' && source.get(at + 1).is_some_and(u8::is_ascii_digit))
+        {
             at = number_end(source, at);
             let text = std::str::from_utf8(&source[begin..at]).map_err(|error| error.to_string())?;
-            out.push((Token::Number(text.parse().map_err(|_| format!("byte {begin}: no number: {text}"))?), begin));
+            out.push((
+                Token::Number(text.parse().map_err(|_| format!("byte {begin}: no number: {text}"))?),
+                begin,
+            ));
         } else if byte == b'"' {
             let text = string(source, &mut at)?;
             out.push((Token::Text(text), begin));

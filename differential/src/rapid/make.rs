@@ -124,9 +124,8 @@ pub fn program(rng: &mut ChaCha8Rng, case: &Case, features: Features, taught: bo
 
 /// Joints around which the program moves, and how far it goes from there (share of the usual).
 fn base(rng: &mut ChaCha8Rng, arm: &Arm, borders: bool) -> ([f64; 6], f64) {
-    let mut quarter = |low: i32, high: i32| {
-        90.0 * f64::from(rng.random_range(low..=high)) + rng.random_range(25.0..65.0)
-    };
+    let mut quarter =
+        |low: i32, high: i32| 90.0 * f64::from(rng.random_range(low..=high)) + rng.random_range(25.0..65.0);
     let (q1, q4, q6) = (quarter(-1, 0), quarter(-1, 0), quarter(-2, 1));
     let q5 = rng.random_range(35.0..85.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
     let mut deg = [q1, rng.random_range(-15.0..35.0), rng.random_range(-25.0..15.0), q4, q5, q6];
@@ -249,12 +248,20 @@ impl Maker<'_> {
         let (tool, object) = (&self.tools[pair.tool], &self.objects[pair.object]);
         let flange = self.arm.nominal_forward(q);
         let place = object.user * object.object;
-        if tool.held { place.inverse() * flange * tool.frame } else { place.inverse() * flange.inverse() * tool.frame }
+        if tool.held {
+            place.inverse() * flange * tool.frame
+        } else {
+            place.inverse() * flange.inverse() * tool.frame
+        }
     }
 
     fn number(&mut self, v: f64, decimals: usize) -> String {
         let text = format!("{v:.decimals$}");
-        let text = if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text };
+        let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
+            text.trim_start_matches('-').to_owned()
+        } else {
+            text
+        };
         match self.rng.random_range(0..12) {
             0 if text.contains('.') => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
             1 if text.starts_with("0.") => text[1..].to_owned(),
@@ -313,7 +320,8 @@ impl Maker<'_> {
             let frame = self.pose(&frame, [6, 9]);
             let (kg, [x, y, z]) = load.unwrap_or((0.5, [0.0, 0.0, 30.0]));
             let held = if held { "TRUE" } else { "FALSE" };
-            let _ = writeln!(out, "PERS tooldata {name}:=[{held},{frame},[{kg},[{x},{y},{z}],[1,0,0,0],0,0,0]];");
+            let _ =
+                writeln!(out, "PERS tooldata {name}:=[{held},{frame},[{kg},[{x},{y},{z}],[1,0,0,0],0,0,0]];");
         }
         for index in 1..self.objects.len() {
             let Object { name, held, user, object } = self.objects[index].clone();

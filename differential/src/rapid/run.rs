@@ -119,6 +119,8 @@ pub struct Motion {
     pub monitored: bool,
     /// What the arm carries.
     pub load: Load,
+    /// What it carries without what is gripped.
+    pub tool_load: Load,
     /// Speed, zone and what else stands behind the targets.
     pub rest: String,
 }
@@ -178,7 +180,11 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// Where a file cannot be read.
-    pub fn new(files: &[&[u8]], seed: u64, inserted: &'a dyn Fn(usize, usize) -> bool) -> Result<Self, String> {
+    pub fn new(
+        files: &[&[u8]],
+        seed: u64,
+        inserted: &'a dyn Fn(usize, usize) -> bool,
+    ) -> Result<Self, String> {
         let mut run = Run {
             types: Types::default(),
             modules: Vec::new(),
@@ -220,7 +226,8 @@ impl<'a> Run<'a> {
                 value: RefCell::new(value),
                 pending: RefCell::new(None),
             });
-            run.global.insert(name.to_owned(), Symbol::Data(Ref { data, path: Vec::new(), kind: kind.to_owned() }));
+            run.global
+                .insert(name.to_owned(), Symbol::Data(Ref { data, path: Vec::new(), kind: kind.to_owned() }));
         });
         for (index, (module, file)) in modules.into_iter().enumerate() {
             let mut scope = Scope::new();
@@ -447,7 +454,13 @@ impl<'a> Run<'a> {
         matches!(self.look(name, frame), Some(Symbol::Data(_)))
     }
 
-    fn bind(&mut self, routine: &Rc<Routine>, module: usize, arguments: &[Argument], frame: &Frame) -> Ran<Scope> {
+    fn bind(
+        &mut self,
+        routine: &Rc<Routine>,
+        module: usize,
+        arguments: &[Argument],
+        frame: &Frame,
+    ) -> Ran<Scope> {
         let _ = module;
         let mut scope = Scope::new();
         let mut required = routine.parameters.iter().filter(|p| !p.optional);
@@ -469,7 +482,8 @@ impl<'a> Run<'a> {
                     (find(name), Some(Expr::Place(whole)))
                 }
             };
-            let parameter = parameter.ok_or_else(|| Stop::Unknown(format!("{}: too many arguments", routine.name)))?;
+            let parameter =
+                parameter.ok_or_else(|| Stop::Unknown(format!("{}: too many arguments", routine.name)))?;
             let made = match (&expr, parameter.mode) {
                 (Some(Expr::Place(place)), Mode::Reference) => self.place(place, frame)?,
                 (Some(expr), _) => {
@@ -514,7 +528,10 @@ impl<'a> Run<'a> {
                 return Err(Stop::Unknown("PERS in a routine".into()));
             }
             let value = self.initial(data, frame)?;
-            frame.locals.borrow_mut().insert(data.name.clone(), Symbol::Data(local(&data.name, &data.kind, value)));
+            frame
+                .locals
+                .borrow_mut()
+                .insert(data.name.clone(), Symbol::Data(local(&data.name, &data.kind, value)));
         }
         self.block(&routine.body, frame)
     }
@@ -592,7 +609,9 @@ impl<'a> Run<'a> {
                     return self.block(rest, frame);
                 }
             }
-            Kind::For(name, from, to, step, body) => return self.counted(name, [from, to], step.as_ref(), body, frame),
+            Kind::For(name, from, to, step, body) => {
+                return self.counted(name, [from, to], step.as_ref(), body, frame);
+            }
             Kind::While(condition, body) => {
                 while self.value(condition, frame)?.truth()? {
                     match self.block(body, frame)? {

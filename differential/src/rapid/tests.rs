@@ -29,9 +29,13 @@ fn writes(value: &str) -> String {
 
 fn motions(rest: &str, main: &str) -> Vec<Motion> {
     let target = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n";
-    let (events, ended) = ran(&format!("MODULE m\n{target}{rest}\nPROC main()\n{main}\nENDPROC\nENDMODULE\n"));
+    let (events, ended) =
+        ran(&format!("MODULE m\n{target}{rest}\nPROC main()\n{main}\nENDPROC\nENDMODULE\n"));
     assert_eq!(ended, None);
-    events.into_iter().filter_map(|event| if let Event::Motion(m) = event { Some(*m) } else { None }).collect()
+    events
+        .into_iter()
+        .filter_map(|event| if let Event::Motion(m) = event { Some(*m) } else { None })
+        .collect()
 }
 
 /// Where a motion ends in its object.
@@ -154,7 +158,10 @@ fn parameters_are_copies() {
 #[test]
 fn inout_var_and_pers_are_the_callers_own() {
     for mode in ["INOUT", "VAR", "PERS"] {
-        assert_eq!(says(&format!("PROC a({mode} num k) k:=5; ENDPROC VAR num n:=1;"), "a n; TPWrite n;"), ["5"]);
+        assert_eq!(
+            says(&format!("PROC a({mode} num k) k:=5; ENDPROC VAR num n:=1;"), "a n; TPWrite n;"),
+            ["5"]
+        );
     }
 }
 
@@ -202,7 +209,10 @@ fn arguments_are_worked_out_in_order() {
 
 #[test]
 fn arrays_count_from_one_and_know_their_size() {
-    assert_eq!(says("CONST num a{2,3}:=[[1,2,3],[4,5,6]];", "TPWrite a{2,1}; TPWrite Dim(a,1)*10+Dim(a,2);"), ["4", "23"]);
+    assert_eq!(
+        says("CONST num a{2,3}:=[[1,2,3],[4,5,6]];", "TPWrite a{2,1}; TPWrite Dim(a,1)*10+Dim(a,2);"),
+        ["4", "23"]
+    );
 }
 
 #[test]
@@ -256,7 +266,10 @@ fn late_binding_calls_by_name() {
 
 #[test]
 fn a_handler_ends_the_routine() {
-    assert_eq!(says("PROC a() RAISE 3; ENDPROC PROC b() a; TPWrite 1; ERROR TPWrite 2; ENDPROC", "b; TPWrite 3;"), ["2", "3"]);
+    assert_eq!(
+        says("PROC a() RAISE 3; ENDPROC PROC b() a; TPWrite 1; ERROR TPWrite 2; ENDPROC", "b; TPWrite 3;"),
+        ["2", "3"]
+    );
 }
 
 #[test]
@@ -266,7 +279,8 @@ fn trynext_goes_on_behind_the_call() {
 
 #[test]
 fn retry_calls_again() {
-    let rest = "VAR num n:=3; PROC a() IF n>1 RAISE 1; TPWrite n; ENDPROC PROC b() a; ERROR n:=n-1; RETRY; ENDPROC";
+    let rest =
+        "VAR num n:=3; PROC a() IF n>1 RAISE 1; TPWrite n; ENDPROC PROC b() a; ERROR n:=n-1; RETRY; ENDPROC";
     assert_eq!(says(rest, "b;"), ["1"]);
 }
 
@@ -295,7 +309,10 @@ fn division_by_zero_is_an_error() {
 
 #[test]
 fn incr_add_clear() {
-    assert_eq!(says("VAR num n:=1;", "Incr n; Add n,3; TPWrite n; Decr n; TPWrite n; Clear n; TPWrite n;"), ["5", "4", "0"]);
+    assert_eq!(
+        says("VAR num n:=1;", "Incr n; Add n,3; TPWrite n; Decr n; TPWrite n; Clear n; TPWrite n;"),
+        ["5", "4", "0"]
+    );
 }
 
 #[test]
@@ -313,7 +330,10 @@ fn displacements_stand_within_the_object() {
         "PDispSet d; MoveL p,v10,fine,tool0; PDispOff; MoveL p,v10,fine,tool0; PDispOn\\ExeP:=Offs(p,0,7,0),p,tool0; MoveL \
          p,v10,fine,tool0;",
     );
-    assert_eq!(all.iter().map(end).collect::<Vec<_>>(), [[405.0, 0.0, 400.0], [400.0, 0.0, 400.0], [400.0, 7.0, 400.0]]);
+    assert_eq!(
+        all.iter().map(end).collect::<Vec<_>>(),
+        [[405.0, 0.0, 400.0], [400.0, 0.0, 400.0], [400.0, 7.0, 400.0]]
+    );
 }
 
 #[test]
@@ -324,9 +344,14 @@ fn arcs_have_a_point_between() {
 
 #[test]
 fn joint_targets_are_degrees() {
-    let all = motions("CONST jointtarget j:=[[90,0,0,0,0,180],[9E9,9E9,9E9,9E9,9E9,9E9]];", "MoveAbsJ j\\NoEOffs,v10,fine,tool0;");
+    let all = motions(
+        "CONST jointtarget j:=[[90,0,0,0,0,180],[9E9,9E9,9E9,9E9,9E9,9E9]];",
+        "MoveAbsJ j\\NoEOffs,v10,fine,tool0;",
+    );
     let super::run::Goal::Joints(q) = all[0].goals[0] else { panic!("no joints") };
-    assert!((q[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-12 && (q[5] - std::f64::consts::PI).abs() < 1e-12);
+    assert!(
+        (q[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-12 && (q[5] - std::f64::consts::PI).abs() < 1e-12
+    );
 }
 
 #[test]
@@ -348,7 +373,10 @@ fn grips_add_to_the_tool() {
 
 #[test]
 fn switches_are_told_apart() {
-    let all = motions("", "ConfL\\Off; MoveL p,v10,fine,tool0; MoveJ p,v10,fine,tool0; ConfL\\On; MoveL p,v10,fine,tool0;");
+    let all = motions(
+        "",
+        "ConfL\\Off; MoveL p,v10,fine,tool0; MoveJ p,v10,fine,tool0; ConfL\\On; MoveL p,v10,fine,tool0;",
+    );
     assert_eq!(all.iter().map(|m| m.monitored).collect::<Vec<_>>(), [false, true, true]);
 }
 
@@ -369,9 +397,8 @@ fn a_program_without_end_is_cut_off() {
 #[test]
 fn a_joint_keeps_its_side_until_it_turns() {
     let case = model::with(1, true, false);
-    let joint = |deg: f64| {
-        format!("MoveAbsJ [[{deg},0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\n")
-    };
+    let joint =
+        |deg: f64| format!("MoveAbsJ [[{deg},0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\n");
     let all = motions("", &[0.0, 10.0, 10.0, 5.0].map(joint).concat());
     let mut course = Course::new(&case.arm, [1; 6]);
     let sides: Vec<i8> = all.iter().map(|m| course.go(m)[0].approach[0]).collect();
@@ -380,7 +407,8 @@ fn a_joint_keeps_its_side_until_it_turns() {
 
 #[test]
 fn an_arc_goes_through_its_point() {
-    let arc = Arc::through(&[1.0, 0.0, 0.0].into(), &[0.0, 1.0, 0.0].into(), &[0.0, -1.0, 0.0].into()).expect("an arc");
+    let arc = Arc::through(&[1.0, 0.0, 0.0].into(), &[0.0, 1.0, 0.0].into(), &[0.0, -1.0, 0.0].into())
+        .expect("an arc");
     assert!((arc.at(1.0 / 3.0) - nalgebra::Vector3::new(0.0, 1.0, 0.0)).norm() < 1e-12);
     assert!((arc.at(1.0) - nalgebra::Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-12);
 }

@@ -164,7 +164,8 @@ impl Types {
 
     /// Place and type of a component.
     pub fn component(&self, kind: &str, name: &str) -> Result<(usize, String), String> {
-        let components = self.records.get(self.plain(kind)).ok_or_else(|| format!("{kind} has no components"))?;
+        let components =
+            self.records.get(self.plain(kind)).ok_or_else(|| format!("{kind} has no components"))?;
         let index = components.iter().position(|c| c.1 == name);
         let index = index.ok_or_else(|| format!("{kind} has no component {name}"))?;
         Ok((index, components[index].0.clone()))

@@ -5,8 +5,9 @@ use rand::RngExt;
 use super::Maker;
 
 /// Words that are written in capitals, small letters or mixed, as the program likes.
-const WORDS: [&str; 12] =
-    ["MoveL", "MoveJ", "MoveC", "MoveAbsJ", "Offs", "RelTool", "IF", "FOR", "ENDIF", "ENDFOR", "THEN", "ConfL"];
+const WORDS: [&str; 12] = [
+    "MoveL", "MoveJ", "MoveC", "MoveAbsJ", "Offs", "RelTool", "IF", "FOR", "ENDIF", "ENDFOR", "THEN", "ConfL",
+];
 
 const COMMENTS: [&str; 6] = [
     "! MoveL p10,v100,fine,tool0;",

@@ -43,14 +43,18 @@ impl Maker<'_> {
             let body = motion(self);
             out.push_str(&format!("PROC pLate{k}()\nn1:=n1+{k};\n{body}ENDPROC\n"));
         }
-        out.push_str("FUNC robtarget fUp(robtarget t,num k)\nIF k<0 RETURN t;\nRETURN Offs(t,0,0,k);\nENDFUNC\n");
+        out.push_str(
+            "FUNC robtarget fUp(robtarget t,num k)\nIF k<0 RETURN t;\nRETURN Offs(t,0,0,k);\nENDFUNC\n",
+        );
         out.push_str("FUNC num fLift()\nRETURN 2.5;\nENDFUNC\nFUNC num fTwice(num k)\nVAR num r;\nr:=k;\nWHILE r<2*k DO\nr:=r+1;\nENDWHILE\nRETURN r;\nENDFUNC\n");
         out.push_str("FUNC robtarget fCount(robtarget t)\nn2:=n2+1;\nRETURN t;\nENDFUNC\n");
         out.push_str("FUNC num fNext(INOUT num k)\nk:=k+1;\nRETURN 3;\nENDFUNC\n");
         out.push_str("FUNC num fSay()\nTPWrite \"lift\"\\Num:=n1;\nRETURN 4;\nENDFUNC\n");
         out.push_str("FUNC num fMoves()\npv1.trans.z:=pv1.trans.z+1.5;\nRETURN 1;\nENDFUNC\n");
         out.push_str("FUNC bool fTest(num k)\nRETURN k>2 OR (NOT b1 AND k MOD 2=1);\nENDFUNC\n");
-        out.push_str("TRAP trAdd\nn2:=n2+1;\npv2.trans.x:=pv2.trans.x+0.5;\nIF n2 MOD 3=0 b1:=NOT b1;\nENDTRAP\n");
+        out.push_str(
+            "TRAP trAdd\nn2:=n2+1;\npv2.trans.x:=pv2.trans.x+0.5;\nIF n2 MOD 3=0 b1:=NOT b1;\nENDTRAP\n",
+        );
         out
     }
 }

@@ -131,7 +131,18 @@ impl Maker<'_> {
     }
 
     fn condition(&mut self) -> String {
-        self.pick(&["n1>1", "b1", "n1=n2", "fTest(n1)", "DInput(doGrip)=1", "NOT b1", "n1<4 AND n2<>1", "TRUE", "step>4"]).into()
+        self.pick(&[
+            "n1>1",
+            "b1",
+            "n1=n2",
+            "fTest(n1)",
+            "DInput(doGrip)=1",
+            "NOT b1",
+            "n1<4 AND n2<>1",
+            "TRUE",
+            "step>4",
+        ])
+        .into()
     }
 
     fn block(&mut self, out: &mut String, depth: usize) {
@@ -165,12 +176,19 @@ impl Maker<'_> {
                 let _ = writeln!(out, "{label}:");
             }
             10 => {
-                let text = self.pick(&["TPWrite \"at\"\\Num:=n1;", "TPWrite s1;", "SetDO doSpindle,1;", "WaitTime 0.5;", "Reset doGrip;"]);
+                let text = self.pick(&[
+                    "TPWrite \"at\"\\Num:=n1;",
+                    "TPWrite s1;",
+                    "SetDO doSpindle,1;",
+                    "WaitTime 0.5;",
+                    "Reset doGrip;",
+                ]);
                 let _ = writeln!(out, "{text}");
             }
             11 => self.displacement(out),
             12 => {
-                let text = self.pick(&["ConfL\\Off;", "ConfL\\On;", "ConfJ\\Off;", "ConfJ\\On;", "ConfL\\On;"]);
+                let text =
+                    self.pick(&["ConfL\\Off;", "ConfL\\On;", "ConfJ\\Off;", "ConfJ\\On;", "ConfL\\On;"]);
                 let _ = writeln!(out, "{text}");
             }
             13 => {
@@ -178,13 +196,24 @@ impl Maker<'_> {
                 let _ = writeln!(out, "{text}");
             }
             14 => {
-                let text =
-                    self.pick(&["SingArea\\Wrist;", "SingArea\\Off;", "SoftAct 1,20;", "SoftDeact;", "AccSet 80,80;", "SoftDeact;"]);
+                let text = self.pick(&[
+                    "SingArea\\Wrist;",
+                    "SingArea\\Off;",
+                    "SoftAct 1,20;",
+                    "SoftDeact;",
+                    "AccSet 80,80;",
+                    "SoftDeact;",
+                ]);
                 let _ = writeln!(out, "{text}");
             }
             15 => {
                 let named = self.named();
-                let target = self.pick(&["tGrind.tframe.trans.z", "tSmall.tframe.trans", "wPart.oframe.trans.x", "wRoom.oframe.trans.y"]);
+                let target = self.pick(&[
+                    "tGrind.tframe.trans.z",
+                    "tSmall.tframe.trans",
+                    "wPart.oframe.trans.x",
+                    "wRoom.oframe.trans.y",
+                ]);
                 let _ = match target {
                     "tSmall.tframe.trans" => writeln!(out, "{target}:={target}+[0.5,0,1];"),
                     _ => writeln!(out, "{target}:={target}+{};", self.amount()),
@@ -198,7 +227,8 @@ impl Maker<'_> {
 
     fn assignment(&mut self, out: &mut String) {
         let named = self.writable();
-        let other = self.targets.iter().filter(|t| t.pair == named.pair).map(|t| t.name.clone()).collect::<Vec<_>>();
+        let other =
+            self.targets.iter().filter(|t| t.pair == named.pair).map(|t| t.name.clone()).collect::<Vec<_>>();
         let other = other[self.rng.random_range(0..other.len())].clone();
         let name = named.name;
         let _ = match self.rng.random_range(0..14) {
@@ -223,7 +253,11 @@ impl Maker<'_> {
         let condition = self.condition();
         if self.chance(0.25) {
             let _ = write!(out, "IF {condition} ");
-            if self.chance(0.6) { self.motion(out) } else { self.assignment(out) }
+            if self.chance(0.6) {
+                self.motion(out)
+            } else {
+                self.assignment(out)
+            }
             return;
         }
         let _ = writeln!(out, "IF {condition} THEN");
@@ -268,7 +302,9 @@ impl Maker<'_> {
         let _ = match self.rng.random_range(0..6) {
             0 | 1 => writeln!(out, "PDispSet shift1;"),
             2 => writeln!(out, "PDispSet shift2;"),
-            3 => writeln!(out, "PDispOff;\nPDispOn\\ExeP:=Offs({name},3,0,-2),{name},{tool}\\WObj:={object};"),
+            3 => {
+                writeln!(out, "PDispOff;\nPDispOn\\ExeP:=Offs({name},3,0,-2),{name},{tool}\\WObj:={object};")
+            }
             _ => writeln!(out, "PDispOff;"),
         };
     }

@@ -34,7 +34,8 @@ impl Maker<'_> {
         let real = Pose::from_parts(Translation3::from(corner.coords), self.small_turn(15.0));
         let mut joints = Vec::new();
         for point in [[15.0, 0.0, 0.0], [95.0, 0.0, 0.0], [0.0, 70.0, 0.0]] {
-            let touch = Pose::from_parts(Translation3::from((real * Point3::from(point)).coords), tip.rotation);
+            let touch =
+                Pose::from_parts(Translation3::from((real * Point3::from(point)).coords), tip.rotation);
             match self.arm.actual_inverse(&(touch * pointer.inverse()), &self.base, &at) {
                 Some(q) => joints.push(q),
                 None => return,
