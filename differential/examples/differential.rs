@@ -33,8 +33,9 @@ fn main() -> ExitCode {
         println!("{}", report::line(dialect.name(), &tally, seconds));
         all.merge(tally);
     }
+    let most = number("--show").unwrap_or(12) as usize;
     println!("{}", report::kinds(&all));
-    for disagreement in all.disagreements.iter().take(12) {
+    for disagreement in all.disagreements.iter().take(most) {
         println!("{disagreement}");
     }
     if all.disagreements.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }

@@ -4,7 +4,7 @@
 //! yield under the torque of gravity on links and payload, and joints with play that rest on the flank against which
 //! they moved last. The controller's inverse is the closed form of an arm with a spherical wrist.
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A pose (mm).
@@ -249,6 +249,8 @@ fn twist(a: &Pose, b: &Pose) -> nalgebra::Vector6<f64> {
 
 /// How far two poses are apart: mm, rad.
 pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
-    let turn: Rotation3<f64> = (a.rotation.inverse() * b.rotation).to_rotation_matrix();
-    ((a.translation.vector - b.translation.vector).norm(), turn.angle())
+    // The arc cosine of the trace would be blind below 1e-8.
+    let turn = a.rotation.inverse() * b.rotation;
+    let angle = 2.0 * turn.imag().norm().atan2(turn.w.abs());
+    ((a.translation.vector - b.translation.vector).norm(), angle)
 }

@@ -215,7 +215,6 @@ impl<'s> Heidenhain<'s> {
                 self.preset = format!("PRESET{number}");
                 self.shift = [Some(0.0); 3];
                 self.recount();
-                self.machine.turn = super::machine::Turn::Unknown;
             }
             7 | 8 | 10 => {}
             _ => self.machine.note(line),

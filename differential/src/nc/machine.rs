@@ -139,6 +139,8 @@ pub struct Machine<'s> {
     pub at: [Option<f64>; 3],
     /// How the tool is turned.
     pub turn: Turn,
+    /// The last turn about a tool vector (°).
+    pub spin: f64,
     /// The coordinates of the program in the base.
     pub chain: Option<Pose>,
     /// The tool in use.
@@ -170,6 +172,7 @@ impl<'s> Machine<'s> {
             line: 0,
             at: [None; 3],
             turn: Turn::Unknown,
+            spin: 0.0,
             chain: None,
             tool: Some("T0".to_owned()),
             tip: false,
@@ -234,9 +237,32 @@ impl<'s> Machine<'s> {
     /// A motion that is not followed: it leaves the tip elsewhere, turned as it was. `begins` where it matters where it
     /// starts.
     pub fn elsewhere(&mut self, text: impl Into<String>, begins: bool) {
+        self.some_elsewhere(text, begins, [true; 3]);
+    }
+
+    /// A motion that is not followed, of some of the axes.
+    pub fn some_elsewhere(&mut self, text: impl Into<String>, begins: bool, named: [bool; 3]) {
         let start = begins.then_some((self.at, self.chain));
         self.trace.push(Event::Elsewhere(self.line, text.into(), start));
-        self.at = [None; 3];
+        for (at, named) in self.at.iter_mut().zip(named) {
+            *at = at.filter(|_| !named);
+        }
+    }
+
+    /// X, Y and Z become the tip's, or are no more; the axes that turn the tool stay.
+    pub fn follow_tip(&mut self, on: bool) {
+        if self.tip != on {
+            self.at = [None; 3];
+        }
+        self.tip = on;
+    }
+
+    /// Another tool; where its tip is the text does not tell.
+    pub fn hold(&mut self, tool: Option<String>) {
+        if self.tool != tool {
+            self.lost();
+        }
+        self.tool = tool;
     }
 
     /// A motion of lines and arcs.
@@ -277,10 +303,14 @@ impl<'s> Machine<'s> {
             }
             self.turn = Turn::Angles(angles);
         } else if words.vector.iter().any(Option::is_some) {
-            let spin = words.spin.or(if let Turn::Vector(_, spin) = self.turn { Some(spin) } else { None });
-            self.turn = Turn::Vector(words.vector.map(|part| part.unwrap_or(0.0)), spin.unwrap_or(0.0));
-        } else if let (Turn::Vector(_, spin), Some(new)) = (&mut self.turn, words.spin) {
-            *spin = new;
+            self.spin = words.spin.unwrap_or(self.spin);
+            self.turn = Turn::Vector(words.vector.map(|part| part.unwrap_or(0.0)), self.spin);
+        } else if let Some(new) = words.spin {
+            // It holds on, whether a vector is in force or not.
+            self.spin = new;
+            if let Turn::Vector(_, spin) = &mut self.turn {
+                *spin = new;
+            }
         }
     }
 

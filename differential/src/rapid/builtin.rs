@@ -317,7 +317,8 @@ impl Run<'_> {
         let object = (wobj.0, wobj.1.part(0)?.truth()?, wobj.1.part(3)?.pose()?, wobj.1.part(4)?.pose()?);
         let (own, grip) = (loaded(tool.part(2)?)?, self.state.grip);
         let grip_frame = if held { frame_of_tool } else { object.2 };
-        let mut load: Load = own.unwrap_or((0.0, [0.0; 3]));
+        let tool_load: Load = own.unwrap_or((0.0, [0.0; 3]));
+        let mut load = tool_load;
         if let Some((kg, centre)) = grip {
             let centre = grip_frame * nalgebra::Point3::from(centre);
             let whole = load.0 + kg;
@@ -334,7 +335,7 @@ impl Run<'_> {
             _ => self.state.monitor_lines,
         };
         let motion =
-            Motion { at, way, goals, tool: (tool_name, held, frame_of_tool), object, monitored, load, rest };
+            Motion { at, way, goals, tool: (tool_name, held, frame_of_tool), object, monitored, load, tool_load, rest };
         self.events.push(super::run::Event::Motion(Box::new(motion)));
         Ok(())
     }

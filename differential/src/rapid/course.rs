@@ -110,9 +110,11 @@ impl<'a> Course<'a> {
         };
         let before = self.sides;
         let way = self.way(motion, &start, &end, points);
+        let mut turned = [false; 6];
         for q in way.iter().chain([&end]) {
             for j in 0..6 {
                 self.turn(j, q[j]);
+                turned[j] |= self.sides[j] != before[j];
             }
         }
         for j in 0..6 {
@@ -130,7 +132,7 @@ impl<'a> Course<'a> {
             point.doubt = self.doubt;
             if k + 1 < count {
                 // Somewhere on the arc.
-                (0..6).for_each(|j| point.doubt[j] |= before[j] != self.sides[j]);
+                (0..6).for_each(|j| point.doubt[j] |= turned[j]);
             }
         }
     }

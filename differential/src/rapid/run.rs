@@ -119,6 +119,8 @@ pub struct Motion {
     pub monitored: bool,
     /// What the arm carries.
     pub load: Load,
+    /// What it carries without what is gripped.
+    pub tool_load: Load,
     /// Speed, zone and what else stands behind the targets.
     pub rest: String,
 }

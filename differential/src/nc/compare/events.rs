@@ -159,7 +159,8 @@ impl Judge<'_> {
                 "{mm:.4} mm and {rad:.6} rad from where it shall be (before {before:.3} mm; stated {:?}): {:?} -> {:?}, {:?} -> {:?}",
                 row.after_mm, old.to, new.to, old.angles, new.angles
             );
-            return self.wrong(line, "wrong-place", text);
+            let kind = if self.pair.case.play { "wrong-place-with-play" } else { "wrong-place" };
+            return self.wrong(line, kind, text);
         }
         self.changed_arc(old, new);
     }
@@ -220,9 +221,11 @@ impl Judge<'_> {
             let (a, b, _) = axes(plane_of(&old.state));
             let within = std::array::from_fn(|axis| axis == a || axis == b);
             let moved = apart(old.chain, was.mid, new.chain, now.mid, within, 5e-3);
-            if let Some(off) = moved {
+            // What counts from its start, and what the control takes for no circle, goes on from where it starts.
+            let whole = stated[a] && stated[b] && (was.radii[0] - was.radii[1]).abs() < 0.02;
+            if let Some(off) = moved.filter(|_| whole) {
                 self.wrong(line, "left-arc-moved", format!("half way {off}: {was:?} -> {now:?} ({reason})"));
-            } else if (was.sweep - now.sweep).abs() > 1.0 {
+            } else if whole && (was.sweep - now.sweep).abs() > 1.0 {
                 self.wrong(line, "left-arc-sweep", format!("{was:?} -> {now:?} ({reason})"));
             }
         } else if old.arc.is_some() != new.arc.is_some() {

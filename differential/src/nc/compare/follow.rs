@@ -91,11 +91,11 @@ fn shortly_before(done: &Move) -> Option<Pose> {
     let share = 0.99;
     let chain = done.chain?;
     let turn = done.turns[0]?.try_slerp(&done.turns[1]?, share, 1e-9)?;
-    let mut at = [0.0; 3];
-    for axis in 0..3 {
+    let part = |axis: usize| {
         let (from, to) = (done.from[axis]?, done.to[axis]?);
-        at[axis] = from + (to - from) * share;
-    }
+        Some(from + (to - from) * share)
+    };
+    let mut at = [part(0)?, part(1)?, part(2)?];
     if let Some(arc) = done.arc {
         let (a, b, _) = crate::nc::arc::axes(plane_of(&done.state));
         let angle =

@@ -1,7 +1,7 @@
 //! What the words of a Fanuc block do, in the order of the control.
 
 use super::super::arc::Circle;
-use super::super::machine::{Mode, Say, Turn, Words};
+use super::super::machine::{Mode, Say, Words};
 use super::super::setting::Pose;
 use super::{Block, Fanuc};
 
@@ -99,15 +99,12 @@ impl Fanuc<'_> {
                         _ => format!("G{}", code / 10),
                     };
                     self.recount();
-                    // The axes that turn count in the new offset as well.
-                    self.machine.turn = Turn::Unknown;
                 }
                 430 | 434 | 490 => {
-                    self.machine.tip = code == 434;
-                    if let Some(number) = block.get('H').filter(|_| code != 490) {
-                        self.machine.tool = Some(format!("T{number}"));
-                    }
-                    self.machine.lost();
+                    let number = block.get('H').filter(|_| code != 490);
+                    let tool = number.map_or(self.machine.tool.clone(), |number| Some(format!("T{number}")));
+                    self.machine.follow_tip(code == 434);
+                    self.machine.hold(tool);
                 }
                 680 => self.machine.bend("turned", true),
                 690 => self.machine.bend("turned", false),
@@ -190,7 +187,8 @@ impl Fanuc<'_> {
     fn returns(&mut self, block: &Block) -> bool {
         for (code, begins) in [(280, false), (300, false), (310, true), (530, false)] {
             if block.has(code) {
-                self.machine.elsewhere(block.text.clone(), begins);
+                let named = AXES.map(|letter| begins || block.get(letter).is_some());
+                self.machine.some_elsewhere(block.text.clone(), begins, named);
                 return true;
             }
         }

@@ -53,8 +53,7 @@ impl Heidenhain<'_> {
             self.machine.elsewhere("cycle that is called by M99", true);
         }
         if beside.control_off {
-            self.machine.tip = false;
-            self.machine.lost();
+            self.machine.follow_tip(false);
         }
         Ok(beside.ends)
     }
@@ -71,7 +70,8 @@ impl Heidenhain<'_> {
         }
         let along_normal = beside.normal && words.vector == [None; 3];
         if beside.machine || along_normal {
-            self.machine.elsewhere(line, along_normal);
+            let named = words.place.map(|say| along_normal || say.is_some());
+            self.machine.some_elsewhere(line, along_normal, named);
             return Ok(());
         }
         self.machine.mode = match kind {
@@ -122,8 +122,7 @@ impl Heidenhain<'_> {
             "DR+" => beside.anticlockwise = true,
             "DR-" => beside.anticlockwise = false,
             "M128" => {
-                self.machine.tip = true;
-                self.machine.lost();
+                self.machine.follow_tip(true);
             }
             "M129" => beside.control_off = true,
             "M91" => beside.machine = true,

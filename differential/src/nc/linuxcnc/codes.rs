@@ -2,7 +2,7 @@
 //! shifts, motion.
 
 use super::super::arc::Circle;
-use super::super::machine::{Mode, Say, Turn, Words};
+use super::super::machine::{Mode, Say, Words};
 use super::super::setting::{Pose, plain};
 use super::{Block, LinuxCnc};
 
@@ -91,7 +91,6 @@ impl LinuxCnc<'_> {
                         if frame != self.frame {
                             self.frame = frame;
                             self.recount();
-                            self.machine.turn = Turn::Unknown;
                         }
                     }
                 }
@@ -103,20 +102,18 @@ impl LinuxCnc<'_> {
 
     fn lengths_of_tools(&mut self, block: &Block) {
         if block.has(430) {
-            self.machine.tool = Some(match block.get('H') {
+            self.machine.hold(Some(match block.get('H') {
                 Some(number) if number != 0.0 => format!("T{number}"),
                 Some(_) => "T0".to_owned(),
                 None => self.spindle.clone(),
-            });
-            self.machine.lost();
+            }));
         }
         if block.has(431) {
             self.machine.tool = None;
             self.machine.lost();
         }
         if block.has(490) {
-            self.machine.tool = Some(self.spindle.clone());
-            self.machine.lost();
+            self.machine.hold(Some(self.spindle.clone()));
         }
     }
 
@@ -127,7 +124,6 @@ impl LinuxCnc<'_> {
                     if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G59.{}", code % 10) };
                 self.frame = name;
                 self.recount();
-                self.machine.turn = Turn::Unknown;
             }
         }
         Ok(())
@@ -185,7 +181,9 @@ impl LinuxCnc<'_> {
         for (code, begins) in [(280, false), (300, false), (530, false), (382, true), (383, true)] {
             if block.has(code) {
                 self.mode_of(block);
-                self.machine.elsewhere(block.text.clone(), begins);
+                let none = AXES.iter().all(|letter| block.get(*letter).is_none());
+                let named = AXES.map(|letter| none || block.get(letter).is_some());
+                self.machine.some_elsewhere(block.text.clone(), begins, named);
                 return Ok(true);
             }
         }

@@ -82,7 +82,7 @@ fn arc(m: &mut Maker) -> Vec<String> {
         // A whole circle.
         block.truncate(block.len() - 2);
     }
-    if kind >= 1.0 && kind <= 3.0 {
+    if (1.0..=3.0).contains(&kind) {
         let radius = centre[0].hypot(centre[1]);
         let long = (end[0].hypot(end[1]) - 2.0 * radius).abs() > 1e-6 && is_long(end, centre, anticlockwise);
         block.push(m.axis("R", if long { -radius } else { radius }));

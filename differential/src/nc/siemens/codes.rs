@@ -1,8 +1,8 @@
 //! What the words of a Siemens block do.
 
 use super::super::arc::Circle;
-use super::super::machine::{Mode, Say, Turn, Words};
-use super::super::setting::{Angles, Pose, plain};
+use super::super::machine::{Mode, Say, Words};
+use super::super::setting::{Pose, plain};
 use super::{Siemens, Word};
 
 const AXES: [&str; 3] = ["X", "Y", "Z"];
@@ -49,7 +49,11 @@ impl Siemens<'_> {
         let begins = [33.0, 74.0, 75.0].iter().any(|g| code(*g));
         let machine = code(53.0) || words.contains(&Word::Name("SUPA".into()));
         if begins || machine {
-            self.machine.elsewhere(text, !machine);
+            let mut named = [code(33.0); 3];
+            for (axis, letter) in AXES.iter().enumerate() {
+                named[axis] |= self.say(words, letter, 1.0)?.is_some();
+            }
+            self.machine.some_elsewhere(text, !machine, named);
             return Ok(());
         }
         self.motion(words, text)
@@ -113,8 +117,7 @@ impl Siemens<'_> {
             let Word::Name(name) = word else { continue };
             match name.as_str() {
                 "TRAORI" | "TRAFOOF" => {
-                    self.machine.tip = name == "TRAORI";
-                    self.machine.lost();
+                    self.machine.follow_tip(name == "TRAORI");
                 }
                 name if name.starts_with("CYCLE832") || name.starts_with("MSG") => self.machine.note(name),
                 "STOPRE" | "SOFT" | "BRISK" | "COMPCAD" | "COMPOF" | "FFWON" | "FFWOF" => {
@@ -187,7 +190,6 @@ impl Siemens<'_> {
             54..=57 | 500 | 505..=599 => {
                 self.frame = format!("G{}", code as i32);
                 self.recount();
-                self.machine.turn = Turn::Unknown;
             }
             60 | 64 | 641 | 642 | 9 => machine.note(format!("G{code}")),
             _ => {}
@@ -271,7 +273,6 @@ impl Siemens<'_> {
             words.vector[axis] = self.number(list, ["A3", "B3", "C3"][axis])?;
         }
         words.spin = self.number(list, "THETA")?;
-        debug_assert!(self.machine.setting.angles == Angles::Wpr || true);
         let mut centre = [None; 3];
         let mut any = false;
         for (axis, letter) in ["I", "J", "K"].iter().enumerate() {

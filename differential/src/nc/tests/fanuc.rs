@@ -76,7 +76,8 @@ fn coordinates_are_counted_from_offsets_and_shifts() {
             ("G55\nX5. Y5. Z5. A180. B0. C0.", Some([605.0, 5.0, 5.0])),
             ("G54.1 P2\nX5. Y5. Z5. A180. B0. C0.", Some([705.0, 5.0, 5.0])),
             ("G56\nX5. Y6. Z5. A180. B0. C0.", Some([494.0, 5.0, 5.0])),
-            ("G55\nX5.", None),
+            ("G55\nX5.", Some([605.0, 2.0, 3.0])),
+            ("G56\nX5.", None),
             ("G92 X10.\nX11.", Some([502.0, 2.0, 3.0])),
             ("G92 X10. Y0.\nG92.1 X0. Y0.\nX11. Y5.", Some([511.0, 5.0, 3.0])),
             ("G52 X10.\nX1.", Some([511.0, 2.0, 3.0])),
@@ -87,9 +88,10 @@ fn coordinates_are_counted_from_offsets_and_shifts() {
             ("G68 X0. Y0. R30.\nG69\nX1. Y1. Z1. A180. B0. C0.", Some([501.0, 1.0, 1.0])),
             ("G43 H1\nX1. Y1. Z1. A180. B0. C0.", None),
             ("G28 Z0.\nX1.", None),
+            ("G28 Z0.\nZ1.", Some([501.0, 2.0, 1.0])),
         ],
     );
-    goes(Fanuc, &[("G53 Z0.\nX1.", &[[1.0, NAN, NAN]]), ("T2 M6\nX1.", &[[1.0, NAN, NAN]])]);
+    goes(Fanuc, &[("G53 Z0.\nX1.", &[[1.0, 2.0, NAN]]), ("T2 M6\nX1.", &[[1.0, NAN, NAN]])]);
 }
 
 #[test]

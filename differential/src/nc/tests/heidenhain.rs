@@ -79,13 +79,13 @@ fn coordinates_are_counted_from_presets_and_shifts() {
             (with("CYCL DEF 10.0 ROT\nCYCL DEF 10.1 ROT+30"), None),
             (with("PLANE SPATIAL SPA+0 SPB+20 SPC+0 STAY\nPLANE RESET STAY"), Some([501.0, 2.0, 3.0])),
             (with("M129"), None),
-            (with("TOOL CALL 1 Z S1 DL+5").replace(go, go).leak(), Some([501.0, 2.0, 3.0])),
+            (with("TOOL CALL 1 Z S1 DL+5"), Some([501.0, 2.0, 3.0])),
         ],
     );
     goes(
         Heidenhain,
         &[
-            ("L Z+0 M91\nL X+1", &[[1.0, NAN, NAN]]),
+            ("L Z+0 M91\nL X+1", &[[1.0, 2.0, NAN]]),
             ("TOOL CALL 2 Z\nL X+1", &[[1.0, NAN, NAN]]),
             ("TOOL CALL S500\nL X+1", &[[1.0, 2.0, 3.0]]),
         ],

@@ -87,7 +87,7 @@ fn coordinates_are_counted_from_offsets_and_shifts() {
             ("G43.1 Z10\nX1 Y1 Z1 A180 B0 C0", Some([501.0, 1.0, 1.0])),
         ],
     );
-    goes(LinuxCnc, &[("G28 Z0\nX1", &[[1.0, NAN, NAN]]), ("T2 M6\nX1", &[[1.0, NAN, NAN]])]);
+    goes(LinuxCnc, &[("G28 Z0\nX1", &[[1.0, 2.0, NAN]]), ("T2 M6\nX1", &[[1.0, NAN, NAN]])]);
 }
 
 #[test]
