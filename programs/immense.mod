@@ -8,6 +8,7 @@ MODULE Immense
     MoveL [[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tHeavy;
     MoveL [[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0\WObj:=wFar;
     MoveL [[400,-1E30,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
+    MoveL [[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[1E39,500,5000,1000],fine,tool0;
     MoveAbsJ [[0,0,0,0,2E7,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
   ENDPROC
 ENDMODULE

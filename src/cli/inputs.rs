@@ -9,6 +9,7 @@ use truegrind::kinematics::model::Model;
 use truegrind::robots::{self, Robot};
 
 use super::files;
+use super::outputs::tell;
 
 /// A robot by catalogue name or from a TOML file.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
@@ -70,7 +71,7 @@ pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Resu
             "{name}: this model is doubtful, programs are corrected with it only with --allow-doubtful: {reasons}"
         );
     }
-    eprintln!("note: {name}: this model is doubtful: {reasons}");
+    tell(format_args!("note: {name}: this model is doubtful: {reasons}"));
     Ok(())
 }
 

@@ -589,7 +589,7 @@ fn work<'a>(
 /// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
 fn unchanged(why: Why) -> Status {
     match why {
-        Why::Program(Reason::BeyondReach) => Status::Refused,
+        Why::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
         Why::Program(_) => Status::Left,
         _ => Status::Refused,
     }

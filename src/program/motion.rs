@@ -520,7 +520,7 @@ impl Listing {
         let tool = match self.tool(motion).map(|tool| &tool.value) {
             Some(Ok(tool)) => tool,
             Some(Err(Reason::Assigned)) => return Some(Reason::ToolAssigned),
-            Some(Err(Reason::BeyondReach)) => return Some(Reason::BeyondReach),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => return Some(*reason),
             Some(Err(Reason::HandedOver)) => return Some(Reason::ToolHandedOver),
             Some(Err(Reason::Parameter)) => return Some(Reason::ToolParameter),
             Some(Err(_)) => return Some(Reason::ToolUnknown),
@@ -531,7 +531,7 @@ impl Listing {
             Some(Ok(work_object)) if work_object.robhold == tool.robhold => Some(Reason::HeldByBoth),
             Some(Ok(_)) => None,
             Some(Err(Reason::Assigned)) => Some(Reason::WorkObjectAssigned),
-            Some(Err(Reason::BeyondReach)) => Some(Reason::BeyondReach),
+            Some(Err(reason @ (Reason::BeyondReach | Reason::NumberRange))) => Some(*reason),
             Some(Err(Reason::HandedOver)) => Some(Reason::WorkObjectHandedOver),
             Some(Err(Reason::Parameter)) => Some(Reason::WorkObjectParameter),
             _ => Some(Reason::WorkObjectUnknown),

@@ -249,9 +249,19 @@ impl Inverse<'_> {
         search.found
     }
 
-    /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again.
+    /// The outcome with each joint on the turn nearest to `wanted`; effects that know the turn are solved again. A joint
+    /// whose turn no configuration states stays within its range where another turn does.
     fn turned(&self, goal: &Goal, outcome: Outcome, wanted: &Joints) -> Outcome {
-        let joints = on_turn_near(&outcome.joints, wanted);
+        let mut joints = on_turn_near(&outcome.joints, wanted);
+        for axis in (0..6).filter(|axis| !QUARTER_AXES.contains(axis)) {
+            let (low, high) = range(&self.arm.model.limits, axis);
+            let (less, more) = (joints[axis] - TAU, joints[axis] + TAU);
+            if joints[axis] > high && less >= low {
+                joints[axis] = less;
+            } else if joints[axis] < low && more <= high {
+                joints[axis] = more;
+            }
+        }
         if joints == outcome.joints {
             return outcome;
         }

@@ -49,7 +49,8 @@ fn all_figures_of_the_paper_are_shown_and_every_table_says_that_it_is_simulated(
     assert!(result.against_rls.iter().all(|a| a.arms == 6 && (0.0..=1.0).contains(&a.p)));
     let experiment = Experiment::by_name("rls-degradation").unwrap();
     let results = Results::Degradation(Box::new(result));
-    let page = view::document(&experiment, &results, &view::Origin::default());
+    let page =
+        view::document(&experiment, &results, &view::Origin { timings: true, ..view::Origin::default() });
     let html = format::html::document(&page);
     for figure in [
         "Fig. 4", "Fig. 7", "Fig. 9", "Fig. 10", "Fig. 11", "Fig. 12", "Fig. 13", "Fig. 14", "Table 2",

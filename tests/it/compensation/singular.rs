@@ -233,7 +233,7 @@ fn near_each_singularity_the_controller_takes_the_joints_that_were_meant_or_noth
             let (mut written, mut far, mut jumps, mut count) = (0, 0, 0, 0);
             for seed in 0..4 {
                 let known = known(robot, seed);
-                let places: Vec<Joints> = (0..40)
+                let places: Vec<Joints> = (0..60)
                     .filter_map(|_| {
                         let m = margin(&mut random);
                         near_singular(&arm, kind, m, &mut random)

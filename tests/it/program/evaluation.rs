@@ -328,7 +328,8 @@ fn a_displacement_that_the_text_tells_is_part_of_the_work_object() {
     assert_eq!(displaced(&format!("IF x THEN\n{set}ELSE\n{set}ENDIF\n{go}")), [moved]);
     assert_eq!(displaced(&format!("WHILE x DO\n{go}{set}{go}ENDWHILE\n{go}")), [left, moved, left]);
     assert_eq!(displaced(&format!("{set}neither;\n{go}sets;\n{go}ends;\n{go}")), [moved, left, plain]);
-    assert_eq!(displaced(&format!("PDispSet found;\n{go}PDispOn p,tool0;\n{go}")), [left, left]);
+    let before = Err(Reason::BeforeDisplacement);
+    assert_eq!(displaced(&format!("PDispSet found;\n{go}PDispOn p,tool0;\n{go}")), [before, left]);
     // SmarTac adds what it found to what is set already.
     assert_eq!(displaced(&format!("{set}{go}PDispAdd found;\n{go}PDispOff;\n{go}")), [moved, left, plain]);
     assert_eq!(displaced(&format!("{set}EOffsSet [1,0,0,0,0,0];\n{go}")), [left]);

@@ -171,7 +171,13 @@ fn every_reason_to_leave_a_motion_has_a_sample() {
         look(&super::nc::read(name, bytes).listing);
     }
     // These belong to rewriting and have tests there.
-    let rewriting = [Reason::NoInsertion, Reason::NoJointForm, Reason::WrongKind];
+    let rewriting = [
+        Reason::NoInsertion,
+        Reason::NoJointForm,
+        Reason::WrongKind,
+        Reason::BeforeOrigin,
+        Reason::BeforeIncrement,
+    ];
     let missing: Vec<_> =
         Reason::ALL.iter().filter(|reason| !seen.contains(reason) && !rewriting.contains(reason)).collect();
     assert!(missing.is_empty(), "{missing:?}");

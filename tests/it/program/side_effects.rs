@@ -139,5 +139,5 @@ fn what_only_computes_is_listed_in_order_and_writes_nothing() {
 fn a_displacement_from_where_the_robot_stands_keeps_that_motion() {
     let reason = |line: &str| first(line).0;
     assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn p,tool0;"), Some(Reason::BeforeDisplacement));
-    assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn\\ExeP:=p,p,tool0;"), None);
+    assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn\\ExeP:=p,p,tool0;\nPDispOff;"), None);
 }
