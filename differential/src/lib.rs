@@ -14,7 +14,6 @@
 
 pub mod arm;
 pub mod model;
-#[cfg(feature = "nc")]
 pub mod nc;
 pub mod outcome;
 pub mod rapid;
