@@ -37,7 +37,7 @@ pub fn many(languages: &[Dialect], seed: u64, wanted: usize) -> Vec<(Dialect, Ta
 pub fn run(dialect: Dialect, seed: u64) -> Tally {
     match dialect {
         Dialect::Rapid => rapid::run(seed, Features::ALL),
-                other => crate::nc::run(other, seed, &crate::model::random(seed)),
+        other => crate::nc::run(other, seed, &crate::model::random(seed)),
     }
 }
 
@@ -64,7 +64,7 @@ pub fn one(dialect: Dialect, seed: u64) -> String {
             let _ = writeln!(out, "{disagreement}");
         }
     }
-        if dialect != Dialect::Rapid {
+    if dialect != Dialect::Rapid {
         let shown = crate::nc::shown(dialect, seed, &crate::model::random(seed), Default::default());
         let corrected = shown.corrected.unwrap_or_else(|error| error);
         let _ = writeln!(out, "---- original\n{}\n---- corrected\n{corrected}", shown.original);

@@ -579,7 +579,9 @@ impl<'a, 's> Lister<'a, 's> {
             motion.left = motion.left.or(Some(Reason::NumberRange));
         }
         // Whatever is written in place of an expression that acts, or instead of the circle point, would act no more.
-        motion.left = motion.left.or(self.acting.then_some(Reason::SideEffect));
+        // A target that is not known stays for that reason.
+        let known = motion.targets.iter().all(|target| target.value.is_ok());
+        motion.left = motion.left.or((self.acting && known).then_some(Reason::SideEffect));
         motion
     }
 
