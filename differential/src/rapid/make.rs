@@ -198,7 +198,7 @@ impl Maker<'_> {
 
     /// Tools and objects.
     fn cell(&mut self) {
-        let mut frame = |maker: &mut Self, z: f64| {
+        let frame = |maker: &mut Self, z: f64| {
             let turn = if maker.chance(0.5) { UnitQuaternion::identity() } else { maker.small_turn(20.0) };
             let pose = Pose::from_parts(maker.place([0.0, 0.0, z], 15.0), turn);
             maker.rounded(&pose, [3, 8])

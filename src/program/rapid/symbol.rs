@@ -162,6 +162,8 @@ pub struct Symbols {
     pub interrupts: Vec<bool>,
     /// Those that may.
     pub interrupting: Vec<u32>,
+    /// Whether one of those leads the robot away.
+    led_away: bool,
     /// What any statement sets.
     pub everything: States,
     /// Whether the next cycle may begin in the middle of this one.

@@ -205,6 +205,7 @@ impl Symbols {
         let interrupting = (0..).zip(&self.interrupts).filter(|&(_, &interrupts)| interrupts);
         self.interrupting = interrupting.map(|(routine, _)| routine).collect();
         self.settle_reaches(&all);
+        self.led_away = self.leads_away(trees);
         self.late_sets = self.reached_late().into_iter().map(|(_, sets)| sets).collect();
         self.settle_volatile(trees, &all);
         let mut called = vec![false; all.len()];
@@ -427,18 +428,7 @@ impl Symbols {
     /// Whether the robot may be moved between the statements of a unit: by an error handler that goes back to them, or by a
     /// routine that interrupts it and does not store the path to come back to.
     pub fn wanders(&self, trees: &[RapidTree<'_>], unit: Unit) -> bool {
-        let stores = |unit: Unit| {
-            let tree = &trees[unit.file as usize];
-            (unit.node..unit.node + tree.nodes[unit.node as usize].size).any(|node| {
-                let node = tree.nodes[node as usize];
-                node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
-            })
-        };
-        let leads_away = |routine: &u32| {
-            let routine = &self.routines[*routine as usize];
-            routine.reach.moves && !stores(self.units[routine.unit as usize])
-        };
-        if self.interrupting.iter().any(leads_away) {
+        if self.led_away {
             return true;
         }
         let tree = &trees[unit.file as usize];
@@ -456,6 +446,21 @@ impl Symbols {
         };
         let mut clauses = tree.child_nodes(unit.node).filter(|&clause| resumes(tree, clause));
         clauses.any(|clause| (clause..clause + tree.nodes[clause as usize].size).any(moves))
+    }
+
+    /// Whether a routine that interrupts others moves the robot and does not store the path to come back to.
+    fn leads_away(&self, trees: &[RapidTree<'_>]) -> bool {
+        let stores = |unit: Unit| {
+            let tree = &trees[unit.file as usize];
+            (unit.node..unit.node + tree.nodes[unit.node as usize].size).any(|node| {
+                let node = tree.nodes[node as usize];
+                node.kind == Syntax::Call && same_name(tree.text(node.first), b"StorePath")
+            })
+        };
+        self.interrupting.iter().any(|&routine| {
+            let routine = &self.routines[routine as usize];
+            routine.reach.moves && !stores(self.units[routine.unit as usize])
+        })
     }
 
     fn type_named(&self, scope: u32, name: &[u8]) -> Vec<u8> {

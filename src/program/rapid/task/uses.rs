@@ -55,7 +55,8 @@ impl<'s> Lister<'_, 's> {
                 name.and_then(|name| name.value).and_then(|name| token_kind(tree, name))
                     != Some(Token::String)
             };
-            for node in (0..tree.nodes.len() as u32).filter(reads).filter(computed) {
+            // One in a file says it for all.
+            if let Some(node) = (0..tree.nodes.len() as u32).filter(reads).find(computed) {
                 let place = self.place(file, tree.nodes[node as usize].first);
                 for declaration in &mut self.listing.declarations {
                     declaration.other_uses.push(OtherUse { motion: None, place });
