@@ -34,6 +34,7 @@ mod slack;
 mod segment;
 mod circle;
 mod strayed;
+mod staying;
 mod singular;
 mod notes;
 mod passage;

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
-use super::cut::{self, Cuts};
+use super::cut::Cuts;
 use super::deviation::{PathPoint, Status};
 use super::mounting::Mounting;
 use super::mountings::Mountings;
@@ -23,10 +23,9 @@ use super::notes::{load_notes, open_notes, play_note};
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
 use super::segment::{Ends, Path, middles_off};
-use super::singular::forbid_ways;
 use super::solve::{Solved, SolvedTargets, as_joints, solve_all, take_room};
 use super::speed::{Pace, fastest};
-use super::strayed::strayed;
+use super::staying::{obstacle, staying};
 use super::why::Why;
 use crate::kinematics::condition::Condition;
 use crate::kinematics::effect::Effect;
@@ -37,7 +36,7 @@ use crate::kinematics::model::{Joints, Model};
 use crate::kinematics::region::Outside;
 use crate::math::se3::Pose;
 use crate::program::motion::{
-    Listing, Motion, MotionKind, MotionTarget, Reason, RobTarget, Role, Switch, TargetValue,
+    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
 };
 use crate::program::rewrite::{Change, NewTarget};
 
@@ -232,75 +231,6 @@ pub(super) fn plan_without(
     }
     plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
     plan
-}
-
-/// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
-/// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
-/// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
-fn staying(
-    listing: &Listing,
-    solved: &mut SolvedTargets,
-    mountings: &Mountings,
-    arms: &Arms<'_>,
-    options: &Options,
-    refused: &BTreeMap<u32, Why>,
-) -> BTreeMap<u32, Why> {
-    let mut stays = refused.clone();
-    let cuts = cut::of(listing);
-    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None);
-    loop {
-        let before = stays.len();
-        for motion in strayed(listing, solved, mountings, options, &stays) {
-            stays.insert(motion, Why::NoCircle);
-        }
-        let solved_so_far = &*solved;
-        let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
-        let more = match options.cuts {
-            Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
-            Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
-                solved
-                    .of(motion as usize)
-                    .last()
-                    .and_then(|to| to.as_ref().ok())
-                    .map_or(0.0, Solved::shift_mm)
-            }),
-            Cuts::Single => Vec::new(),
-        };
-        stays.extend(more);
-        if stays.len() == before && !forbidden {
-            return stays;
-        }
-        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays));
-    }
-}
-
-/// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
-fn obstacle(
-    index: u32,
-    listing: &Listing,
-    solved: &SolvedTargets,
-    options: &Options,
-    stays: &BTreeMap<u32, Why>,
-) -> Option<(Status, Why)> {
-    let motion = &listing.motions[index as usize];
-    if let Some(reason) = motion.left {
-        let why = Why::Program(reason);
-        return Some((unchanged(why), why));
-    }
-    let targets = solved.of(index as usize);
-    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
-    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
-    if let Some(why) = unknown.or_else(|| errors().next()) {
-        return Some((unchanged(why), why));
-    }
-    if targets.is_empty() {
-        return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
-    }
-    if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
-        return Some((Status::Left, Why::JointTarget));
-    }
-    let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
-    forbidden.or_else(|| stays.get(&index).copied()).map(|why| (Status::Refused, why))
 }
 
 /// Motions that one thread takes at a time.
@@ -584,15 +514,6 @@ fn work<'a>(
     let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
-}
-
-/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
-fn unchanged(why: Why) -> Status {
-    match why {
-        Why::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
-        Why::Program(_) => Status::Left,
-        _ => Status::Refused,
-    }
 }
 
 /// Whether a motion is of a kind that is rewritten at all.
