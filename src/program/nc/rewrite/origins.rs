@@ -295,7 +295,7 @@ impl Task<'_> {
                 }
                 (None, _) => {}
             }
-            if motion.conditional {
+            if motion.conditional || written.may_lack {
                 let hangs = course.place[axis].and(before[axis]);
                 course.place[axis] = Hangs { unsettled: !hangs.is_nothing(), ..hangs };
             }
