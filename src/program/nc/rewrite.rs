@@ -259,8 +259,10 @@ impl<'s> Follower<'_, 's> {
                 self.now.position = position.map(Some);
                 match told {
                     Told::AsMeant => (self.now.angles, self.now.vector) = (written.angles, written.vector),
-                    Told::Angles(angles) => self.now.angles = angles.map(Some),
-                    Told::Vector(vector, spin) => self.now.vector = Some((vector, spin)),
+                    Told::Angles(angles) => (self.now.angles, self.now.vector) = (angles.map(Some), None),
+                    Told::Vector(vector, spin) => {
+                        (self.now.angles, self.now.vector) = ([None; 3], Some((vector, spin)));
+                    }
                 }
             }
         }

@@ -116,6 +116,8 @@ pub(super) struct Written {
     pub(super) insertable: bool,
     /// Whether words that it leaves out can be said again though it stays.
     pub(super) restates: bool,
+    /// Whether a word of it may say nothing, because its variable may never have been set (Fanuc).
+    pub(super) may_lack: bool,
     /// Whether it is a positioning block of Heidenhain without L.
     pub(super) paraxial: bool,
     /// What its way hangs on where it stays as it is.

@@ -1,7 +1,7 @@
 //! What stays as it is written while what is before it has moved: where the control stands now, and the words that are said
 //! again.
 
-use super::pen::Pen;
+use super::pen::{Pen, differs};
 use super::slots::{ANGLES, AXES, SPIN, Slots, VECTOR, said, slots};
 use super::{Follower, vector_names};
 use crate::program::motion::Motion;
@@ -99,7 +99,7 @@ impl<'s> Follower<'_, 's> {
                 }
                 continue;
             }
-            let Some((now, meant)) = stands.filter(|(now, meant)| now != meant) else { continue };
+            let Some((now, meant)) = stands.filter(|(now, meant)| differs(*now, *meant, 9)) else { continue };
             let base = if written.absolute {
                 written.shift[axis].unwrap_or(0.0) + self.now.moved[axis]
             } else {
@@ -118,7 +118,7 @@ impl<'s> Follower<'_, 's> {
             let (Some(now), Some(meant)) = (self.now.angles[axis], written.start_angles[axis]) else {
                 continue;
             };
-            if slots.angles[axis].is_some() || now == meant {
+            if slots.angles[axis].is_some() || !differs(now, meant, 9) {
                 continue;
             }
             let base = if written.absolute { 0.0 } else { now };

@@ -36,8 +36,8 @@ impl Task<'_> {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
             // Where the block before may be skipped, the one before that ends here too.
-            if needs == Needs::Tangent || before.conditional {
-                let written = &mut self.written[at as usize];
+            let written = &mut self.written[at as usize];
+            if needs == Needs::Tangent || before.conditional || written.may_lack {
                 written.needs = written.needs.max(Needs::Start);
             }
         }
@@ -70,7 +70,9 @@ impl Task<'_> {
                 continue;
             }
             held[before as usize] |= axes;
-            if needs == Needs::Tangent || self.listing.motions[before as usize].conditional {
+            let perhaps =
+                self.listing.motions[before as usize].conditional || self.written[before as usize].may_lack;
+            if needs == Needs::Tangent || perhaps {
                 directed.insert(before);
             }
             match wanted.get(&before).copied() {
@@ -122,6 +124,9 @@ impl Task<'_> {
         let file = motion.place.file as usize;
         let (tree, dialect) = (&self.trees[file], self.dialects[file]);
         let slots = slots(tree, dialect, written);
+        if written.may_lack {
+            return 0;
+        }
         let again = written.restates || motion.reason().is_none_or(stays_in_place);
         let own = |axis: &usize| {
             again && written.start[*axis].is_some()

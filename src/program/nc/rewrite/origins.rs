@@ -233,10 +233,32 @@ impl Task<'_> {
         any
     }
 
+    /// After a block that may be skipped the tool stands as corrected or as it always did: no increment can be written from
+    /// there that is right on both ways.
+    fn hold_unsettled(&self, index: u32, course: &mut Course) {
+        if !course.place.iter().any(|place| place.unsettled) {
+            return;
+        }
+        let (motion, written) = (&self.listing.motions[index as usize], &self.written[index as usize]);
+        let file = motion.place.file as usize;
+        let (tree, dialect) = (&self.trees[file], self.dialects[file]);
+        let slots = slots(tree, dialect, written);
+        for (axis, word) in slots.axes.iter().chain(&slots.angles).enumerate() {
+            let counts =
+                word.as_ref().and_then(|word| said(tree, dialect, word)).unwrap_or(!written.absolute);
+            if counts && course.place[axis].unsettled {
+                course.hold_place(BY_INCREMENT, axis);
+            }
+        }
+    }
+
     /// What a motion makes of place and origin.
     fn goes(&self, index: u32, moves: bool, course: &mut Course) {
         let (motion, written) = (&self.listing.motions[index as usize], &self.written[index as usize]);
         let known = motion.to().is_some_and(|target| target.value.is_ok());
+        if known {
+            self.hold_unsettled(index, course);
+        }
         if known && motion.left.is_none_or(stays_in_place) {
             // It is written anew, or says again what must be said again.
             let hangs = if moves { Hangs::only(index) } else { Hangs::NOTHING };
@@ -273,7 +295,7 @@ impl Task<'_> {
                 }
                 (None, _) => {}
             }
-            if motion.conditional {
+            if motion.conditional || written.may_lack {
                 let hangs = course.place[axis].and(before[axis]);
                 course.place[axis] = Hangs { unsettled: !hangs.is_nothing(), ..hangs };
             }

@@ -296,7 +296,10 @@ impl Lister<'_, '_> {
     fn state_offset(&mut self, said: &Said<'_>, name: &str) {
         let known = self.frame_value(name).ok();
         let mut frame = known.unwrap_or(Frame::IDENTITY);
-        let mut good = said.axes.iter().all(Option::is_some) || known.is_some();
+        // What is not said stays: on LinuxCNC, for which a plain file may be, an offset has a turn as well.
+        let turns = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
+        let whole = said.axes.iter().all(Option::is_some) && (said.radius.is_some() || !turns);
+        let mut good = whole || known.is_some();
         // LinuxCNC takes the values as they are in G91 too, Fanuc and Haas add them; which of them a plain file is for is
         // not known.
         let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;

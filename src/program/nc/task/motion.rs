@@ -6,6 +6,7 @@ use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
 use super::super::machine::{ALL_BUT_PLANE, Group, Mode, Turn};
+use super::super::syntax::Belongs;
 use super::{Event, Lister, Needs, Said, Written};
 use crate::program::motion::{
     FARTHEST_MM, Modal, Motion, MotionKind, MotionTarget, Origin, Reason, RobTarget, Role, Span, Speed,
@@ -108,8 +109,19 @@ impl Lister<'_, '_> {
             insertable: false,
             paraxial: said.paraxial,
             restates: false,
+            may_lack: self.may_lack(said),
             needs: Needs::Nothing,
         }
+    }
+
+    /// Whether a word of the block may say nothing: Fanuc passes over a word whose variable has never been set.
+    fn may_lack(&self, said: &Said<'_>) -> bool {
+        let words = said.axes.iter().chain(&said.abc).chain(&said.centre).chain([&said.radius]).flatten();
+        let unset = |&index: &usize| {
+            let word = &said.words[index];
+            matches!(word.belongs, Belongs::Expression { .. }) && self.worth(word).0.is_err()
+        };
+        matches!(self.dialect, Dialect::Fanuc | Dialect::Iso) && { words }.any(unset)
     }
 
     fn axis_values(
@@ -329,8 +341,9 @@ impl Lister<'_, '_> {
             self.state.previous = None;
             self.events.push(Event::Lost(super::ORIENTATION));
         } else if said.aside.is_some() {
+            // The place is as before in the axes that the block leaves out, with what has been corrected there.
             self.state.lose_orientation();
-            self.events.push(Event::Unknown);
+            self.events.push(Event::Lost(super::ORIENTATION));
         }
         if said.lengthens {
             self.lose_axes(said);
@@ -352,7 +365,9 @@ impl Lister<'_, '_> {
         let settled = !(1 << Group::Radius as u32 | 1 << Group::Tool as u32) & ALL_BUT_PLANE;
         // A cycle runs where the words of the block say.
         let call = self.modal_call(said);
+        // With words put in, a block would move that does not where its variable has never been set.
         plain
+            && !self.may_lack(said)
             && call.is_none_or(|call| call == Reason::Cycle)
             && self.state.turned == 0
             && self.state.doubt(settled).is_none()
@@ -407,19 +422,21 @@ impl Lister<'_, '_> {
         let (mut abc, mut rpy, mut vector, mut spin) = (state.abc, state.rpy, state.vector, state.spin);
         let mut turn = state.turn;
         let any = |words: &[Option<usize>; 3]| words.iter().any(Option::is_some);
+        // What turns the tool in one way leaves open what the words of the other ways hold.
+        let lost = [Err(Reason::OrientationUnknown); 3];
         if any(&said.abc) {
             abc = self.axis_values(said, &said.abc, &abc, 1.0);
-            turn = Turn::Angles;
+            (turn, rpy, vector) = (Turn::Angles, lost, lost);
         }
         if any(&said.rpy) {
             rpy = self.axis_values(said, &said.rpy, &rpy, 1.0);
-            turn = Turn::Rpy;
+            (turn, abc, vector) = (Turn::Rpy, lost, lost);
         }
         let vector_said = if vector_words { &said.centre } else { &said.vector };
         if any(vector_said) {
             // Components that are not written are 0.
             vector = vector_said.map(|index| index.map_or(Ok(0.0), |index| self.worth(&said.words[index]).0));
-            turn = Turn::Vector;
+            (turn, abc, rpy) = (Turn::Vector, lost, lost);
         }
         if let Some(index) = said.spin {
             spin = self.worth(&said.words[index]).0;

@@ -26,7 +26,7 @@ fn a_number_beside_a_work_offset_is_not_passed_over() {
 
 #[test]
 fn offsets_in_incremental_mode_are_values_for_linuxcnc() {
-    let body = "G90 G54\nG10 L2 P1 X350 Y0 Z250\nG91 G10 L2 P1 X10 Y1 Z2\nG90\nG1 X1 Y2 Z3 A180 B0 C0\n";
+    let body = "G90 G54\nG10 L2 P1 X350 Y0 Z250 R0\nG91 G10 L2 P1 X10 Y1 Z2\nG90\nG1 X1 Y2 Z3 A180 B0 C0\n";
     let at = |dialect| {
         let listing = listing_of(body, dialect);
         let motion = listing.motions.last().unwrap();
@@ -155,4 +155,22 @@ fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
             (&format!("TRANS X1\nAGAIN:\nATRANS X5\n{go}\nGOTOB AGAIN"), &[t]),
         ],
     );
+}
+
+/// The class: what an offset holds where the program states a part of it. What is not said stays, and is known only where it was.
+#[test]
+fn an_offset_of_which_the_turn_is_not_said_keeps_the_turn_it_has() {
+    let value = |begin: &str, offset: &str, dialect| {
+        let source = format!("{begin}G90 G54\nG10 L2 P1 {offset}\nG1 X1 Y2 Z3 A180 B0 C0\n");
+        let listing = listing_of(&source, dialect);
+        let motion = listing.motions.last().unwrap();
+        let object = listing.work_object(motion).unwrap();
+        object.value.as_ref().map(|value| value.user_frame.quaternion).map_err(|reason| *reason)
+    };
+    assert_eq!(value("", "X350 Y10 Z250", LinuxCnc), Err(Assigned));
+    assert_eq!(value("", "X350 Y10 Z250", Iso), Err(Assigned));
+    assert_eq!(value("", "X350 Y10 Z250 R0", LinuxCnc), Ok([1.0, 0.0, 0.0, 0.0]));
+    assert_eq!(value("", "X350. Y10. Z250.", Fanuc), Ok([1.0, 0.0, 0.0, 0.0]));
+    let turned = "; truegrind frame G54 w [[500,0,0],[0,0,0,1]]\n";
+    assert_eq!(value(turned, "X350 Y10 Z250", LinuxCnc), Ok([0.0, 0.0, 0.0, 1.0]));
 }

@@ -73,3 +73,17 @@ fn nothing_is_put_in_before_a_block_that_changes_what_numbers_mean() {
         assert_eq!(task.listing.motions[1].insertable, free, "{body}");
     }
 }
+
+/// The class: a block that may be skipped says again what was corrected, so that the tool stands in one of two places. What
+/// is written as an increment from there is right on one way only: then nothing is corrected there.
+#[test]
+fn an_increment_behind_a_block_that_may_be_skipped_keeps_the_motion_before() {
+    let refused = Outcome::Refused(Reason::BeforeIncrement);
+    for body in ["/Y-10\nX=IC(5) Y-7", "/A=175\nX4 A=IC(5)", "/Z7\nG91 X5 Y1 Z1", "/Y-10\nG91 Z4"] {
+        assert_eq!(first(Siemens, body), refused, "{body}");
+    }
+    assert_eq!(first(Fanuc, "/Y-10.\nG91 X5."), refused);
+    assert_eq!(first(LinuxCnc, "/Y-10\nG91 X5"), refused);
+    // A value needs no place to count from.
+    assert_eq!(first(Siemens, "/Y-10\nX5 Y-7"), Outcome::InPlace);
+}

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use truegrind::program::motion::Reason::*;
 use truegrind::program::nc::Task;
-use truegrind::program::nc::dialect::Dialect::{self, Heidenhain, LinuxCnc, Siemens};
+use truegrind::program::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc, Siemens};
 use truegrind::program::nc::setup::Setup;
 use truegrind::program::rewrite::Outcome;
 
@@ -104,6 +104,42 @@ fn a_tool_vector_that_is_left_out_is_said_again() {
     assert_eq!(line("/X5"), format!("/X5 {again}"));
     // After a block that may be skipped both are said.
     assert!(line("X6").contains("THETA="), "{text}");
+}
+
+/// The class: words that are left out are taken from a memory that the control does not have. Where the tool is turned by
+/// a vector, by angles of axes or by A2, B2, C2, the words of the other two hold nothing that is known.
+#[test]
+fn angles_from_before_a_tool_vector_are_not_remembered() {
+    for (dialect, turn, block) in [
+        (Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1", "L X+7 Y+8 Z+9 B+10"),
+        (Siemens, "X4 Y5 Z6 A3=0 B3=0 C3=1", "X7 Y8 Z9 B=10"),
+        (Siemens, "X4 Y5 Z6 A2=180 B2=0 C2=0", "X7 Y8 Z9 B=10"),
+    ] {
+        let text = rewritten(dialect, &format!("{turn}\n{block}"));
+        assert_eq!(text.lines().last(), Some(block), "{text}");
+    }
+    // An increment of which the turn is not known stays, and with it the place that it counts from.
+    let text = rewritten(Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0");
+    assert_eq!(text, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0\n");
+}
+
+/// The class: a word that may say nothing, because its variable has never been set, is taken to say something. The block may
+/// not move at all: nothing is put into it, and what begins there hangs on the motion before.
+#[test]
+fn a_block_that_may_not_move_gets_no_words() {
+    let head = "X4. Y5. Z6.\n";
+    for block in ["G0 Y#149", "G1 X10. Y#149", "G1 A#149", "/G0 Y#149", "G0 Z-#149"] {
+        let text = rewritten(Fanuc, &format!("{head}{block}\nG1 X7. Y8. Z9. A180. B0. C0."));
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[..2], ["X4.5000 Y4.7500 Z6.1250", block], "{text}");
+        assert_eq!(lines[2], "G1 X7.5000 Y7.7500 Z9.1250 A180. B0. C0.");
+    }
+    // An arc that stays begins where such a block ends, or the one before it.
+    let text = rewritten(Fanuc, &format!("{head}G0 Y#149\nG2 X14. Y5. I5."));
+    assert_eq!(text, "X4. Y5. Z6.\nG0 Y#149\nG2 X14. Y5. I5.\n");
+    // A variable that is set has a value.
+    let text = rewritten(Fanuc, &format!("{head}#149=7.\n/G0 Y#149"));
+    assert_eq!(text.lines().last(), Some("/G0 X4.0000 Y#149 Z6.0000"), "{text}");
 }
 
 proptest! {
