@@ -75,7 +75,7 @@ impl Bound {
 /// A number as a message shows it: three hundred digits say less than an exponent.
 pub fn shown(value: f64) -> String {
     let size = value.abs();
-    if size != 0.0 && (size >= 1e16 || size < 1e-6) { format!("{value:e}") } else { value.to_string() }
+    if size != 0.0 && !(1e-6..1e16).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
 
 /// Lengths of links, frames and levers (mm).

@@ -324,8 +324,7 @@ impl<'a, 's> Lister<'a, 's> {
             let mut outside = States::NONE;
             // Many units share one list of routines.
             let mut late: BTreeMap<*const u32, (States, &[u32])> = BTreeMap::new();
-            for unit in 0..units.len() {
-                let entry = entries[unit];
+            for (unit, &entry) in entries.iter().enumerate().take(units.len()) {
                 outside = outside.or(self.outside[unit].entered(entry));
                 let called = &symbols.late[unit];
                 let arriving = &mut late.entry(called.as_ptr()).or_insert((States::NONE, called)).0;

@@ -273,7 +273,7 @@ impl Task<'_> {
         let returns = reason == Some(Reason::ReferenceReturn);
         let mends = written.restates && known && slots.axes.iter().any(Option::is_some);
         let before = course.place;
-        for axis in 0..AXES {
+        for (axis, was) in before.iter().enumerate() {
             let linear = axis < 3;
             let word = if linear { slots.axes[axis] } else { slots.angles[axis - 3] };
             let start = if linear { written.start[axis] } else { written.start_angles[axis - 3] };
@@ -296,7 +296,7 @@ impl Task<'_> {
                 (None, _) => {}
             }
             if motion.conditional || written.may_lack {
-                let hangs = course.place[axis].and(before[axis]);
+                let hangs = course.place[axis].and(*was);
                 course.place[axis] = Hangs { unsettled: !hangs.is_nothing(), ..hangs };
             }
         }
