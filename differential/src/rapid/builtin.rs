@@ -334,8 +334,17 @@ impl Run<'_> {
             Way::Joint => self.state.monitor_joints,
             _ => self.state.monitor_lines,
         };
-        let motion =
-            Motion { at, way, goals, tool: (tool_name, held, frame_of_tool), object, monitored, load, tool_load, rest };
+        let motion = Motion {
+            at,
+            way,
+            goals,
+            tool: (tool_name, held, frame_of_tool),
+            object,
+            monitored,
+            load,
+            tool_load,
+            rest,
+        };
         self.events.push(super::run::Event::Motion(Box::new(motion)));
         Ok(())
     }
