@@ -1,10 +1,12 @@
-//! `cargo run --release -p truegrind-differential --example differential -- COUNT [--seed S] [--only LANGUAGE] [--one N]`
+//! `cargo run --release -p truegrind-differential --example differential -- COUNT [--seed S] [--only LANGUAGE] [--one N]
+//! [--without effects,taught,borders] [--show N]`
 //!
 //! COUNT corrected executions in all, over all languages or one. Ends with 1 where anything disagrees.
 
 use std::process::ExitCode;
 
 use truegrind_differential::outcome::{Dialect, Tally};
+use truegrind_differential::rapid::Features;
 use truegrind_differential::report;
 
 fn main() -> ExitCode {
@@ -22,14 +24,20 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    let left_out = value("--without").unwrap_or("");
+    let features = Features {
+        effects: !left_out.contains("effects"),
+        taught: !left_out.contains("taught"),
+        borders: !left_out.contains("borders"),
+    };
     let seed = number("--seed").unwrap_or(0);
     if let Some(one) = number("--one") {
-        println!("{}", report::one(languages[0], seed.wrapping_add(one)));
+        println!("{}", report::one(languages[0], seed.wrapping_add(one), features));
         return ExitCode::SUCCESS;
     }
     let wanted = arguments.first().and_then(|text| text.parse().ok()).unwrap_or(1000);
     let mut all = Tally::default();
-    for (dialect, tally, seconds) in report::many(&languages, seed, wanted) {
+    for (dialect, tally, seconds) in report::many(&languages, seed, wanted, features) {
         println!("{}", report::line(dialect.name(), &tally, seconds));
         all.merge(tally);
     }

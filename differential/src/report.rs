@@ -10,11 +10,16 @@ use crate::outcome::{Dialect, Tally};
 use crate::rapid::{self, Features};
 
 /// Programs that are made before the count is looked at again.
-const BATCH: u64 = 256;
+const BATCH: u64 = 64;
 
 /// Runs programs of each language until its share of `wanted` corrected executions is reached; the seconds beside it. The
 /// result does not depend on the number of threads.
-pub fn many(languages: &[Dialect], seed: u64, wanted: usize) -> Vec<(Dialect, Tally, f64)> {
+pub fn many(
+    languages: &[Dialect],
+    seed: u64,
+    wanted: usize,
+    features: Features,
+) -> Vec<(Dialect, Tally, f64)> {
     let share = wanted.div_ceil(languages.len());
     languages
         .iter()
@@ -24,7 +29,7 @@ pub fn many(languages: &[Dialect], seed: u64, wanted: usize) -> Vec<(Dialect, Ta
             let mut next = seed;
             while tally.corrected < share && tally.programs < 1000 + 50 * share {
                 let batch: Vec<Tally> =
-                    (next..next + BATCH).into_par_iter().map(|seed| run(dialect, seed)).collect();
+                    (next..next + BATCH).into_par_iter().map(|seed| run(dialect, seed, features)).collect();
                 batch.into_iter().for_each(|one| tally.merge(one));
                 next += BATCH;
             }
@@ -34,18 +39,18 @@ pub fn many(languages: &[Dialect], seed: u64, wanted: usize) -> Vec<(Dialect, Ta
 }
 
 /// One program.
-pub fn run(dialect: Dialect, seed: u64) -> Tally {
+pub fn run(dialect: Dialect, seed: u64, features: Features) -> Tally {
     match dialect {
-        Dialect::Rapid => rapid::run(seed, Features::ALL),
+        Dialect::Rapid => rapid::run(seed, features),
         other => crate::nc::run(other, seed, &crate::model::random(seed)),
     }
 }
 
 /// Both programs of a seed with what was found, as text.
-pub fn one(dialect: Dialect, seed: u64) -> String {
+pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
     let mut out = String::new();
     if dialect == Dialect::Rapid {
-        let shown = rapid::shown(seed, Features::ALL);
+        let shown = rapid::shown(seed, features);
         for (what, files) in [("original", &shown.original), ("corrected", &shown.corrected)] {
             for (name, bytes) in files {
                 let text: String = bytes.iter().map(|byte| char::from(*byte)).collect();

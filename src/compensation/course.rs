@@ -221,12 +221,16 @@ impl Samples {
     }
 
     fn of(&mut self, from: Option<&Stop>, stop: &Stop, mounting: &dyn Fn(usize) -> Mounting) {
-        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
-            && from.mounted == to.mounted
-        {
+        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop) {
+            // The path is one of the tool and in the object of the motion, also where it begins under others.
+            let within = mounting(to.mounted);
+            let mut from = *from;
+            if from.mounted != to.mounted {
+                from.told = within.target_of(&mounting(from.mounted).flange_for(&from.told));
+            }
             match to.kind {
-                MotionKind::Linear => self.line(from, to, &mounting(to.mounted)),
-                MotionKind::Circular => self.arc(from, to, &mounting(to.mounted)),
+                MotionKind::Linear => self.line(&from, to, &within),
+                MotionKind::Circular => self.arc(&from, to, &within),
                 // Joints in proportion: none turns on the way.
                 _ => {}
             }

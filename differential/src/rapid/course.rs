@@ -9,6 +9,9 @@ use crate::arm::{Arm, Pose, difference};
 /// A joint that comes back by less has not turned (rad).
 const DEAD_BAND: f64 = 1e-5;
 
+/// A joint that moves by less at the end of a path may as well have turned (rad).
+const LITTLE: f64 = 1e-3;
+
 /// What the controller was told at one goal, and what follows.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -43,6 +46,8 @@ pub struct Course<'a> {
     last: Option<Pose>,
     sides: [i8; 6],
     farthest: [f64; 6],
+    /// Where each joint turned last.
+    turned_at: [f64; 6],
     doubt: [bool; 6],
 }
 
@@ -50,7 +55,16 @@ impl<'a> Course<'a> {
     /// A start of which nothing is known but the sides.
     pub fn new(arm: &'a Arm, sides: [i8; 6]) -> Self {
         let play = arm.play.iter().any(|p| *p != 0.0);
-        Self { arm, play, joints: None, last: None, sides, farthest: [f64::NAN; 6], doubt: [false; 6] }
+        Self {
+            arm,
+            play,
+            joints: None,
+            last: None,
+            sides,
+            farthest: [f64::NAN; 6],
+            turned_at: [f64::NAN; 6],
+            doubt: [false; 6],
+        }
     }
 
     /// Goes through one motion; a point for each goal.
@@ -101,10 +115,8 @@ impl<'a> Course<'a> {
             return;
         };
         let Some(start) = self.joints else {
-            for j in 0..6 {
-                self.farthest[j] = end[j];
-                self.doubt[j] = true;
-            }
+            self.farthest = end;
+            self.doubt = [true; 6];
             points.iter_mut().for_each(|p| p.doubt = self.doubt);
             return;
         };
@@ -117,12 +129,17 @@ impl<'a> Course<'a> {
                 turned[j] |= self.sides[j] != before[j];
             }
         }
+        let last = way.last().unwrap_or(&start);
         for j in 0..6 {
-            // A joint that has come back by hardly more, or hardly less, than the dead band.
-            let back = (end[j] - self.farthest[j]).abs();
-            let near = back > 1e-7 && back < 1e-4;
-            let hardly = (end[j] - start[j]).abs() < 1e-4 && (end[j] - start[j]).abs() > 1e-8;
-            if near || hardly {
+            let moved = |from: f64| (end[j] - from).abs();
+            // A joint that has come back by hardly more, or hardly less, than the dead band, or that comes to rest where it
+            // might just have turned.
+            let near = moved(self.farthest[j]) > 1e-7 && moved(self.farthest[j]) < 1e-4;
+            let hardly = moved(start[j]) < 1e-4 && moved(start[j]) > 1e-8;
+            let resting = !way.is_empty()
+                && (moved(last[j]) < LITTLE || turned[j] && moved(self.turned_at[j]) < LITTLE);
+            // How the tool turns along an arc is the controller's own affair.
+            if near || hardly || resting || turned[j] && motion.way == Way::Arc {
                 self.doubt[j] = true;
             }
         }
@@ -150,6 +167,7 @@ impl<'a> Course<'a> {
             }
         } else if gone.abs() > DEAD_BAND {
             self.sides[j] = side;
+            self.turned_at[j] = self.farthest[j];
             self.farthest[j] = angle;
             if gone.abs() > 1e-3 {
                 self.doubt[j] = false;

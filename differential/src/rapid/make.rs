@@ -331,7 +331,7 @@ impl Maker<'_> {
             let _ = writeln!(out, "PERS wobjdata {name}:=[{held},TRUE,\"\",{user},{object}];");
         }
         out.push_str("VAR num n1:=1;\nVAR num n2:=0;\nVAR num n3;\nPERS num np:=2;\nVAR bool b1:=FALSE;\n");
-        out.push_str("VAR string s1:=\"go ! \"\"x\"\" \\\\ MoveL\";\nCONST num step:=4.5;\nCONST num lifts{3}:=[3,-2,7];\n");
+        out.push_str("VAR string s1:=\"go ! \"\"x\"\" \\\\ MoveL\";\nCONST num gap:=4.5;\nCONST num lifts{3}:=[3,-2,7];\n");
         out.push_str("PERS loaddata ldPart:=[0.8,[0,5,20],[1,0,0,0],0,0,0];\nVAR intnum int1;\n");
         let shift = Pose::from_parts(self.place([0.0; 3], 12.0), UnitQuaternion::identity());
         let turned = Pose::from_parts(self.place([0.0; 3], 6.0), self.small_turn(3.0));

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::payload::Loads;
-use truegrind::compensation::rewrite::{Options, Plan, plan};
+use truegrind::compensation::rewrite::{Emit, Options, Plan, plan};
 use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::effect::Effect;
@@ -254,4 +254,51 @@ fn the_judge_sees_what_the_simulation_sees_and_a_start_without_sides_is_said() {
     assert!(sigma(0) > 0.09, "σ at the start {}", sigma(0));
     let settled = planned.outcomes[3..].iter().filter_map(|o| o.sigma_mm).fold(0.0, f64::max);
     assert!(settled < 0.2 * sigma(0), "σ later {settled}");
+}
+
+/// The class: what is followed along a line must be followed as well where the line begins under another tool or work
+/// object than that in which it ends. The path is the same, and so are the sides at its end.
+#[test]
+fn joints_turn_on_lines_that_begin_in_another_object_too() {
+    let unit = "[[0,0,0],[1,0,0,0]]";
+    let object = format!(" PERS wobjdata wSame := [FALSE,TRUE,\"\",{unit},{unit}];\n PROC main()");
+    let mut text = String::new();
+    for (k, line) in source().replace(" PROC main()", &object).lines().enumerate() {
+        // Lines that follow each other name one object and the other.
+        let other = k % 2 == 0 && line.contains("Move");
+        text += &if other { line.replace("tGrip;", "tGrip\\WObj:=wSame;") } else { line.to_owned() };
+        text.push('\n');
+    }
+    assert!(text.contains("tGrip;") && text.contains("wSame;"));
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let arm = worn(0);
+    let (_, program) = rewrite(&text, &arm, &options(5.0, Some(Loads::of_task(&task))));
+    let left = worst_end(&program, &text, &arm);
+    assert!(left < 1e-3, "where the object changes {left} mm are left");
+}
+
+/// The class: the sides are those of the way that the arm really goes. Told joints it goes by joints, and none of them turns
+/// on the way, as some do on a line.
+#[test]
+fn an_arm_that_is_told_joints_comes_from_where_its_joints_come() {
+    // Not the same to the left and to the right, so that every joint moves.
+    let text = source().replace(",120,260", ",90,260");
+    let arm = worn(2);
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let wanted = Options { emit: Emit::Joints, ..options(5.0, Some(Loads::of_task(&task))) };
+    let (_, program) = rewrite(&text, &arm, &wanted);
+    let joints = |m: &truegrind::program::motion::Motion| match m.to().unwrap().value.unwrap() {
+        TargetValue::Joint(t) => Joints::from_fn(|j, _| t.robot_deg[j].to_radians()),
+        other => panic!("expected joints, found {other:?}"),
+    };
+    let told: Vec<Joints> = Task::read(&[("p.mod", &program)]).listing.motions.iter().map(joints).collect();
+    let meant = intended(&text);
+    for k in 3..told.len() {
+        let approach = std::array::from_fn(|j| if told[k][j] > told[k - 1][j] { -1 } else { 1 });
+        let condition = Condition { approach, ..carried(if k < 6 { 0 } else { 3 }) };
+        let tip =
+            arm.under(&condition).forward(&told[k]) * Pose::translation(0.0, 0.0, 60.0) * Point3::origin();
+        let left = (tip.coords - meant[k]).norm();
+        assert!(left < 1e-3, "motion {k}: {left} mm are left");
+    }
 }

@@ -50,6 +50,8 @@ impl Maker<'_> {
         out.push_str("FUNC robtarget fCount(robtarget t)\nn2:=n2+1;\nRETURN t;\nENDFUNC\n");
         out.push_str("FUNC num fNext(INOUT num k)\nk:=k+1;\nRETURN 3;\nENDFUNC\n");
         out.push_str("FUNC num fSay()\nTPWrite \"lift\"\\Num:=n1;\nRETURN 4;\nENDFUNC\n");
+        out.push_str("FUNC robtarget fPick(robtarget t,num unused)\nRETURN t;\nENDFUNC\n");
+        out.push_str("FUNC num fNote(num k)\nn2:=k;\nRETURN k;\nENDFUNC\n");
         out.push_str("FUNC num fMoves()\npv1.trans.z:=pv1.trans.z+1.5;\nRETURN 1;\nENDFUNC\n");
         out.push_str("FUNC bool fTest(num k)\nRETURN k>2 OR (NOT b1 AND k MOD 2=1);\nENDFUNC\n");
         out.push_str(

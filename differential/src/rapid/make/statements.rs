@@ -30,8 +30,8 @@ impl Maker<'_> {
     pub(super) fn amount(&mut self) -> String {
         let effects = self.features.effects;
         match self.rng.random_range(0..20) {
-            0 => "step".into(),
-            1 => "-step/2".into(),
+            0 => "gap".into(),
+            1 => "-gap/2".into(),
             2 => "lifts{2}".into(),
             3 => "n1".into(),
             4 => "fLift()".into(),
@@ -41,6 +41,7 @@ impl Maker<'_> {
             8 => "Abs(-3.25)".into(),
             9 => "7 DIV 2+7 MOD 4".into(),
             10 => "10*Sin(30)".into(),
+            18 => "n2".into(),
             11 if effects => "fNext(n1)".into(),
             12 if effects => "fSay()".into(),
             13 if effects => "fMoves()".into(),
@@ -48,6 +49,12 @@ impl Maker<'_> {
             15 => "-fLift()".into(),
             _ => format!("{:.2}", self.rng.random_range(-12.0..12.0f64)),
         }
+    }
+
+    /// A small number as it may stand behind a plus: a sign there wants parentheses.
+    fn addend(&mut self) -> String {
+        let amount = self.amount();
+        if amount.starts_with('-') { format!("({amount})") } else { amount }
     }
 
     /// A target as an argument, and the pair for which it was made.
@@ -70,6 +77,10 @@ impl Maker<'_> {
             11 => format!("RelTool({name},0,{},-3)", self.amount()),
             12 => format!("fUp({name},{})", self.amount()),
             13 if self.features.effects => format!("fCount({name})"),
+            18 if self.features.effects => {
+                let what = self.pick(&["fNote(5)", "fNext(n1)", "fMoves()", "fSay()", "fNote(n1)"]);
+                format!("fPick({name},{what})")
+            }
             14 => format!("Offs(fUp({name},2),1,{},0)", self.amount()),
             15 => format!("[{name}.trans,{name}.rot,{name}.robconf,{name}.extax]"),
             16 => format!("[{name}.trans+[1,{},-2],{name}.rot,{name}.robconf,{name}.extax]", self.amount()),
@@ -114,7 +125,8 @@ impl Maker<'_> {
                     Some(name) => name,
                     None => self.jointtarget(),
                 };
-                writeln!(out, "MoveAbsJ {joints}\\NoEOffs,{speed},{zone},{tool};")
+                let object = if self.tools[pair.tool].held { "" } else { &object };
+                writeln!(out, "MoveAbsJ {joints}\\NoEOffs,{speed},{zone},{tool}{object};")
             }
             _ => writeln!(out, "MoveLDO {target},{speed},{zone},{tool}{object},doSpindle,1;"),
         };
@@ -140,7 +152,7 @@ impl Maker<'_> {
             "NOT b1",
             "n1<4 AND n2<>1",
             "TRUE",
-            "step>4",
+            "gap>4",
         ])
         .into()
     }
@@ -216,7 +228,7 @@ impl Maker<'_> {
                 ]);
                 let _ = match target {
                     "tSmall.tframe.trans" => writeln!(out, "{target}:={target}+[0.5,0,1];"),
-                    _ => writeln!(out, "{target}:={target}+{};", self.amount()),
+                    _ => writeln!(out, "{target}:={target}+{};", self.addend()),
                 };
                 let _ = named;
             }
@@ -236,7 +248,7 @@ impl Maker<'_> {
             1 => writeln!(out, "n1:={};", self.rng.random_range(0..5)),
             2 => writeln!(out, "b1:=NOT b1;"),
             3 => writeln!(out, "Incr n1;"),
-            4 => writeln!(out, "{name}.trans.z:={name}.trans.z+{};", self.amount()),
+            4 => writeln!(out, "{name}.trans.z:={name}.trans.z+{};", self.addend()),
             5 => writeln!(out, "{name}.trans:={other}.trans;"),
             6 => writeln!(out, "{name}:={};", self.target(named.pair)),
             7 => writeln!(out, "{name}:=Offs({other},{},0,1);", self.amount()),
