@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Point3;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::compensate::{Compensated, compensate};
+use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::payload::Loads;
@@ -155,7 +155,11 @@ pub fn corrected_task(
     };
     let mark = Some(Mark { version: "0".to_owned(), model: "test".to_owned(), partial: false });
     let Compensated { plan: planned, rewritten } =
-        compensate(&program, &estimated, &cell, &wanted, mark).map_err(|error| error.to_string())?;
+        match compensate(&program, &estimated, &cell, &wanted, mark) {
+            // The whole program is refused: the cell file does not fit it.
+            Err(error @ CompensateError::Cell(_)) => return Ok(refused(files, &program, &error.to_string())),
+            done => done.map_err(|error| error.to_string())?,
+        };
     let mut out = CorrectedTask { files: Vec::new(), rows: Vec::new() };
     for ((_, source), edits) in files.iter().zip(&rewritten.files) {
         let bytes = edits.edits.apply(source).map_err(|error| error.to_string())?;
@@ -178,6 +182,21 @@ pub fn corrected_task(
         });
     }
     Ok(out)
+}
+
+/// A program of which nothing is corrected.
+fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> CorrectedTask {
+    let rows = program.listing().motions.iter().map(|motion| Row {
+        file: motion.place.file as usize,
+        line: motion.place.line as usize,
+        statement: motion.statement.start as usize..motion.statement.end as usize,
+        status: Status::Refused,
+        reason: Some(reason.to_owned()),
+        after_mm: None,
+        sigma_mm: None,
+    });
+    let same = |(_, bytes): &(&str, &[u8])| CorrectedFile { bytes: bytes.to_vec(), edits: Vec::new() };
+    CorrectedTask { files: files.iter().map(same).collect(), rows: rows.collect() }
 }
 
 /// Where edits stand in the old and in the new bytes.

@@ -303,14 +303,7 @@ impl Work<'_> {
                 return Stop::Lost;
             };
             let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
-            // A line whose end is written as joints is no line any more.
-            let as_joints = self.options.emit == Emit::Joints
-                && motion.kind == MotionKind::Linear
-                && rewritten
-                    .and_then(|portions| portions[m / PORTION].get(targets.end - 1 - begin))
-                    .is_some_and(Result::is_ok);
-            let kind = if as_joints { MotionKind::AbsoluteJoint } else { motion.kind };
-            Stop::At(Reached { kind, mounted, told, joints, via })
+            Stop::At(Reached { kind: motion.kind, mounted, told, joints, via })
         };
         let stops: Vec<Stop> = (0..motions.len()).map(stop).collect();
         let before: Vec<Option<u32>> = motions.iter().map(|m| m.previous).collect();

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::payload::Loads;
-use truegrind::compensation::rewrite::{Emit, Options, Plan, plan};
+use truegrind::compensation::rewrite::{Options, Plan, plan};
 use truegrind::compensation::why::Why;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::effect::Effect;
@@ -275,30 +275,4 @@ fn joints_turn_on_lines_that_begin_in_another_object_too() {
     let (_, program) = rewrite(&text, &arm, &options(5.0, Some(Loads::of_task(&task))));
     let left = worst_end(&program, &text, &arm);
     assert!(left < 1e-3, "where the object changes {left} mm are left");
-}
-
-/// The class: the sides are those of the way that the arm really goes. Told joints it goes by joints, and none of them turns
-/// on the way, as some do on a line.
-#[test]
-fn an_arm_that_is_told_joints_comes_from_where_its_joints_come() {
-    // Not the same to the left and to the right, so that every joint moves.
-    let text = source().replace(",120,260", ",90,260");
-    let arm = worn(2);
-    let task = Task::read(&[("p.mod", text.as_bytes())]);
-    let wanted = Options { emit: Emit::Joints, ..options(5.0, Some(Loads::of_task(&task))) };
-    let (_, program) = rewrite(&text, &arm, &wanted);
-    let joints = |m: &truegrind::program::motion::Motion| match m.to().unwrap().value.unwrap() {
-        TargetValue::Joint(t) => Joints::from_fn(|j, _| t.robot_deg[j].to_radians()),
-        other => panic!("expected joints, found {other:?}"),
-    };
-    let told: Vec<Joints> = Task::read(&[("p.mod", &program)]).listing.motions.iter().map(joints).collect();
-    let meant = intended(&text);
-    for k in 3..told.len() {
-        let approach = std::array::from_fn(|j| if told[k][j] > told[k - 1][j] { -1 } else { 1 });
-        let condition = Condition { approach, ..carried(if k < 6 { 0 } else { 3 }) };
-        let tip =
-            arm.under(&condition).forward(&told[k]) * Pose::translation(0.0, 0.0, 60.0) * Point3::origin();
-        let left = (tip.coords - meant[k]).norm();
-        assert!(left < 1e-3, "motion {k}: {left} mm are left");
-    }
 }

@@ -161,7 +161,7 @@ fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
 #[test]
 fn an_offset_of_which_the_turn_is_not_said_keeps_the_turn_it_has() {
     let value = |begin: &str, offset: &str, dialect| {
-        let source = format!("{begin}G90 G54\nG10 L2 P1 {offset}\nG1 X1 Y2 Z3 A180 B0 C0\n");
+        let source = format!("{begin}G90 G57\nG10 L2 P4 {offset}\nG1 X1 Y2 Z3 A180 B0 C0\n");
         let listing = listing_of(&source, dialect);
         let motion = listing.motions.last().unwrap();
         let object = listing.work_object(motion).unwrap();
@@ -171,6 +171,6 @@ fn an_offset_of_which_the_turn_is_not_said_keeps_the_turn_it_has() {
     assert_eq!(value("", "X350 Y10 Z250", Iso), Err(Assigned));
     assert_eq!(value("", "X350 Y10 Z250 R0", LinuxCnc), Ok([1.0, 0.0, 0.0, 0.0]));
     assert_eq!(value("", "X350. Y10. Z250.", Fanuc), Ok([1.0, 0.0, 0.0, 0.0]));
-    let turned = "; truegrind frame G54 w [[500,0,0],[0,0,0,1]]\n";
+    let turned = "; truegrind frame G57 w [[500,0,0],[0,0,0,1]]\n";
     assert_eq!(value(turned, "X350 Y10 Z250", LinuxCnc), Ok([0.0, 0.0, 0.0, 1.0]));
 }
