@@ -1,6 +1,6 @@
 //! Workbooks: XLSX, read cell by cell, so that a table takes the memory of its cells and not of the rectangle around them.
 //!
-//! What a workbook may ask for is bounded before it is believed: what its parts unpack to ([`super::archive`]), the sheets
+//! What a workbook may ask for is bounded before it is believed: what its parts unpack to (`archive`), the sheets
 //! that share a part, the cells of all sheets together with the empty ones to the left of each, and their text. The old
 //! binary workbooks (XLS, XLSB) and ODS are told apart and refused: their reader sets memory aside for whatever
 //! rectangle a file claims.
