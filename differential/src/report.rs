@@ -46,6 +46,14 @@ pub fn run(dialect: Dialect, seed: u64, features: Features) -> Tally {
     }
 }
 
+/// Whether the arm of a seed has play.
+pub fn play(dialect: Dialect, seed: u64, features: Features) -> bool {
+    match dialect {
+        Dialect::Rapid => rapid::play(seed, features),
+        _ => crate::model::random(seed).play,
+    }
+}
+
 /// Both programs of a seed with what was found, as text.
 pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
     let mut out = String::new();

@@ -1,6 +1,5 @@
 //! A thousand corrected executions of each language, a fixed share of what the example runs.
 
-use truegrind_differential::model;
 use truegrind_differential::outcome::Dialect;
 use truegrind_differential::rapid::Features;
 use truegrind_differential::report;
@@ -14,7 +13,7 @@ fn a_thousand_corrected_executions_of_each_language_agree() {
     let mut wrong = Vec::new();
     for (dialect, tally, _) in report::many(&Dialect::ALL, 0, 1000 * Dialect::ALL.len(), Features::ALL) {
         let (play, rigid): (Vec<_>, Vec<_>) =
-            tally.disagreements.iter().partition(|found| model::random(found.seed).play);
+            tally.disagreements.iter().partition(|found| report::play(dialect, found.seed, Features::ALL));
         println!("{}; with play {}", report::line(dialect.name(), &tally, 0.0), play.len());
         play.iter().for_each(|found| println!("with play: {found}"));
         assert!(tally.corrected >= 1000, "{}: {} corrected", dialect.name(), tally.corrected);

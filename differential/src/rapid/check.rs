@@ -47,12 +47,23 @@ pub fn run(seed: u64, features: Features) -> Tally {
 
 /// The same with both programs.
 pub fn shown(seed: u64, features: Features) -> Shown {
+    let (mut rng, case, taught) = drawn(seed, features);
+    let made = make::program(&mut rng, &case, features, taught);
+    compare(seed, &case, &made)
+}
+
+/// Whether the arm of a seed has play.
+pub fn play(seed: u64, features: Features) -> bool {
+    drawn(seed, features).1.play
+}
+
+/// What draws the program of a seed, its arm, and whether its frames were taught.
+fn drawn(seed: u64, features: Features) -> (ChaCha8Rng, Case, bool) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Frames that were taught are worked out for an arm that stands where it is told to, play and load apart.
     let taught = features.taught && rng.random_bool(0.12);
     let case = if taught { model::with(seed, false, false) } else { model::random(seed) };
-    let made = make::program(&mut rng, &case, features, taught);
-    compare(seed, &case, &made)
+    (rng, case, taught)
 }
 
 /// Compares a program with its correction.
