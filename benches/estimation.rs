@@ -193,7 +193,7 @@ fn method_on_100_cable_rows(bencher: Bencher<'_, '_>, name: &str) {
 /// One pose taken in by a track: process noise, linearisation, update.
 #[divan::bench(args = ["cable", "position", "pose"])]
 fn track_one_pose(bencher: Bencher<'_, '_>, sensor: &str) {
-    use truegrind::comparison::tracking::{Options, Tracker};
+    use truegrind::tracking::{Options, Tracker};
     let (model, dataset) = arm::measured(sensor);
     let mut tracker = Tracker::begin(&model, "bench", &dataset, &Options::default()).expect("placed");
     let task = tracker.prepare(&dataset);

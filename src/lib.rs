@@ -29,18 +29,16 @@
 //! [`robots`], [`measurement`]), what is learnt from it ([`estimation`], [`identification`], [`diagnosis`],
 //! [`comparison`]), what is done with it ([`compensation`], [`planning`]), and how it is told ([`report`]).
 
-pub mod math;
-pub mod kinematics;
-pub mod program;
-pub mod surface;
-pub mod robots;
-pub mod measurement;
-pub mod estimation;
-pub mod identification;
-pub mod diagnosis;
-pub mod compensation;
-pub mod planning;
-pub mod comparison;
-pub mod report;
+pub use truegrind_arm as kinematics;
+pub use truegrind_arm::robots;
+pub use truegrind_calibration::{diagnosis, identification, measurement, tracking};
+pub use truegrind_compensation as compensation;
+pub use truegrind_estimation as estimation;
+pub use truegrind_math as math;
+pub use truegrind_papers as comparison;
 #[cfg(feature = "visual")]
-pub mod visual;
+pub use truegrind_pictures as visual;
+pub use truegrind_planning as planning;
+pub use truegrind_programs as program;
+pub use truegrind_report as report;
+pub use truegrind_surfaces as surface;

@@ -7,10 +7,10 @@ use clap::Args;
 use truegrind::comparison::experiment::{Experiment, Kind};
 use truegrind::comparison::grinding::Actual;
 use truegrind::comparison::protocol::Options;
+use truegrind::comparison::views::{self as view, Origin};
 use truegrind::comparison::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::dataset::Dataset;
-use truegrind::report::comparison::{self as view, Origin};
 use truegrind::report::format;
 
 use super::files::{self, Batch};

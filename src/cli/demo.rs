@@ -7,7 +7,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use truegrind::comparison::grinding::taught_cell;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::rewrite::Options as RewriteBounds;
@@ -19,6 +18,7 @@ use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::import;
+use truegrind::planning::taught_cell::taught_cell;
 use truegrind::planning::toolpath::toolpath;
 use truegrind::program::motion::Mark;
 use truegrind::program::rapid::{Task, writer};

@@ -6,12 +6,13 @@ use anyhow::bail;
 use clap::Args;
 use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::diagnosis::transfer::transfer;
+use truegrind::identification::register::starting_frames;
 use truegrind::kinematics::model::Model;
 use truegrind::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
 
 use super::files::Batch;
-use super::identify::{DataArguments, best_start, read, write_model};
+use super::identify::{DataArguments, read, write_model};
 use super::outputs::{Outputs, tell};
 use super::progress::Work;
 use super::{Common, Ending, on_threads};
@@ -78,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))?;
         for other in &others {
             work.tell(&format!("judging on {}", other.file));
-            let frames = best_start(other, &robot.model, &options.tolerance, true)?;
+            let frames = starting_frames(other, &robot.model, &options.tolerance, true)?;
             let models = [&robot.model, &found.geometric.model, &found.extended.model];
             let [nominal, geometric, extended] = models;
             found.diagnosis.transfers.push(transfer(
@@ -122,6 +123,6 @@ pub(super) fn diagnosed(
     options: &Options,
     tell: &(dyn Fn(&str) + Sync),
 ) -> anyhow::Result<Diagnosed> {
-    let frames = best_start(dataset, nominal, &options.tolerance, true)?;
+    let frames = starting_frames(dataset, nominal, &options.tolerance, true)?;
     Ok(diagnose(dataset, robot, nominal, &frames, options, tell)?)
 }

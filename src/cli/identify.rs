@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
-use truegrind::identification::calibration::Frames;
-use truegrind::identification::fit::{Start, fit, frame_parameters, summary_on};
-use truegrind::identification::identify::{Identification, Options, identify, observe};
+
+use truegrind::identification::identify::{Identification, Options, identify};
+use truegrind::identification::register::starting_frames;
 use truegrind::identification::solver::{SOLVERS, by_name};
-use truegrind::identification::start::starts;
 use truegrind::identification::study::study;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::estimated::{Estimated, Judgement};
@@ -138,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if let Some(splits) = arguments.compare_methods {
         let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));
         let rows = on_threads(arguments.common.threads, || {
-            let frames = best_start(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
+            let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
             let share = arguments.held_out;
             let split = |d: &Dataset, seed: u64| split_of(d, share, seed);
             Ok::<_, anyhow::Error>(study(&dataset, &name, &robot.model, &frames, &split, &options, splits)?)
@@ -234,28 +233,6 @@ pub(super) fn split_of(dataset: &Dataset, share: f64, seed: u64) -> Split {
     split::random(dataset, share, seed)
 }
 
-/// Where several outlets explain the rows, the one with which registered frames fit best.
-pub(super) fn best_start(
-    dataset: &Dataset,
-    nominal: &Model,
-    tolerance: &Tolerance,
-    sharpen: bool,
-) -> anyhow::Result<Frames> {
-    let candidates = starts(dataset, nominal)?;
-    if candidates.len() == 1 {
-        return Ok(candidates.into_iter().next().unwrap_or_else(|| Frames::at_origin(1)));
-    }
-    let (observed, _) = observe(dataset, nominal, sharpen);
-    let sensing = frame_parameters(dataset);
-    let rmse = |frames: &Frames| {
-        let start = Start { model: nominal, frames };
-        let fitted = fit(&observed, start, &sensing, tolerance, &SOLVERS[0], 0);
-        summary_on(&observed, &fitted.model, &fitted.frames).rmse
-    };
-    let best = candidates.into_iter().map(|f| (rmse(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, f)| f).ok_or_else(|| anyhow::anyhow!("no starting frames"))
-}
-
 /// The whole identification, starting frames included.
 pub(super) fn identified(
     dataset: &Dataset,
@@ -263,7 +240,7 @@ pub(super) fn identified(
     nominal: &Model,
     options: &Options,
 ) -> anyhow::Result<Identification> {
-    let frames = best_start(dataset, nominal, &options.tolerance, options.sharpen)?;
+    let frames = starting_frames(dataset, nominal, &options.tolerance, options.sharpen)?;
     let share = options.held_out;
     let split = |d: &Dataset| split_of(d, share, options.seed);
     Ok(identify(dataset, robot, nominal, &frames, &split, options)?)

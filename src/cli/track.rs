@@ -6,8 +6,6 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use truegrind::comparison::tracking::state::Consumed;
-use truegrind::comparison::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::convention::AngleConvention;
 use truegrind::measurement::dataset::Dataset;
@@ -15,6 +13,8 @@ use truegrind::measurement::import;
 use truegrind::measurement::plausibility::{Evidence, plausibility};
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
+use truegrind::tracking::state::Consumed;
+use truegrind::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 
 use super::defect::isolated;
 use super::files::{self, Batch};

@@ -9,6 +9,7 @@ use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::diagnosis::diagnose::Diagnosed;
 use truegrind::identification::fit::{Start, errors_on, fit, frame_parameters};
 use truegrind::identification::identify::{Identification, Options, observe};
+use truegrind::identification::register::starting_frames;
 use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
@@ -181,7 +182,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         return Ok(visual::dataset_recording(&dataset, &found)?);
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
-    let frames = identify::best_start(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
+    let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
     let (observed, _) = observe(&dataset, &robot.model, true);
     let sensing = frame_parameters(&dataset);
     let mut registered = None;

@@ -224,7 +224,7 @@ fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
         follower.wait().unwrap();
         // Whatever is there is whole.
         if let Ok(state) = fs::read_to_string(at.join("out/model.track.toml")) {
-            assert!(truegrind::comparison::tracking::State::from_toml(&state).is_ok());
+            assert!(truegrind::tracking::State::from_toml(&state).is_ok());
         }
     }
     assert_eq!(written, 151);

@@ -39,7 +39,7 @@ fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
 #[test]
 fn all_figures_of_the_paper_are_shown_and_every_table_says_that_it_is_simulated() {
     use truegrind::comparison::Results;
-    use truegrind::report::comparison as view;
+    use truegrind::comparison::views as view;
     use truegrind::report::format;
     let settings = Degradation { arms: 6, groups: 2, counts: vec![4, 15, 50], ..small() };
     let result = run(&settings, "test", "tx60-pose", 3, nominal).unwrap();

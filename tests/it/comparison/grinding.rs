@@ -3,9 +3,9 @@
 use truegrind::comparison::experiment::{Experiment, Grinding, GrindingMethod, Kind};
 use truegrind::comparison::grinding::{Actual, run};
 use truegrind::comparison::protocol::Options;
+use truegrind::comparison::views as view;
 use truegrind::comparison::{Results, simulated};
 use truegrind::measurement::dataset::Dataset;
-use truegrind::report::comparison as view;
 use truegrind::report::format;
 
 use super::experiment::nominal;

@@ -1,7 +1,7 @@
 //! The tests and their distributions against published tables and counts by hand.
 
-use truegrind::comparison::distribution::{chi_square_quantile, ln_gamma, student_two_sided};
 use truegrind::comparison::statistics::{holm, resampled_t, signed_rank};
+use truegrind::math::distribution::{chi_square_quantile, ln_gamma, student_two_sided};
 
 /// Differences whose smaller rank sum is `w`: the first pairs are negative as far as their ranks fit into w.
 fn with_rank_sum(n: usize, w: usize) -> Vec<f64> {

@@ -2,8 +2,6 @@
 
 use std::sync::OnceLock;
 
-use truegrind::comparison::tracking::locate::{Form, locate};
-use truegrind::comparison::tracking::{Course, Options, State, TrackError, Tracker, first_poses};
 use truegrind::identification::identify::{self, identify};
 use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::start::starts;
@@ -12,6 +10,8 @@ use truegrind::kinematics::estimated::Estimated;
 use truegrind::measurement::dataset::{Dataset, Reading};
 use truegrind::measurement::simulation::recipe::{LinkDeviation, Recipe};
 use truegrind::measurement::{import, split};
+use truegrind::tracking::locate::{Form, locate};
+use truegrind::tracking::{Course, Options, State, TrackError, Tracker, first_poses};
 
 use super::experiment::nominal;
 

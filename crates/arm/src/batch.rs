@@ -1,0 +1,131 @@
+//! Forward kinematics of many rows at once, in columns.
+//!
+//! Method: the kernels of [`chain`](super::chain) and of the effects on eight rows in lanes, compiled for the widest
+//! vector instructions that the machine has. No allocation once the buffers have their size.
+//! Shapes: one column per joint in, twelve columns out (position and the three axes of the flange).
+//! Checked against: [`Posed::forward`], row by row.
+
+use super::chain::{End, end};
+use super::model::{Joints, Posed};
+use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
+use truegrind_math::se3::{Pose, rotation_from_matrix};
+
+/// Controller angles of many rows (rad), one column per joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointColumns {
+    /// The columns, all of one length.
+    pub angle_rad: [Vec<f64>; 6],
+}
+
+impl FromIterator<Joints> for JointColumns {
+    fn from_iter<I: IntoIterator<Item = Joints>>(rows: I) -> Self {
+        let mut out = Self::default();
+        for row in rows {
+            for (column, angle) in out.angle_rad.iter_mut().zip(row.iter()) {
+                column.push(*angle);
+            }
+        }
+        out
+    }
+}
+
+impl JointColumns {
+    /// Number of rows: the length of the shortest column.
+    pub fn len(&self) -> usize {
+        self.angle_rad.iter().map(Vec::len).min().unwrap_or(0)
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Poses of the flange in the base of many rows, one column per number.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PoseColumns {
+    /// x, y and z of the origin (mm).
+    pub position_mm: [Vec<f64>; 3],
+    /// Rotation matrix, column by column: x axis (x, y, z), y axis, z axis.
+    pub axes: [Vec<f64>; 9],
+}
+
+impl PoseColumns {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.position_mm[0].len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One row as a pose.
+    pub fn pose(&self, row: usize) -> Pose {
+        let position = nalgebra::Vector3::from_fn(|k, _| self.position_mm[k][row]);
+        let matrix = nalgebra::Matrix3::from_fn(|i, j| self.axes[3 * j + i][row]);
+        Pose::from_parts(position.into(), rotation_from_matrix(&matrix))
+    }
+
+    fn resize(&mut self, rows: usize) {
+        for column in self.position_mm.iter_mut().chain(&mut self.axes) {
+            column.resize(rows, 0.0);
+        }
+    }
+}
+
+impl Posed<'_> {
+    /// Poses of the flange for all rows of `joints`. `out` takes their number and keeps its buffers.
+    pub fn forward_columns(&self, joints: &JointColumns, out: &mut PoseColumns) {
+        let rows = joints.len();
+        out.resize(rows);
+        let turn = self.model.flange.rotation.to_rotation_matrix();
+        let flange = End {
+            axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
+            origin: self.model.flange.translation.vector.into(),
+        };
+        let plain = self.model.flange == Pose::identity();
+        vectorised(
+            #[inline(always)]
+            || {
+                for from in (0..rows).step_by(WIDTH) {
+                    let mut end = self.end_lanes(joints, from);
+                    if !plain {
+                        end = end.then(&flange);
+                    }
+                    for k in 0..3 {
+                        end.origin[k].store(&mut out.position_mm[k], from);
+                        for j in 0..3 {
+                            end.axes[j][k].store(&mut out.axes[3 * j + k], from);
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// Poses of the flange for many joint vectors.
+    pub fn forward_many(&self, joints: &[Joints]) -> Vec<Pose> {
+        let columns: JointColumns = joints.iter().copied().collect();
+        let mut poses = PoseColumns::default();
+        self.forward_columns(&columns, &mut poses);
+        (0..joints.len()).map(|row| poses.pose(row)).collect()
+    }
+
+    /// The last frame of eight rows.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn end_lanes(&self, joints: &JointColumns, from: usize) -> End<Lanes> {
+        let zero = Lanes::splat(0.0);
+        let mut angle = [zero; 6];
+        for (lanes, column) in angle.iter_mut().zip(&joints.angle_rad) {
+            *lanes = Lanes::load(column, from);
+        }
+        let rotation = self.affected(&self.mapped(&angle));
+        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
+        for j in 0..6 {
+            (sin[j], cos[j]) = sin_cos(rotation[j]);
+        }
+        end(&self.tables, &sin, &cos)
+    }
+}

@@ -1,0 +1,147 @@
+//! Which numbers an arm may have that comes from a file: finite, and such as an arm has.
+//!
+//! The bounds are wide; what they keep out is no arm at all: NaN and infinity, units mistaken by a thousand, a joint map that
+//! turns nothing. What comes after may then rely on finite numbers.
+
+use std::ops::RangeInclusive;
+
+use nalgebra::Matrix6;
+
+use super::model::Body;
+use truegrind_math::spectral;
+
+/// A number that no arm has.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{key}: found {found}, expected {expected}")]
+pub struct Unfit {
+    /// Key, as a path; links, bodies and lists count from 1.
+    pub key: String,
+    /// What is there.
+    pub found: String,
+    /// What it should be.
+    pub expected: &'static str,
+}
+
+impl Unfit {
+    /// A fault that is no number out of its range.
+    pub fn new(key: impl Into<String>, found: impl Into<String>, expected: &'static str) -> Self {
+        Self { key: key.into(), found: found.into(), expected }
+    }
+
+    /// The same fault within a larger part of the file.
+    pub fn within(self, part: &str) -> Self {
+        Self { key: format!("{part}.{}", self.key), ..self }
+    }
+}
+
+/// A range of numbers, and what it is in words.
+#[derive(Debug, Clone)]
+pub struct Bound {
+    range: RangeInclusive<f64>,
+    expected: &'static str,
+}
+
+impl Bound {
+    /// A range and its words.
+    pub const fn new(least: f64, most: f64, expected: &'static str) -> Self {
+        Self { range: least..=most, expected }
+    }
+
+    /// Whether a number lies in the range; NaN lies in none.
+    pub fn holds(&self, value: f64) -> bool {
+        self.range.contains(&value)
+    }
+
+    /// Refuses a number outside the range under its key.
+    ///
+    /// # Errors
+    /// [`Unfit`].
+    pub fn check(&self, key: impl FnOnce() -> String, value: f64) -> Result<(), Unfit> {
+        if self.holds(value) {
+            return Ok(());
+        }
+        Err(Unfit { key: key(), found: shown(value), expected: self.expected })
+    }
+
+    /// Refuses the first of several numbers under one key that is outside the range.
+    ///
+    /// # Errors
+    /// [`Unfit`].
+    pub fn check_all<'v>(&self, key: &str, values: impl IntoIterator<Item = &'v f64>) -> Result<(), Unfit> {
+        values.into_iter().try_for_each(|value| self.check(|| key.to_owned(), *value))
+    }
+}
+
+/// A number as a message shows it: three hundred digits say less than an exponent.
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-6..1e16).contains(&size) { format!("{value:e}") } else { value.to_string() }
+}
+
+/// Lengths of links, frames and levers (mm).
+pub const LENGTH_MM: Bound = Bound::new(-1e4, 1e4, "a finite length in mm, within ±10,000");
+/// Positions in a cell (mm).
+pub const PLACE_MM: Bound = Bound::new(-1e6, 1e6, "a finite position in mm, within ±1,000,000");
+/// Twists and offsets of links (°).
+pub const TWIST_DEG: Bound = Bound::new(-720.0, 720.0, "a finite angle in degrees, within ±720");
+/// Joint angles (°).
+pub const JOINT_DEG: Bound = Bound::new(-3600.0, 3600.0, "a finite joint angle in degrees, within ±3600");
+/// Speeds of joints [°/s].
+pub const SPEED_DEG_S: Bound = Bound::new(1e-3, 1e5, "a speed above 0 in degrees per second");
+/// Masses (kg).
+pub const MASS_KG: Bound = Bound::new(0.0, 1e4, "a mass in kg, 0 to 10,000");
+/// Components of a direction.
+pub const DIRECTION: Bound = Bound::new(-1e6, 1e6, "a finite component of a direction");
+/// Entries of a joint map.
+const TURNS: Bound = Bound::new(-10.0, 10.0, "turns of a link for a turn of a joint, within ±10");
+
+/// Six joint ranges (°).
+///
+/// # Errors
+/// A number that is no angle, or a range that is empty.
+pub fn joint_ranges(min_deg: &[f64; 6], max_deg: &[f64; 6]) -> Result<(), Unfit> {
+    JOINT_DEG.check_all("min_deg", min_deg)?;
+    JOINT_DEG.check_all("max_deg", max_deg)?;
+    match (0..6).find(|&i| min_deg[i] >= max_deg[i]) {
+        Some(i) => Err(Unfit::new(
+            format!("min_deg and max_deg of joint {}", i + 1),
+            format!("{} and {}", min_deg[i], max_deg[i]),
+            "min below max",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// A joint map: signs and couplings, which leave the volume of the joint space as it is.
+///
+/// # Errors
+/// Numbers that are no turns, or a map that is far from a matrix of determinant ±1 with a good inverse.
+pub fn joint_map(rows: &[[f64; 6]; 6]) -> Result<(), Unfit> {
+    const VOLUME: RangeInclusive<f64> = 0.5..=2.0;
+    const CONDITION: f64 = 100.0;
+    TURNS.check_all("joint_map", rows.as_flattened())?;
+    let map = Matrix6::from_fn(|row, column| rows[row][column]);
+    let volume = map.determinant().abs();
+    let values = spectral::singular_values(&map);
+    let condition = values.map_or(f64::INFINITY, |v| v.max() / v.min());
+    if VOLUME.contains(&volume) && condition <= CONDITION {
+        return Ok(());
+    }
+    Err(Unfit::new(
+        "joint_map",
+        format!("a matrix of determinant ±{} and condition {}", shown(volume), shown(condition)),
+        "signs and couplings of the joints: a determinant near ±1 and a condition up to 100",
+    ))
+}
+
+/// Mass and centre of a link.
+///
+/// # Errors
+/// [`Unfit`].
+pub fn bodies(bodies: &[Body]) -> Result<(), Unfit> {
+    for (i, body) in bodies.iter().enumerate() {
+        MASS_KG.check(|| format!("body {} mass_kg", i + 1), body.mass_kg)?;
+        LENGTH_MM.check_all(&format!("body {} centre_mm", i + 1), &body.centre_mm)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,53 @@
+//! Backlash: the joint rests on one or the other flank, depending on the side it came from: δθⱼ = b/2 · approachⱼ.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::Real;
+
+/// Play of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Backlash {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Play between the flanks b (rad).
+    pub play_rad: f64,
+}
+
+impl Backlash {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![EffectParameter { name: "play", unit: "rad", value: self.play_rad }]
+    }
+
+    pub(super) fn set(&mut self, _index: usize, value: f64) {
+        self.play_rad = value;
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, _: &Joints, condition: &Condition) -> Vec<Joints> {
+        let mut out = Joints::zeros();
+        out[self.joint] = 0.5 * f64::from(condition.approach[self.joint]);
+        vec![out]
+    }
+
+    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        self.regressors(statics, u, condition)[0] * self.play_rad
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
+        let side = f64::from(condition.approach[self.joint]);
+        out[self.joint] += R::splat(self.play_rad * 0.5 * side);
+    }
+
+    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+        Matrix6::zeros()
+    }
+}

@@ -1,0 +1,119 @@
+//! Which parameters an effect may have that comes from a file.
+
+use super::Effect;
+use super::load::GravityLoad;
+use super::map::JointMap;
+use super::smooth::Smooth;
+use super::thermal::Thermal;
+use crate::bounds::{Bound, Unfit};
+
+/// Turns that an effect adds (rad).
+const TURN_RAD: Bound = Bound::new(-0.5, 0.5, "an angle in rad, within ±0.5");
+/// Turns for a turn.
+const SHARE: Bound = Bound::new(-0.5, 0.5, "a share within ±0.5");
+/// Torsional compliance, lumped masses in it or not.
+const COMPLIANCE: Bound =
+    Bound::new(-1.0, 1.0, "a compliance in rad/(N m), times kg where masses are lumped, within ±1");
+const ORDER: Bound = Bound::new(1e-3, 1e5, "periods per turn of the joint, above 0");
+const GROWTH: Bound = Bound::new(-0.1, 0.1, "a relative growth within ±0.1");
+const TIME_H: Bound = Bound::new(1e-6, 1e6, "a time in hours, above 0");
+const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
+const PLACE_RAD: Bound = Bound::new(-100.0, 100.0, "joint angles in rad, within ±100");
+const REACH_RAD: Bound = Bound::new(1e-6, 1e3, "an angle in rad, above 0");
+
+/// Most knots, lumps or centres of one effect.
+const MOST_PARTS: usize = 10_000;
+
+impl Effect {
+    /// Refuses joints that an arm has not, and numbers that no effect of that kind has.
+    ///
+    /// # Errors
+    /// [`Unfit`], with the key within the effect.
+    pub fn check(&self) -> Result<(), Unfit> {
+        joint("joint", self.joint().unwrap_or(0))?;
+        match self {
+            Effect::JointCompliance(e) => {
+                COMPLIANCE.check(|| "compliance_rad_per_nm".to_owned(), e.compliance_rad_per_nm)
+            }
+            Effect::LumpedCompliance(e) => lumps(e),
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => {
+                ORDER.check(|| "order".to_owned(), e.order)?;
+                TURN_RAD.check(|| "sine_rad".to_owned(), e.sine_rad)?;
+                TURN_RAD.check(|| "cosine_rad".to_owned(), e.cosine_rad)
+            }
+            Effect::GearMap(e) => knots(e),
+            Effect::GearRatio(e) => SHARE.check(|| "error".to_owned(), e.error),
+            Effect::JointCoupling(e) => {
+                joint("driver", e.driver)?;
+                SHARE.check(|| "factor".to_owned(), e.factor)
+            }
+            Effect::Backlash(e) => TURN_RAD.check(|| "play_rad".to_owned(), e.play_rad),
+            Effect::ThermalDrift(e) => thermal(e),
+            Effect::SmoothCorrection(e) => smooth(e),
+        }
+    }
+}
+
+/// Checks a list of effects; they count from 1, as parameters name them.
+///
+/// # Errors
+/// [`Unfit`].
+pub fn effects(list: &[Effect]) -> Result<(), Unfit> {
+    for (i, effect) in list.iter().enumerate() {
+        effect.check().map_err(|unfit| unfit.within(&format!("effect {} ({})", i + 1, effect.name())))?;
+    }
+    Ok(())
+}
+
+fn joint(key: &str, joint: usize) -> Result<(), Unfit> {
+    if joint < 6 {
+        return Ok(());
+    }
+    Err(Unfit::new(key, joint.to_string(), "a joint from 0 to 5"))
+}
+
+fn count(key: &str, found: usize, least: usize, expected: &'static str) -> Result<(), Unfit> {
+    if (least..=MOST_PARTS).contains(&found) {
+        return Ok(());
+    }
+    Err(Unfit::new(key, format!("{found} entries"), expected))
+}
+
+fn lumps(load: &GravityLoad) -> Result<(), Unfit> {
+    count("lump", load.lump.len(), 1, "1 to 10,000 lumps")?;
+    for lump in &load.lump {
+        if !(1..=6).contains(&lump.frame) {
+            return Err(Unfit::new("lump.frame", lump.frame.to_string(), "a frame from 1 to 6"));
+        }
+        for (key, axis) in [("lump.axis", lump.axis), ("lump.moment", lump.moment)] {
+            if let Some(axis) = axis.filter(|axis| *axis > 2) {
+                return Err(Unfit::new(key, axis.to_string(), "an axis from 0 to 2"));
+            }
+        }
+        COMPLIANCE.check(|| "lump.factor".to_owned(), lump.factor)?;
+    }
+    Ok(())
+}
+
+fn knots(map: &JointMap) -> Result<(), Unfit> {
+    count("knots_rad", map.knots_rad.len(), 4, "4 to 10,000 knots")?;
+    TURN_RAD.check_all("knots_rad", &map.knots_rad)
+}
+
+fn thermal(thermal: &Thermal) -> Result<(), Unfit> {
+    GROWTH.check(|| "growth".to_owned(), thermal.growth)?;
+    GROWTH.check(|| "growth_per_k".to_owned(), thermal.growth_per_k)?;
+    TIME_H.check(|| "time_constant_h".to_owned(), thermal.time_constant_h)?;
+    TEMPERATURE_C.check(|| "reference_c".to_owned(), thermal.reference_c)
+}
+
+fn smooth(smooth: &Smooth) -> Result<(), Unfit> {
+    count("centres_rad", smooth.centres_rad.len(), 0, "up to 10,000 centres")?;
+    if smooth.weights_rad.len() != smooth.centres_rad.len() {
+        let found = format!("{} weights for {} centres", smooth.weights_rad.len(), smooth.centres_rad.len());
+        return Err(Unfit::new("weights_rad", found, "one for each centre"));
+    }
+    PLACE_RAD.check_all("centres_rad", smooth.centres_rad.as_flattened())?;
+    REACH_RAD.check(|| "reach_rad".to_owned(), smooth.reach_rad)?;
+    TURN_RAD.check_all("weights_rad", smooth.weights_rad.as_flattened())
+}

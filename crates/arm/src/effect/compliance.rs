@@ -1,0 +1,64 @@
+//! Joint compliance: a joint and its reducer yield under the torque of gravity.
+//!
+//! δθⱼ = cⱼ τⱼ(u), with cⱼ the torsional compliance (rad/(N m)) and τⱼ the static torque about the axis.
+//! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004), section 3.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::Real;
+
+/// Compliance of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Compliance {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Torsional compliance (rad/(N m)).
+    pub compliance_rad_per_nm: f64,
+}
+
+impl Compliance {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![EffectParameter { name: "compliance", unit: "rad/(N m)", value: self.compliance_rad_per_nm }]
+    }
+
+    pub(super) fn set(&mut self, _index: usize, value: f64) {
+        self.compliance_rad_per_nm = value;
+    }
+
+    pub(super) fn regressors(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Vec<Joints> {
+        let mut out = Joints::zeros();
+        out[self.joint] = statics.torques(u, condition).0[self.joint];
+        vec![out]
+    }
+
+    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        self.regressors(statics, u, condition)[0] * self.compliance_rad_per_nm
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += R::splat(self.compliance_rad_per_nm) * torque[self.joint];
+    }
+
+    pub(super) fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {
+        let mut out = Matrix6::zeros();
+        self.add_slope(&statics.torques(u, condition).1, &mut out);
+        out
+    }
+
+    /// Adds the slope, given that of the torques.
+    pub(crate) fn add_slope(&self, torque: &Matrix6<f64>, out: &mut Matrix6<f64>) {
+        for i in 0..6 {
+            out[(self.joint, i)] += self.compliance_rad_per_nm * torque[(self.joint, i)];
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Coupling: one joint moves along with another, as in the gear trains of wrists: δθⱼ = κ uᵢ.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::Real;
+
+/// Coupling of joint `driver` into joint `joint`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Coupling {
+    /// The joint that is moved along, 0-based.
+    pub joint: usize,
+    /// The joint that moves it, 0-based.
+    pub driver: usize,
+    /// Turns of `joint` for one turn of `driver`.
+    pub factor: f64,
+}
+
+impl Coupling {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![EffectParameter { name: "factor", unit: "1", value: self.factor }]
+    }
+
+    pub(super) fn set(&mut self, _index: usize, value: f64) {
+        self.factor = value;
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+        let mut out = Joints::zeros();
+        out[self.joint] = u[self.driver];
+        vec![out]
+    }
+
+    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        self.regressors(statics, u, condition)[0] * self.factor
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += R::splat(self.factor) * u[self.driver];
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
+        self.turn(step, out);
+    }
+
+    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+        let mut out = Matrix6::zeros();
+        out[(self.joint, self.driver)] = self.factor;
+        out
+    }
+}

@@ -1,0 +1,88 @@
+//! A periodic error of one joint: eccentric gears (orders 1 and 2) and reducer lines (higher orders).
+//!
+//! δθⱼ = S sin(n uⱼ) + C cos(n uⱼ), n per turn of the joint.
+//! Source: Ma et al. 2018 (doi 10.1016/j.rcim.2017.09.006) for joint-dependent periodic errors of gears and encoders.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::{SinCos, sin_cos};
+
+/// One harmonic of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Harmonic {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Periods per turn of the joint.
+    pub order: f64,
+    /// Factor of the sine (rad).
+    pub sine_rad: f64,
+    /// Factor of the cosine (rad).
+    pub cosine_rad: f64,
+}
+
+impl Harmonic {
+    /// Amplitude (rad).
+    pub fn amplitude_rad(&self) -> f64 {
+        self.sine_rad.hypot(self.cosine_rad)
+    }
+
+    /// Phase φ (rad) with δθ = amplitude · sin(n u + φ).
+    pub fn phase_rad(&self) -> f64 {
+        self.cosine_rad.atan2(self.sine_rad)
+    }
+
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![
+            EffectParameter { name: "sine", unit: "rad", value: self.sine_rad },
+            EffectParameter { name: "cosine", unit: "rad", value: self.cosine_rad },
+        ]
+    }
+
+    pub(super) fn set(&mut self, index: usize, value: f64) {
+        *(if index == 0 { &mut self.sine_rad } else { &mut self.cosine_rad }) = value;
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+        let (sin, cos) = (self.order * u[self.joint]).sin_cos();
+        let (mut first, mut second) = (Joints::zeros(), Joints::zeros());
+        first[self.joint] = sin;
+        second[self.joint] = cos;
+        vec![first, second]
+    }
+
+    pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+        let (sin, cos) = (self.order * u[self.joint]).sin_cos();
+        let mut out = Joints::zeros();
+        out[self.joint] = self.sine_rad * sin + self.cosine_rad * cos;
+        out
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
+        out[self.joint] += R::splat(self.sine_rad) * sin + R::splat(self.cosine_rad) * cos;
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
+        let slope = R::splat(self.order * self.sine_rad) * cos - R::splat(self.order * self.cosine_rad) * sin;
+        out[self.joint] += slope * step[self.joint];
+    }
+
+    pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+        let (sin, cos) = (self.order * u[self.joint]).sin_cos();
+        let mut out = Matrix6::zeros();
+        out[(self.joint, self.joint)] = self.order * (self.sine_rad * cos - self.cosine_rad * sin);
+        out
+    }
+}

@@ -1,0 +1,144 @@
+//! Joint compliance where masses or the direction of gravity are not known: a joint yields in proportion to the torques
+//! that lumped masses at frame origins would have.
+//!
+//! δθⱼ = Σ κₜ τⱼ(oₜ, dₜ), with τⱼ(o, d) = zⱼ · ((o − oⱼ) × g d) the torque about axis j of 1 kg at the origin o of a frame
+//! beyond the joint, under gravity along d (the arm's own direction, or an axis of the base), and κₜ the product of
+//! compliance and mass. The static torque of any arm is linear in its masses and first moments, so lumps at elbow, wrist
+//! and flange, and first moments in the frames between them, span it whatever the masses are.
+//! Source: the elastostatic joint model of Nubiola and Bonev 2013 (doi 10.1016/j.rcim.2012.06.004) with the masses freed.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, GRAVITY, Statics};
+use crate::chain::{Chain, cross, dot, minus};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::{Real, SinCos};
+
+/// One lump.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lump {
+    /// Frame at whose origin it sits: 1 to 6, the end of link 1 to 6.
+    pub frame: usize,
+    /// Base axis (0, 1, 2) along which gravity pulls; absent for the arm's own direction of gravity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<usize>,
+    /// Axis (0, 1, 2) of the frame along which the lump stands off its origin by a metre; then only the stand-off counts: a
+    /// first moment of 1 kg m that moves with the frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<usize>,
+    /// Compliance times mass [rad kg/(N m)].
+    pub factor: f64,
+}
+
+/// Compliance of one joint under lumped masses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GravityLoad {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// The lumps.
+    pub lump: Vec<Lump>,
+}
+
+impl GravityLoad {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        self.lump
+            .iter()
+            .map(|l| EffectParameter {
+                name: match l.frame {
+                    _ if l.moment.is_some() => "compliance x first moment",
+                    0..=2 => "compliance x elbow mass",
+                    3 => "compliance x forearm mass",
+                    4 | 5 => "compliance x wrist mass",
+                    _ => "compliance x flange mass",
+                },
+                unit: "rad kg/(N m)",
+                value: l.factor,
+            })
+            .collect()
+    }
+
+    pub(super) fn set(&mut self, index: usize, value: f64) {
+        if let Some(lump) = self.lump.get_mut(index) {
+            lump.factor = value;
+        }
+    }
+
+    /// Torque of 1 kg at a lump's place.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn torque<R: Real>(&self, statics: &Statics, frames: &Chain<R>, lump: &Lump) -> R {
+        let g = pull(statics, lump).map(R::splat);
+        let lever = lever(frames, lump, self.joint);
+        dot(&frames.z[self.joint], &cross(&lever, &g))
+    }
+
+    pub(super) fn regressors(&self, statics: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+        let frames = statics.frames::<f64>(&(*u).into());
+        self.lump
+            .iter()
+            .map(|lump| {
+                let mut out = Joints::zeros();
+                out[self.joint] = self.torque(statics, &frames, lump);
+                out
+            })
+            .collect()
+    }
+
+    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, _: &Condition) -> Joints {
+        let mut out = [0.0; 6];
+        self.turn(statics, &(*u).into(), &mut out);
+        out.into()
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: SinCos>(&self, statics: &Statics, u: &[R; 6], out: &mut [R; 6]) {
+        let frames = statics.frames(u);
+        for lump in &self.lump {
+            out[self.joint] += R::splat(lump.factor) * self.torque(statics, &frames, lump);
+        }
+    }
+
+    pub(super) fn slope(&self, statics: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+        let frames = statics.frames::<f64>(&(*u).into());
+        let mut out = Matrix6::zeros();
+        for lump in &self.lump {
+            let g = pull(statics, lump);
+            for i in 0..lump.frame.min(6) {
+                // The torque is the gradient of a potential: ∂²/∂uₐ∂u_b = g · (zₐ × (z_b × (p − o_b))), a ≤ b.
+                let (a, b) = (i.min(self.joint), i.max(self.joint));
+                let lever = lever(&frames, lump, b);
+                let bent = cross(&frames.z[a], &cross(&frames.z[b], &lever));
+                out[(self.joint, i)] += lump.factor * dot(&g, &bent);
+            }
+        }
+        out
+    }
+}
+
+/// From the axis of a joint to the lump, or the stand-off of a first moment (mm).
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
+    let axis = match lump.moment {
+        None => return minus(&frames.origin[lump.frame], &frames.origin[joint]),
+        Some(0) => cross(&frames.y[lump.frame - 1], &frames.z[lump.frame]),
+        Some(1) => frames.y[lump.frame - 1],
+        Some(_) => frames.z[lump.frame],
+    };
+    axis.map(|a| R::splat(1e3) * a)
+}
+
+/// Weight of 1 kg (N), with metres for the millimetres of the levers.
+#[inline(always)]
+fn pull(statics: &Statics, lump: &Lump) -> [f64; 3] {
+    match lump.axis {
+        None => statics.gravity_newton(),
+        Some(axis) => std::array::from_fn(|k| if k == axis { GRAVITY * 1e-3 } else { 0.0 }),
+    }
+}

@@ -1,0 +1,118 @@
+//! An error map fixed to one joint: a smooth periodic curve over its turn, for what a few harmonics cannot hold (a worn
+//! stretch of teeth, an encoder's ring).
+//!
+//! δθⱼ = Σ vₘ B(uⱼ M / 2π − m), with B the cubic B-spline and M knots over a turn. Each knot reaches over four
+//! spacings only, so a range that was never measured stays where its prior holds it.
+//! Source: de Boor, A Practical Guide to Splines, uniform cubic B-spline; Ma et al. 2018 (doi
+//! 10.1016/j.rcim.2017.09.006) for joint-dependent error maps.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::Real;
+
+/// Map of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointMap {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Values at the knots (rad), evenly spaced over a turn from angle 0; at least four.
+    pub knots_rad: Vec<f64>,
+}
+
+impl JointMap {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        self.knots_rad.iter().map(|&value| EffectParameter { name: "knot", unit: "rad", value }).collect()
+    }
+
+    pub(super) fn set(&mut self, index: usize, value: f64) {
+        if let Some(knot) = self.knots_rad.get_mut(index) {
+            *knot = value;
+        }
+    }
+
+    /// First of the four knots that reach to `u`, and their weights with the weights' slopes (1/rad).
+    fn near(&self, u: f64) -> (usize, [f64; 4], [f64; 4]) {
+        let count = self.knots_rad.len().max(1);
+        let place = (u / TAU).rem_euclid(1.0) * count as f64;
+        let t = place - place.floor();
+        let s = 1.0 - t;
+        let weights = [
+            s * s * s / 6.0,
+            (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
+            (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0,
+            t * t * t / 6.0,
+        ];
+        let scale = count as f64 / TAU;
+        let slopes = [
+            -0.5 * s * s * scale,
+            (1.5 * t * t - 2.0 * t) * scale,
+            (2.0 * s - 1.5 * s * s) * scale,
+            0.5 * t * t * scale,
+        ];
+        // A place that is not finite reaches no knot that exists, and comes out as the first.
+        let first = if place.is_finite() { (place as usize + count - 1) % count } else { 0 };
+        (first, weights, slopes)
+    }
+
+    fn sum(&self, first: usize, weights: &[f64; 4]) -> f64 {
+        let count = self.knots_rad.len();
+        if count == 0 {
+            return 0.0;
+        }
+        weights.iter().enumerate().map(|(k, w)| w * self.knots_rad[(first + k) % count]).sum()
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+        let count = self.knots_rad.len();
+        let mut out = vec![Joints::zeros(); count];
+        let (first, weights, _) = self.near(u[self.joint]);
+        for (k, w) in weights.iter().enumerate() {
+            if let Some(place) = out.get_mut((first + k) % count.max(1)) {
+                place[self.joint] += w;
+            }
+        }
+        out
+    }
+
+    pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
+        let mut out = Joints::zeros();
+        let (first, weights, _) = self.near(u[self.joint]);
+        out[self.joint] = self.sum(first, &weights);
+        out
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += u[self.joint].each(|u| {
+            let (first, weights, _) = self.near(u);
+            self.sum(first, &weights)
+        });
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn carry<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+        let slope = u[self.joint].each(|u| {
+            let (first, _, slopes) = self.near(u);
+            self.sum(first, &slopes)
+        });
+        out[self.joint] += slope * step[self.joint];
+    }
+
+    pub(super) fn slope(&self, _: &Statics, u: &Joints, _: &Condition) -> Matrix6<f64> {
+        let mut out = Matrix6::zeros();
+        let (first, _, slopes) = self.near(u[self.joint]);
+        out[(self.joint, self.joint)] = self.sum(first, &slopes);
+        out
+    }
+}

@@ -1,0 +1,59 @@
+//! A gear ratio that is not the nominal one: δθⱼ = ρ uⱼ.
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+use truegrind_math::lanes::Real;
+
+/// Ratio error of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ratio {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Relative error of the ratio.
+    pub error: f64,
+}
+
+impl Ratio {
+    pub(super) fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![EffectParameter { name: "ratio error", unit: "1", value: self.error }]
+    }
+
+    pub(super) fn set(&mut self, _index: usize, value: f64) {
+        self.error = value;
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, u: &Joints, _: &Condition) -> Vec<Joints> {
+        let mut out = Joints::zeros();
+        out[self.joint] = u[self.joint];
+        vec![out]
+    }
+
+    pub(super) fn rotation(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Joints {
+        self.regressors(statics, u, condition)[0] * self.error
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+        out[self.joint] += R::splat(self.error) * u[self.joint];
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
+        self.turn(step, out);
+    }
+
+    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+        let mut out = Matrix6::zeros();
+        out[(self.joint, self.joint)] = self.error;
+        out
+    }
+}

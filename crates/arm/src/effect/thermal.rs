@@ -1,0 +1,65 @@
+//! Thermal drift: all link lengths grow while the arm warms up, by g (1 − e^(−t/T)), or with a measured temperature.
+//!
+//! Source: the first-order warm-up of industrial arms in Yin et al. 2014 (doi 10.1007/s00170-014-5902-y).
+
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+
+use super::{EffectParameter, Statics};
+use crate::condition::Condition;
+use crate::model::Joints;
+
+/// Growth of the links.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thermal {
+    /// Relative growth of a warm arm over a cold one g, by the clock.
+    pub growth: f64,
+    /// Time constant of warming up T (h).
+    pub time_constant_h: f64,
+    /// Relative growth per kelvin, by the thermometer.
+    pub growth_per_k: f64,
+    /// Temperature at which the links have their nominal lengths [°C].
+    pub reference_c: f64,
+}
+
+impl Thermal {
+    pub(super) fn joint(&self) -> Option<usize> {
+        None
+    }
+
+    pub(super) fn parameters(&self) -> Vec<EffectParameter> {
+        vec![
+            EffectParameter { name: "growth", unit: "1", value: self.growth },
+            EffectParameter { name: "growth per kelvin", unit: "1/K", value: self.growth_per_k },
+        ]
+    }
+
+    pub(super) fn set(&mut self, index: usize, value: f64) {
+        *(if index == 0 { &mut self.growth } else { &mut self.growth_per_k }) = value;
+    }
+
+    pub(super) fn growth(&self, condition: &Condition) -> f64 {
+        let regressors = self.growth_regressors(condition);
+        self.growth * regressors[0] + self.growth_per_k * regressors[1]
+    }
+
+    pub(super) fn growth_regressors(&self, condition: &Condition) -> Vec<f64> {
+        vec![
+            condition.time_h.map_or(0.0, |t| 1.0 - (-t / self.time_constant_h).exp()),
+            condition.temperature_c.map_or(0.0, |t| t - self.reference_c),
+        ]
+    }
+
+    pub(super) fn regressors(&self, _: &Statics, _: &Joints, _: &Condition) -> Vec<Joints> {
+        vec![Joints::zeros(); 2]
+    }
+
+    pub(super) fn rotation(&self, _: &Statics, _: &Joints, _: &Condition) -> Joints {
+        Joints::zeros()
+    }
+
+    pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {
+        Matrix6::zeros()
+    }
+}

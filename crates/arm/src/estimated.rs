@@ -1,0 +1,424 @@
+//! An estimated arm: the nominal arm, everything identified, how well it is known, and where it came from.
+//!
+//! The TOML file of an estimated arm is complete: it holds the nominal arm too, so a program can be rewritten from it
+//! alone.
+
+mod checks;
+
+use nalgebra::{DMatrix, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+
+use super::arm_file::ArmFile;
+use super::chain::{Chain, cross, minus};
+use super::condition::Condition;
+use super::jacobian::{Ends, effect_twist, parameter_jacobian};
+use super::model::{Joints, Model, Posed};
+use super::parameter::{LinkCoordinate, Parameter};
+use super::region::Region;
+use truegrind_math::lanes::{Lanes, Real, WIDTH, vectorised};
+use truegrind_math::se3::{Pose, vector_from_pose};
+use truegrind_math::statistics::ErrorSummary;
+
+/// The name and version of the file format.
+pub const SCHEMA: &str = "truegrind.model/1";
+
+/// How a fit is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Judgement {
+    /// All stated limits are met.
+    Pass,
+    /// The fit may not be used.
+    Fail,
+    /// The data do not promise that programs gain: used only where that is asked for.
+    Doubtful,
+    /// Nothing speaks against the fit, and no limits were stated to judge it by.
+    NotEvaluated,
+}
+
+/// Judgement with its reasons.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// The judgement.
+    pub status: Judgement,
+    /// One sentence each.
+    pub reasons: Vec<String>,
+}
+
+/// One identified number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatedParameter {
+    /// Name, as `link2.alpha`.
+    pub name: String,
+    /// Unit of all the numbers.
+    pub unit: String,
+    /// Value of the data sheet (0 for an effect).
+    pub nominal: f64,
+    /// Estimated value.
+    pub value: f64,
+    /// Standard deviation of the estimate, priors included.
+    pub sigma: f64,
+    /// Standard deviation of the prior; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior_sigma: Option<f64>,
+    /// Share of the knowledge that the data brought: 1 − (sigma / prior sigma)²; 0 means the prior alone holds it.
+    pub determined: f64,
+}
+
+/// Where an estimate came from.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Measurement file.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+    /// Rows used.
+    pub rows: usize,
+    /// Rows set aside as outliers, by data row from 0.
+    pub set_aside: Vec<usize>,
+    /// Sensor.
+    pub sensor: String,
+    /// Method by name.
+    pub method: String,
+    /// Seed of the split.
+    pub seed: u64,
+    /// Share of rows that was held out to state the error.
+    pub held_out: f64,
+    /// Whether rounded angles were sharpened by the controller's read-out.
+    pub sharpened: bool,
+    /// Version of truegrind.
+    pub version: String,
+}
+
+/// Errors of one stage, on the rows it was fitted to and on rows it never saw (mm).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageErrors {
+    /// Rows of the fit.
+    pub fitted: ErrorSummary,
+    /// Held-out rows.
+    pub held_out: ErrorSummary,
+}
+
+/// An estimated arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimated {
+    /// Catalogue name of the nominal arm.
+    pub robot: String,
+    /// What the controller computes with.
+    pub nominal: Model,
+    /// The arm as estimated.
+    pub model: Model,
+    /// Everything that was identified, of the arm first.
+    pub parameters: Vec<EstimatedParameter>,
+    /// Parameters of the arm in the order of the covariance.
+    pub order: Vec<Parameter>,
+    /// Covariance of the arm's parameters (mm, rad).
+    pub covariance: DMatrix<f64>,
+    /// Where the data came from.
+    pub provenance: Provenance,
+    /// Errors with frames registered alone.
+    pub registered: StageErrors,
+    /// Errors with geometry.
+    pub geometry: StageErrors,
+    /// What the sensor and the rounding leave (mm); absent where it cannot be told.
+    pub noise_floor_mm: Option<f64>,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Where the arm was measured.
+    pub region: Region,
+    /// The condition that the estimate holds for.
+    pub condition: Condition,
+}
+
+/// A frame that was taught with the arm, so that it moves with the arm's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carried {
+    /// Its origin in the base (mm).
+    pub origin_mm: Vector3<f64>,
+    /// Its twist in the base per unit of each parameter of the covariance: velocity of the origin, angular velocity.
+    pub twists: Vec<Vector6<f64>>,
+}
+
+/// A point that rides on the flange, whose predicted σ is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct RidingPoint<'a> {
+    /// Controller angles (rad).
+    pub joints: Joints,
+    /// The point on the flange: its translation counts.
+    pub flange_from_tool: Pose,
+    /// The frame that the arm itself placed, against which the point is judged.
+    pub carried: Option<&'a Carried>,
+}
+
+/// Velocities of a point that rides on the last frame at `rides`, for the parameters of links (zero for all others);
+/// hands back the point in the base (mm).
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn link_velocities<R: Real>(
+    frames: &Chain<R>,
+    rides: &[R; 3],
+    scale: f64,
+    order: &[Parameter],
+    velocities: &mut [[R; 3]],
+) -> [R; 3] {
+    let mut point = frames.origin[6];
+    for (k, coordinate) in point.iter_mut().enumerate() {
+        *coordinate += rides[0] * frames.x[k] + rides[1] * frames.y[5][k] + rides[2] * frames.z[6][k];
+    }
+    let grown = |axis: &[R; 3]| axis.map(|v| v * R::splat(scale));
+    for (parameter, velocity) in order.iter().zip(velocities) {
+        *velocity = match *parameter {
+            Parameter::Link { joint, coordinate } => match coordinate {
+                LinkCoordinate::D => grown(&frames.z[joint]),
+                LinkCoordinate::A => grown(&frames.lateral[joint]),
+                LinkCoordinate::Theta => cross(&frames.z[joint], &minus(&point, &frames.origin[joint])),
+                LinkCoordinate::Alpha => {
+                    cross(&frames.lateral[joint], &minus(&point, &frames.origin[joint + 1]))
+                }
+                LinkCoordinate::Beta => cross(&frames.y[joint], &minus(&point, &frames.origin[joint + 1])),
+            },
+            _ => [R::splat(0.0); 3],
+        };
+    }
+    point
+}
+
+/// Σᵢⱼ Cᵢⱼ vᵢ·vⱼ for a symmetric C, given column by column.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
+    let n = velocities.len();
+    let mut out = R::splat(0.0);
+    for (i, v) in velocities.iter().enumerate() {
+        let column = &matrix[i * n..i * n + i + 1];
+        let mut sum = [R::splat(0.0); 3];
+        for (c, w) in column.iter().zip(&velocities[..i]) {
+            for k in 0..3 {
+                sum[k] += R::splat(2.0 * c) * w[k];
+            }
+        }
+        for k in 0..3 {
+            out += v[k] * (sum[k] + R::splat(column[i]) * v[k]);
+        }
+    }
+    out
+}
+
+/// √v of a variance that rounding may have taken below 0; not a number of what is none.
+fn root(variance: f64) -> f64 {
+    if variance > 0.0 || variance.is_nan() { variance.sqrt() } else { 0.0 }
+}
+
+impl Estimated {
+    /// Covariance of the position of a point on the flange (mm²), 3 × 3 in the base.
+    pub fn position_covariance(
+        &self,
+        arm: &Posed<'_>,
+        q: &Joints,
+        flange_from_tool: &Pose,
+    ) -> nalgebra::Matrix3<f64> {
+        let jacobian = self.position_jacobian(arm, q, flange_from_tool);
+        let product: DMatrix<f64> = &jacobian * &self.covariance * jacobian.transpose();
+        product.fixed_view::<3, 3>(0, 0).into_owned()
+    }
+
+    /// Predicted standard deviation of the position of a point on the flange (mm): √trace(J Σ Jᵀ), the double sum of
+    /// Σᵢⱼ vᵢ·vⱼ over the velocities that the arm's parameters give the point.
+    ///
+    /// With `carried`, relative to a frame that the arm itself placed: what moves point and frame alike does not count.
+    pub fn position_sigma_mm(
+        &self,
+        arm: &Posed<'_>,
+        q: &Joints,
+        flange_from_tool: &Pose,
+        carried: Option<&Carried>,
+    ) -> f64 {
+        let point = RidingPoint { joints: *q, flange_from_tool: *flange_from_tool, carried };
+        self.position_sigmas_mm(arm, &[point])[0]
+    }
+
+    /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
+    pub fn position_sigmas_mm(&self, arm: &Posed<'_>, points: &[RidingPoint<'_>]) -> Vec<f64> {
+        let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
+        let zero = Lanes([0.0; WIDTH]);
+        let mut velocities = vec![[zero; 3]; self.order.len()];
+        let mut out = Vec::with_capacity(points.len());
+        for block in points.chunks(WIDTH) {
+            let row = |k: usize| &block[k.min(block.len() - 1)];
+            let angles: [Lanes; 6] =
+                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| row(k).joints[i])));
+            let rides: [Vector3<f64>; WIDTH] =
+                std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
+            let rides: [Lanes; 3] = std::array::from_fn(|i| Lanes(std::array::from_fn(|k| rides[k][i])));
+            let at = vectorised(
+                #[inline(always)]
+                || {
+                    link_velocities(
+                        &arm.frames_of(&angles),
+                        &rides,
+                        1.0 + growth,
+                        &self.order,
+                        &mut velocities,
+                    )
+                },
+            );
+            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i].0[k]) };
+            if !arm.model.effects.is_empty() {
+                for k in 0..block.len() {
+                    let frames = arm.frames(&row(k).joints);
+                    for (parameter, velocity) in self.order.iter().zip(&mut velocities) {
+                        if let Parameter::Effect { index, parameter } = *parameter {
+                            let twist =
+                                effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
+                            (0..3).for_each(|i| velocity[i].0[k] = twist[i]);
+                        }
+                    }
+                }
+            }
+            for (k, here) in block.iter().enumerate() {
+                let Some(carried) = here.carried else { continue };
+                let lever = Vector3::from(point(k)) - carried.origin_mm;
+                for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
+                    let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
+                    (0..3).for_each(|i| velocity[i].0[k] -= moved[i]);
+                }
+            }
+            let variance = vectorised(
+                #[inline(always)]
+                || quadratic(self.covariance.as_slice(), &velocities),
+            );
+            out.extend(variance.0[..block.len()].iter().map(|v| root(*v)));
+        }
+        out
+    }
+
+    /// Derivative of the position of a point on the flange with respect to the arm's parameters: 3 × p, in the base.
+    pub fn position_jacobian(&self, arm: &Posed<'_>, q: &Joints, flange_from_tool: &Pose) -> DMatrix<f64> {
+        let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(flange_from_tool) };
+        let full = parameter_jacobian(&ends, arm, q, &self.order);
+        DMatrix::from_fn(3, self.order.len(), |i, j| full[(i, j)])
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    /// A sentence, when a number cannot be written (not finite).
+    pub fn to_toml(&self) -> Result<String, String> {
+        let file = ModelFile {
+            schema: SCHEMA.to_owned(),
+            robot: self.robot.clone(),
+            provenance: self.provenance.clone(),
+            verdict: self.verdict.clone(),
+            registered: self.registered,
+            geometry: self.geometry,
+            noise_floor_mm: self.noise_floor_mm,
+            region: self.region.clone(),
+            condition: self.condition,
+            nominal: ArmFile::from(&self.nominal),
+            estimated: ArmFile::from(&self.model),
+            covariance: CovarianceFile {
+                order: self.order.iter().map(ToString::to_string).collect(),
+                lower: (0..self.order.len())
+                    .map(|i| (0..=i).map(|j| self.covariance[(i, j)]).collect())
+                    .collect(),
+            },
+            parameter: self.parameters.clone(),
+        };
+        let text = toml::to_string(&file).map_err(|e| format!("the model cannot be written: {e}"))?;
+        Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
+    }
+
+    /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
+    /// parameters are the arm's.
+    ///
+    /// # Errors
+    /// A sentence that says what in the file cannot be used: key, what was found, what was expected.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let file: ModelFile = toml::from_str(text).map_err(|e| format!("not a truegrind model: {e}"))?;
+        if file.schema != SCHEMA {
+            return Err(format!("`schema` is \"{}\", expected \"{SCHEMA}\"", file.schema));
+        }
+        let order = file
+            .covariance
+            .order
+            .iter()
+            .map(|name| {
+                parse_arm_parameter(name).ok_or_else(|| format!("`covariance.order`: unknown {name}"))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let n = order.len();
+        if file.covariance.lower.len() != n
+            || file.covariance.lower.iter().enumerate().any(|(i, r)| r.len() != i + 1)
+        {
+            return Err(format!("`covariance.lower`: expected {n} rows of 1 to {n} numbers"));
+        }
+        let covariance = DMatrix::from_fn(n, n, |i, j| file.covariance.lower[i.max(j)][i.min(j)]);
+        let model = Self {
+            robot: file.robot,
+            nominal: file.nominal.model().map_err(|e| format!("`nominal`: {e}"))?,
+            model: file.estimated.model().map_err(|e| format!("`estimated`: {e}"))?,
+            parameters: file.parameter,
+            order,
+            covariance,
+            provenance: file.provenance,
+            registered: file.registered,
+            geometry: file.geometry,
+            noise_floor_mm: file.noise_floor_mm,
+            verdict: file.verdict,
+            region: file.region,
+            condition: file.condition,
+        };
+        checks::check(&model).map_err(|unfit| unfit.to_string())?;
+        Ok(model)
+    }
+}
+
+/// Reads `link2.alpha` or `effect1.2`.
+fn parse_arm_parameter(name: &str) -> Option<Parameter> {
+    let (part, coordinate) = name.split_once('.')?;
+    if let Some(number) = part.strip_prefix("effect") {
+        let index = number.parse::<usize>().ok()?.checked_sub(1)?;
+        return Some(Parameter::Effect {
+            index,
+            parameter: coordinate.parse::<usize>().ok()?.checked_sub(1)?,
+        });
+    }
+    let joint = part.strip_prefix("link")?.parse::<usize>().ok()?.checked_sub(1).filter(|j| *j < 6)?;
+    let coordinate = match coordinate {
+        "a" => LinkCoordinate::A,
+        "d" => LinkCoordinate::D,
+        "alpha" => LinkCoordinate::Alpha,
+        "theta" => LinkCoordinate::Theta,
+        "beta" => LinkCoordinate::Beta,
+        _ => return None,
+    };
+    Some(Parameter::Link { joint, coordinate })
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ModelFile {
+    schema: String,
+    robot: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    noise_floor_mm: Option<f64>,
+    provenance: Provenance,
+    verdict: Verdict,
+    condition: Condition,
+    registered: StageErrors,
+    geometry: StageErrors,
+    region: Region,
+    nominal: ArmFile,
+    estimated: ArmFile,
+    covariance: CovarianceFile,
+    parameter: Vec<EstimatedParameter>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CovarianceFile {
+    order: Vec<String>,
+    lower: Vec<Vec<f64>>,
+}

@@ -1,0 +1,237 @@
+//! What must hold before the numbers of a model file are used.
+//!
+//! A model decides where the real tool goes, so nothing in its file is taken on trust: a number that is not finite would
+//! come out as a σ of 0, and a covariance that is none as a σ of any size.
+
+use nalgebra::DMatrix;
+
+use super::{Estimated, EstimatedParameter, Provenance, StageErrors};
+use crate::bounds::{self, Bound, JOINT_DEG, LENGTH_MM, MASS_KG, Unfit};
+use crate::condition::Condition;
+use crate::model::Model;
+use crate::parameter::{Parameter, link_coordinates};
+use crate::region::Region;
+use truegrind_math::statistics::ErrorSummary;
+
+const ERROR_MM: Bound = Bound::new(0.0, 1e6, "an error in mm, 0 or more");
+const SIGNED_MM: Bound = Bound::new(-1e6, 1e6, "an error in mm, within ±1,000,000");
+const SIGMA_MM: Bound = Bound::new(0.0, 1e4, "a standard deviation in mm, 0 to 10,000");
+const SIGMA: Bound = Bound::new(0.0, 1e6, "a standard deviation, 0 or more");
+const PRIOR: Bound = Bound::new(f64::MIN_POSITIVE, 1e12, "a standard deviation above 0");
+const VALUE: Bound = Bound::new(-1e9, 1e9, "a finite number within ±1e9");
+const SHARE: Bound = Bound::new(0.0, 1.0, "a share from 0 to 1");
+const SPACING_DEG: Bound = Bound::new(0.0, 1e4, "a distance in degrees, 0 or more");
+const TIME_H: Bound = Bound::new(-1e6, 1e6, "a time in hours");
+const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
+
+/// How far the links of an estimated arm may be from the nominal ones: far more than any arm is off (mm).
+const FARTHEST_MM: Bound = Bound::new(-200.0, 200.0, "a link within 200 mm of the nominal arm's");
+/// The same for angles (°).
+const FARTHEST_DEG: Bound = Bound::new(-45.0, 45.0, "a link within 45° of the nominal arm's");
+/// Most samples of a region and parameters of a model.
+const MOST: usize = 100_000;
+
+/// Checks a model as it was read; its two arms have passed their own checks.
+pub(super) fn check(model: &Estimated) -> Result<(), Unfit> {
+    if model.robot.trim().is_empty() {
+        return Err(Unfit::new("robot", "nothing", "the name of the arm"));
+    }
+    arms(&model.nominal, &model.model)?;
+    for (key, errors) in [("registered", &model.registered), ("geometry", &model.geometry)] {
+        stage(errors).map_err(|unfit| unfit.within(key))?;
+    }
+    if let Some(floor) = model.noise_floor_mm {
+        ERROR_MM.check(|| "noise_floor_mm".to_owned(), floor)?;
+    }
+    provenance(&model.provenance).map_err(|unfit| unfit.within("provenance"))?;
+    region(&model.region).map_err(|unfit| unfit.within("region"))?;
+    condition(&model.condition).map_err(|unfit| unfit.within("condition"))?;
+    order(model)?;
+    for parameter in &model.parameters {
+        number(parameter).map_err(|unfit| unfit.within(&format!("parameter {}", parameter.name)))?;
+    }
+    covariance(&model.order, &model.covariance)
+}
+
+/// The estimated arm is the nominal one, a little off: the same joint map, link by link.
+fn arms(nominal: &Model, estimated: &Model) -> Result<(), Unfit> {
+    if (nominal.joint_map - estimated.joint_map).amax() > 1e-9 {
+        return Err(Unfit::new(
+            "estimated.joint_map",
+            "another map than nominal.joint_map",
+            "the same: what an arm adds to it is an effect",
+        ));
+    }
+    for (i, (from, to)) in nominal.links.iter().zip(&estimated.links).enumerate() {
+        let key = |name: &str| format!("estimated.link {} {name}", i + 1);
+        FARTHEST_MM.check(|| key("a_mm less nominal"), to.a_mm - from.a_mm)?;
+        FARTHEST_MM.check(|| key("d_mm less nominal"), to.d_mm - from.d_mm)?;
+        for (name, turn) in [
+            ("alpha_deg less nominal", to.alpha_rad - from.alpha_rad),
+            ("theta_deg less nominal", to.theta_rad - from.theta_rad),
+            ("beta_deg less nominal", to.beta_rad - from.beta_rad),
+        ] {
+            FARTHEST_DEG.check(|| key(name), turn.to_degrees())?;
+        }
+    }
+    Ok(())
+}
+
+fn stage(errors: &StageErrors) -> Result<(), Unfit> {
+    let summary = |errors: &ErrorSummary| {
+        for (key, value) in [
+            ("rmse", errors.rmse),
+            ("mean_absolute", errors.mean_absolute),
+            ("standard_deviation", errors.standard_deviation),
+            ("max", errors.max),
+        ] {
+            ERROR_MM.check(|| key.to_owned(), value)?;
+        }
+        SIGNED_MM.check(|| "mean".to_owned(), errors.mean)
+    };
+    summary(&errors.fitted).map_err(|unfit| unfit.within("fitted"))?;
+    summary(&errors.held_out).map_err(|unfit| unfit.within("held_out"))
+}
+
+fn provenance(provenance: &Provenance) -> Result<(), Unfit> {
+    SHARE.check(|| "held_out".to_owned(), provenance.held_out)
+}
+
+pub(super) fn region(region: &Region) -> Result<(), Unfit> {
+    JOINT_DEG.check_all("min_deg", &region.min_deg)?;
+    JOINT_DEG.check_all("max_deg", &region.max_deg)?;
+    if let Some(i) = (0..6).find(|&i| region.min_deg[i] > region.max_deg[i]) {
+        return Err(Unfit::new(
+            format!("min_deg and max_deg of joint {}", i + 1),
+            format!("{} and {}", region.min_deg[i], region.max_deg[i]),
+            "min not above max",
+        ));
+    }
+    if region.samples_deg.len() > MOST {
+        return Err(Unfit::new(
+            "samples_deg",
+            format!("{} poses", region.samples_deg.len()),
+            "up to 100,000",
+        ));
+    }
+    JOINT_DEG.check_all("samples_deg", region.samples_deg.as_flattened())?;
+    SPACING_DEG.check(|| "spacing_deg".to_owned(), region.spacing_deg)?;
+    SIGMA_MM.check(|| "sigma_mm".to_owned(), region.sigma_mm)
+}
+
+pub(super) fn condition(condition: &Condition) -> Result<(), Unfit> {
+    for (key, bound, value) in [
+        ("time_h", TIME_H, condition.time_h),
+        ("temperature_c", TEMPERATURE_C, condition.temperature_c),
+        ("payload_kg", MASS_KG, condition.payload_kg),
+    ] {
+        if let Some(value) = value {
+            bound.check(|| key.to_owned(), value)?;
+        }
+    }
+    LENGTH_MM.check_all("payload_centre_mm", &condition.payload_centre_mm)?;
+    match condition.approach.iter().find(|side| !(-1..=1).contains(*side)) {
+        Some(side) => Err(Unfit::new("approach", side.to_string(), "-1, 0 or 1 for each joint")),
+        None => Ok(()),
+    }
+}
+
+fn number(parameter: &EstimatedParameter) -> Result<(), Unfit> {
+    VALUE.check(|| "nominal".to_owned(), parameter.nominal)?;
+    VALUE.check(|| "value".to_owned(), parameter.value)?;
+    SIGMA.check(|| "sigma".to_owned(), parameter.sigma)?;
+    if let Some(prior) = parameter.prior_sigma {
+        PRIOR.check(|| "prior_sigma".to_owned(), prior)?;
+    }
+    SHARE.check(|| "determined".to_owned(), parameter.determined)
+}
+
+/// Every parameter of the covariance is one that the arm has, and the list of parameters follows the same order.
+fn order(model: &Estimated) -> Result<(), Unfit> {
+    let arm = &model.model;
+    for (i, parameter) in model.order.iter().enumerate() {
+        let exists = match *parameter {
+            Parameter::Link { joint, coordinate } => {
+                link_coordinates(arm.links[joint].model).contains(&coordinate)
+            }
+            Parameter::Effect { index, parameter } => {
+                arm.effects.get(index).is_some_and(|effect| parameter < effect.parameters().len())
+            }
+            _ => false,
+        };
+        if !exists {
+            return Err(Unfit::new("covariance.order", parameter.to_string(), "parameters that the arm has"));
+        }
+        if model.order[..i].contains(parameter) {
+            return Err(Unfit::new(
+                "covariance.order",
+                format!("{parameter} twice"),
+                "each parameter of the arm once",
+            ));
+        }
+    }
+    // A model may leave its list of parameters away: nothing is computed from it.
+    if model.parameters.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<String> = model.order.iter().map(ToString::to_string).collect();
+    let found: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
+    if named == found {
+        return Ok(());
+    }
+    let at = named.iter().zip(&found).position(|(a, b)| a != b).unwrap_or(named.len().min(found.len()));
+    let name = |name: Option<&str>| name.unwrap_or("nothing").to_owned();
+    Err(Unfit::new(
+        format!("parameter, number {}", at + 1),
+        format!(
+            "{} beside {} in covariance.order",
+            name(found.get(at).copied()),
+            name(named.get(at).map(String::as_str))
+        ),
+        "the same parameters in the same order",
+    ))
+}
+
+/// A covariance has a Cholesky factor. It is looked for in correlations, so that units do not matter; a pivot may lie
+/// below 0 by what rounding does to parameters that are all but the same.
+fn covariance(order: &[Parameter], matrix: &DMatrix<f64>) -> Result<(), Unfit> {
+    const SLACK: f64 = 1e-6;
+    let n = order.len();
+    let refuse = |k: usize, found: String, expected| {
+        Err(Unfit::new(format!("covariance.lower, row {} ({})", k + 1, order[k]), found, expected))
+    };
+    for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+        let value = matrix[(i, j)];
+        if !value.is_finite() || (i == j && !(0.0..=1e12).contains(&value)) {
+            let expected = "finite numbers, and on the diagonal variances of 0 or more";
+            return refuse(i, bounds::shown(value), expected);
+        }
+    }
+    let sigma: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
+    let mut factor = DMatrix::<f64>::zeros(n, n);
+    for k in 0..n {
+        for i in k..n {
+            let known: f64 = (0..k).map(|m| factor[(i, m)] * factor[(k, m)]).sum();
+            let scale = sigma[i] * sigma[k];
+            // Of what never varies nothing depends.
+            if scale == 0.0 && matrix[(i, k)] != 0.0 {
+                return refuse(i, bounds::shown(matrix[(i, k)]), "0 beside a variance of 0");
+            }
+            let rest = if scale == 0.0 { 0.0 } else { matrix[(i, k)] / scale - known };
+            if i == k && rest >= -SLACK {
+                factor[(k, k)] = rest.max(0.0).sqrt();
+            } else if i > k && factor[(k, k)] > SLACK.sqrt() {
+                factor[(i, k)] = rest / factor[(k, k)];
+            } else if i == k || rest.abs() > 10.0 * SLACK.sqrt() {
+                let expected =
+                    "a positive semi-definite covariance: the block up to this row has no Cholesky factor";
+                return refuse(
+                    i,
+                    format!("correlations that contradict each other by {}", bounds::shown(rest)),
+                    expected,
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,242 @@
+//! Joints for a pose: closed form on the nominal arm for seeds, Newton on the estimated arm for the answer.
+//!
+//! Method: the nominal geometry tells the family: spherical wrist, three parallel axes (UR), or neither. A closed form
+//! gives up to eight branches as seeds; Newton's method carries each to the estimated arm, whose perturbed links have
+//! no closed form and whose effects depend on the joints. Without a closed form the seeds are spread over the joint
+//! ranges. Along a path no closed form is needed: each target starts from its neighbour, eight in lanes.
+//! Shapes: one target, a pose of the flange in the base (mm); solutions in controller angles (rad).
+//! Stops: at 1e-9 mm and 1e-12 rad, see [`newton`]; how it ended otherwise is an [`InverseError`].
+//! Checked against: `forward(inverse(pose)) = pose` for every arm of the catalogue, nominal and perturbed.
+
+pub mod solution;
+pub mod configuration;
+pub mod newton;
+mod axes;
+mod spherical;
+mod ur;
+mod structure;
+mod kernel;
+mod candidates;
+mod path;
+
+use std::f64::consts::PI;
+
+use nalgebra::Matrix6;
+
+use self::configuration::{BRANCH_TOLERANCE, Configuration};
+use self::kernel::{Kernel, Solved};
+use self::newton::{Goal, Outcome};
+use self::structure::Structure;
+use super::chain::End;
+use super::condition::Condition;
+use super::model::{Joints, Limits, Model, Posed};
+use truegrind_math::se3::Pose;
+use truegrind_math::spectral;
+
+pub use self::solution::{InverseError, Singularity, SingularityDistances, Solution};
+pub use self::structure::Branch;
+
+/// A joint angle may lie beyond its limit by rounding (rad).
+const LIMIT_SLACK_RAD: f64 = 1e-9;
+
+/// A solution farther from its seed than this is found by way of all branches (rad).
+const FARTHEST_RAD: f64 = 0.9 * PI;
+/// The same for an arm whose branches cannot be told apart (rad).
+const FARTHEST_WITHOUT_BRANCHES_RAD: f64 = 0.5;
+
+/// The inverse map of one estimated arm under one condition. Prepare once, use for many targets.
+#[derive(Debug, Clone)]
+pub struct Inverse<'a> {
+    arm: Posed<'a>,
+    map_inverse: Option<Matrix6<f64>>,
+    flange_inverse: End<f64>,
+    structure: Structure,
+    kernel: Kernel,
+}
+
+impl<'a> Inverse<'a> {
+    /// Prepares the inverse of `estimated` under `condition`; seeds and branches come from `nominal`, whose joint map
+    /// must be that of `estimated`. Give the same model twice for the nominal arm itself.
+    pub fn new(estimated: &'a Model, condition: &Condition, nominal: &Model) -> Self {
+        let structure = Structure::of(nominal);
+        let half: f64 = nominal.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>() * 0.5;
+        Self {
+            arm: estimated.under(condition),
+            map_inverse: estimated.joint_map.try_inverse(),
+            flange_inverse: {
+                let inverse = estimated.flange.inverse();
+                let turn = inverse.rotation.to_rotation_matrix();
+                End {
+                    axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
+                    origin: inverse.translation.vector.into(),
+                }
+            },
+            kernel: Kernel {
+                wrist_mm: structure.wrist_in_last(),
+                flange_mm: estimated.flange.translation.vector.into(),
+                length_mm: half.max(1.0),
+            },
+            structure,
+        }
+    }
+
+    /// The estimated arm under its condition.
+    pub fn arm(&self) -> &Posed<'a> {
+        &self.arm
+    }
+
+    /// Characteristic length by which translations are divided: half of the link lengths behind axis 1 (mm).
+    pub fn length_mm(&self) -> f64 {
+        self.kernel.length_mm
+    }
+
+    /// Configuration of the arm at controller angles.
+    pub fn configuration(&self, joints: &Joints) -> Configuration {
+        configuration::of(self.branch(joints), joints)
+    }
+
+    /// Branch of the arm at controller angles; `None` for an arm without a closed form.
+    pub fn branch(&self, joints: &Joints) -> Option<Branch> {
+        self.structure.has_branches().then(|| Branch::of(&self.margins(joints)))
+    }
+
+    /// Distances to the named singularities; `None` for an arm without a closed form.
+    pub fn singularity_distances(&self, joints: &Joints) -> Option<SingularityDistances> {
+        let [shoulder, elbow, wrist] = self.margins(joints).map(f64::abs);
+        self.structure.has_branches().then_some(SingularityDistances { wrist, elbow, shoulder })
+    }
+
+    /// The distances of [`Inverse::singularity_distances`] with the signs that tell the branches apart: shoulder, elbow,
+    /// wrist; negative for behind, elbow back and axis 5 negative. All 1 for an arm without a closed form.
+    pub fn branch_margins(&self, joints: &Joints) -> [f64; 3] {
+        self.margins(joints)
+    }
+
+    /// Whether the arm has a closed form, and so branches.
+    pub fn has_branches(&self) -> bool {
+        self.structure.has_branches()
+    }
+
+    /// Distance to singularity at controller angles, as [`Solution::singularity`] states it.
+    pub fn singularity(&self, joints: &Joints) -> f64 {
+        let jacobian = newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm);
+        jacobian.try_inverse().map_or(0.0, |inverse| 1.0 / inverse.norm())
+    }
+
+    /// Smallest singular value of the 6 × 6 Jacobian of the flange, translations divided by [`Inverse::length_mm`],
+    /// with respect to the rotations of the joints (couplings and slopes of effects not counted). Not a number where the
+    /// joints are not.
+    pub fn smallest_singular_value(&self, joints: &Joints) -> f64 {
+        let jacobian = newton::scaled_jacobian(&self.arm, joints, self.kernel.length_mm);
+        spectral::singular_values(&jacobian).map_or(f64::NAN, |values| values.min())
+    }
+
+    /// The solution on the branch of `seed`, each joint on the turn nearest to it. The fast way along a path.
+    ///
+    /// A branch is left only across its border: where the seed or the solution stands within 2 % of a singularity,
+    /// either side counts as the seed's.
+    pub fn solve_near(&self, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
+        let goal = self.goal(target)?;
+        if !seed.iter().all(|q| q.is_finite()) {
+            return Err(InverseError::NotFinite);
+        }
+        let solved = self.solve_fast(target, seed);
+        match self.accepted(&solved, seed) {
+            Some(solution) => {
+                self.check_limits(&solution.joints)?;
+                Ok(solution)
+            }
+            None => self.solve_carefully(&goal, seed, &solved.margins[0]),
+        }
+    }
+
+    /// The solution in a requested configuration.
+    ///
+    /// An axis may lie outside its requested quarter by up to 5°, since the estimated arm stands a little beside the
+    /// nominal one for which the program was written; so may a branch be left across its border. A solution on the very
+    /// branch goes before all others: near a singularity the arm has two solutions close together, and cfx tells which is
+    /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters.
+    /// Joints 2, 3 and 5 stand on the turn nearest to `near`; without it, or with less than a turn of room, on that nearest
+    /// to the middle of their range.
+    pub fn solve_configured(
+        &self,
+        target: &Pose,
+        configuration: &Configuration,
+        near: Option<&Joints>,
+    ) -> Result<Solution, InverseError> {
+        let goal = self.goal(target)?;
+        if near.is_some_and(|near| !near.iter().all(|q| q.is_finite())) {
+            return Err(InverseError::NotFinite);
+        }
+        if let Some(near) = near
+            && let Ok(solution) = self.solve_near(target, near)
+            && let margins = self.margins(&solution.joints)
+            && configuration.fits(&solution.joints, &margins)
+            && configuration.states_branch(&margins)
+        {
+            return Ok(solution);
+        }
+        self.solve_in(&goal, configuration, near)
+    }
+
+    /// All solutions within the limits: every branch, and every turn of joints with more than one.
+    pub fn all(&self, target: &Pose) -> Vec<Solution> {
+        self.goal(target).map(|goal| self.every_turn(&goal)).unwrap_or_default()
+    }
+
+    fn goal(&self, target: &Pose) -> Result<Goal, InverseError> {
+        let finite =
+            target.translation.vector.iter().chain(target.rotation.coords.iter()).all(|v| v.is_finite());
+        if finite { Ok(Goal::of(target, &self.arm.model.flange)) } else { Err(InverseError::NotFinite) }
+    }
+
+    fn margins(&self, joints: &Joints) -> [f64; 3] {
+        self.structure.margins_of(&self.arm.frames(joints))
+    }
+
+    /// The solution of the kernel, if it counts: arrived, not far from the seed, on its branch.
+    fn accepted(&self, solved: &Solved<f64>, seed: &Joints) -> Option<Solution> {
+        let joints = self.map_inverse? * Joints::from(solved.mapped);
+        let farthest =
+            if self.structure.has_branches() { FARTHEST_RAD } else { FARTHEST_WITHOUT_BRANCHES_RAD };
+        (solved.converged == 1.0
+            && solved.singularity > 1e-9
+            && (joints - seed).amax() < farthest
+            && same_branch(&solved.margins[0], &solved.margins[1]))
+        .then_some(Solution {
+            joints,
+            residual_mm: solved.residual_mm,
+            residual_rad: solved.residual_rad,
+            iterations: solved.steps as usize,
+            singularity: solved.singularity,
+        })
+    }
+
+    fn check_limits(&self, joints: &Joints) -> Result<(), InverseError> {
+        let Limits { min_rad, max_rad, .. } = &self.arm.model.limits;
+        for joint in 0..6 {
+            let (angle_rad, min_rad, max_rad) = (joints[joint], min_rad[joint], max_rad[joint]);
+            if angle_rad < min_rad - LIMIT_SLACK_RAD || angle_rad > max_rad + LIMIT_SLACK_RAD {
+                return Err(InverseError::OutsideLimits { joint, angle_rad, min_rad, max_rad });
+            }
+        }
+        Ok(())
+    }
+
+    fn solution(&self, outcome: &Outcome) -> Solution {
+        Solution {
+            joints: outcome.joints,
+            residual_mm: outcome.residual_mm,
+            residual_rad: outcome.residual_rad,
+            iterations: outcome.iterations,
+            singularity: self.singularity(&outcome.joints),
+        }
+    }
+}
+
+/// Whether margins belong to one branch; a border near which either stands does not count.
+fn same_branch(a: &[f64; 3], b: &[f64; 3]) -> bool {
+    (0..3).all(|k| {
+        (a[k] < 0.0) == (b[k] < 0.0) || a[k].abs() < BRANCH_TOLERANCE || b[k].abs() < BRANCH_TOLERANCE
+    })
+}

@@ -1,0 +1,285 @@
+//! Newton's method for one target or for eight in lanes: the fast road, with no branch and no allocation.
+//!
+//! Method: the twist that is missing is taken at the wrist point, which joints 4 to 6 hardly move. The Jacobian is
+//! then [A B; C D] with A (3 × 3, translation by joints 1 to 3) far from singular wherever shoulder and elbow are, and
+//! A⁻¹ and the inverse of the Schur complement S = D − C A⁻¹ B follow from cross products: no pivoting. The slope σ of
+//! the effects enters as Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is left out and costs at most
+//! one step more.
+//! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u (rad).
+//! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
+//! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
+//! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`]. Where only the
+//! joints are asked for ([`Asked::Joints`]), a step shorter than [`SETTLED_RAD`] is the last: by Newton's square law
+//! what it leaves lies below the tolerances, which holds where the slope of the effects is exact, so only without them.
+//! Checked against: [`super::newton`], the forward map.
+
+use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
+use super::structure::Structure;
+use crate::chain::{Chain, End, chain, cross, dot, minus};
+use crate::model::Posed;
+use truegrind_math::lanes::{SinCos, sin_cos};
+
+/// Most steps of a row.
+const STEPS: usize = 8;
+/// Longest step of a joint (rad).
+const LONGEST_STEP_RAD: f64 = 0.5;
+
+/// A step of every joint below this leaves half its square, 1.3e-13 rad, and over 3 m of arm 4e-10 mm (rad).
+const SETTLED_RAD: f64 = 5e-7;
+
+/// What is asked of the kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// Joints, residuals and the distance to singularity at the end.
+    Everything,
+    /// Joints alone: `singularity` says by more than 0 that the Jacobian at the end has an inverse, and residuals are
+    /// those before the last step.
+    Joints,
+}
+
+/// What the kernel needs to know of an arm.
+#[derive(Debug, Clone)]
+pub(super) struct Kernel {
+    /// The wrist point in the last frame (mm).
+    pub(super) wrist_mm: [f64; 3],
+    /// The flange in the last frame (mm).
+    pub(super) flange_mm: [f64; 3],
+    /// Characteristic length (mm).
+    pub(super) length_mm: f64,
+}
+
+/// Where a row ended.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Solved<R> {
+    /// Mapped joint angles (rad).
+    pub(super) mapped: [R; 6],
+    pub(super) residual_mm: R,
+    pub(super) residual_rad: R,
+    pub(super) steps: R,
+    pub(super) converged: R,
+    pub(super) singularity: R,
+    /// [`Structure::margins`] at the start and at the end.
+    pub(super) margins: [[R; 3]; 2],
+}
+
+#[inline(always)]
+fn at<R: SinCos>(origin: &[R; 3], axes: &[[R; 3]; 3], point: &[f64; 3]) -> [R; 3] {
+    let mut out = *origin;
+    for k in 0..3 {
+        out[k] += R::splat(point[0]) * axes[0][k]
+            + R::splat(point[1]) * axes[1][k]
+            + R::splat(point[2]) * axes[2][k];
+    }
+    out
+}
+
+/// Rows of the inverse of a 3 × 3 matrix given by its columns.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn inverse_rows<R: SinCos>(columns: &[[R; 3]; 3]) -> [[R; 3]; 3] {
+    let [a, b, c] = columns;
+    let mut rows = [cross(b, c), cross(c, a), cross(a, b)];
+    let scale = R::splat(1.0) / dot(a, &rows[0]);
+    for row in &mut rows {
+        for entry in row {
+            *entry = *entry * scale;
+        }
+    }
+    rows
+}
+
+#[inline(always)]
+fn times<R: SinCos>(rows: &[[R; 3]; 3], v: &[R; 3]) -> [R; 3] {
+    [dot(&rows[0], v), dot(&rows[1], v), dot(&rows[2], v)]
+}
+
+#[inline(always)]
+fn combine<R: SinCos>(columns: &[[R; 3]; 3], v: &[R; 3]) -> [R; 3] {
+    let mut out = [R::splat(0.0); 3];
+    for k in 0..3 {
+        out[k] = columns[0][k] * v[0] + columns[1][k] * v[1] + columns[2][k] * v[2];
+    }
+    out
+}
+
+/// The Jacobian with respect to the DH rotations at the wrist point, factored.
+struct Factored<R> {
+    /// Rows of A⁻¹.
+    first: [[R; 3]; 3],
+    /// Columns of A⁻¹ B.
+    coupled: [[R; 3]; 3],
+    /// Columns of C.
+    turns: [[R; 3]; 3],
+    /// Rows of S⁻¹.
+    last: [[R; 3]; 3],
+}
+
+impl<R: SinCos> Factored<R> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn of(frames: &Chain<R>, wrist: &[R; 3]) -> Self {
+        let zero = R::splat(0.0);
+        let mut shifts = [[zero; 3]; 6];
+        for (j, shift) in shifts.iter_mut().enumerate() {
+            *shift = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
+        }
+        let first = inverse_rows(&[shifts[0], shifts[1], shifts[2]]);
+        let turns = [frames.z[0], frames.z[1], frames.z[2]];
+        let (mut coupled, mut schur) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+        for j in 0..3 {
+            coupled[j] = times(&first, &shifts[3 + j]);
+            schur[j] = minus(&frames.z[3 + j], &combine(&turns, &coupled[j]));
+        }
+        Self { first, coupled, turns, last: inverse_rows(&schur) }
+    }
+
+    /// Joint rotations for a twist.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn solve(&self, shift: &[R; 3], turn: &[R; 3]) -> [R; 6] {
+        let alone = times(&self.first, shift);
+        let wrist = times(&self.last, &minus(turn, &combine(&self.turns, &alone)));
+        let arm = minus(&alone, &combine(&self.coupled, &wrist));
+        [arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]]
+    }
+
+    /// Above 0 where both factors have an inverse.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn regular(&self, length: f64) -> R {
+        let mut square = R::splat(0.0);
+        for k in 0..3 {
+            let first = dot(&self.first[k], &self.first[k]) * R::splat(length * length);
+            square += first + dot(&self.last[k], &self.last[k]);
+        }
+        R::splat(1.0) / square.sqrt()
+    }
+
+    /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn distance(&self, lever: &[R; 3], length: f64) -> R {
+        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        let mut square = zero;
+        for k in 0..3 {
+            let mut unit = [zero; 3];
+            unit[k] = one;
+            // A unit of scaled translation, and a turn about the point, which carries the wrist point along.
+            let shift = self.solve(&unit, &[zero; 3]);
+            let turn = self.solve(&cross(&unit, lever), &unit);
+            for j in 0..6 {
+                let scaled = shift[j] * R::splat(length);
+                square += scaled * scaled + turn[j] * turn[j];
+            }
+        }
+        one / square.sqrt()
+    }
+}
+
+impl Kernel {
+    /// Runs from mapped angles `start` to where the last frame is at `goal`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn solve<R: SinCos>(
+        &self,
+        arm: &Posed<'_>,
+        structure: &Structure,
+        goal: &End<R>,
+        start: &[R; 6],
+        asked: Asked,
+    ) -> Solved<R> {
+        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        let goal_wrist = at(&goal.origin, &goal.axes, &self.wrist_mm);
+        let goal_flange = at(&goal.origin, &goal.axes, &self.flange_mm);
+        let mut mapped = *start;
+        let (mut alive, mut steps) = (one, zero);
+        // Rows whose last step was too short for another one, and their margins before it.
+        let (mut settled, mut settled_margins) = (zero, [zero; 3]);
+        let brief = asked == Asked::Joints && arm.model.effects.is_empty();
+        let mut first_margins = [zero; 3];
+        let mut step = 0;
+        loop {
+            let frames = self.frames(arm, &mapped);
+            let axes = [frames.x, frames.y[5], frames.z[6]];
+            let wrist = at(&frames.origin[6], &axes, &self.wrist_mm);
+            let flange = at(&frames.origin[6], &axes, &self.flange_mm);
+            let missing = minus(&goal_flange, &flange);
+            let mut turn = [zero; 3];
+            let mut trace = zero;
+            for (here, there) in axes.iter().zip(&goal.axes) {
+                let c = cross(here, there);
+                for (t, c) in turn.iter_mut().zip(c) {
+                    *t += R::splat(0.5) * c;
+                }
+                trace += dot(here, there);
+            }
+            let residual_mm = dot(&missing, &missing).sqrt();
+            let residual_rad = dot(&turn, &turn).sqrt();
+            // The sine of the missing angle says nothing beyond a quarter turn.
+            let sensible = (trace - one).positive();
+            let converged = residual_mm.within(TOLERANCE_MM) * residual_rad.within(TOLERANCE_RAD) * sensible;
+            if step == 0 {
+                first_margins = structure.margins(&frames, &wrist);
+            }
+            alive = alive * sensible * (one - converged);
+            let factored = Factored::of(&frames, &wrist);
+            let mut ends = step == STEPS || alive.max_abs() == 0.0;
+            if !ends {
+                let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
+                let mut carried = [zero; 6];
+                for effect in &arm.model.effects {
+                    effect.carry(&mapped, &delta, &mut carried);
+                }
+                for j in 0..6 {
+                    delta[j] -= carried[j];
+                    alive = alive * delta[j].within(LONGEST_STEP_RAD);
+                }
+                // Rows that stand still must not take up a NaN: 0 · NaN is NaN, so a lost row stays lost, and only it.
+                for j in 0..6 {
+                    mapped[j] += alive * delta[j];
+                }
+                steps += alive;
+                step += 1;
+                if brief {
+                    let mut last = alive;
+                    for turn in delta {
+                        last = last * turn.within(SETTLED_RAD);
+                    }
+                    alive += -last;
+                    ends = alive.max_abs() == 0.0;
+                    if last.max_abs() > 0.0 {
+                        let margins = structure.margins(&frames, &wrist);
+                        for k in 0..3 {
+                            settled_margins[k] += last * margins[k];
+                        }
+                        settled += last;
+                    }
+                }
+            }
+            if ends {
+                let open = one - settled;
+                let mut margins = structure.margins(&frames, &wrist);
+                for k in 0..3 {
+                    margins[k] = open * margins[k] + settled_margins[k];
+                }
+                return Solved {
+                    mapped,
+                    residual_mm,
+                    residual_rad,
+                    steps,
+                    converged: open * converged + settled,
+                    singularity: match asked {
+                        Asked::Everything => factored.distance(&minus(&wrist, &flange), self.length_mm),
+                        Asked::Joints => factored.regular(self.length_mm),
+                    },
+                    margins: [first_margins, margins],
+                };
+            }
+        }
+    }
+
+    /// Joint frames for mapped angles.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn frames<R: SinCos>(&self, arm: &Posed<'_>, mapped: &[R; 6]) -> Chain<R> {
+        let rotations = arm.affected(mapped);
+        let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
+        for i in 0..6 {
+            (sin[i], cos[i]) = sin_cos(rotations[i]);
+        }
+        chain(&arm.tables, &sin, &cos)
+    }
+}

@@ -1,0 +1,132 @@
+//! Which closed form an arm has, and the three signs that tell its branches apart.
+
+use nalgebra::{Point3, Vector3};
+
+use super::axes::Axes;
+use super::{spherical, ur};
+use crate::chain::{Chain, cross, dot, minus};
+use crate::model::Model;
+use truegrind_math::lanes::Real;
+use truegrind_math::se3::Pose;
+
+/// Where Newton's method starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seed {
+    /// DH joint rotations (rad).
+    pub(super) rotations: [f64; 6],
+    /// How far the target lies beyond the nominal arm's reach on this branch (mm); 0 within.
+    pub(super) beyond_mm: f64,
+}
+
+/// The family of an arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Family {
+    /// Axes 4, 5 and 6 meet in this point (all rotations at zero) (mm).
+    Spherical(Vector3<f64>),
+    /// Axes 2, 3 and 4 are parallel; axes 5 and 6 meet in this point (mm).
+    Parallel(Vector3<f64>),
+    /// Neither: only Newton's method.
+    Other,
+}
+
+/// One of the eight ways in which an arm with a closed form reaches a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Branch {
+    /// The wrist centre lies behind axis 1, seen in the direction in which the shoulder faces.
+    pub behind: bool,
+    /// The wrist centre lies behind the lower arm (the line through axes 2 and 3).
+    pub elbow_back: bool,
+    /// Axis 5 is bent to the negative side.
+    pub wrist_negative: bool,
+}
+
+/// Geometry of the nominal arm for seeds and branches.
+#[derive(Debug, Clone)]
+pub(super) struct Structure {
+    pub(super) axes: Axes,
+    pub(super) family: Family,
+    scales: [f64; 3],
+}
+
+impl Structure {
+    pub(super) fn of(model: &Model) -> Self {
+        let axes = Axes::of(model);
+        let family = spherical::wrist_centre(&axes)
+            .map(Family::Spherical)
+            .or_else(|| ur::wrist_point(&axes).map(Family::Parallel))
+            .unwrap_or(Family::Other);
+        let scales = scales(&axes, family);
+        Self { axes, family, scales }
+    }
+
+    /// All branches for a pose of the last frame; `free` gives the rotations that a singular pose leaves open. Empty
+    /// without a closed form.
+    pub(super) fn seeds(&self, target: &Pose, free: &[f64; 6]) -> Vec<Seed> {
+        match &self.family {
+            Family::Spherical(centre) => spherical::solve(&self.axes, centre, target, free),
+            Family::Parallel(point) => ur::solve(&self.axes, point, target, free),
+            Family::Other => Vec::new(),
+        }
+    }
+
+    /// The point that joints 4 to 6 move least, in the last frame (mm): where the twist is taken.
+    pub(super) fn wrist_in_last(&self) -> [f64; 3] {
+        match self.family {
+            Family::Spherical(point) | Family::Parallel(point) => {
+                (self.axes.home_inverse * Point3::from(point)).coords.into()
+            }
+            Family::Other => [0.0; 3],
+        }
+    }
+
+    /// Signed distances from the borders between branches: how far the wrist point lies in front of axis 1 (as part of the
+    /// arm's extent), the sine of the elbow, the sine of the wrist. Behind, elbow back and axis 5 negative count as
+    /// negative. All 1 for an arm without a closed form, which has no branches.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn margins<R: Real>(&self, frames: &Chain<R>, wrist: &[R; 3]) -> [R; 3] {
+        let (z, o) = (&frames.z, &frames.origin);
+        let (end, reference) = match self.family {
+            Family::Spherical(_) => (*wrist, z[3]),
+            Family::Parallel(_) => (o[3], z[1]),
+            Family::Other => return [R::splat(1.0); 3],
+        };
+        let shoulder = dot(&cross(&z[1], &z[0]), &minus(wrist, &o[0])) * R::splat(self.scales[0]);
+        let bend = cross(&minus(&o[2], &o[1]), &minus(&end, &o[2]));
+        let elbow = dot(&z[1], &bend) * R::splat(self.scales[1]);
+        let wrist = dot(&z[4], &cross(&reference, &z[5])) * R::splat(self.scales[2]);
+        [shoulder, elbow, wrist]
+    }
+
+    /// The margins of a model of this structure whose joints have been put into frames.
+    pub(super) fn margins_of(&self, frames: &Chain<f64>) -> [f64; 3] {
+        let [x, y, z] = self.wrist_in_last();
+        let wrist = std::array::from_fn(|k| {
+            frames.origin[6][k] + x * frames.x[k] + y * frames.y[5][k] + z * frames.z[6][k]
+        });
+        self.margins(frames, &wrist)
+    }
+
+    /// Whether the arm has a closed form, and so branches.
+    pub(super) fn has_branches(&self) -> bool {
+        self.family != Family::Other
+    }
+}
+
+impl Branch {
+    pub(super) fn of(margins: &[f64; 3]) -> Self {
+        Self { behind: margins[0] < 0.0, elbow_back: margins[1] < 0.0, wrist_negative: margins[2] < 0.0 }
+    }
+}
+
+/// What makes the margins signed parts of one: with the controller's senses of joints 2 and 5.
+fn scales(axes: &Axes, family: Family) -> [f64; 3] {
+    let end = match family {
+        Family::Spherical(centre) => centre,
+        Family::Parallel(_) => axes.point[3],
+        Family::Other => return [0.0; 3],
+    };
+    let h = axes.direction[1];
+    let flat = |x: Vector3<f64>| (x - h * h.dot(&x)).norm();
+    let area = flat(axes.point[2] - axes.point[1]) * flat(end - axes.point[2]);
+    [axes.sense[1] / axes.extent_mm, axes.sense[1] / area, axes.sense[4]]
+}

@@ -1,0 +1,151 @@
+//! Analytic derivatives of the pose with respect to joints and to every parameter.
+//!
+//! A derivative is a twist: velocity of the point [mm per unit of the parameter], then angular velocity [rad per
+//! unit], both in the frame in which the point is given (base or world).
+//!
+//! With frame i−1 before link i (z, o), x′ its x axis after the joint's rotation, frame i after it (y, o), point p:
+//! theta turns about z through oᵢ₋₁, d shifts along z, a shifts along x′, alpha turns about x′ through oᵢ, beta turns
+//! about yᵢ through oᵢ.
+
+use nalgebra::{Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
+
+use super::chain::{Chain, cross, minus};
+use super::model::{Joints, Posed};
+use super::parameter::{LinkCoordinate, Parameter};
+use truegrind_math::se3::{Pose, left_jacobian, pose_from_vector};
+
+fn turning(axis: &[f64; 3], through: &[f64; 3], point: &[f64; 3]) -> Vector6<f64> {
+    let v = cross(axis, &minus(point, through));
+    Vector6::new(v[0], v[1], v[2], axis[0], axis[1], axis[2])
+}
+
+fn shifting(axis: &[f64; 3]) -> Vector6<f64> {
+    Vector6::new(axis[0], axis[1], axis[2], 0.0, 0.0, 0.0)
+}
+
+/// Twist of a point [mm, in the base] that rides on the flange, for one coordinate of link `joint` (0-based).
+pub fn link_twist(
+    frames: &Chain<f64>,
+    joint: usize,
+    coordinate: LinkCoordinate,
+    point: &[f64; 3],
+) -> Vector6<f64> {
+    let after = &frames.origin[joint + 1];
+    match coordinate {
+        LinkCoordinate::Theta => turning(&frames.z[joint], &frames.origin[joint], point),
+        LinkCoordinate::D => shifting(&frames.z[joint]),
+        LinkCoordinate::A => shifting(&frames.lateral[joint]),
+        LinkCoordinate::Alpha => turning(&frames.lateral[joint], after, point),
+        LinkCoordinate::Beta => turning(&frames.y[joint], after, point),
+    }
+}
+
+/// 6 × 6 Jacobian of a point [mm, in the base] that rides on the flange with respect to the controller's joints
+/// [mm/rad over rad/rad], effects and couplings included.
+pub fn joint_jacobian(arm: &Posed<'_>, q: &Joints, frames: &Chain<f64>, point: &[f64; 3]) -> Matrix6<f64> {
+    let rotations = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|j| {
+        link_twist(frames, j, LinkCoordinate::Theta, point)
+    }));
+    rotations * arm.rotation_slopes(q)
+}
+
+/// An arm between a base frame and a tool frame, both given by translation and rotation vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends {
+    /// The arm's base in the world: x, y, z (mm), rotation vector (rad).
+    pub world_from_base: [f64; 6],
+    /// The tool on the flange: x, y, z (mm), rotation vector (rad).
+    pub flange_from_tool: [f64; 6],
+}
+
+impl Ends {
+    /// Pose of the tool in the world.
+    pub fn forward(&self, arm: &Posed<'_>, q: &Joints) -> Pose {
+        pose_from_vector(&self.world_from_base) * arm.forward(q) * pose_from_vector(&self.flange_from_tool)
+    }
+}
+
+/// Twists of the tool in the world, one column for each of `parameters` (base, links, effects, tool).
+/// Parameters of a cable move no pose: their columns are zero.
+pub fn parameter_jacobian(
+    ends: &Ends,
+    arm: &Posed<'_>,
+    q: &Joints,
+    parameters: &[Parameter],
+) -> Matrix6xX<f64> {
+    let frames = arm.frames(q);
+    let base_from_flange = frames.last() * arm.model.flange;
+    let world_from_base = pose_from_vector(&ends.world_from_base);
+    let flange_from_tool = pose_from_vector(&ends.flange_from_tool);
+    let base_from_tool = base_from_flange * flange_from_tool;
+    let point: [f64; 3] = base_from_tool.translation.vector.into();
+    let to_world = world_from_base.rotation.to_rotation_matrix();
+    let in_world = |twist: Vector6<f64>| {
+        let v = to_world * twist.fixed_rows::<3>(0);
+        let w = to_world * twist.fixed_rows::<3>(3);
+        Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    };
+    let rotation_column = |vector: &[f64; 6], k: usize| {
+        let phi = Vector3::new(vector[3], vector[4], vector[5]);
+        let jacobian: Matrix3<f64> = left_jacobian(&phi);
+        jacobian.column(k - 3).into_owned()
+    };
+    let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
+    let columns: Vec<Vector6<f64>> = parameters
+        .iter()
+        .map(|parameter| match *parameter {
+            Parameter::Base(k) if k < 3 => Vector6::ith(k, 1.0),
+            Parameter::Base(k) => {
+                let w = rotation_column(&ends.world_from_base, k);
+                let v = w.cross(&(world_from_base.rotation * base_from_tool.translation.vector));
+                Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+            }
+            Parameter::Link { joint, coordinate } => {
+                let scale = if coordinate.is_length() { 1.0 + growth } else { 1.0 };
+                in_world(link_twist(&frames, joint, coordinate, &point) * scale)
+            }
+            Parameter::Effect { index, parameter } => {
+                in_world(effect_twist(arm, q, &frames, index, parameter, &point))
+            }
+            Parameter::Tool(k) => {
+                let to_flange = base_from_flange.rotation;
+                if k < 3 {
+                    let v = to_flange * Vector3::ith(k, 1.0);
+                    in_world(Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0))
+                } else {
+                    let w = to_flange * rotation_column(&ends.flange_from_tool, k);
+                    in_world(Vector6::new(0.0, 0.0, 0.0, w.x, w.y, w.z))
+                }
+            }
+            Parameter::Outlet { .. } | Parameter::Zero { .. } | Parameter::Disturbance { .. } => {
+                Vector6::zeros()
+            }
+        })
+        .collect();
+    Matrix6xX::from_columns(&columns)
+}
+
+/// Twist of a point [mm, in the base] for one parameter of one effect.
+pub fn effect_twist(
+    arm: &Posed<'_>,
+    q: &Joints,
+    frames: &Chain<f64>,
+    index: usize,
+    parameter: usize,
+    point: &[f64; 3],
+) -> Vector6<f64> {
+    let mut out = Vector6::zeros();
+    let rotation = arm.effect_regressors(index, q)[parameter];
+    for joint in (0..6).filter(|&j| rotation[j] != 0.0) {
+        out += link_twist(frames, joint, LinkCoordinate::Theta, point) * rotation[joint];
+    }
+    let growths = arm.model.effects[index].growth_regressors(&arm.condition);
+    let growth = growths.get(parameter).copied().unwrap_or(0.0);
+    if growth != 0.0 {
+        for (joint, link) in arm.model.links.iter().enumerate() {
+            out += link_twist(frames, joint, LinkCoordinate::A, point) * (growth * link.a_mm);
+            out += link_twist(frames, joint, LinkCoordinate::D, point) * (growth * link.d_mm);
+        }
+    }
+    out
+}

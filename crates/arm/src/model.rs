@@ -1,0 +1,191 @@
+//! An arm: links, joint map, limits, masses, effects, and the forward map from logged joints to the flange.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+
+use super::chain::{self, Chain, LinkTable};
+use super::condition::Condition;
+use super::effect::{Effect, Statics};
+use super::link::Link;
+use truegrind_math::lanes::{Real, SinCos, sin_cos};
+use truegrind_math::se3::Pose;
+
+/// Joint angles of the controller (rad).
+pub type Joints = Vector6<f64>;
+
+/// Range and speed of the joints, in the controller's angles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Lowest angle (rad).
+    pub min_rad: [f64; 6],
+    /// Highest angle (rad).
+    pub max_rad: [f64; 6],
+    /// Highest speed [rad/s], where published.
+    pub speed_rad_s: Option<[f64; 6]>,
+}
+
+impl Limits {
+    /// The first joint (0-based) outside its range, if any.
+    pub fn violated(&self, q: &Joints) -> Option<usize> {
+        (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
+    }
+}
+
+/// Mass of one link.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Centre of mass in the frame at the end of the link (mm).
+    pub centre_mm: [f64; 3],
+}
+
+/// A six-axis arm. See the chapter page for the order of the parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// The links from base to flange.
+    pub links: [Link; 6],
+    /// DH joint rotation = `joint_map` · controller angle (signs, couplings such as FANUC's J3 with J2).
+    pub joint_map: Matrix6<f64>,
+    /// Ranges of the controller's angles.
+    pub limits: Limits,
+    /// The flange in the last DH frame; identity for most arms.
+    pub flange: Pose,
+    /// Masses of the links, where known.
+    pub bodies: Option<[Body; 6]>,
+    /// Direction of gravity in the base, a unit vector; (0, 0, −1) for an arm that stands on the floor.
+    pub gravity: Vector3<f64>,
+    /// Physical effects beyond rigid links.
+    pub effects: Vec<Effect>,
+}
+
+impl Model {
+    /// Pose of the flange in the base. For many poses under one condition take [`Model::under`] once.
+    pub fn forward(&self, q: &Joints, condition: &Condition) -> Pose {
+        self.under(condition).forward(q)
+    }
+
+    /// The model with everything worked out that does not depend on the joints.
+    pub fn under(&self, condition: &Condition) -> Posed<'_> {
+        Posed {
+            model: self,
+            condition: *condition,
+            tables: chain::tables(&self.links_under(condition)),
+            statics: (!self.effects.is_empty()).then(|| Statics::of(self)),
+            loaded: self.effects.iter().any(Effect::needs_torque),
+        }
+    }
+
+    /// The links under a condition: grown by whatever effect changes lengths.
+    pub fn links_under(&self, condition: &Condition) -> [Link; 6] {
+        let growth: f64 = self.effects.iter().map(|e| e.growth(condition)).sum();
+        let mut links = self.links;
+        if growth != 0.0 {
+            for link in &mut links {
+                link.a_mm *= 1.0 + growth;
+                link.d_mm *= 1.0 + growth;
+            }
+        }
+        links
+    }
+}
+
+/// A model under one condition, ready for many poses.
+#[derive(Debug, Clone)]
+pub struct Posed<'a> {
+    /// The arm.
+    pub model: &'a Model,
+    /// The circumstances.
+    pub condition: Condition,
+    /// Link tables under the condition.
+    pub tables: [LinkTable; 6],
+    statics: Option<Statics>,
+    loaded: bool,
+}
+
+impl Posed<'_> {
+    /// Pose of the flange in the base.
+    pub fn forward(&self, q: &Joints) -> Pose {
+        self.frames(q).last() * self.model.flange
+    }
+
+    /// All joint frames in the base.
+    pub fn frames(&self, q: &Joints) -> Chain<f64> {
+        self.frames_of(&(*q).into())
+    }
+
+    /// All joint frames in the base, for one row or eight in lanes.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
+        let rotation = self.affected(&self.mapped(q));
+        let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
+        for i in 0..6 {
+            (sin[i], cos[i]) = sin_cos(rotation[i]);
+        }
+        chain::chain(&self.tables, &sin, &cos)
+    }
+
+    /// DH joint rotations (offsets of the links not included): joint map, then the joint effects.
+    pub fn rotations(&self, q: &Joints) -> Joints {
+        self.affected(&self.mapped(&(*q).into())).into()
+    }
+
+    /// Joint angles after the joint map, for one row or eight in lanes.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn mapped<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
+        let map = &self.model.joint_map;
+        let mut out = [R::splat(0.0); 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                if map[(i, j)] != 0.0 {
+                    out[i] += R::splat(map[(i, j)]) * q[j];
+                }
+            }
+        }
+        out
+    }
+
+    /// DH joint rotations for mapped joint angles: the effects alone, for one row or eight in lanes.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn affected<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
+        let mut out = *mapped;
+        if let Some(statics) = &self.statics {
+            let torque = match self.loaded {
+                true => statics.loads(mapped, &self.condition),
+                false => [R::splat(0.0); 6],
+            };
+            for effect in &self.model.effects {
+                effect.turn(statics, mapped, &torque, &self.condition, &mut out);
+            }
+        }
+        out
+    }
+
+    /// Derivative of [`Posed::rotations`] with respect to the controller's angles.
+    pub fn rotation_slopes(&self, q: &Joints) -> Matrix6<f64> {
+        let mut slope = Matrix6::identity();
+        if let Some(statics) = &self.statics {
+            let mapped = self.model.joint_map * q;
+            let torque = self.loaded.then(|| statics.torques(&mapped, &self.condition).1);
+            for effect in &self.model.effects {
+                match (effect, &torque) {
+                    (Effect::JointCompliance(compliance), Some(torque)) => {
+                        compliance.add_slope(torque, &mut slope)
+                    }
+                    _ => slope += effect.slope(statics, &mapped, &self.condition),
+                }
+            }
+        }
+        slope * self.model.joint_map
+    }
+
+    /// What each parameter of effect `index` adds to the joint rotations, per unit.
+    pub fn effect_regressors(&self, index: usize, q: &Joints) -> Vec<Joints> {
+        let mapped = self.model.joint_map * q;
+        match (&self.statics, self.model.effects.get(index)) {
+            (Some(statics), Some(effect)) => effect.regressors(statics, &mapped, &self.condition),
+            _ => Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Data sheets of robot arms: the catalogue that ships, and any other arm from a TOML file.
+//!
+//! One file per maker in the folder beside this one, each number with its source. The nominal model of an arm is what
+//! its own controller computes with; nothing here is measured. How a file is built up: [`sheet`]; what is checked
+//! before a model comes out of it: [`validation`].
+//!
+//! ```
+//! let robot = crate::robots::load("abb-irb-120")?;
+//! let flange = robot.model.forward(&nalgebra::Vector6::zeros(), &Default::default());
+//! assert!((flange.translation.vector - nalgebra::Vector3::new(374.0, 0.0, 630.0)).norm() < 1e-9);
+//! # Ok::<(), crate::robots::RobotError>(())
+//! ```
+
+pub mod sheet;
+pub mod validation;
+
+use thiserror::Error;
+
+use crate::model::Model;
+use sheet::{DataSheet, RobotFile};
+
+/// The files of the catalogue: name for messages, text.
+const FILES: [(&str, &str); 7] = [
+    ("abb.toml", include_str!("robots/abb.toml")),
+    ("fanuc.toml", include_str!("robots/fanuc.toml")),
+    ("hsr.toml", include_str!("robots/hsr.toml")),
+    ("kuka.toml", include_str!("robots/kuka.toml")),
+    ("staubli.toml", include_str!("robots/staubli.toml")),
+    ("universal-robots.toml", include_str!("robots/universal-robots.toml")),
+    ("yaskawa.toml", include_str!("robots/yaskawa.toml")),
+];
+
+/// An arm as its data sheet has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot {
+    /// What the file says, sources included.
+    pub sheet: DataSheet,
+    /// The nominal model.
+    pub model: Model,
+    /// What is allowed but will hurt, one sentence each. In the catalogue only `hsr-jr680` has one: no range of its
+    /// joints is published.
+    pub warnings: Vec<String>,
+}
+
+impl Robot {
+    /// Checks a data sheet and makes the model. `file` is named in errors.
+    pub fn new(sheet: DataSheet, file: &str) -> Result<Self, RobotError> {
+        let warnings = validation::check(&sheet).map_err(|fault| fault.of(file, &sheet.name))?;
+        let links = <&[_; 6]>::try_from(sheet.link.as_slice())
+            .map_err(|_| validation::link_count(sheet.link.len()).of(file, &sheet.name))?;
+        let model = sheet.model(links);
+        validation::check_published(&sheet, &model).map_err(|fault| fault.of(file, &sheet.name))?;
+        Ok(Self { sheet, model, warnings })
+    }
+}
+
+/// Names of the arms that ship, in alphabetical order.
+pub fn catalogue() -> Vec<String> {
+    let mut names: Vec<String> = FILES
+        .iter()
+        .filter_map(|(file, text)| read(text, file).ok())
+        .flat_map(|content| content.robot.into_iter().map(|sheet| sheet.name))
+        .collect();
+    names.sort();
+    names
+}
+
+/// An arm of the catalogue. Capitals do not matter.
+pub fn load(name: &str) -> Result<Robot, RobotError> {
+    for (file, text) in FILES {
+        let sheets = read(text, file)?.robot;
+        if let Some(sheet) = sheets.into_iter().find(|sheet| sheet.name.eq_ignore_ascii_case(name.trim())) {
+            return Robot::new(sheet, file);
+        }
+    }
+    Err(RobotError::Unknown { name: name.to_owned(), known: catalogue().join(", ") })
+}
+
+/// Refuses a nominal arm that goes by a name of the catalogue and is not that arm. A name that the catalogue has not is
+/// nobody's business.
+///
+/// # Errors
+/// A sentence that says where the two differ first.
+pub fn agrees(name: &str, nominal: &Model) -> Result<(), String> {
+    let plain =
+        |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+    let wanted = plain(name);
+    let mut different = None;
+    for (file, text) in FILES {
+        let Ok(content) = read(text, file) else { continue };
+        for sheet in content.robot {
+            // The maker's own designation is as good as the catalogue's name.
+            if wanted.is_empty() || (plain(&sheet.name) != wanted && plain(&sheet.model) != wanted) {
+                continue;
+            }
+            let Ok(known) = Robot::new(sheet, file) else { continue };
+            match validation::difference(nominal, &known.model) {
+                None => return Ok(()),
+                Some(place) => different = Some(place),
+            }
+        }
+    }
+    different.map_or(Ok(()), |place| {
+        Err(format!(
+            "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give \
+             an arm of your own a name of its own"
+        ))
+    })
+}
+
+/// Refuses a nominal arm whose links are not those of another of the same name.
+///
+/// # Errors
+/// A sentence that says where the two differ first.
+pub fn same(nominal: &Model, stated: &Model) -> Result<(), String> {
+    validation::difference(nominal, stated).map_or(Ok(()), |place| {
+        Err(format!("the two have one name and are not one arm: {place}; give the robot that the model was identified for"))
+    })
+}
+
+/// An arm from a user's own file, which holds exactly one `[[robot]]`. `file` is named in errors.
+pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
+    let mut sheets = read(text, file)?.robot;
+    match (sheets.pop(), sheets.len()) {
+        (Some(sheet), 0) => Robot::new(sheet, file),
+        (_, rest) => Err(RobotError::Several { file: file.to_owned(), found: rest + usize::from(rest > 0) }),
+    }
+}
+
+/// The sheets of a file, as written: keys and types are right, values are not yet checked.
+fn read(text: &str, file: &str) -> Result<RobotFile, RobotError> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start).min(text.len());
+        let before = text.get(..start).unwrap_or_default();
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        let found = text.get(line_start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+        RobotError::Syntax {
+            file: file.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: before.get(line_start..).unwrap_or_default().chars().count() + 1,
+            found: found.trim().to_owned(),
+            message: error.message().replace('\n', " "),
+        }
+    })
+}
+
+/// Why there is no robot.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RobotError {
+    /// The name is not in the catalogue.
+    #[error("unknown robot \"{name}\", expected one of {known}; or give the path of a TOML file of your own")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The catalogue.
+        known: String,
+    },
+    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
+    #[error(
+        "{file}:{line}:{column}: found \"{found}\": {message}; a file of the catalogue is a complete example"
+    )]
+    Syntax {
+        /// File.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// The line itself.
+        found: String,
+        /// What the TOML reader expected.
+        message: String,
+    },
+    /// Not exactly one arm in a user's file.
+    #[error("{file}: found {found} robots, expected one [[robot]]; put each arm into a file of its own")]
+    Several {
+        /// File.
+        file: String,
+        /// How many.
+        found: usize,
+    },
+    /// A value that cannot be right.
+    #[error("{file}: robot \"{robot}\": {key}: found {found}, expected {expected}; {remedy}")]
+    Invalid {
+        /// File.
+        file: Box<str>,
+        /// Robot.
+        robot: Box<str>,
+        /// Key.
+        key: Box<str>,
+        /// The value.
+        found: Box<str>,
+        /// What it should be.
+        expected: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+}

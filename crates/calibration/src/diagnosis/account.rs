@@ -1,0 +1,204 @@
+//! A finding for every accepted cause: what it is, how sure that is, what else was fitted in its place.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::catalogue::{Candidate, Columns, MAP_KNOTS};
+use super::cause::Cause;
+use super::design::Whole;
+use super::diagnose::VISIBLE;
+use super::extension::{Extended, Subject};
+use super::finding::{Alternative, Confidence, Finding, Gain, Step};
+use super::held::Held;
+use super::picture::{Picture, picture};
+use super::score::{non_centrality, score};
+use super::selection::Accepted;
+use super::words;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::map::JointMap;
+
+/// Twice the log Bayes factor by which a finding must beat its best rival to be called identified: 20 to 1.
+const CLEAR: f64 = 6.0;
+
+/// A rival, the arm without the finding among them, whose held-out error is below this share of the finding's is not beaten,
+/// whatever the Bayes factor says.
+const BETTER: f64 = 0.99;
+
+/// Part of a harmonic's period (rad) below which it cannot be told from any other smooth error.
+const SHORT_ARC: f64 = 1.0;
+
+/// Joints as on the teach pendant, from 1.
+pub(super) fn pendant(joints: &[usize]) -> Option<Vec<usize>> {
+    (!joints.is_empty()).then(|| joints.iter().map(|j| j + 1).collect())
+}
+
+pub(super) struct Context<'a> {
+    /// Where causes were looked for: all rows, or some of very many.
+    pub(super) subject: &'a Subject<'a>,
+    /// The fit there.
+    pub(super) found: &'a Extended,
+    /// The fit to all rows.
+    pub(super) extended: &'a Extended,
+    /// Linearised where causes were looked for.
+    pub(super) whole: &'a Whole,
+    /// The same with its rows in folds.
+    pub(super) held: &'a Held<'a>,
+    pub(super) set_aside: &'a [usize],
+}
+
+impl Context<'_> {
+    /// A finding for every story, and which finding each cause went into.
+    pub(super) fn findings(
+        &self,
+        accepted: &[Accepted],
+        steps: &mut Vec<Step>,
+    ) -> (Vec<Finding>, Vec<usize>, Vec<Picture>) {
+        let mut pictures = Vec::new();
+        let mut findings: Vec<Finding> = Vec::new();
+        let mut places = Vec::new();
+        let last = self.subject.observed.dataset.rows.last().map_or(0, |r| r.number);
+        let after_mm = self.held.without(&[]).rmse_mm(None, self.set_aside);
+        let judged: Vec<(f64, Finding, Picture)> = accepted
+            .par_iter()
+            .enumerate()
+            .map(|(index, own)| {
+                let later: Vec<usize> =
+                    (index + 1..accepted.len()).flat_map(|k| self.found.places(k)).collect();
+                let step = self.held.without(&later).rmse_mm(None, self.set_aside);
+                let (finding, picture) = self.finding(index, own, after_mm, last);
+                (step, finding, picture)
+            })
+            .collect();
+        for (index, (step, finding, picture)) in judged.into_iter().enumerate() {
+            let cause = &self.extended.causes[index];
+            steps.push(Step { added: told_short(cause), cv_rmse_mm: step });
+            let told = findings.iter().position(|f: &Finding| {
+                cause.rows().is_none()
+                    && f.effect == cause.name()
+                    && f.rows.is_none()
+                    && f.joints == pendant(&cause.joints())
+            });
+            if let Some(place) = told {
+                findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
+                findings[place].parameters.extend(finding.parameters);
+                places.push(place);
+                continue;
+            }
+            places.push(findings.len());
+            findings.push(finding);
+            pictures.push(picture);
+        }
+        (findings, places, pictures)
+    }
+
+    /// For a harmonic of a joint that moved through too small a part of its period: the joint's error map, which is any
+    /// smooth curve.
+    fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
+        let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
+        let dataset = &self.subject.observed.dataset;
+        let range = Columns::of(dataset).range_rad[harmonic.joint];
+        (range * harmonic.order < SHORT_ARC).then(|| {
+            let map = JointMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
+            Candidate::arm(Effect::GearMap(map), dataset, self.subject.nominal)
+        })
+    }
+
+    fn finding(&self, index: usize, own: &Accepted, after_mm: f64, last: usize) -> (Finding, Picture) {
+        let cause = &self.extended.causes[index];
+        let parameters = words::parameters(self.extended, index);
+        let places = self.found.places(index);
+        let without = self.whole.without(&places);
+        let held = self.held.without(&places);
+        let before_mm = held.rmse_mm(None, self.set_aside);
+        let mut alternatives: Vec<Alternative> = own
+            .rivals
+            .iter()
+            .take(3)
+            .map(|rival| {
+                let columns = rival.candidate.columns(&without);
+                let sizes = rival.candidate.cause.sizes();
+                Alternative {
+                    effect: rival.candidate.cause.name().to_owned(),
+                    joints: pendant(&rival.candidate.cause.joints()),
+                    rows: rival.candidate.cause.rows(),
+                    cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
+                    beaten_by: own.own.merit - rival.score.merit,
+                }
+            })
+            .collect();
+        let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
+        let mut clear = alternatives.iter().all(beaten);
+        // Held-out rows that are told better without the finding do not confirm it, however well it explains the others.
+        let unconfirmed = before_mm < BETTER * after_mm;
+        if unconfirmed || own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
+            clear = false;
+            alternatives.insert(
+                0,
+                Alternative {
+                    effect: "link-geometry".to_owned(),
+                    joints: None,
+                    rows: None,
+                    cv_rmse_mm: before_mm,
+                    beaten_by: own.own.merit,
+                },
+            );
+        }
+        if let Some(map) = self.any_curve(cause) {
+            // Over a small part of a turn every smooth error of a joint looks alike.
+            clear = false;
+            if !alternatives.iter().any(|a| a.effect == map.cause.name()) {
+                alternatives.push(Alternative {
+                    effect: map.cause.name().to_owned(),
+                    joints: pendant(&map.cause.joints()),
+                    rows: None,
+                    cv_rmse_mm: held
+                        .rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
+                    beaten_by: own.own.merit - score(&without, &map).merit,
+                });
+            }
+        }
+        let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
+        let lambda = non_centrality(&own.own.information, &values);
+        let picture = picture(self.subject, cause, &without, &self.whole.design);
+        let finding = Finding {
+            effect: cause.name().to_owned(),
+            cause: words::cause(cause, &parameters, last),
+            confidence: if clear { Confidence::Identified } else { Confidence::Ambiguous },
+            rows: cause.rows(),
+            row_list: None,
+            joints: pendant(&cause.joints()),
+            evidence: format!(
+                "{}: χ² falls by {:.0} for {}, everything else refitted; twice the log Bayes factor {:.0} with {} tried",
+                words::pattern(cause),
+                own.own.gain,
+                counted(own.own.estimate.len(), "parameter"),
+                own.own.evidence,
+                counted(own.tried.round() as usize, "variant"),
+            ),
+            parameters,
+            p_value: own.log_p.exp(),
+            non_centrality: Some(lambda),
+            gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
+            alternatives,
+            remedy: words::remedy(cause.name()).to_owned(),
+        };
+        (finding, picture)
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+pub(super) fn told_short(cause: &Cause) -> String {
+    let joints = cause.joints();
+    match (joints.as_slice(), cause.rows()) {
+        ([], Some([from, to])) => format!("{} in rows {from} to {to}", cause.name()),
+        ([], None) => cause.name().to_owned(),
+        ([joint], _) => format!("{} of joint {}", cause.name(), joint + 1),
+        (many, _) => {
+            let list: Vec<String> = many.iter().map(|j| (j + 1).to_string()).collect();
+            format!("{} of joints {}", cause.name(), list.join(" and "))
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Every candidate against one fit, and against the same fit without some of its parameters.
+//!
+//! What costs time (columns of all candidates, their products with the basis of everything free) is done once for a fit.
+//! The model without one cause differs by a few directions of that basis, so judging every candidate there is a matter of
+//! small matrices. Candidates whose rows or orders are found, not listed, are looked for anew in every design.
+
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+
+use super::catalogue::Candidate;
+use super::cause::Cause;
+use super::design::{Design, Linear, Projected, Whole};
+use super::extension::{Extended, Subject};
+use super::intervals::{self, Strip};
+use super::lines;
+use super::score::score_projected;
+use super::selection::{Catalogue, Scored};
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_arm::effect::Effect;
+
+/// A listed candidate and its projection on the whole design.
+struct Entry {
+    candidate: Arc<Candidate>,
+    projected: Projected,
+}
+
+impl Entry {
+    fn of(candidate: &Arc<Candidate>, design: &Design) -> Self {
+        let projected = design.project(&candidate.columns(design));
+        Self { candidate: Arc::clone(candidate), projected }
+    }
+
+    fn scored(&self, design: &Design) -> Scored {
+        let projected = design.project_on(&self.projected);
+        let sizes = self.candidate.cause.sizes();
+        let score = score_projected(&projected, &sizes, self.candidate.tried);
+        Scored { candidate: Arc::clone(&self.candidate), score }
+    }
+}
+
+/// A kind of shift over all rows.
+struct Shift {
+    kind: Kind,
+    strip: Option<Strip>,
+}
+
+/// See the module page.
+pub struct Board<'a> {
+    /// What may be wrong.
+    pub catalogue: &'a Catalogue,
+    /// What is diagnosed.
+    pub subject: &'a Subject<'a>,
+    /// The fit.
+    pub fit: Arc<Extended>,
+    /// The fit linearised.
+    pub linear: Linear,
+    /// Everything free in it.
+    pub whole: Whole,
+    listed: Vec<Entry>,
+    shifts: Vec<Shift>,
+    fine: Vec<Vec<OnceLock<Entry>>>,
+}
+
+/// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
+const CLOSER: f64 = 10.0;
+
+impl<'a> Board<'a> {
+    /// All candidates of `catalogue` against `fit`.
+    pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
+        let linear = Linear::of(subject, &fit);
+        let whole = linear.whole();
+        let design = &whole.design;
+        let columns: Vec<_> = catalogue.listed.par_iter().map(|c| c.columns(design)).collect();
+        let listed = catalogue
+            .listed
+            .iter()
+            .zip(design.project_all(&columns))
+            .map(|(candidate, projected)| Entry { candidate: Arc::clone(candidate), projected })
+            .collect();
+        let known = known_load(&fit).map(|kind| {
+            let always = Disturbance::new(kind, Course::Always);
+            Candidate::measurement(always, &subject.observed.dataset, subject.nominal)
+        });
+        let shifts: Vec<&Candidate> = catalogue.shifts.iter().chain(&known).collect();
+        let shifts = shifts
+            .into_par_iter()
+            .filter_map(|candidate| {
+                let Cause::Measurement(disturbance) = &candidate.cause else { return None };
+                let strip = Strip::of(design, &candidate.columns(design), &candidate.cause.sizes());
+                Some(Shift { kind: disturbance.kind.clone(), strip })
+            })
+            .collect();
+        let fine = catalogue.fine.iter().map(|f| f.iter().map(|_| OnceLock::new()).collect()).collect();
+        Self { catalogue, subject, fit, linear, whole, listed, shifts, fine }
+    }
+
+    /// All candidates against `design`, which is the whole one or a part of it, best first. Without `open` only the listed
+    /// ones: those whose rows and orders need not be looked for.
+    pub fn scored(&self, design: &Design, open: bool) -> Vec<Scored> {
+        let mut out: Vec<Scored> = self.listed.par_iter().map(|entry| entry.scored(design)).collect();
+        if open {
+            self.add_open(design, &mut out);
+        }
+        for scored in &mut out {
+            if self.fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
+                scored.score.merit += CLOSER;
+            }
+        }
+        out.sort_by(|a, b| b.score.merit.total_cmp(&a.score.merit));
+        out
+    }
+
+    /// Shifts between rows that are found, lines of orders that are found, and maps where lines stand out.
+    fn add_open(&self, design: &Design, out: &mut Vec<Scored>) {
+        let dataset = &self.subject.observed.dataset;
+        let tried = intervals::tried(dataset.rows.len() as f64);
+        let found: Vec<Candidate> = self
+            .shifts
+            .par_iter()
+            .flat_map_iter(|shift| {
+                let found = shift.strip.as_ref().map_or_else(Vec::new, |s| s.scan(design, 2));
+                found.into_iter().map(|interval| {
+                    let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
+                    let disturbance = Disturbance::new(shift.kind.clone(), Course::Rows { from, to });
+                    let candidate = Candidate::measurement(disturbance, dataset, self.subject.nominal);
+                    Candidate { tried, ..candidate }
+                })
+            })
+            .collect();
+        let (spoken, mapped) = lines::candidates(self.subject, design);
+        let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
+        let fine: Vec<&Entry> = mapped
+            .into_par_iter()
+            .filter_map(|(joint, level)| {
+                let candidate = self.catalogue.fine[joint].get(level)?;
+                let place = &self.fine[joint][level];
+                // Not under the lock: the products hand out work, and who waits for it may come by here again.
+                if place.get().is_none() {
+                    let _ = place.set(Entry::of(candidate, &self.whole.design));
+                }
+                place.get()
+            })
+            .collect();
+        let columns: Vec<_> = open.par_iter().map(|c| c.columns(design)).collect();
+        let projected = design.project_all(&columns);
+        out.par_extend(open.into_par_iter().zip(projected).map(|(candidate, projected)| {
+            let score = score_projected(&projected, &candidate.cause.sizes(), candidate.tried);
+            Scored { candidate, score }
+        }));
+        out.par_extend(fine.par_iter().map(|entry| entry.scored(design)));
+    }
+}
+
+/// Unlogged payload under the compliances that were already found.
+fn known_load(fit: &Extended) -> Option<Kind> {
+    let found: Vec<(usize, f64)> = fit
+        .causes
+        .iter()
+        .filter_map(|c| match c {
+            Cause::Arm(Effect::JointCompliance(c)) => Some((c.joint, c.compliance_rad_per_nm)),
+            _ => None,
+        })
+        .collect();
+    (!found.is_empty()).then(|| Kind::Load {
+        joints: found.iter().map(|f| f.0).collect(),
+        compliance: Some(found.iter().map(|f| f.1).collect()),
+    })
+}

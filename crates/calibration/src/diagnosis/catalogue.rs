@@ -1,0 +1,373 @@
+//! Every cause that is tried, as regressors that do not depend on the fit.
+//!
+//! Lists, not code, where that is possible: a new effect is one more entry of [`arm_candidates`] or
+//! [`measurement_candidates`]. Shifts between unknown rows and reducer lines have rooms of their own (`intervals`, `lines`),
+//! because which rows and which orders is found, not listed.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::cause::Cause;
+use super::design::Design;
+use super::extension::Subject;
+use crate::identification::calibration::flange_torques;
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::split;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_arm::effect::load::{GravityLoad, Lump};
+use truegrind_arm::effect::map::JointMap;
+use truegrind_arm::effect::ratio::Ratio;
+use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::effect::{Effect, Statics};
+use truegrind_arm::model::Model;
+
+/// A cause with its regressors.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The cause, at size 0.
+    pub cause: Cause,
+    /// One for each parameter.
+    pub regressors: Vec<Regressor>,
+    /// Variants of the same cause that were tried beside it (rows, orders, time constants), itself included.
+    pub tried: f64,
+}
+
+/// What one parameter does, row by row, per unit.
+#[derive(Debug, Clone)]
+pub enum Regressor {
+    /// Turns joints (by 0-based joint), and lets all lengths grow.
+    Arm {
+        /// Rotations of joints (rad).
+        rotation: Vec<(usize, Vec<f64>)>,
+        /// Relative growth; empty where there is none.
+        growth: Vec<f64>,
+    },
+    /// Pushes one coordinate of a kind of disturbance, as far as the course says.
+    Push {
+        /// Which.
+        along: Along,
+        /// How far in each row.
+        course: Vec<f64>,
+    },
+}
+
+/// A direction in which a measurement can be pushed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Along {
+    /// The cable's zero.
+    Zero,
+    /// Coordinate of the sensor's frame.
+    Frame(usize),
+    /// Coordinate of the touched point.
+    Tool(usize),
+    /// The scale.
+    Scale,
+    /// The sag.
+    Sag,
+}
+
+impl Candidate {
+    /// A candidate of the arm, its regressors taken at the nominal arm.
+    pub fn arm(effect: Effect, dataset: &Dataset, nominal: &Model) -> Self {
+        let statics = Statics::of(nominal);
+        let count = effect.parameters().len();
+        let n = dataset.rows.len();
+        let mut rotation: Vec<[Option<Vec<f64>>; 6]> = vec![Default::default(); count];
+        let mut growth = vec![Vec::new(); count];
+        for (i, row) in dataset.rows.iter().enumerate() {
+            let u = nominal.joint_map * row.joints;
+            for (k, turn) in effect.regressors(&statics, &u, &row.condition).iter().enumerate() {
+                for j in (0..6).filter(|&j| turn[j] != 0.0) {
+                    rotation[k][j].get_or_insert_with(|| vec![0.0; n])[i] = turn[j];
+                }
+            }
+            for (k, g) in effect.growth_regressors(&row.condition).into_iter().enumerate() {
+                if g != 0.0 {
+                    if growth[k].is_empty() {
+                        growth[k] = vec![0.0; n];
+                    }
+                    growth[k][i] = g;
+                }
+            }
+        }
+        let regressors = rotation
+            .into_iter()
+            .zip(growth)
+            .map(|(rotation, growth)| Regressor::Arm {
+                rotation: rotation
+                    .into_iter()
+                    .enumerate()
+                    .filter_map(|(j, column)| column.map(|c| (j, c)))
+                    .collect(),
+                growth,
+            })
+            .collect();
+        Self { cause: Cause::Arm(effect), regressors, tried: 1.0 }
+    }
+
+    /// A candidate of the measurement.
+    pub fn measurement(disturbance: Disturbance, dataset: &Dataset, nominal: &Model) -> Self {
+        let course: Vec<f64> = dataset.rows.iter().map(|r| disturbance.course.at(r)).collect();
+        let push = |along| Regressor::Push { along, course: course.clone() };
+        let regressors = match &disturbance.kind {
+            Kind::Zero => vec![push(Along::Zero)],
+            Kind::Frame { turning } => {
+                (0..if *turning { 6 } else { 3 }).map(|k| push(Along::Frame(k))).collect()
+            }
+            Kind::Tool => (0..3).map(|k| push(Along::Tool(k))).collect(),
+            Kind::Scale => vec![push(Along::Scale)],
+            Kind::Sag => vec![push(Along::Sag)],
+            Kind::Load { joints, compliance } => {
+                let torques = flange_torques(dataset, nominal);
+                let bent = |joint: usize, factor: f64| {
+                    (joint, torques.iter().zip(&course).map(|(t, c)| factor * c * t[joint]).collect())
+                };
+                match compliance {
+                    Some(compliance) => vec![Regressor::Arm {
+                        rotation: joints.iter().zip(compliance).map(|(&j, &c)| bent(j, c)).collect(),
+                        growth: Vec::new(),
+                    }],
+                    None => joints
+                        .iter()
+                        .map(|&j| Regressor::Arm { rotation: vec![bent(j, 1.0)], growth: Vec::new() })
+                        .collect(),
+                }
+            }
+        };
+        Self { cause: Cause::Measurement(disturbance), regressors, tried: 1.0 }
+    }
+
+    /// The whitened columns of the candidate, rows × parameters.
+    pub fn columns(&self, design: &Design) -> DMatrix<f64> {
+        let (n, per) = (design.observations, design.per);
+        let mut out = DMatrix::zeros(n * per, self.regressors.len());
+        for (k, regressor) in self.regressors.iter().enumerate() {
+            let mut column = out.column_mut(k);
+            let mut add = |course: &[f64], slope: &dyn Fn(usize) -> f64| {
+                for (i, c) in course.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+                    for s in i * per..(i + 1) * per {
+                        column[s] += c * slope(s);
+                    }
+                }
+            };
+            match regressor {
+                Regressor::Arm { rotation, growth } => {
+                    for (joint, course) in rotation {
+                        add(course, &|s| design.slopes.by_joint[*joint][s]);
+                    }
+                    add(growth, &|s| design.slopes.by_growth[s]);
+                }
+                Regressor::Push { along, course } => match along {
+                    Along::Zero => add(course, &|s| design.slopes.by_zero[s]),
+                    Along::Frame(axis) => add(course, &|s| design.slopes.by_frame[(s, *axis)]),
+                    Along::Tool(axis) => add(course, &|s| design.slopes.by_tool[(s, *axis)]),
+                    Along::Scale => add(course, &|s| design.slopes.by_scale[s]),
+                    Along::Sag => add(course, &|s| design.slopes.by_sag[s]),
+                },
+            }
+        }
+        out
+    }
+}
+
+/// What the rows can show at all.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// Whether approach sides are logged and differ, for each joint.
+    pub approach: [bool; 6],
+    /// Whether times are logged, and how long the run is (h).
+    pub hours: Option<f64>,
+    /// Whether temperatures are logged, and their mean and range [°C].
+    pub temperature: Option<(f64, f64)>,
+    /// Range of each joint (rad).
+    pub range_rad: [f64; 6],
+}
+
+impl Columns {
+    /// Looks at a data set.
+    pub fn of(dataset: &Dataset) -> Self {
+        let span = |values: Vec<f64>| {
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            (low, high)
+        };
+        let times = span(dataset.rows.iter().filter_map(|r| r.condition.time_h).collect());
+        let warm: Vec<f64> = dataset.rows.iter().filter_map(|r| r.condition.temperature_c).collect();
+        let heat = span(warm.clone());
+        Self {
+            approach: std::array::from_fn(|j| {
+                let has = |side: i8| dataset.rows.iter().any(|r| r.condition.approach[j] == side);
+                has(-1) && has(1)
+            }),
+            hours: (times.1 - times.0 > 0.0 && times.0.is_finite()).then_some(times.1 - times.0),
+            temperature: (heat.1 - heat.0 > 0.0 && heat.0.is_finite())
+                .then(|| (warm.iter().sum::<f64>() / warm.len() as f64, heat.1 - heat.0)),
+            range_rad: std::array::from_fn(|j| {
+                let (low, high) = span(dataset.rows.iter().map(|r| r.joints[j]).collect());
+                high - low
+            }),
+        }
+    }
+}
+
+/// Couplings that gear trains have: the wrist's, and the forearm's linkage.
+const COUPLINGS: [(usize, usize); 10] =
+    [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
+
+/// Knots of an error map over a turn: a smooth curve.
+pub const MAP_KNOTS: usize = 24;
+/// Maps that follow the periods of a reducer's stages, tried where lines of the joint stand out within their reach: knots, and
+/// the highest order that they follow, for which a cubic spline needs nearly two and a half knots.
+pub const FINE: [(usize, usize); 2] = [(72, 30), (144, 60)];
+
+/// Poses for each knot of the finest map: with fewer, its lines one by one say as much.
+const POSES_PER_KNOT: usize = 10;
+
+/// The finely resolved error maps of each joint, coarsest first: those of [`FINE`] for which there are poses enough.
+pub fn fine_maps(subject: &Subject<'_>) -> Vec<Vec<Arc<Candidate>>> {
+    let dataset = &subject.observed.dataset;
+    let needed = POSES_PER_KNOT * FINE[1].0;
+    let all = dataset.rows.len() >= needed && split::poses(dataset).len() >= needed;
+    let map = |joint: usize, knots: usize| {
+        let effect = Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; knots] });
+        Arc::new(Candidate::arm(effect, dataset, subject.nominal))
+    };
+    let tried = if all { &FINE[..] } else { &FINE[..1] };
+    (0..6).map(|joint| tried.iter().map(|&(knots, _)| map(joint, knots)).collect()).collect()
+}
+
+/// An axis that moved less than this shows nothing of itself (rad).
+pub const STILL_RAD: f64 = 0.02;
+
+/// Candidates of the arm.
+pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
+    let dataset = &subject.observed.dataset;
+    let columns = Columns::of(dataset);
+    let nominal = subject.nominal;
+    let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
+    let mut effects: Vec<(Effect, f64)> = Vec::new();
+    for joint in (0..6).filter(|&j| moves(j)) {
+        for order in [1.0, 2.0] {
+            let harmonic = Harmonic { joint, order, sine_rad: 0.0, cosine_rad: 0.0 };
+            effects.push((Effect::GearEccentricity(harmonic), 1.0));
+        }
+        effects.push((Effect::GearRatio(Ratio { joint, error: 0.0 }), 1.0));
+        effects.push((Effect::GearMap(JointMap { joint, knots_rad: vec![0.0; MAP_KNOTS] }), 1.0));
+    }
+    if nominal.bodies.is_some() {
+        for joint in 0..6 {
+            let compliance = Compliance { joint, compliance_rad_per_nm: 0.0 };
+            effects.push((Effect::JointCompliance(compliance), 1.0));
+        }
+    }
+    let lump = |frame, axis, moment| Lump { frame, axis, moment, factor: 0.0 };
+    for joint in 0..5 {
+        let frames: &[usize] = match joint {
+            0 | 1 => &[2, 4, 6],
+            2 => &[4, 6],
+            _ => &[6],
+        };
+        let lumps: Vec<Lump> = frames.iter().map(|&frame| lump(frame, None, None)).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        // With the first moments of the links between, the static torque of any masses is spanned.
+        if (1..4).contains(&joint) {
+            let moments = (joint + 1..if joint == 3 { 6 } else { 4 })
+                .flat_map(|frame| (0..3).map(move |m| lump(frame, None, Some(m))));
+            let all = lumps.into_iter().chain(moments).collect();
+            effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+        }
+    }
+    // Gravity that does not point down the base's own axis: the same torques along the two other axes of the base.
+    let down = nominal.gravity.iamax();
+    let across: Vec<usize> = (0..3).filter(|&axis| axis != down).collect();
+    for joint in 0..5 {
+        let frames: &[usize] = match joint {
+            0 | 1 => &[2, 4],
+            2 => &[4],
+            _ => &[6],
+        };
+        let tilted = |frame, moment| across.iter().map(move |&axis| lump(frame, Some(axis), moment));
+        let lumps: Vec<Lump> = frames.iter().flat_map(|&frame| tilted(frame, None)).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: lumps.clone() }), 1.0));
+        let moments = (joint + 1..5)
+            .flat_map(|frame| (0..3).flat_map(move |m| tilted(frame, Some(m))))
+            .collect::<Vec<_>>();
+        let wrist = if joint < 3 { tilted(6, None).collect() } else { Vec::new() };
+        let all = lumps.into_iter().chain(wrist).chain(moments).collect();
+        effects.push((Effect::LumpedCompliance(GravityLoad { joint, lump: all }), 1.0));
+    }
+    for (driver, joint) in COUPLINGS.into_iter().filter(|&(driver, _)| moves(driver)) {
+        effects.push((Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 }), 1.0));
+    }
+    for joint in (0..6).filter(|&j| columns.approach[j]) {
+        effects.push((Effect::Backlash(Backlash { joint, play_rad: 0.0 }), 1.0));
+    }
+    for (time_constant_h, reference_c, tried) in courses(&columns) {
+        let thermal = Thermal { growth: 0.0, time_constant_h, growth_per_k: 0.0, reference_c };
+        effects.push((Effect::ThermalDrift(thermal), tried));
+    }
+    effects
+        .into_par_iter()
+        .map(|(effect, tried)| Candidate { tried, ..Candidate::arm(effect, dataset, nominal) })
+        .collect()
+}
+
+/// Time constants (as shares of the run) that are tried.
+const TIME_CONSTANTS: [f64; 5] = [0.05, 0.12, 0.3, 0.8, 3.0];
+
+/// A time constant so long that the clock stands still (h).
+const NEVER_H: f64 = 1e12;
+
+/// Clocks and thermometers that the columns allow: time constant (h), reference [°C], variants tried.
+fn courses(columns: &Columns) -> Vec<(f64, f64, f64)> {
+    let mut out = Vec::new();
+    if let Some((mean, _)) = columns.temperature {
+        out.push((NEVER_H, mean, 1.0));
+    }
+    if let Some(hours) = columns.hours {
+        let reference = columns.temperature.map_or(20.0, |t| t.0);
+        out.extend(
+            TIME_CONSTANTS.iter().map(|share| (share * hours, reference, TIME_CONSTANTS.len() as f64)),
+        );
+    }
+    out
+}
+
+/// Candidates of the measurement whose rows are all of them.
+pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
+    let dataset = &subject.observed.dataset;
+    let columns = Columns::of(dataset);
+    let mut list = vec![(Kind::Scale, Course::Always, 1.0)];
+    if dataset.sensor == Sensor::Cable {
+        list.push((Kind::Sag, Course::Always, 1.0));
+    }
+    let turning = dataset.sensor != Sensor::Cable;
+    if let Some((mean, _)) = columns.temperature {
+        list.push((Kind::Frame { turning }, Course::Thermometer { reference_c: mean }, 1.0));
+        if dataset.sensor == Sensor::Cable {
+            list.push((Kind::Zero, Course::Thermometer { reference_c: mean }, 1.0));
+        }
+    }
+    if let Some(hours) = columns.hours {
+        let tried = TIME_CONSTANTS.len() as f64;
+        for share in TIME_CONSTANTS {
+            let clock = Course::Clock { time_constant_h: share * hours };
+            list.push((Kind::Frame { turning }, clock, tried));
+            if dataset.sensor == Sensor::Cable {
+                list.push((Kind::Zero, clock, tried));
+            }
+        }
+    }
+    list.into_iter()
+        .map(|(kind, course, tried)| Candidate {
+            tried,
+            ..Candidate::measurement(Disturbance::new(kind, course), dataset, subject.nominal)
+        })
+        .collect()
+}

@@ -1,0 +1,67 @@
+//! A candidate cause: physics of the arm or a disturbance of the measurement, by its contract name.
+
+use crate::identification::tolerance::{Tolerance, effect_sigma};
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_arm::effect::Effect;
+
+/// What may be wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cause {
+    /// In the arm: goes into the model and into every program.
+    Arm(Effect),
+    /// In the measurement: fitted, and left behind.
+    Measurement(Disturbance),
+}
+
+impl Cause {
+    /// The contract name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Cause::Arm(effect) => effect.name(),
+            Cause::Measurement(disturbance) => match (&disturbance.kind, &disturbance.course) {
+                (Kind::Load { .. }, _) => "payload-change",
+                (_, Course::Clock { .. } | Course::Thermometer { .. }) => "thermal-drift",
+                (Kind::Zero, _) => "sensor-zero-shift",
+                (Kind::Frame { .. }, _) => "sensor-frame-shift",
+                (Kind::Tool, _) => "tool-shift",
+                (Kind::Scale, _) => "sensor-scale",
+                (Kind::Sag, _) => "cable-sag",
+            },
+        }
+    }
+
+    /// Joints (0-based) that it is about.
+    pub fn joints(&self) -> Vec<usize> {
+        match self {
+            Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
+            Cause::Arm(effect) => effect.joint().into_iter().collect(),
+            Cause::Measurement(_) => Vec::new(),
+        }
+    }
+
+    /// Data rows that it is about, both ends included.
+    pub fn rows(&self) -> Option<[usize; 2]> {
+        match self {
+            Cause::Measurement(Disturbance { course: Course::Rows { from, to }, .. }) => Some([*from, *to]),
+            _ => None,
+        }
+    }
+
+    /// Standard deviation of each parameter before anything was measured, in its unit.
+    pub fn sizes(&self) -> Vec<f64> {
+        match self {
+            Cause::Arm(effect) => (0..effect.parameters().len()).map(|k| effect_sigma(effect, k)).collect(),
+            Cause::Measurement(d) => (0..d.values.len()).map(|k| Tolerance::of_disturbance(d, k)).collect(),
+        }
+    }
+
+    /// Whether two causes would be told to a technician as the same thing: same name, same joints, rows that overlap.
+    pub fn same_story(&self, other: &Self) -> bool {
+        let rows_meet = match (self.rows(), other.rows()) {
+            (Some(a), Some(b)) => a[0] <= b[1] && b[0] <= a[1],
+            (None, None) => true,
+            _ => false,
+        };
+        self.name() == other.name() && self.joints() == other.joints() && rows_meet
+    }
+}

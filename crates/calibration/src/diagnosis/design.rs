@@ -1,0 +1,452 @@
+//! A fit, linearised and whitened: what a candidate adds beyond everything that is already free.
+//!
+//! With J the whitened Jacobian of the n scalar rows by the p free parameters and Λ their prior precisions,
+//! JᵀJ + Λ = L Lᵀ and Q = J L⁻ᵀ. A candidate with columns C (n × k) has, with everything else refitted to first order, the
+//! gradient g = Cᵀr and the information S = CᵀC − (QᵀC)ᵀ(QᵀC), with r the residual at the optimum. The model without some
+//! of the parameters follows from the same J: their columns go, their share J x goes back into r, and the rest is solved
+//! anew, r ← r − Q L⁻¹(Jᵀr + Λx).
+//!
+//! Source: the score test with nuisance parameters, Rao 1948; the projection is that of Frisch and Waugh.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+
+use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
+use super::extension::{Extended, Subject};
+use crate::identification::calibration::Calibration;
+use crate::measurement::dataset::{Reading, Sensor};
+use crate::measurement::sensor::disturbance::sag_mm;
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+use truegrind_estimation::problem::Problem;
+
+/// Slopes of the whitened residual by what candidates are made of, n each.
+#[derive(Debug, Clone)]
+pub struct Slopes {
+    /// By the rotation of each joint.
+    pub by_joint: Vec<DVector<f64>>,
+    /// By a common relative growth of all lengths.
+    pub by_growth: DVector<f64>,
+    /// By the touched point on the flange, n × 3.
+    pub by_tool: DMatrix<f64>,
+    /// By the sensor's frame or the outlet, n × 6 or n × 3.
+    pub by_frame: DMatrix<f64>,
+    /// By a cable's zero; zeros for other sensors.
+    pub by_zero: DVector<f64>,
+    /// By the sensor's scale.
+    pub by_scale: DVector<f64>,
+    /// By a cable's squared weight over tension; zeros for other sensors.
+    pub by_sag: DVector<f64>,
+    /// What a whitened residual is worth in mm; 0 for orientations.
+    pub mm: Vec<f64>,
+}
+
+/// See the module page. Scalar rows are ordered observation by observation.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// Observations.
+    pub observations: usize,
+    /// Scalar rows of an observation.
+    pub per: usize,
+    /// Residuals at the optimum of what is free, n.
+    pub residual: DVector<f64>,
+    /// Q transposed, p × n.
+    pub basis: Arc<DMatrix<f64>>,
+    /// What was taken out of the basis again.
+    pub reduction: Option<Reduction>,
+    /// What candidates are made of.
+    pub slopes: Arc<Slopes>,
+}
+
+/// Directions of a basis that are free no more.
+#[derive(Debug, Clone)]
+pub struct Reduction {
+    /// U, orthonormal, p × d.
+    directions: DMatrix<f64>,
+    /// (Q U)ᵀ, d × n.
+    pub removed: DMatrix<f64>,
+    /// How far the residual moved along each.
+    moved: DVector<f64>,
+}
+
+/// A fit linearised, from which the design of any smaller model follows without a refit.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    pub(super) observations: usize,
+    pub(super) per: usize,
+    /// Jᵀ, p × n.
+    pub(super) rows: DMatrix<f64>,
+    /// JᵀJ + Λ.
+    pub(super) normal: DMatrix<f64>,
+    /// r, n.
+    pub(super) residual: DVector<f64>,
+    /// Jᵀr + Λx.
+    pub(super) gradient: DVector<f64>,
+    pub(super) x: Vec<f64>,
+    pub(super) precision: Vec<f64>,
+    pub(super) slopes: Arc<Slopes>,
+}
+
+/// A whole design with what it takes to go on from it to smaller ones.
+#[derive(Debug, Clone)]
+pub struct Whole {
+    /// Everything free.
+    pub design: Design,
+    /// L.
+    lower: DMatrix<f64>,
+    /// The estimate after one more step.
+    x: DVector<f64>,
+}
+
+/// What a candidate's columns come to against a design.
+#[derive(Debug, Clone)]
+pub struct Projected {
+    /// Gradient, k.
+    pub gradient: DVector<f64>,
+    /// Information with everything else refitted, k × k.
+    pub information: DMatrix<f64>,
+    /// QᵀC, p × k.
+    pub shared: DMatrix<f64>,
+    /// The part of that along directions that are free no more, d × k.
+    pub given_back: Option<DMatrix<f64>>,
+}
+
+impl Linear {
+    /// Linearises a fit at its estimate.
+    pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
+        let dataset = &subject.observed.dataset;
+        let per = fit.task.rows_per_observation();
+        let rows = fit.task.rows();
+        let (residual, transposed) = linearised(&fit.task, &fit.x);
+        let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
+        let mut normal = outer(&transposed);
+        let mut gradient = &transposed * &residual;
+        for (k, precision) in precision.iter().enumerate() {
+            normal[(k, k)] += precision;
+            gradient[k] += precision * fit.x[k];
+        }
+        // Slopes by what candidates are made of, at the estimate.
+        let anchors = dataset.anchors();
+        let mut probes: Vec<Parameter> = Vec::new();
+        for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
+            probes.extend((0..6).map(|joint| Parameter::Link { joint, coordinate }));
+        }
+        probes.extend((0..3).map(Parameter::Tool));
+        let first_frame = probes.len();
+        if dataset.sensor == Sensor::Cable {
+            for anchor in 0..anchors {
+                probes.extend((0..3).map(|axis| Parameter::Outlet { anchor, axis }));
+                probes.push(Parameter::Zero { anchor });
+            }
+        } else {
+            probes.extend((0..6).map(Parameter::Base));
+        }
+        let weights: Vec<_> = fit
+            .weights
+            .iter()
+            .zip(&fit.trust)
+            .map(|(w, t)| crate::identification::calibration::Weight {
+                per_mm: w.per_mm * t.sqrt(),
+                per_rad: w.per_rad * t.sqrt(),
+            })
+            .collect();
+        let task = Calibration::new(dataset, &fit.model, &fit.frames, &probes, &[], &weights);
+        let slopes = linearised(&task, &vec![0.0; probes.len()]).1;
+        let column = |k: usize| slopes.row(k).transpose();
+        let mut by_growth = DVector::zeros(rows);
+        for (joint, link) in fit.model.links.iter().enumerate() {
+            by_growth += column(6 + joint) * link.a_mm + column(12 + joint) * link.d_mm;
+        }
+        let summed = |axis: usize| {
+            (0..anchors).fold(DVector::zeros(rows), |sum, a| sum + column(first_frame + 4 * a + axis))
+        };
+        let (by_frame, by_zero) = if dataset.sensor == Sensor::Cable {
+            (DMatrix::from_columns(&[summed(0), summed(1), summed(2)]), summed(3))
+        } else {
+            let columns: Vec<_> = (0..6).map(|k| column(first_frame + k)).collect();
+            (DMatrix::from_columns(&columns), DVector::zeros(rows))
+        };
+        let (by_scale, by_sag) = readings(subject, fit, per, &weights);
+        let mm = (0..rows)
+            .map(|s| if s % per < 3 { 1.0 / weights[s / per].per_mm.max(1e-12) } else { 0.0 })
+            .collect();
+        let slopes = Arc::new(Slopes {
+            by_joint: (0..6).map(column).collect(),
+            by_growth,
+            by_tool: DMatrix::from_columns(&[column(18), column(19), column(20)]),
+            by_frame,
+            by_zero,
+            by_scale,
+            by_sag,
+            mm,
+        });
+        let observations = dataset.rows.len();
+        Self {
+            observations,
+            per,
+            rows: transposed,
+            normal,
+            residual,
+            gradient,
+            x: fit.x.clone(),
+            precision,
+            slopes,
+        }
+    }
+
+    /// Residuals at x with the parameters at `dropped` set to 0.
+    pub(super) fn without(&self, dropped: &[usize]) -> DVector<f64> {
+        let mut residual = self.residual.clone();
+        if !dropped.is_empty() {
+            let mut taken = DVector::zeros(self.x.len());
+            dropped.iter().for_each(|&k| taken[k] = -self.x[k]);
+            residual.gemv_tr(1.0, &self.rows, &taken, 1.0);
+        }
+        residual
+    }
+
+    /// The design of the whole fit, from which those of smaller models follow at little cost.
+    pub fn whole(&self) -> Whole {
+        let lower = lower_factor(self.normal.clone());
+        let basis = solved(&lower, self.rows.clone());
+        let x = DVector::from_column_slice(&self.x);
+        let half = lower
+            .solve_lower_triangular(&self.gradient)
+            .unwrap_or_else(|| DVector::zeros(self.gradient.len()));
+        let mut residual = self.residual.clone();
+        residual.gemv_tr(-1.0, &basis, &half, 1.0);
+        let step = lower.tr_solve_lower_triangular(&half).unwrap_or_else(|| DVector::zeros(half.len()));
+        let design = Design {
+            observations: self.observations,
+            per: self.per,
+            residual,
+            basis: Arc::new(basis),
+            reduction: None,
+            slopes: Arc::clone(&self.slopes),
+        };
+        Whole { design, lower, x: x - step }
+    }
+
+    /// The design of the model without the parameters at `dropped`, with a basis of its own: what [`Whole::without`] is
+    /// compared with.
+    pub fn design(&self, dropped: &[usize]) -> Design {
+        let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
+        let p = kept.len();
+        let mut residual = self.without(dropped);
+        let normal = DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]);
+        let lower = lower_factor(normal);
+        let part = self.rows.select_rows(&kept);
+        let mut gradient = &part * &residual;
+        for (g, &k) in gradient.iter_mut().zip(&kept) {
+            *g += self.precision[k] * self.x[k];
+        }
+        let basis = solved(&lower, part);
+        let step = lower.solve_lower_triangular(&gradient).unwrap_or_else(|| DVector::zeros(p));
+        residual.gemv_tr(-1.0, &basis, &step, 1.0);
+        Design {
+            observations: self.observations,
+            per: self.per,
+            residual,
+            basis: Arc::new(basis),
+            reduction: None,
+            slopes: Arc::clone(&self.slopes),
+        }
+    }
+}
+
+impl Whole {
+    /// The design of the model without the parameters at `dropped`, by taking directions out of the whole basis.
+    ///
+    /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller
+    /// model's projection is Q(I − UUᵀ)Qᵀ, and its residual r − QU M⁻¹x with x the dropped parameters.
+    pub fn without(&self, dropped: &[usize]) -> Design {
+        let (p, d) = (self.x.len(), dropped.len());
+        let mut out = self.design.clone();
+        if d == 0 {
+            return out;
+        }
+        let mut picked = DMatrix::zeros(p, d);
+        for (a, &k) in dropped.iter().enumerate() {
+            picked[(k, a)] = 1.0;
+        }
+        let z = solved(&self.lower, picked);
+        let m = lower_factor(gram(&z));
+        let directions = solved(&m, z.transpose()).transpose();
+        let taken = DVector::from_iterator(d, dropped.iter().map(|&k| self.x[k]));
+        let moved = m.solve_lower_triangular(&taken).unwrap_or_else(|| DVector::zeros(d));
+        let removed = product_of_transposed(&directions, &self.design.basis);
+        out.residual.gemv_tr(-1.0, &removed, &moved, 1.0);
+        out.reduction = Some(Reduction { directions, removed, moved });
+        out
+    }
+}
+
+impl Design {
+    /// The design of a whole fit.
+    pub fn of(subject: &Subject<'_>, fit: &Extended) -> Self {
+        Linear::of(subject, fit).whole().design
+    }
+
+    /// Columns against everything that is already free.
+    pub fn project(&self, columns: &DMatrix<f64>) -> Projected {
+        let (shared, square) = self.sparse_product(columns).unwrap_or_else(|| {
+            let shared = product(&self.basis, columns);
+            (shared, gram(columns))
+        });
+        self.projected(columns, shared, square)
+    }
+
+    /// The same for the columns of many candidates, with one pass over the basis for those that are dense.
+    pub fn project_all(&self, all: &[DMatrix<f64>]) -> Vec<Projected> {
+        let sparse: Vec<_> = all.par_iter().map(|columns| self.sparse_product(columns)).collect();
+        let dense = || all.iter().zip(&sparse).filter(|(_, s)| s.is_none()).map(|(columns, _)| columns);
+        let mut side_by_side = DMatrix::zeros(self.rows(), dense().map(DMatrix::ncols).sum());
+        let mut first = 0;
+        for columns in dense() {
+            side_by_side.columns_mut(first, columns.ncols()).copy_from(columns);
+            first += columns.ncols();
+        }
+        let shared = product(&self.basis, &side_by_side);
+        let mut first = 0;
+        let work: Vec<_> = all
+            .iter()
+            .zip(sparse)
+            .map(|(columns, sparse)| {
+                let own = first;
+                first += if sparse.is_none() { columns.ncols() } else { 0 };
+                (columns, sparse, own)
+            })
+            .collect();
+        work.into_par_iter()
+            .map(|(columns, sparse, own)| {
+                let (shared, square) = sparse
+                    .unwrap_or_else(|| (shared.columns(own, columns.ncols()).into_owned(), gram(columns)));
+                self.projected(columns, shared, square)
+            })
+            .collect()
+    }
+
+    /// QᵀC and CᵀC of columns of which each reaches few rows, like a knot of an error map: what it does not reach costs
+    /// nothing.
+    fn sparse_product(&self, columns: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let reached = sparse(columns)?;
+        let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
+        let mut by_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); columns.nrows()];
+        for (k, rows) in reached.iter().enumerate() {
+            let mut place = shared.column_mut(k);
+            for &s in rows {
+                place.axpy(columns[(s, k)], &self.basis.column(s), 1.0);
+                by_row[s].push((k, columns[(s, k)]));
+            }
+        }
+        let mut square = DMatrix::zeros(columns.ncols(), columns.ncols());
+        for (a, x) in by_row.iter().flat_map(|row| row.iter().map(move |x| (row, x))) {
+            a.iter().for_each(|(k, y)| square[(*k, x.0)] += x.1 * y);
+        }
+        Some((shared, square))
+    }
+
+    fn projected(&self, columns: &DMatrix<f64>, shared: DMatrix<f64>, square: DMatrix<f64>) -> Projected {
+        let gradient = columns.tr_mul(&self.residual);
+        let mut information = square - gram(&shared);
+        let given_back = self.reduction.as_ref().map(|r| product_of_transposed(&r.directions, &shared));
+        if let Some(back) = &given_back {
+            information += gram(back);
+        }
+        Projected { gradient, information, shared, given_back }
+    }
+
+    /// The same from the projection on the whole design of which this is a part.
+    pub fn project_on(&self, whole: &Projected) -> Projected {
+        let mut out = whole.clone();
+        if let Some(reduction) = &self.reduction {
+            let back = product_of_transposed(&reduction.directions, &whole.shared);
+            out.information += gram(&back);
+            out.gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
+            out.given_back = Some(back);
+        }
+        out
+    }
+
+    /// What is left of columns when everything free has been fitted to them, n × k.
+    pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
+        let mut out = columns.clone();
+        for a in 0..columns.ncols() {
+            // Row by row: a product of matrices would pack the whole basis for a few columns.
+            let shared = projected.shared.column(a);
+            for (place, q) in out.column_mut(a).iter_mut().zip(self.basis.column_iter()) {
+                *place -= q.dot(&shared);
+            }
+            if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
+                let back = back.column(a);
+                for (place, q) in out.column_mut(a).iter_mut().zip(reduction.removed.column_iter()) {
+                    *place += q.dot(&back);
+                }
+            }
+        }
+        out
+    }
+
+    /// Scalar rows.
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+}
+
+/// Whitened residuals of a task at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
+fn linearised(task: &Calibration, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    let (mut residual, mut rows) = task.linearised(x);
+    residual.apply(|v| *v = finite(*v));
+    rows.apply(|v| *v = finite(*v));
+    (residual, rows)
+}
+
+/// Columns count as sparse where at most one entry in so many is not 0.
+const SPARSE: usize = 4;
+
+/// The rows that each column reaches, where they are few.
+fn sparse(columns: &DMatrix<f64>) -> Option<Vec<Vec<usize>>> {
+    let most = columns.len() / SPARSE;
+    if columns.ncols() < 2 * SPARSE || columns.iter().filter(|c| **c != 0.0).count() > most {
+        return None;
+    }
+    let reached = |column: nalgebra::DVectorView<'_, f64>| {
+        column.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(s, _)| s).collect()
+    };
+    Some(columns.column_iter().map(reached).collect())
+}
+
+/// Slopes by the sensor's scale and by a cable's sag.
+fn readings(
+    subject: &Subject<'_>,
+    fit: &Extended,
+    per: usize,
+    weights: &[crate::identification::calibration::Weight],
+) -> (DVector<f64>, DVector<f64>) {
+    let dataset = &subject.observed.dataset;
+    let rows = dataset.rows.len() * per;
+    let (mut scale, mut sag) = (DVector::zeros(rows), DVector::zeros(rows));
+    let origin = fit.frames.base_from_sensor.translation.vector;
+    let touched = nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector);
+    for (i, row) in dataset.rows.iter().enumerate() {
+        let w = weights[i].per_mm;
+        // Where the model sees the point, not where the reading has it: noise is no evidence of a scale.
+        let at = (fit.model.forward(&row.joints, &row.condition) * touched).coords;
+        match row.reading {
+            Reading::Cable(_) => {
+                let away = at - fit.frames.outlets_mm[row.anchor];
+                scale[i] = w * finite(away.norm() + fit.frames.zeros_mm[row.anchor]);
+                sag[i] = w * finite(sag_mm(1.0, &away));
+            }
+            Reading::Position(_) | Reading::Pose(_) => space(&mut scale, i * per, w, at - origin),
+        }
+    }
+    (scale, sag)
+}
+
+fn space(scale: &mut DVector<f64>, at: usize, w: f64, seen: Vector3<f64>) {
+    for k in 0..3 {
+        scale[at + k] = -w * finite(seen[k]);
+    }
+}

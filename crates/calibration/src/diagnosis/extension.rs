@@ -1,0 +1,381 @@
+//! The model extended by causes: a robust fit of frames, links and causes together.
+//!
+//! Method: iteratively reweighted least squares with Huber's weight min(1, k/s), s the size of a row's whitened residual
+//! and k = 2. A bounded influence, not a redescending one: a block of rows that was shifted still pulls, so that its cause can
+//! be found, while single wild rows pull no more than a bad normal one. Scale by the median, refined at the end so that
+//! the weighted sum of squares has its degrees of freedom. Source: Huber, Robust Statistics, 1981, chapter 7.
+//!
+//! Near another fit the steps are Gauss and Newton's (see `newton`) as long as they descend. A search leaves it at that; any
+//! other fit ends with Levenberg and Marquardt.
+
+use super::cause::Cause;
+use super::newton::{self, Step};
+use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::fit::{Fitted, Observed, frame_parameters};
+use crate::identification::rounding;
+use crate::identification::tolerance::Tolerance;
+use crate::measurement::dataset::Sensor;
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
+use truegrind_estimation::least_squares::lm;
+use truegrind_estimation::problem::{Prior, Problem, prior_cost};
+use truegrind_math::statistics::median;
+
+/// What is diagnosed: the rows, the data sheet, and where the frames start.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    /// The rows.
+    pub observed: &'a Observed,
+    /// The data sheet's arm.
+    pub nominal: &'a Model,
+    /// Starting frames, without disturbances.
+    pub frames: &'a Frames,
+    /// Priors of links and frames.
+    pub tolerance: &'a Tolerance,
+}
+
+/// Which parameters a fit frees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Freedom {
+    /// Frames alone.
+    Frames,
+    /// Frames, links, and the causes.
+    All,
+}
+
+/// A fit of the extended model.
+#[derive(Debug, Clone)]
+pub struct Extended {
+    /// The causes, in the order of their acceptance.
+    pub causes: Vec<Cause>,
+    /// Parameters: links, effects, frames, disturbances.
+    pub parameters: Vec<Parameter>,
+    /// Their priors.
+    pub priors: Vec<Prior>,
+    /// The task, with robust weights.
+    pub task: Calibration,
+    /// The estimate, in deviations from the start.
+    pub x: Vec<f64>,
+    /// The arm.
+    pub model: Model,
+    /// The frames with their disturbances.
+    pub frames: Frames,
+    /// Huber's weight of each row, 1 for a good one.
+    pub trust: Vec<f64>,
+    /// Size of each row's whitened residual.
+    pub sizes: Vec<f64>,
+    /// Weights of the rows, Huber's not included.
+    pub weights: Vec<Weight>,
+    /// Standard deviation of a reading (mm), and of an orientation (rad).
+    pub sigma: (f64, f64),
+    /// What the solver said, with the covariance of the parameters; without it in the middle of a search.
+    pub estimate: Estimate,
+}
+
+/// Bend of Huber's weight, in standard deviations.
+const BEND: f64 = 2.0;
+
+/// No sensor reads better than this (mm, rad). Fewer rows than parameters fit without any error: what is then held is held
+/// by the priors, which must not be lost beside weights without bound.
+const FINEST: (f64, f64) = (1e-3, 1e-6);
+
+/// At most this many rounds of solver and weights.
+const ROUNDS: usize = 8;
+
+/// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have.
+fn start(
+    subject: &Subject<'_>,
+    causes: &[Cause],
+    freedom: Freedom,
+) -> (Model, Frames, Vec<(Parameter, Option<f64>)>) {
+    let (mut model, mut frames) = (subject.nominal.clone(), subject.frames.clone());
+    let links = if freedom == Freedom::All { link_parameters(&model) } else { Vec::new() };
+    let mut links: Vec<_> = links.into_iter().map(|p| (p, None)).collect();
+    let mut sensing: Vec<_> =
+        frame_parameters(&subject.observed.dataset).into_iter().map(|p| (p, None)).collect();
+    for cause in causes {
+        match cause {
+            Cause::Arm(effect) => {
+                let mut effect = effect.clone();
+                let index = model.effects.len();
+                let values = effect.parameters();
+                links.extend(
+                    values
+                        .iter()
+                        .enumerate()
+                        .map(|(parameter, p)| (Parameter::Effect { index, parameter }, Some(p.value))),
+                );
+                (0..values.len()).for_each(|k| effect.set(k, 0.0));
+                model.effects.push(effect);
+            }
+            Cause::Measurement(disturbance) => {
+                let mut disturbance = disturbance.clone();
+                let index = frames.disturbances.len();
+                sensing.extend(
+                    disturbance.values.iter().enumerate().map(|(parameter, value)| {
+                        (Parameter::Disturbance { index, parameter }, Some(*value))
+                    }),
+                );
+                disturbance.values.iter_mut().for_each(|v| *v = 0.0);
+                frames.disturbances.push(disturbance);
+            }
+        }
+    }
+    links.extend(sensing);
+    (model, frames, links)
+}
+
+/// Where a parameter starts: at the size that its cause has, or where links and frames were in another fit.
+fn starting((parameter, size): &(Parameter, Option<f64>), near: Option<&Extended>) -> f64 {
+    size.unwrap_or_else(|| {
+        near.and_then(|e| e.parameters.iter().position(|q| q == parameter).map(|k| e.x[k])).unwrap_or(0.0)
+    })
+}
+
+/// Scalars of one observation: lengths, angles.
+fn components(sensor: Sensor) -> (usize, usize) {
+    match sensor {
+        Sensor::Cable => (1, 0),
+        Sensor::Position => (3, 0),
+        Sensor::Pose => (3, 3),
+    }
+}
+
+/// Median of √(χ²ₖ/k), which turns a median of sizes into a standard deviation.
+fn median_size(k: usize) -> f64 {
+    match k {
+        1 => 0.6745,
+        3 => 0.8881,
+        _ => 0.9441,
+    }
+}
+
+/// Fits the nominal arm extended by `causes` robustly, from the sizes that the causes have. `near` gives starting values of
+/// links and frames, and of the noise.
+pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
+    approached(subject, causes, freedom, near).polished()
+}
+
+/// The same for a search: where `near` is near enough for Gauss and Newton, as close to the optimum as they stop, and without a
+/// covariance.
+pub(super) fn approached(
+    subject: &Subject<'_>,
+    causes: &[Cause],
+    freedom: Freedom,
+    near: Option<&Extended>,
+) -> Extended {
+    let observed = subject.observed;
+    let dataset = &observed.dataset;
+    let (start_model, start_frames, free) = start(subject, causes, freedom);
+    let mut x: Vec<f64> = free.iter().map(|p| starting(p, near)).collect();
+    let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
+    let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
+    let n = dataset.rows.len();
+    let (lengths, angles) = components(dataset.sensor);
+    let per = lengths + angles;
+    let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
+    let mut trust = near.filter(|e| e.trust.len() == n).map_or_else(|| vec![1.0; n], |e| e.trust.clone());
+    let mut round = 0;
+    let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
+    let plain_task =
+        Calibration::new(dataset, &start_model, &start_frames, &parameters, &priors, &unweighted);
+    let (mut model, mut frames) = plain_task.apply(&x);
+    let mut nearby = near.is_some() && freedom == Freedom::All;
+    loop {
+        round += 1;
+        let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
+        let task = plain_task.reweighted(&trusted(&base, &trust));
+        let step = if nearby { Step::taken(&task, &mut x) } else { None };
+        let mut covariance = None;
+        nearby = step.is_some();
+        if !nearby {
+            // Weights still change: what is beyond a few steps would be thrown away.
+            let steps = if near.is_some() { 1 } else { 3 };
+            let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
+            let estimate = lm::solve(&task, &x, &rough);
+            x.clone_from(&estimate.x);
+            covariance = estimate.covariance;
+        }
+        (model, frames) = task.apply(&x);
+        let plain = task.plain_residuals(&x);
+        let whitened = |i: usize| {
+            let w = &base[i];
+            let row = &plain[i * per..(i + 1) * per];
+            row.iter().enumerate().map(move |(c, r)| r * if c < 3 { w.per_mm } else { w.per_rad })
+        };
+        let size = |i: usize, range: std::ops::Range<usize>| {
+            let count = range.len().max(1) as f64;
+            let sum: f64 = whitened(i).skip(range.start).take(range.len()).map(|v| v * v).sum();
+            let size = (sum / count).sqrt();
+            if size.is_finite() { size } else { 1e6 }
+        };
+        let spread = |range: std::ops::Range<usize>| {
+            let k = range.len();
+            let all: Vec<f64> = (0..n).map(|i| size(i, range.clone())).collect();
+            (median(&all).unwrap_or(1.0) / median_size(k)).clamp(1e-6, 1e6)
+        };
+        let of_lengths = spread(0..lengths);
+        let of_angles = if angles > 0 { spread(lengths..per) } else { 1.0 };
+        let sizes: Vec<f64> = (0..n)
+            .map(|i| {
+                let a = size(i, 0..lengths) / of_lengths;
+                if angles > 0 {
+                    let b = size(i, lengths..per) / of_angles;
+                    (0.5 * (a * a + b * b)).sqrt()
+                } else {
+                    a
+                }
+            })
+            .collect();
+        let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
+        let moved = next.iter().zip(&trust).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
+        if (settled && round > 1) || round >= ROUNDS {
+            // The scale under which the weighted squares have their degrees of freedom.
+            let variances = match (&step, &covariance) {
+                (Some(step), _) => step.variances(),
+                (None, Some(covariance)) => covariance.diagonal().as_slice().to_vec(),
+                (None, None) => Vec::new(),
+            };
+            // Each parameter counts by the share that its prior does not determine.
+            let shares =
+                priors.iter().zip(&variances).map(|(p, v)| (1.0 - v / p.sigma.powi(2)).clamp(0.0, 1.0));
+            let spent: f64 = shares.sum();
+            let rows = (n * per) as f64;
+            let dispersion = |range: std::ops::Range<usize>| {
+                let sum: f64 = (0..n)
+                    .map(|i| {
+                        let row: f64 = whitened(i).skip(range.start).take(range.len()).map(|v| v * v).sum();
+                        if row.is_finite() { trust[i] * row } else { 0.0 }
+                    })
+                    .sum();
+                let freedom = (n * range.len()) as f64 * ((rows - spent) / rows).max(0.05);
+                (sum / freedom.max(1.0)).sqrt().max(1e-6)
+            };
+            let by_length = dispersion(0..lengths);
+            let by_angle = if angles > 0 { dispersion(lengths..per) } else { 1.0 };
+            let weights: Vec<Weight> = base
+                .iter()
+                .map(|w| Weight {
+                    per_mm: (w.per_mm / by_length).min(FINEST.0.recip()),
+                    per_rad: (w.per_rad / by_angle).min(FINEST.1.recip()),
+                })
+                .collect();
+            let task = plain_task.reweighted(&trusted(&weights, &trust));
+            let estimate = if nearby && newton::descend(&task, &mut x) {
+                Estimate {
+                    covariance: None,
+                    cost: task.row_cost(&x) + prior_cost(&priors, &x),
+                    evaluations: Evaluations::default(),
+                    termination: Termination::Cost,
+                    trace: Vec::new(),
+                    x,
+                }
+            } else {
+                lm::solve(&task, &x, &lm::Options::default())
+            };
+            let (model, frames) = task.apply(&estimate.x);
+            return Extended {
+                causes: filled(causes, &model, &frames),
+                parameters,
+                priors,
+                x: estimate.x.clone(),
+                model,
+                frames,
+                trust,
+                sizes,
+                weights,
+                sigma,
+                estimate,
+                task,
+            };
+        }
+        trust = next;
+        sigma = (narrowed(sigma.0, of_lengths, &base, true), narrowed(sigma.1, of_angles, &base, false));
+    }
+}
+
+/// The sensor's σ after the spread of whole residuals turned out `spread` times what σ and the angles' share promised.
+fn narrowed(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64 {
+    let of = |w: &Weight| if lengths { w.per_mm } else { w.per_rad };
+    let total = median(&base.iter().map(|w| 1.0 / of(w).powi(2)).collect::<Vec<_>>()).unwrap_or(1.0);
+    let share = (total - sigma * sigma).max(0.0);
+    let smallest = if lengths { FINEST.0 } else { FINEST.1 };
+    (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
+}
+
+fn trusted(weights: &[Weight], trust: &[f64]) -> Vec<Weight> {
+    weights
+        .iter()
+        .zip(trust)
+        .map(|(w, t)| Weight { per_mm: w.per_mm * t.sqrt(), per_rad: w.per_rad * t.sqrt() })
+        .collect()
+}
+
+/// The causes with the values that the fit gave them.
+fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
+    let first = model.effects.len() - causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
+    let (mut effect, mut disturbance) = (first, 0);
+    causes
+        .iter()
+        .map(|cause| match cause {
+            Cause::Arm(_) => {
+                effect += 1;
+                Cause::Arm(model.effects[effect - 1].clone())
+            }
+            Cause::Measurement(_) => {
+                disturbance += 1;
+                Cause::Measurement(frames.disturbances[disturbance - 1].clone())
+            }
+        })
+        .collect()
+}
+
+impl Extended {
+    /// The fit with the solver's last word on it: at the optimum, with a covariance.
+    pub(super) fn polished(self) -> Self {
+        if self.estimate.covariance.is_some() {
+            return self;
+        }
+        let estimate = lm::solve(&self.task, &self.x, &lm::Options::default());
+        let (model, frames) = self.task.apply(&estimate.x);
+        let causes = filled(&self.causes, &model, &frames);
+        Self { causes, x: estimate.x.clone(), model, frames, estimate, ..self }
+    }
+
+    /// Places in x of the parameters of cause `index`.
+    pub fn places(&self, index: usize) -> Vec<usize> {
+        let arm = matches!(self.causes[index], Cause::Arm(_));
+        let before = self.causes[..index].iter().filter(|c| matches!(c, Cause::Arm(_)) == arm).count();
+        let own = self.causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
+        let first = if arm { self.model.effects.len() - own } else { 0 };
+        self.parameters
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| match **p {
+                Parameter::Effect { index, .. } => arm && index == first + before,
+                Parameter::Disturbance { index, .. } => !arm && index == before,
+                _ => false,
+            })
+            .map(|(k, _)| k)
+            .collect()
+    }
+}
+
+impl From<&Extended> for Fitted {
+    fn from(fit: &Extended) -> Self {
+        Self {
+            parameters: fit.parameters.clone(),
+            priors: fit.priors.clone(),
+            estimate: fit.estimate.clone(),
+            model: fit.model.clone(),
+            frames: fit.frames.clone(),
+            sigma_mm: fit.sigma.0,
+            sigma_rad: fit.sigma.1,
+            task: fit.task.clone(),
+            evaluations: fit.estimate.evaluations,
+            rounds: vec![fit.estimate.trace.clone()],
+        }
+    }
+}

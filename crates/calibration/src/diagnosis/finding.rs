@@ -1,0 +1,219 @@
+//! The result of a diagnosis, in the terms of the contract `truegrind.diagnosis/1`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::identification::identify::IdentifyError;
+use truegrind_arm::estimated::Verdict;
+
+/// Name and version of the JSON form.
+pub const SCHEMA: &str = "truegrind.diagnosis/1";
+
+/// The rows that were diagnosed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// File.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// `cable`, `position` or `pose`.
+    pub sensor: String,
+    /// Robot by name.
+    pub robot: String,
+    /// Rows set aside as outliers: left out of both held-out errors.
+    pub set_aside: usize,
+}
+
+/// Errors of one stage (mm).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// On the rows of the fit.
+    pub rmse_mm: f64,
+    /// Mean size.
+    pub mean_mm: f64,
+    /// Largest.
+    pub max_mm: f64,
+    /// Held out, five random folds.
+    pub cv_rmse_mm: f64,
+    /// Held out, contiguous blocks.
+    pub cv_blocks_rmse_mm: f64,
+}
+
+/// The three stages.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fits {
+    /// Frames fitted, links of the data sheet.
+    pub nominal: Stage,
+    /// Links freed.
+    pub geometric: Stage,
+    /// Findings added.
+    pub extended: Stage,
+}
+
+/// How sure a cause is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Confidence {
+    /// Its rivals were fitted and beaten.
+    Identified,
+    /// A rival explains nearly as much.
+    Ambiguous,
+}
+
+/// A number of a finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FoundParameter {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation; absent where the number was read, not estimated.
+    pub sigma: Option<f64>,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Held-out error without and with the finding, everything else in the model (mm).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gain {
+    /// Without.
+    pub cv_rmse_before_mm: f64,
+    /// With.
+    pub cv_rmse_after_mm: f64,
+}
+
+/// Another cause that was fitted in the place of the finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Alternative {
+    /// Its contract name.
+    pub effect: String,
+    /// Its joints, from 1.
+    pub joints: Option<Vec<usize>>,
+    /// Its rows.
+    pub rows: Option<[usize; 2]>,
+    /// Held-out error with it in the finding's place (mm).
+    pub cv_rmse_mm: f64,
+    /// Twice the log Bayes factor of the finding against it; large is well beaten.
+    pub beaten_by: f64,
+}
+
+/// A finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Contract name of the effect.
+    pub effect: String,
+    /// One sentence for a technician.
+    pub cause: String,
+    /// How sure.
+    pub confidence: Confidence,
+    /// Data rows from 0, both ends included.
+    pub rows: Option<[usize; 2]>,
+    /// Single rows, of outliers and contradicting rows.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub row_list: Option<Vec<usize>>,
+    /// Joints, from 1 as on the teach pendant.
+    pub joints: Option<Vec<usize>>,
+    /// Its numbers.
+    pub parameters: Vec<FoundParameter>,
+    /// The pattern that showed it, with its statistic.
+    pub evidence: String,
+    /// Chance of a pattern this strong without a cause, corrected for all trials.
+    pub p_value: f64,
+    /// Non-centrality of the estimate against everything else that was free: below some 40 it could have been missed.
+    pub non_centrality: Option<f64>,
+    /// What it brought.
+    pub gain: Gain,
+    /// What else was tried in its place, best first.
+    pub alternatives: Vec<Alternative>,
+    /// What to do about it in the workshop.
+    pub remedy: String,
+}
+
+/// An effect that these rows cannot show.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NotTestable {
+    /// Contract name.
+    pub effect: String,
+    /// Joints, from 1, where only some cannot be seen.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joints: Option<Vec<usize>>,
+    /// Why.
+    pub reason: String,
+    /// The measurement that would decide.
+    pub remedy: String,
+}
+
+/// Noise that grows with range.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RangeNoise {
+    /// At range 0 (mm).
+    pub sigma_mm: f64,
+    /// Growth (mm per metre).
+    pub per_metre_mm: f64,
+    /// p-value.
+    pub p_value: f64,
+}
+
+/// One step from the data sheet to the extended model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// What was added.
+    pub added: String,
+    /// Held-out error after it (mm), five random folds.
+    pub cv_rmse_mm: f64,
+}
+
+/// The models on another series of the same arm, with only the frames refitted: RMSE (mm).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// File.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// Data sheet.
+    pub nominal_rmse_mm: f64,
+    /// Geometry of this diagnosis.
+    pub geometric_rmse_mm: f64,
+    /// Extended model of this diagnosis.
+    pub extended_rmse_mm: f64,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// The rows.
+    pub dataset: Source,
+    /// The verdict on the extended model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// What sensor and rounding leave (mm); absent where it cannot be told.
+    pub noise_floor_mm: Option<f64>,
+    /// Where the floor comes from, in words.
+    pub noise_floor_source: String,
+    /// Errors of the stages.
+    pub fits: Fits,
+    /// Held-out error after each step.
+    pub steps: Vec<Step>,
+    /// What is wrong.
+    pub findings: Vec<Finding>,
+    /// What cannot be told.
+    pub not_testable: Vec<NotTestable>,
+    /// What the extended model still does not explain.
+    pub remaining: Option<String>,
+    /// Noise that grows with range.
+    pub noise_model: Option<RangeNoise>,
+    /// Rows to measure again, by data row from 0.
+    pub measure_again: Vec<usize>,
+    /// Different poses that causes need to be told from geometry; absent where there are as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses_needed: Option<usize>,
+    /// The models on other series of the same arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub transfers: Vec<Transfer>,
+    /// What a reader should know.
+    pub notes: Vec<String>,
+}
+
+/// Why nothing could be diagnosed.
+pub type DiagnoseError = IdentifyError;

@@ -1,0 +1,133 @@
+//! Overlapping shifts of one kind, told again as the levels between their change points.
+//!
+//! Two shifts found one after the other may overlap: one over rows 72 to 535, another that takes it back in 300 to 387. What a
+//! technician can check is what stood where from which row to which, so overlapping shifts are cut at their ends, each
+//! piece gets the sum of what covers it, and a piece that comes to nothing is left out. The same rows are described, with
+//! as many parameters or fewer.
+
+use super::cause::Cause;
+use super::extension::Extended;
+use super::intervals::{SHORTEST, tried};
+use crate::identification::tolerance::Tolerance;
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_estimation::problem::Problem;
+
+/// A piece whose level is below this share of the largest comes to nothing.
+const NOTHING: f64 = 0.25;
+
+/// How much worse the levels may fit, in χ² with ln n for each parameter and the ends that were tried: they are the plainer
+/// story.
+const PLAINER: f64 = 4.0;
+
+/// A shift and its rows.
+fn shift(cause: &Cause) -> Option<(&Disturbance, usize, usize)> {
+    match cause {
+        Cause::Measurement(d) => match d.course {
+            Course::Rows { from, to } => Some((d, from, to)),
+            _ => None,
+        },
+        Cause::Arm(_) => None,
+    }
+}
+
+/// The causes with overlapping shifts as levels, and a guess at their values; `None` where none overlap.
+pub fn disjoint(causes: &[Cause]) -> Option<Vec<Cause>> {
+    let mut kinds: Vec<&Kind> = Vec::new();
+    for (d, ..) in causes.iter().filter_map(shift) {
+        if !kinds.contains(&&d.kind) {
+            kinds.push(&d.kind);
+        }
+    }
+    let mut out = causes.to_vec();
+    let mut changed = false;
+    for kind in kinds {
+        let group: Vec<(&Disturbance, usize, usize)> =
+            causes.iter().filter_map(shift).filter(|(d, ..)| d.kind == *kind).collect();
+        let overlaps =
+            |a: &(&Disturbance, usize, usize), b: &(&Disturbance, usize, usize)| a.1 <= b.2 && b.1 <= a.2;
+        if !group.iter().enumerate().any(|(i, a)| group[..i].iter().any(|b| overlaps(a, b))) {
+            continue;
+        }
+        let levels = levels(&group);
+        let first = causes.iter().position(|c| shift(c).is_some_and(|(d, ..)| d.kind == *kind));
+        let Some(first) = first else { continue };
+        let place = out.iter().position(|c| c == &causes[first]).unwrap_or(out.len());
+        out.retain(|c| shift(c).is_none_or(|(d, ..)| d.kind != *kind));
+        let place = place.min(out.len());
+        out.splice(place..place, levels.into_iter().map(Cause::Measurement));
+        changed = true;
+    }
+    changed.then_some(out)
+}
+
+/// The pieces between the ends of a group of shifts of one kind that come to something.
+fn levels(group: &[(&Disturbance, usize, usize)]) -> Vec<Disturbance> {
+    let mut cuts: Vec<usize> = group.iter().flat_map(|(_, from, to)| [*from, to + 1]).collect();
+    cuts.sort_unstable();
+    cuts.dedup();
+    let kind = &group[0].0.kind;
+    let unit = Disturbance::new(kind.clone(), Course::Always);
+    let sizes: Vec<f64> = (0..unit.values.len()).map(|k| Tolerance::of_disturbance(&unit, k)).collect();
+    let nothing = vec![0.0; sizes.len()];
+    let apart = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter().zip(b).zip(&sizes).map(|((a, b), s)| ((a - b) / s).powi(2)).sum::<f64>().sqrt()
+    };
+    // First row, row after the last, level; before the first and after the last there is nothing.
+    let mut pieces: Vec<(usize, usize, Vec<f64>)> = cuts
+        .windows(2)
+        .map(|cut| {
+            let mut level = nothing.clone();
+            for (d, ..) in group.iter().filter(|(_, low, high)| *low <= cut[0] && cut[0] <= *high) {
+                level.iter_mut().zip(&d.values).for_each(|(l, v)| *l += v);
+            }
+            (cut[0], cut[1], level)
+        })
+        .collect();
+    // Ends that nearly coincide are one event: the few rows between them go to the neighbour that they are more like.
+    while let Some(k) = pieces.iter().position(|(from, to, _)| to - from < SHORTEST) {
+        let (from, to, level) = pieces.remove(k);
+        let beside = |at: Option<usize>| at.and_then(|i| pieces.get(i)).map_or(&nothing, |p| &p.2);
+        let (before, after) = (k.checked_sub(1), Some(k));
+        let left = apart(&level, beside(before)) <= apart(&level, beside(after));
+        if left && let Some(piece) = before.and_then(|i| pieces.get_mut(i)) {
+            piece.1 = to;
+        } else if !left && let Some(piece) = pieces.get_mut(k) {
+            piece.0 = from;
+        }
+    }
+    let largest = pieces.iter().map(|p| apart(&p.2, &nothing)).fold(0.0, f64::max);
+    pieces
+        .into_iter()
+        .filter(|p| apart(&p.2, &nothing) > NOTHING * largest)
+        .map(|(from, to, values)| Disturbance {
+            values,
+            ..Disturbance::new(kind.clone(), Course::Rows { from, to: to - 1 })
+        })
+        .collect()
+}
+
+/// Whether `told` describes the rows as well as `before` does, for the number of its parameters.
+pub fn as_good(told: &Extended, before: &Extended) -> bool {
+    let per = before.task.rows_per_observation();
+    let criterion = |fit: &Extended| {
+        let plain = fit.task.plain_residuals(&fit.x);
+        let rows: f64 = plain
+            .chunks(per)
+            .zip(before.weights.iter().zip(&before.trust))
+            .map(|(row, (w, trust))| {
+                let square: f64 = row
+                    .iter()
+                    .enumerate()
+                    .map(|(c, r)| (r * if c < 3 { w.per_mm } else { w.per_rad }).powi(2))
+                    .filter(|s| s.is_finite())
+                    .sum();
+                trust * square
+            })
+            .sum();
+        let n = (plain.len() / per.max(1)) as f64;
+        let shifts = fit.causes.iter().filter(|c| shift(c).is_some()).count() as f64;
+        // The ends of a shift were looked for among all rows.
+        rows + fit.parameters.len() as f64 * (plain.len() as f64).ln() + shifts * 2.0 * tried(n).ln()
+    };
+    criterion(told) <= criterion(before) + PLAINER
+}

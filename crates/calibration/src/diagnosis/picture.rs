@@ -1,0 +1,143 @@
+//! The view of the residual in which a cause can be seen, before and after it went into the model.
+
+use nalgebra::Vector3;
+
+use super::cause::Cause;
+use super::design::Design;
+use super::extension::Subject;
+use crate::measurement::dataset::{Reading, Sensor};
+use crate::measurement::sensor::disturbance::{Course, Kind};
+use truegrind_arm::effect::Effect;
+
+/// What an axis shows, and its unit.
+pub type Label = (String, &'static str);
+
+/// Residuals against the variable that reveals a cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Horizontal variable and its unit.
+    pub x: Label,
+    /// Vertical variable and its unit.
+    pub y: Label,
+    /// Without the cause in the model.
+    pub before: Vec<[f64; 2]>,
+    /// With it.
+    pub after: Vec<[f64; 2]>,
+    /// Rows that the cause is about.
+    pub rows: Option<[usize; 2]>,
+}
+
+/// A row turns a joint visibly when its lever is at least this share of the longest.
+const LEVER: f64 = 0.25;
+
+/// The picture of a cause: `before` is the model without it, `after` the extended one.
+pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &Design) -> Picture {
+    let dataset = &subject.observed.dataset;
+    let joint = match cause {
+        Cause::Arm(Effect::ThermalDrift(_)) | Cause::Measurement(_) => None,
+        Cause::Arm(effect) => effect.joint(),
+    };
+    let number = |i: usize| dataset.rows[i].number as f64;
+    if let Some(joint) = joint {
+        let driver = match cause {
+            Cause::Arm(Effect::JointCoupling(c)) => c.driver,
+            _ => joint,
+        };
+        let side = matches!(cause, Cause::Arm(Effect::Backlash(_)));
+        let x = |i: usize| {
+            let row = &dataset.rows[i];
+            if side {
+                // Spread a little by row, so that points of one side do not hide each other.
+                f64::from(row.condition.approach[joint]) + 0.3 * (number(i) / dataset.rows.len() as f64 - 0.5)
+            } else {
+                row.joints[driver].to_degrees()
+            }
+        };
+        let label = if side {
+            (format!("side from which joint {} came (−1 below, +1 above)", joint + 1), "")
+        } else {
+            (format!("angle of joint {}", driver + 1), "°")
+        };
+        return Picture {
+            x: label,
+            y: (format!("residual turned to joint {}", joint + 1), "°"),
+            before: turned(before, joint, &x),
+            after: turned(after, joint, &x),
+            rows: None,
+        };
+    }
+    let (x_label, x): (Label, Box<dyn Fn(usize) -> f64>) = match cause {
+        Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
+            ("distance from the sensor".to_owned(), "mm"),
+            Box::new(|i| match dataset.rows[i].reading {
+                Reading::Cable(l) => l,
+                Reading::Position(p) => p.norm(),
+                Reading::Pose(p) => p.translation.vector.norm(),
+            }),
+        ),
+        Cause::Measurement(d) if matches!(d.course, Course::Thermometer { .. }) => (
+            ("temperature".to_owned(), "°C"),
+            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
+        ),
+        Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => (
+            ("temperature".to_owned(), "°C"),
+            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
+        ),
+        Cause::Arm(Effect::ThermalDrift(_)) => {
+            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
+        }
+        Cause::Measurement(d) if matches!(d.course, Course::Clock { .. }) => {
+            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
+        }
+        _ => (("data row".to_owned(), ""), Box::new(number)),
+    };
+    let along = direction(cause);
+    let y_label = match (dataset.sensor, along) {
+        (Sensor::Cable, _) => "residual of the cable's length".to_owned(),
+        (_, Some(_)) => "residual along the shift".to_owned(),
+        (_, None) => "size of the residual".to_owned(),
+    };
+    let shown = |design: &Design| -> Vec<[f64; 2]> {
+        let per = design.per;
+        let mm = |s: usize| design.residual[s] * design.slopes.mm[s];
+        (0..dataset.rows.len())
+            .map(|i| {
+                let vector = || Vector3::from_fn(|k, _| mm(i * per + k));
+                let y = match (per, along) {
+                    (1, _) => mm(i),
+                    (_, Some(along)) => vector().dot(&along),
+                    (_, None) => vector().norm(),
+                };
+                [x(i), y]
+            })
+            .collect()
+    };
+    Picture { x: x_label, y: (y_label, "mm"), before: shown(before), after: shown(after), rows: cause.rows() }
+}
+
+/// Unit vector of a shift of the sensor in the base, where that is the direction to look along.
+fn direction(cause: &Cause) -> Option<Vector3<f64>> {
+    match cause {
+        Cause::Measurement(d) if matches!(d.kind, Kind::Frame { .. }) => {
+            Vector3::new(d.values[0], d.values[1], d.values[2]).try_normalize(1e-9)
+        }
+        _ => None,
+    }
+}
+
+/// For each row, the rotation of a joint that would explain most of its residual (°).
+fn turned(design: &Design, joint: usize, x: &dyn Fn(usize) -> f64) -> Vec<[f64; 2]> {
+    let theta = &design.slopes.by_joint[joint];
+    let rows: Vec<(f64, f64)> = (0..design.observations)
+        .map(|i| {
+            (i * design.per..(i + 1) * design.per)
+                .fold((0.0, 0.0), |(a, b), s| (a - theta[s] * design.residual[s], b + theta[s] * theta[s]))
+        })
+        .collect();
+    let longest = rows.iter().map(|r| r.1).fold(0.0, f64::max);
+    rows.iter()
+        .enumerate()
+        .filter(|(_, r)| r.1 > LEVER * LEVER * longest)
+        .map(|(i, r)| [x(i), (r.0 / r.1).to_degrees()])
+        .collect()
+}

@@ -1,0 +1,234 @@
+//! Findings about the record itself, which no parameter of the model stands for: rounding, contradicting columns, outliers;
+//! and what the extended model leaves, against the noise floor.
+
+use super::extension::{Extended, Freedom, Subject, fit};
+use super::finding::{Confidence, Finding, FoundParameter, Gain};
+use super::remaining::{Structure, stands_out};
+use super::rows::Prepared;
+use super::selection::BLOCKS;
+use super::validation::{StageError, Validation};
+use super::words;
+use crate::identification::rounding::angle_shares;
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split;
+
+/// The rounding counts as a finding when it makes more than this share of the geometric residual's variance.
+const ROUNDING_SHARE: f64 = 0.25;
+
+pub(super) fn rounding_finding(
+    dataset: &Dataset,
+    prepared: &Prepared,
+    subject: &Subject<'_>,
+    geometric: &Extended,
+    stages: &[StageError; 3],
+) -> Option<Finding> {
+    let step = dataset.angle_step_rad?;
+    let logged = &prepared.logged;
+    let shares = angle_shares(&logged.dataset, &geometric.model, &geometric.frames, &logged.angles);
+    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let share = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    let raw = Subject { observed: logged, ..*subject };
+    let unsharpened = fit(&raw, &[], Freedom::All, Some(geometric));
+    let before = Validation::of(&raw, &[], 0, BLOCKS).random_rmse(&unsharpened);
+    if share < ROUNDING_SHARE * before * before {
+        return None;
+    }
+    let (gain, evidence) = match &prepared.sharpening {
+        Ok(report) => (
+            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: stages[1].random.rmse },
+            format!(
+                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; fused with the read-out they are known \
+                 {:.1} times better",
+                step.to_degrees(),
+                share.sqrt(),
+                1.0 / report.narrowed.max(1e-6)
+            ),
+        ),
+        Err(_) => (
+            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
+            format!(
+                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to sharpen them",
+                step.to_degrees(),
+                share.sqrt()
+            ),
+        ),
+    };
+    Some(Finding {
+        effect: "angle-rounding".to_owned(),
+        cause: format!(
+            "the log rounds joint angles to {:.3}°, which alone moves the touched point by {:.3} mm RMS",
+            step.to_degrees(),
+            share.sqrt()
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: vec![FoundParameter {
+            name: "step".to_owned(),
+            value: step.to_degrees(),
+            sigma: None,
+            unit: "°".to_owned(),
+        }],
+        evidence,
+        p_value: 0.0,
+        non_centrality: None,
+        gain,
+        alternatives: Vec::new(),
+        remedy: words::remedy("angle-rounding").to_owned(),
+    })
+}
+
+pub(super) fn mismatch_finding(
+    dataset: &Dataset,
+    prepared: &Prepared,
+    after: &StageError,
+) -> Option<Finding> {
+    let rows = &prepared.mismatch.rows;
+    let largest = rows.iter().map(|r| r.1).fold(f64::NAN, f64::max);
+    if rows.is_empty() {
+        return None;
+    }
+    Some(Finding {
+        effect: "readout-mismatch".to_owned(),
+        cause: format!(
+            "in {} rows the controller's x, y, z belong to another pose than its angles, up to {largest:.2} mm apart",
+            rows.len()
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: Some(rows.iter().map(|(i, _)| dataset.rows[*i].number).collect()),
+        joints: None,
+        parameters: vec![FoundParameter {
+            name: "largest mismatch".to_owned(),
+            value: largest,
+            sigma: None,
+            unit: "mm".to_owned(),
+        }],
+        evidence: format!(
+            "read-out against the nominal forward map of the angles: the other rows scatter by {:.4} mm",
+            prepared.mismatch.usual_mm
+        ),
+        p_value: 0.0,
+        non_centrality: None,
+        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        alternatives: Vec::new(),
+        remedy: words::remedy("readout-mismatch").to_owned(),
+    })
+}
+
+pub(super) fn outlier_finding(
+    dataset: &Dataset,
+    wild: &[(usize, f64)],
+    after: &StageError,
+) -> Option<Finding> {
+    if wild.is_empty() {
+        return None;
+    }
+    let mut list: Vec<usize> = wild.iter().map(|(i, _)| dataset.rows[*i].number).collect();
+    list.sort_unstable();
+    Some(Finding {
+        effect: "outliers".to_owned(),
+        cause: format!(
+            "{} single readings lie far beyond the scatter of all others, up to {:.0} times",
+            list.len(),
+            wild[0].1
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: Some(list),
+        joints: None,
+        parameters: Vec::new(),
+        evidence: "sizes beyond what the tail of the other residuals gives once in a hundred data sets"
+            .to_owned(),
+        p_value: 1e-2,
+        non_centrality: None,
+        gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        alternatives: Vec::new(),
+        remedy: words::remedy("outliers").to_owned(),
+    })
+}
+
+/// What sensor and rounding leave, and where that is from.
+pub(super) fn noise_floor(
+    repeated: &Option<split::NoiseFloor>,
+    subject: &Subject<'_>,
+    extended: &Extended,
+) -> (Option<f64>, String) {
+    if let Some(floor) = repeated {
+        return (
+            Some(floor.sigma_mm),
+            format!("{} repeated poses, {} degrees of freedom", floor.poses, floor.freedom),
+        );
+    }
+    let observed = subject.observed;
+    let shares = angle_shares(&observed.dataset, &extended.model, &extended.frames, &observed.angles);
+    let coordinates = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let mean = shares.iter().map(|s| s.0).sum::<f64>() * coordinates / shares.len().max(1) as f64;
+    if mean > 0.0 {
+        (Some(mean.sqrt()), "rounding of the angles alone; no pose was repeated".to_owned())
+    } else {
+        (None, "no pose was repeated and nothing is rounded".to_owned())
+    }
+}
+
+/// A sentence on what is left, and a finding where it has a pattern. `smoothed`: the held-out error before a smooth
+/// correction, where there is one (mm).
+pub(super) fn told(
+    structure: &Structure,
+    after: &StageError,
+    smoothed: Option<f64>,
+    floor_mm: Option<f64>,
+    findings: &mut Vec<Finding>,
+) -> Option<String> {
+    let mut patterns = Vec::new();
+    let mut strongest = 0.0_f64;
+    for (r, z, what) in [
+        (structure.neighbours, structure.neighbours_z, "neighbouring poses"),
+        (structure.order, structure.order_z, "consecutive rows"),
+    ] {
+        if stands_out(r, z) {
+            patterns.push(format!("{what} share {:.0} % of it", 100.0 * r));
+            strongest = strongest.max(z);
+        }
+    }
+    let rmse = after.fitted.rmse;
+    if patterns.is_empty() {
+        return match floor_mm {
+            Some(floor) if rmse > 1.5 * floor => Some(format!(
+                "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
+            )),
+            _ => None,
+        };
+    }
+    let text = format!("{rmse:.3} mm RMS with a pattern: {}", patterns.join(", "));
+    let followed = match smoothed {
+        Some(_) => "; a smooth correction follows a part of it, without saying what it is",
+        None => "",
+    };
+    findings.push(Finding {
+        effect: "unexplained".to_owned(),
+        cause: format!(
+            "something repeatable is left that nothing in the catalogue explains: {}{followed}",
+            patterns.join(", ")
+        ),
+        confidence: Confidence::Identified,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: format!(
+            "correlation of residuals: nearest poses {:.2} (z = {:.1}), consecutive rows {:.2} (z = {:.1})",
+            structure.neighbours, structure.neighbours_z, structure.order, structure.order_z
+        ),
+        p_value: truegrind_math::tail::normal_two_sided(strongest),
+        non_centrality: None,
+        gain: Gain {
+            cv_rmse_before_mm: smoothed.unwrap_or(after.random.rmse),
+            cv_rmse_after_mm: after.random.rmse,
+        },
+        alternatives: Vec::new(),
+        remedy: words::remedy("unexplained").to_owned(),
+    });
+    Some(text)
+}

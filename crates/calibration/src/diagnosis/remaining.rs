@@ -1,0 +1,234 @@
+//! What the extended model leaves: gross outliers, noise that grows with range, and structure without a name.
+//!
+//! - Outliers: Student's t is fitted by its quantiles to the bulk of the residuals' sizes, so a heavy tail is not taken for
+//!   accidents; a row is an outlier where its size, under that tail, would come once in a hundred data sets of this length.
+//! - Range: Spearman's rank correlation of size and distance; where it is sure, σ₀ and slope by least squares on the sizes.
+//! - Structure: rows that are neighbours in joint space, and rows that follow each other, should not resemble one another.
+//!   Correlation of their residuals, with the exact variance under exchangeability (Moran 1950; von Neumann 1941).
+
+use nalgebra::Vector3;
+
+use super::extension::{Extended, Subject};
+use crate::measurement::dataset::{Reading, Sensor};
+use truegrind_math::statistics::median;
+use truegrind_math::tail::normal_two_sided;
+
+/// Noise that grows with range: σ(d) = σ₀ + slope · d.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseModel {
+    /// At range 0 (mm).
+    pub sigma_mm: f64,
+    /// Growth (mm per metre).
+    pub per_metre_mm: f64,
+    /// Rank correlation of size and range.
+    pub correlation: f64,
+    /// p-value.
+    pub p_value: f64,
+}
+
+/// Structure that is left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Structure {
+    /// Correlation of residuals with that of the nearest pose.
+    pub neighbours: f64,
+    /// Its z-score.
+    pub neighbours_z: f64,
+    /// Correlation with the residual of the row before.
+    pub order: f64,
+    /// Its z-score.
+    pub order_z: f64,
+}
+
+/// Neighbours must resemble each other by this many standard deviations to be called structure.
+const STRUCTURE_Z: f64 = 5.5;
+
+/// And by at least this correlation: a large set makes any trifle significant.
+const STRUCTURE_R: f64 = 0.15;
+
+/// Whether a correlation of neighbours, with its z-score, is structure.
+pub fn stands_out(correlation: f64, z: f64) -> bool {
+    z > STRUCTURE_Z && correlation > STRUCTURE_R
+}
+
+/// Whether something repeatable is left.
+pub fn patterned(structure: &Structure) -> bool {
+    stands_out(structure.neighbours, structure.neighbours_z) || stands_out(structure.order, structure.order_z)
+}
+
+/// Residual vectors (whitened, position part) of all rows.
+fn vectors(subject: &Subject<'_>, fit: &Extended) -> Vec<Vector3<f64>> {
+    let per = match subject.observed.dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let plain = fit.task.plain_residuals(&fit.x);
+    fit.weights
+        .iter()
+        .enumerate()
+        .map(|(i, w)| {
+            Vector3::from_fn(|k, _| {
+                if k < per.min(3) {
+                    // Residuals are held with Huber's weight in the task; plain ones are in mm.
+                    plain[i * per + k] * w.per_mm
+                } else {
+                    0.0
+                }
+            })
+        })
+        .map(|v| v.map(|c| if c.is_finite() { c } else { 0.0 }))
+        .collect()
+}
+
+/// Rows beyond any tail that the others have, with their size in standard deviations, largest first.
+pub fn outliers(fit: &Extended) -> Vec<(usize, f64)> {
+    let n = fit.sizes.len();
+    if n < 12 {
+        return Vec::new();
+    }
+    let mut sorted: Vec<f64> = fit.sizes.clone();
+    sorted.sort_by(f64::total_cmp);
+    // A heavy tail stretches the 95 % quantile against the median.
+    let quantile = |p: f64| sorted[((n - 1) as f64 * p) as usize];
+    let (middle, high) = (quantile(0.5).max(1e-12), quantile(0.95));
+    // Sizes of whole vectors: the reach of a tail is taken as that of one coordinate with the same stretch.
+    let stretch = high / middle;
+    // Two quantiles of a few hundred sizes cannot rule out a tail of five degrees of freedom: it is always allowed for.
+    let limit = middle * reach(heaviness(stretch), n);
+    let mut rows: Vec<(usize, f64)> =
+        fit.sizes.iter().copied().enumerate().filter(|(_, s)| !(*s <= limit)).collect();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    rows
+}
+
+/// Degrees of freedom of Student's t, 2 to 5, by the ratio of the 95 % quantile of |t| to its median.
+fn heaviness(stretch: f64) -> f64 {
+    // ν and t(0.975)/t(0.75), from the tables of Student's distribution.
+    const TABLE: [(f64, f64); 4] =
+        [(2.0, 4.303 / 0.8165), (3.0, 3.182 / 0.7649), (4.0, 2.776 / 0.7407), (5.0, 2.571 / 0.7267)];
+    for pair in TABLE.windows(2) {
+        let ((low, a), (high, b)) = (pair[0], pair[1]);
+        if stretch >= b {
+            let share = ((a - stretch) / (a - b)).clamp(0.0, 1.0);
+            return 1.0 / (1.0 / low + share * (1.0 / high - 1.0 / low));
+        }
+    }
+    5.0
+}
+
+/// Size over median beyond which one of n rows comes once in a hundred data sets, for Student's t with ν degrees of
+/// freedom: its tail falls as the power ν, tied to its 97.5 % quantile.
+fn reach(nu: f64, n: usize) -> f64 {
+    let p = 1e-2 / n as f64;
+    let quantile = 1.96 + 2.0 / nu + 5.4 / (nu * nu);
+    let median = 0.6745 + 0.26 / nu;
+    (3.0 * 0.05 * quantile.powf(nu) / p).powf(1.0 / nu) / median
+}
+
+/// Whether the noise grows with range.
+pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Option<NoiseModel> {
+    let dataset = &subject.observed.dataset;
+    let plain = fit.task.errors_mm(&fit.x);
+    let coordinates = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0_f64.sqrt() };
+    let pairs: Vec<(f64, f64)> = dataset
+        .rows
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !set_aside.contains(i))
+        .map(|(i, row)| {
+            let range = match row.reading {
+                Reading::Cable(_) => {
+                    let at = (fit.model.forward(&row.joints, &row.condition)
+                        * nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector))
+                    .coords;
+                    (at - fit.frames.outlets_mm[row.anchor]).norm()
+                }
+                Reading::Position(p) => p.norm(),
+                Reading::Pose(pose) => pose.translation.vector.norm(),
+            };
+            (range * 1e-3, plain[i].abs() / coordinates)
+        })
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        .collect();
+    let n = pairs.len();
+    if n < 30 {
+        return None;
+    }
+    let ranks = |values: Vec<f64>| {
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+        let mut out = vec![0.0; n];
+        order.iter().enumerate().for_each(|(rank, &i)| out[i] = rank as f64);
+        out
+    };
+    let (a, b) = (ranks(pairs.iter().map(|p| p.0).collect()), ranks(pairs.iter().map(|p| p.1).collect()));
+    let middle = 0.5 * (n as f64 - 1.0);
+    let (mut shared, mut square) = (0.0, 0.0);
+    for (x, y) in a.iter().zip(&b) {
+        shared += (x - middle) * (y - middle);
+        square += (x - middle) * (x - middle);
+    }
+    let correlation = shared / square.max(1e-300);
+    let p_value = normal_two_sided(correlation * (n as f64 - 1.0).sqrt());
+    if !(p_value < 1e-5) || correlation < 0.0 {
+        return None;
+    }
+    // Mean of |normal| is 0.798 σ; that of three coordinates 1.596 σ.
+    let consistency = if dataset.sensor == Sensor::Cable { 0.7979 } else { 1.5958 / 3.0_f64.sqrt() };
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n as f64;
+    let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
+    let slope = mean(&|p| (p.0 - mx) * (p.1 - my)) / mean(&|p| (p.0 - mx).powi(2)).max(1e-12);
+    let at_zero = my - slope * mx;
+    Some(NoiseModel {
+        sigma_mm: (at_zero / consistency).max(0.0),
+        per_metre_mm: slope / consistency,
+        correlation,
+        p_value,
+    })
+}
+
+/// Correlations of neighbours.
+pub fn structure(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -> Structure {
+    let dataset = &subject.observed.dataset;
+    let all = vectors(subject, fit);
+    let kept: Vec<usize> = (0..all.len()).filter(|i| !set_aside.contains(i)).collect();
+    // Bounded, so that no single row makes a correlation.
+    let values: Vec<Vector3<f64>> = kept.iter().map(|&i| all[i].map(|c| c.clamp(-3.0, 3.0))).collect();
+    let power = values.iter().map(Vector3::norm_squared).sum::<f64>() / values.len().max(1) as f64;
+    let dimensions = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let correlation = |pairs: &[(usize, usize)]| {
+        let count = pairs.len().max(1) as f64;
+        let r =
+            pairs.iter().map(|&(a, b)| values[a].dot(&values[b])).sum::<f64>() / count / power.max(1e-300);
+        (r, r * (count * dimensions).sqrt())
+    };
+    // Nearest poses: by joint angles, among rows close in the order of a projection, which is enough for a statistic.
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    let joints: Vec<_> = kept.iter().map(|&i| dataset.rows[i].joints).collect();
+    let window = 4000.min(joints.len());
+    for (a, q) in joints.iter().enumerate().take(window) {
+        let nearest = joints
+            .iter()
+            .enumerate()
+            .take(window)
+            .filter(|(b, _)| *b != a)
+            .map(|(b, r)| ((q - r).norm_squared(), b))
+            // Repetitions of one pose share its error in truth: they are the noise floor, not structure.
+            .filter(|(d, _)| *d > 1e-6)
+            .min_by(|x, y| x.0.total_cmp(&y.0));
+        if let Some((_, b)) = nearest {
+            pairs.push((a.min(b), a.max(b)));
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let (neighbours, neighbours_z) = correlation(&pairs);
+    let consecutive: Vec<(usize, usize)> = (1..values.len()).map(|i| (i - 1, i)).collect();
+    let (order, order_z) = correlation(&consecutive);
+    Structure { neighbours, neighbours_z, order, order_z }
+}
+
+/// Median size of the rows' errors (mm), for words.
+pub fn typical_mm(fit: &Extended) -> f64 {
+    median(&fit.task.errors_mm(&fit.x).iter().map(|e| e.abs()).collect::<Vec<_>>()).unwrap_or(0.0)
+}

@@ -1,0 +1,107 @@
+//! Rows before any fit: angles sharpened by the read-out, and rows whose own columns contradict each other.
+//!
+//! A read-out is the controller's own forward map of the angles that it did not round, at its own tool point. Where a row's
+//! read-out lies further from its angles than rounding and the other rows' scatter allow, one of the two was not written
+//! at the same moment, or by the same pose. Such a row keeps its logged angles; the others are sharpened without it.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::identification::fit::Observed;
+use crate::identification::rounding::{NotSharpened, Sharpening, logged_covariance, sharpen};
+use crate::measurement::dataset::Dataset;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Model;
+use truegrind_math::statistics::median;
+
+/// Rows whose columns contradict each other.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Mismatch {
+    /// Index of the row and how far read-out and angles are apart (mm).
+    pub rows: Vec<(usize, f64)>,
+    /// What the other rows scatter by (mm, robust).
+    pub usual_mm: f64,
+}
+
+/// A mismatch is this many times what the other rows scatter by.
+const CUT: f64 = 8.0;
+
+/// More rows than this share are no accident but another tool point or arm.
+const SHARE: f64 = 0.1;
+
+/// Finds rows whose read-out belongs to another pose.
+pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
+    let posed = nominal.under(&Condition::default());
+    let gaps: Vec<Option<(usize, Vector3<f64>)>> = dataset
+        .rows
+        .iter()
+        .enumerate()
+        .map(|(i, row)| {
+            row.readout_mm.map(|at| {
+                // The read-out's tool point on the flange, as this row has it.
+                (i, posed.forward(&row.joints).inverse_transform_point(&Point3::from(at)).coords)
+            })
+        })
+        .collect();
+    let gaps: Vec<(usize, Vector3<f64>)> = gaps.into_iter().flatten().collect();
+    if gaps.len() < 8 {
+        return Mismatch::default();
+    }
+    let middle =
+        Vector3::from_fn(|k, _| median(&gaps.iter().map(|g| g.1[k]).collect::<Vec<_>>()).unwrap_or_default());
+    let sizes: Vec<(usize, f64)> = gaps.iter().map(|(i, g)| (*i, (g - middle).norm())).collect();
+    // The norm of three normal coordinates has median 1.538 σ.
+    let usual = median(&sizes.iter().map(|s| s.1).collect::<Vec<_>>()).unwrap_or(0.0) / 1.538;
+    let smallest = dataset.readout_step_mm.unwrap_or(1e-3);
+    let rows: Vec<(usize, f64)> =
+        sizes.into_iter().filter(|(_, s)| !(*s <= CUT * usual.max(smallest))).collect();
+    if rows.len() as f64 > SHARE * dataset.rows.len() as f64 {
+        return Mismatch { rows: Vec::new(), usual_mm: usual };
+    }
+    Mismatch { rows, usual_mm: usual }
+}
+
+/// Rows ready for a fit.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// The rows with what is known of their angles.
+    pub observed: Observed,
+    /// The same without the use of the read-out.
+    pub logged: Observed,
+    /// What sharpening brought, or why it was not done.
+    pub sharpening: Result<Sharpening, NotSharpened>,
+    /// Contradicting rows.
+    pub mismatch: Mismatch,
+    /// Whether the sides of approach were taken from the order of the rows.
+    pub sides_from_order: bool,
+}
+
+/// Prepares a data set.
+pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
+    let mismatch = mismatches(dataset, nominal);
+    let mut rows = dataset.clone();
+    let silent = dataset.rows.iter().all(|r| r.condition.approach == [0; 6]);
+    if silent {
+        for i in 1..rows.rows.len() {
+            let step = dataset.rows[i].joints - dataset.rows[i - 1].joints;
+            rows.rows[i].condition.approach =
+                // A joint that moved up came from below, which is −1.
+                std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { -step[j].signum() as i8 });
+        }
+    }
+    let logged = Observed { angles: logged_covariance(&rows), dataset: rows.clone() };
+    let good: Vec<usize> =
+        (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
+    let mut kept = rows.subset(&good);
+    let (observed, sharpening) = match sharpen(&mut kept, nominal) {
+        Ok((report, covariances)) => {
+            let mut observed = logged.clone();
+            for ((&i, row), covariance) in good.iter().zip(&kept.rows).zip(covariances) {
+                observed.dataset.rows[i].joints = row.joints;
+                observed.angles.set(i, covariance);
+            }
+            (observed, Ok(report))
+        }
+        Err(why) => (logged.clone(), Err(why)),
+    };
+    Prepared { observed, logged, sharpening, mismatch, sides_from_order: silent }
+}

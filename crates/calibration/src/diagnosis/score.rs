@@ -1,0 +1,178 @@
+//! How much a candidate explains, fitted jointly with everything else, and whether that could be chance.
+//!
+//! With gradient g and information S of the projected candidate and its size prior Λ:
+//!
+//! - estimate −(S + Λ)⁻¹ g and gain gᵀ(S + Λ)⁻¹ g, the fall of χ²;
+//! - evidence gain − ln det(I + S Λ⁻¹), twice the log Bayes factor against its absence (Laplace): what a candidate with many
+//!   parameters, or none that this data could see, has to pay;
+//! - the p-value takes the smaller of gᵀS⁺g under the model's own noise and under the scatter that the residuals really
+//!   have, row by row (White 1980, heteroskedasticity-consistent): noise that depends on the pose is no evidence;
+//! - non-centrality λ = cᵀ S c of a stated size c: what the data would show of it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::algebra::eigen;
+use super::catalogue::Candidate;
+use super::design::{Design, Projected};
+use truegrind_math::tail::log_chi_square_tail;
+
+/// A scored candidate.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Fall of χ² with the size prior.
+    pub gain: f64,
+    /// Twice the log Bayes factor, variants not counted.
+    pub evidence: f64,
+    /// Evidence less 2 ln of the variants tried.
+    pub merit: f64,
+    /// First-order estimate of the parameters.
+    pub estimate: DVector<f64>,
+    /// Information, projected.
+    pub information: DMatrix<f64>,
+    /// Gradient, projected.
+    pub gradient: DVector<f64>,
+}
+
+impl Score {
+    /// Natural logarithm of the p-value of the candidate alone under the model's own noise, not corrected for trials:
+    /// what [`log_p`] goes on from. `sizes` as scored.
+    pub fn plain_log_p(&self, sizes: &[f64]) -> f64 {
+        if self.gain > SOME {
+            let (information, gradient) = in_sizes(&self.information, &self.gradient, sizes);
+            let (statistic, freedom) = plain_statistic(&information, &gradient);
+            log_chi_square_tail(statistic, freedom.max(1))
+        } else {
+            log_chi_square_tail(self.gain, sizes.len())
+        }
+    }
+}
+
+/// Scores one candidate.
+pub fn score(design: &Design, candidate: &Candidate) -> Score {
+    score_columns(design, &candidate.columns(design), &candidate.cause.sizes(), candidate.tried)
+}
+
+/// Scores columns with the standard deviations that their parameters have beforehand.
+pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tried: f64) -> Score {
+    score_projected(&design.project(columns), sizes, tried)
+}
+
+/// Scores columns whose projection is known.
+pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Score {
+    let k = sizes.len();
+    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, sizes);
+    let nothing = || Score {
+        gain: 0.0,
+        evidence: 0.0,
+        merit: -2.0 * tried.ln(),
+        estimate: DVector::zeros(k),
+        information: projected.information.clone(),
+        gradient: DVector::zeros(k),
+    };
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return nothing() };
+    let step = factor.solve(&gradient);
+    let gain = gradient.dot(&step);
+    let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let evidence = gain - log_det;
+    if !evidence.is_finite() {
+        return nothing();
+    }
+    let merit = evidence - 2.0 * tried.ln();
+    Score {
+        gain,
+        evidence,
+        merit,
+        estimate: DVector::from_iterator(k, step.iter().zip(sizes).map(|(step, size)| -(size * step))),
+        information: projected.information.clone(),
+        gradient: projected.gradient.clone(),
+    }
+}
+
+/// Information and gradient in units of the sizes: well scaled.
+fn in_sizes(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    sizes: &[f64],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let k = sizes.len();
+    let information = DMatrix::from_fn(k, k, |a, b| sizes[a] * information[(a, b)] * sizes[b]);
+    (information, DVector::from_fn(k, |a, _| sizes[a] * gradient[a]))
+}
+
+/// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
+/// the residuals. Not corrected for trials.
+pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
+    let sizes = candidate.cause.sizes();
+    let plain = || score.plain_log_p(&sizes);
+    // Of many parameters the scatter of a few hundred rows says nothing.
+    if score.gain <= SOME || sizes.len() > MOST_SCATTERED {
+        return plain();
+    }
+    let columns = candidate.columns(design);
+    let projected = design.project(&columns);
+    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, &sizes);
+    let k = columns.ncols();
+    let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return plain() };
+    let step = factor.solve(&gradient);
+    let scattered = scatter_statistic(design, &columns, &projected, &sizes, &gradient, &step);
+    let (plain, freedom) = plain_statistic(&information, &gradient);
+    log_chi_square_tail(plain.min(scattered), freedom.max(1))
+}
+
+/// A fall of χ² below this is nobody's evidence, whatever the noise.
+const SOME: f64 = 8.0;
+
+/// Most parameters whose gradient's covariance is taken from the residuals.
+const MOST_SCATTERED: usize = 6;
+
+/// gᵀ S⁺ g over the directions that the data see, and their number.
+fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64, usize) {
+    let (mut sum, mut freedom) = (0.0, 0);
+    let Some((values, vectors)) = eigen(information) else { return (0.0, 1) };
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
+        // A direction in which the size prior knows more than the data is none of the data's.
+        if *value > 0.1 {
+            sum += vector.dot(gradient).powi(2) / value;
+            freedom += 1;
+        }
+    }
+    (sum, freedom)
+}
+
+/// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over observations
+/// of the outer products.
+fn scatter_statistic(
+    design: &Design,
+    columns: &DMatrix<f64>,
+    projected: &Projected,
+    sizes: &[f64],
+    gradient: &DVector<f64>,
+    step: &DVector<f64>,
+) -> f64 {
+    let k = columns.ncols();
+    let mut pure = design.pure(columns, projected);
+    pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
+    let left = &design.residual - &pure * step;
+    let mut scatter = DMatrix::zeros(k, k);
+    for i in 0..design.observations {
+        let mut g = DVector::zeros(k);
+        for s in i * design.per..(i + 1) * design.per {
+            g += pure.row(s).transpose() * left[s];
+        }
+        scatter += &g * g.transpose();
+    }
+    let Some((values, vectors)) = eigen(&scatter) else { return 0.0 };
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let mut sum = 0.0;
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
+        if *value > 1e-10 * largest {
+            sum += vector.dot(gradient).powi(2) / value;
+        }
+    }
+    sum
+}
+
+/// Non-centrality of an effect of size `values`.
+pub fn non_centrality(information: &DMatrix<f64>, values: &DVector<f64>) -> f64 {
+    (values.transpose() * information * values)[0].max(0.0)
+}

@@ -1,0 +1,146 @@
+//! What the rows cannot show: effects without the columns that would tell of them, and effects that hide inside geometry and
+//! frames, with the smallest size that would show.
+
+use nalgebra::DVector;
+
+use super::account::pendant;
+use super::catalogue::{Columns, Regressor, STILL_RAD};
+use super::cause::Cause;
+use super::design::Design;
+use super::diagnose::VISIBLE;
+use super::finding::NotTestable;
+use super::rows::Prepared;
+use super::selection::{Scored, scale_beside_growth};
+use crate::measurement::dataset::Dataset;
+use truegrind_arm::effect::Effect;
+use truegrind_math::spectral;
+
+/// Peak rotation of a joint that an effect of practical size has (rad).
+const PRACTICAL_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
+
+/// What these rows cannot show, with the smallest size that they could.
+pub(super) fn not_testable(
+    dataset: &Dataset,
+    whole: &Design,
+    left: &[Scored],
+    found: &[String],
+    prepared: &Prepared,
+) -> Vec<NotTestable> {
+    let columns = Columns::of(dataset);
+    let mut out = Vec::new();
+    let missing = |name: &str| !found.iter().any(|f| f == name);
+    let mut add = |effect: &str, joints: Option<Vec<usize>>, reason: String, remedy: &str| {
+        out.push(NotTestable { effect: effect.to_owned(), joints, reason, remedy: remedy.to_owned() });
+    };
+    if prepared.sides_from_order && missing("backlash") {
+        add(
+            "backlash",
+            None,
+            "no approach columns, and the order of the rows shows nothing of it".to_owned(),
+            "measure each pose from both sides and log approach1 to approach6",
+        );
+    }
+    if columns.hours.is_none() && columns.temperature.is_none() {
+        add(
+            "thermal-drift",
+            None,
+            "neither time nor temperature is logged".to_owned(),
+            "log t and temperature, and measure from a cold start",
+        );
+    }
+    if dataset.rows.iter().all(|r| r.readout_mm.is_none()) {
+        add(
+            "readout-mismatch",
+            None,
+            "the controller's own x, y, z are not logged".to_owned(),
+            "log the controller's Cartesian read-out beside the angles",
+        );
+    }
+    if missing("sensor-scale") {
+        let one = scale_beside_growth(whole, &DVector::from_element(1, 1e-3));
+        if one < VISIBLE {
+            add(
+                "sensor-scale",
+                None,
+                "a scale error of 0.1 % looks like links that are all longer by as much".to_owned(),
+                "measure a length standard, or distances that do not come from the arm",
+            );
+        }
+    }
+    let still: Vec<usize> = (0..6).filter(|&j| columns.range_rad[j] <= STILL_RAD).collect();
+    if !still.is_empty() {
+        add(
+            "gear-eccentricity",
+            pendant(&still),
+            "these axes hardly moved".to_owned(),
+            "turn every axis through its whole range",
+        );
+    }
+    // The smallest peak rotation that would show, for every joint and effect of the arm.
+    for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
+        let mut hidden: Vec<(usize, f64)> = Vec::new();
+        for joint in 0..6 {
+            if still.contains(&joint) || (name == "backlash" && prepared.sides_from_order) {
+                continue;
+            }
+            let smallest = left
+                .iter()
+                .filter(|s| {
+                    s.candidate.cause.name() == name
+                        && s.candidate.cause.joints().last() == Some(&joint)
+                        && !matches!(
+                            s.candidate.cause,
+                            Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_))
+                        )
+                })
+                .filter_map(smallest_rad)
+                .fold(f64::NAN, f64::max);
+            if smallest > PRACTICAL_RAD {
+                hidden.push((joint, smallest));
+            }
+        }
+        let told = found.iter().any(|f| f == name);
+        if !hidden.is_empty() && !told {
+            let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
+            let sizes: Vec<String> = hidden
+                .iter()
+                .map(|(j, s)| {
+                    if s.is_finite() && s.to_degrees() < 90.0 {
+                        format!("joint {}: {:.2}°", j + 1, s.to_degrees())
+                    } else {
+                        format!("joint {}: nothing at all", j + 1)
+                    }
+                })
+                .collect();
+            add(
+                name,
+                pendant(&joints),
+                format!(
+                    "in these poses it hides inside geometry and frames; the smallest peak that would show: {}",
+                    sizes.join(", ")
+                ),
+                "measure poses that turn these joints far while the others differ: `truegrind plan` proposes them",
+            );
+        }
+    }
+    out
+}
+
+/// Smallest peak rotation with the non-centrality of [`VISIBLE`] (rad), in the least favourable phase.
+fn smallest_rad(scored: &Scored) -> Option<f64> {
+    let peak = |r: &Regressor| match r {
+        Regressor::Arm { rotation, .. } => {
+            rotation.iter().flat_map(|(_, c)| c.iter()).fold(0.0_f64, |m, v| m.max(v.abs()))
+        }
+        Regressor::Push { .. } => 0.0,
+    };
+    let information = &scored.score.information;
+    let scaled: Vec<f64> = scored.candidate.regressors.iter().map(peak).collect();
+    if scaled.iter().any(|s| *s <= 0.0) {
+        return None;
+    }
+    let k = scaled.len();
+    let per_peak = nalgebra::DMatrix::from_fn(k, k, |a, b| information[(a, b)] / (scaled[a] * scaled[b]));
+    let least = spectral::symmetric(per_peak)?.eigenvalues.min().max(1e-12);
+    Some((VISIBLE / least).sqrt())
+}

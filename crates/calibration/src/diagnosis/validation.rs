@@ -1,0 +1,163 @@
+//! Held-out errors of a stage: every fold is fitted anew, frames, links and causes, and judged on rows it never saw.
+//!
+//! Few rows and parameters are refitted in full. With many, the rows of a fold are taken off the normal equations of all
+//! rows at their optimum, and one Gauss–Newton step from there is the refit: links move by micrometres between folds, and
+//! what the step leaves is of second order in that. Checked against: full refits.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::algebra::{back_and_forth, factored};
+use super::extension::{Extended, Freedom, Subject};
+use super::held::neither;
+use super::newton;
+use crate::identification::calibration::{Calibration, Weight};
+use crate::identification::fit::{Observed, errors_on};
+use crate::identification::solver::SOLVERS;
+use crate::measurement::split::{self, Split};
+use truegrind_estimation::problem::{NormalEquations, Problem};
+use truegrind_math::statistics::ErrorSummary;
+
+/// Errors of a stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StageError {
+    /// On the rows of the fit.
+    pub fitted: ErrorSummary,
+    /// Over five random folds.
+    pub random: ErrorSummary,
+    /// Over contiguous blocks.
+    pub blocks: ErrorSummary,
+}
+
+/// Scalar rows times squared parameters from which a fold is refitted by one step.
+const MUCH_WORK: f64 = 1e9;
+
+/// How a stage is held out.
+#[derive(Debug, Clone)]
+pub struct Validation {
+    kept: Vec<usize>,
+    rows: Observed,
+    random: Vec<Split>,
+    blocks: Vec<Split>,
+}
+
+impl Validation {
+    /// Splits of the rows that are not set aside.
+    pub fn of(subject: &Subject<'_>, set_aside: &[usize], seed: u64, blocks: usize) -> Self {
+        let n = subject.observed.dataset.rows.len();
+        let kept: Vec<usize> = (0..n).filter(|i| !set_aside.contains(i)).collect();
+        let rows = subject.observed.subset(&kept);
+        let random = split::folds(&rows.dataset, 5, seed);
+        let blocks = split::blocks(&rows.dataset, blocks);
+        Self { kept, rows, random, blocks }
+    }
+
+    /// Rows that are judged.
+    pub fn count(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// Errors of a fit's kind of model.
+    pub fn stage(&self, fit: &Extended) -> StageError {
+        let fitted = ErrorSummary::of(errors_on(&self.rows, &fit.model, &fit.frames));
+        let p = fit.parameters.len() as f64;
+        if fit.task.rows() as f64 * p * p > MUCH_WORK
+            && let Some([random, blocks]) = self.by_steps(fit)
+        {
+            return StageError { fitted, random, blocks };
+        }
+        let [random, blocks] = self.by_refits(fit);
+        StageError { fitted, random, blocks }
+    }
+
+    /// RMSE over the random folds alone, refitted in full.
+    pub fn random_rmse(&self, fit: &Extended) -> f64 {
+        self.held_out(fit, &self.random).rmse
+    }
+
+    /// Errors over random folds and blocks, every fold refitted in full.
+    pub fn by_refits(&self, fit: &Extended) -> [ErrorSummary; 2] {
+        [&self.random, &self.blocks].map(|splits| self.held_out(fit, splits))
+    }
+
+    /// The same with every fold refitted by one step; `None` where a fold leaves the parameters undetermined.
+    pub fn by_steps(&self, fit: &Extended) -> Option<[ErrorSummary; 2]> {
+        let p = fit.parameters.len();
+        let rows_of = |rows: &[usize]| -> Option<NormalEquations> {
+            let observations: Vec<usize> = rows.iter().map(|&k| self.kept[k]).collect();
+            Some(fit.task.thinned(&observations)?.normal_equations(&fit.x))
+        };
+        // The random folds share out all rows.
+        let parts = self
+            .random
+            .par_iter()
+            .map(|split| rows_of(&split.test))
+            .collect::<Option<Vec<NormalEquations>>>()?;
+        let mut all = NormalEquations::zeros(p);
+        parts.iter().for_each(|part| all.add(part));
+        all.add_priors(&fit.priors, &fit.x);
+        let refitted = |split: &Split, part: &NormalEquations| -> Option<Vec<f64>> {
+            let mut normal: DMatrix<f64> = &all.matrix - &part.matrix;
+            let gradient: DVector<f64> = &all.gradient - &part.gradient;
+            factored(&mut normal).then_some(())?;
+            let step = back_and_forth(&normal, &gradient)?;
+            let x: Vec<f64> = fit.x.iter().zip(step.iter()).map(|(x, s)| x - s).collect();
+            let (model, frames) = fit.task.apply(&x);
+            Some(errors_on(&self.rows.subset(&split.test), &model, &frames))
+        };
+        let random = self
+            .random
+            .par_iter()
+            .zip(&parts)
+            .map(|(split, part)| refitted(split, part))
+            .collect::<Option<Vec<_>>>()?;
+        let blocks = self
+            .blocks
+            .par_iter()
+            .map(|split| {
+                let mut out = split.test.clone();
+                out.extend(neither(split, self.kept.len()));
+                refitted(split, &rows_of(&out)?)
+            })
+            .collect::<Option<Vec<_>>>()?;
+        Some([random, blocks].map(|errors| ErrorSummary::of(errors.concat())))
+    }
+
+    fn held_out(&self, fit: &Extended, splits: &[Split]) -> ErrorSummary {
+        let start_weights: Vec<Weight> = self
+            .kept
+            .iter()
+            .map(|&i| {
+                let (w, t) = (fit.weights[i], fit.trust[i].sqrt());
+                Weight { per_mm: w.per_mm * t, per_rad: w.per_rad * t }
+            })
+            .collect();
+        let errors: Vec<Vec<f64>> = splits
+            .par_iter()
+            .map(|split| {
+                let train = self.rows.subset(&split.train);
+                let weights: Vec<Weight> = split.train.iter().map(|&i| start_weights[i]).collect();
+                let task = Calibration::new(
+                    &train.dataset,
+                    fit.task.start(),
+                    fit.task.starting_frames(),
+                    &fit.parameters,
+                    &fit.priors,
+                    &weights,
+                );
+                let mut x = fit.x.clone();
+                if !newton::descend(&task, &mut x) {
+                    x = SOLVERS[0].solve(&task, &x, 0).x;
+                }
+                let (model, frames) = task.apply(&x);
+                errors_on(&self.rows.subset(&split.test), &model, &frames)
+            })
+            .collect();
+        ErrorSummary::of(errors.concat())
+    }
+}
+
+/// The fit without its links freed: what the word `nominal` means in a diagnosis.
+pub fn nominal(subject: &Subject<'_>) -> Extended {
+    super::extension::fit(subject, &[], Freedom::Frames, None)
+}

@@ -1,0 +1,16 @@
+//! From measured rows to an estimated arm: the calibration as a [`truegrind_estimation::problem::Problem`], what the data
+//! can and cannot tell, and the fit with its verdict.
+
+pub mod calibration;
+pub mod tolerance;
+pub mod rounding;
+pub mod identifiability;
+pub mod network;
+pub mod solver;
+pub mod fit;
+pub mod start;
+pub mod benefit;
+pub mod verdict;
+pub mod identify;
+pub mod register;
+pub mod study;

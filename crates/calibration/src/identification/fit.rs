@@ -1,0 +1,319 @@
+//! The fit: frames, outliers, weights, geometry, held-out error, and the verdict.
+//!
+//! Stages, each stated on the rows it was fitted to and on rows it never saw:
+//!
+//! 1. *raw*: the nominal arm with a sensor frame that the user stated; absent where none was stated, since a fitted
+//!    frame is no raw error;
+//! 2. *registered*: the nominal arm, with base or outlet, cable zero and touched point fitted;
+//! 3. *geometry*: the links too.
+//!
+//! The gain of a model is the step from registered to geometry, never from raw.
+//!
+//! Outliers are found on all rows before the split, by a robust fit of geometry (Cauchy weights, then rows beyond ten
+//! robust standard deviations), because a large residual may be physics that geometry explains. The sensor's standard
+//! deviation is estimated along with the fit: the value under which the whitened residuals have their degrees of
+//! freedom.
+
+use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::identifiability::{Identifiability, identifiability};
+use crate::identification::rounding::{self, AngleCovariance};
+use crate::identification::solver::Solver;
+use crate::identification::tolerance::Tolerance;
+use crate::measurement::dataset::{Dataset, Sensor};
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
+use truegrind_estimation::problem::{Prior, Problem};
+use truegrind_math::statistics::{ErrorSummary, median};
+
+/// Parameters of the measurement: frame, outlet, zero, touched point.
+pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
+    let target = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
+    let mut out: Vec<Parameter> = (0..target).map(Parameter::Tool).collect();
+    match dataset.sensor {
+        Sensor::Cable => {
+            for anchor in 0..dataset.anchors() {
+                out.extend((0..3).map(|axis| Parameter::Outlet { anchor, axis }));
+                out.push(Parameter::Zero { anchor });
+            }
+        }
+        Sensor::Position | Sensor::Pose => out.extend((0..6).map(Parameter::Base)),
+    }
+    out
+}
+
+/// Parameters of the arm: links, then effects.
+pub fn arm_parameters(model: &Model) -> Vec<Parameter> {
+    let mut out = link_parameters(model);
+    for (index, effect) in model.effects.iter().enumerate() {
+        let count = effect.parameters().len();
+        out.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
+    }
+    out
+}
+
+/// Rows with what is known of their angles.
+#[derive(Debug, Clone)]
+pub struct Observed {
+    /// The rows, their angles sharpened where that was possible.
+    pub dataset: Dataset,
+    /// Covariance of each row's angles.
+    pub angles: AngleCovariance,
+}
+
+impl Observed {
+    /// The rows at `indices`.
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }
+    }
+}
+
+/// A fitted stage.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// What was free.
+    pub parameters: Vec<Parameter>,
+    /// Its priors.
+    pub priors: Vec<Prior>,
+    /// What the solver found, in deviations from the start.
+    pub estimate: Estimate,
+    /// The arm.
+    pub model: Model,
+    /// The frames.
+    pub frames: Frames,
+    /// Standard deviation of a reading that the fit leaves (mm), angles' rounding not included.
+    pub sigma_mm: f64,
+    /// The same for an orientation (rad).
+    pub sigma_rad: f64,
+    /// The task at its last weights, for whoever wants to look closer.
+    pub task: Calibration,
+    /// Work of all rounds together.
+    pub evaluations: Evaluations,
+    /// The story of every round. Weights change between rounds, so their costs do not share a scale.
+    pub rounds: Vec<Vec<Iteration>>,
+}
+
+/// What a stage starts from.
+#[derive(Debug, Clone, Copy)]
+pub struct Start<'a> {
+    /// The arm.
+    pub model: &'a Model,
+    /// The frames.
+    pub frames: &'a Frames,
+}
+
+/// Smallest standard deviation of a reading that is believed (mm): below it weights would only amplify rounding.
+const SMALLEST_SIGMA_MM: f64 = 1e-4;
+const SMALLEST_SIGMA_RAD: f64 = 1e-6;
+
+/// Fits `parameters` to `observed`, estimating the sensor's standard deviation along.
+///
+/// Three rounds of solver and variance.
+pub fn fit(
+    observed: &Observed,
+    start: Start<'_>,
+    parameters: &[Parameter],
+    tolerance: &Tolerance,
+    solver: &Solver,
+    seed: u64,
+) -> Fitted {
+    let priors = tolerance.priors_within(parameters, start.model, start.frames);
+    let (mut sigma_mm, mut sigma_rad) = (0.1, 1e-3);
+    let mut x = vec![0.0; parameters.len()];
+    let mut model = start.model.clone();
+    let mut frames = start.frames.clone();
+    let mut evaluations = Evaluations::default();
+    let (mut last, mut rounds): (Option<(Calibration, Estimate)>, _) = (None, Vec::with_capacity(ROUNDS));
+    for _ in 0..ROUNDS {
+        let weights =
+            rounding::weights(&observed.dataset, &model, &frames, &observed.angles, sigma_mm, sigma_rad);
+        // Only the weights change from round to round.
+        let task = match last.take() {
+            Some((task, _)) => task.weighted(&weights),
+            None => {
+                Calibration::new(&observed.dataset, start.model, start.frames, parameters, &priors, &weights)
+            }
+        };
+        let estimate = solver.solve(&task, &x, seed);
+        evaluations.residuals += estimate.evaluations.residuals;
+        evaluations.jacobians += estimate.evaluations.jacobians;
+        x.clone_from(&estimate.x);
+        (model, frames) = task.apply(&x);
+        let shares = rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles);
+        let spent = spent_freedom(&task, &estimate);
+        (sigma_mm, sigma_rad) = spreads(&task, &x, &shares, spent);
+        rounds.push(estimate.trace.clone());
+        last = Some((task, estimate));
+    }
+    let (task, estimate) = last.unwrap_or_else(|| unreachable!("at least one round"));
+    Fitted {
+        parameters: parameters.to_vec(),
+        priors,
+        estimate,
+        model,
+        frames,
+        sigma_mm,
+        sigma_rad,
+        task,
+        evaluations,
+        rounds,
+    }
+}
+
+/// Solver and variance are alternated this often; the variance has settled to per cent after two.
+const ROUNDS: usize = 3;
+
+/// Degrees of freedom that the fit used up: Σ (1 − σ²/prior²), each parameter's share that the data determined.
+fn spent_freedom(task: &Calibration, estimate: &Estimate) -> f64 {
+    let Some(covariance) = &estimate.covariance else { return 0.0 };
+    let shares = task
+        .priors()
+        .iter()
+        .enumerate()
+        .map(|(k, prior)| (1.0 - covariance[(k, k)] / (prior.sigma * prior.sigma)).clamp(0.0, 1.0));
+    shares.sum()
+}
+
+/// The standard deviations σ with Σ r²/(σ² + share) = rows − spent, for lengths and for orientations.
+fn spreads(task: &Calibration, x: &[f64], shares: &[(f64, f64)], spent: f64) -> (f64, f64) {
+    let per = task.rows_per_observation();
+    let plain = task.plain_residuals(x);
+    let rows = plain.len() as f64;
+    let freedom_share = ((rows - spent) / rows).max(0.1);
+    let solve = |components: std::ops::Range<usize>, share: &dyn Fn(usize) -> f64, smallest: f64| {
+        let squares: Vec<(f64, f64)> = plain
+            .iter()
+            .enumerate()
+            .filter(|(i, r)| components.contains(&(i % per)) && r.is_finite())
+            .map(|(i, r)| (r * r, share(i / per)))
+            .collect();
+        let freedom = squares.len() as f64 * freedom_share;
+        let excess = |sigma: f64| squares.iter().map(|(r, s)| r / (sigma * sigma + s)).sum::<f64>() - freedom;
+        let (mut low, mut high) = (smallest.ln(), 1e4_f64.ln());
+        if squares.is_empty() || excess(smallest) <= 0.0 {
+            return smallest;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if excess(middle.exp()) > 0.0 { low = middle } else { high = middle }
+        }
+        high.exp()
+    };
+    let mm = solve(0..per.min(3), &|i| shares[i].0, SMALLEST_SIGMA_MM);
+    let rad = if per > 3 { solve(3..per, &|i| shares[i].1, SMALLEST_SIGMA_RAD) } else { 1e-3 };
+    (mm, rad)
+}
+
+/// Rows set aside as gross outliers, by their index, with the robust standard deviations they are off.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outliers {
+    /// Index into the data set and size in robust standard deviations, largest first.
+    pub rows: Vec<(usize, f64)>,
+    /// Rows beyond the cut, when there were too many to be called outliers and none was set aside.
+    pub too_many: usize,
+}
+
+/// A row is an outlier beyond this many robust standard deviations of a geometry fit.
+const OUTLIER_CUT: f64 = 10.0;
+
+/// No more than this share of the rows is ever set aside: more is structure, not accident.
+const OUTLIER_SHARE: f64 = 0.1;
+
+/// Finds gross outliers by a robust fit of geometry.
+pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, solver: &Solver) -> Outliers {
+    let dataset = &observed.dataset;
+    let parameters: Vec<Parameter> =
+        arm_parameters(start.model).into_iter().chain(frame_parameters(dataset)).collect();
+    let priors = tolerance.priors_within(&parameters, start.model, start.frames);
+    let n = dataset.rows.len();
+    let mut factor = vec![1.0; n];
+    let mut x = vec![0.0; parameters.len()];
+    let (mut model, mut frames) = (start.model.clone(), start.frames.clone());
+    let mut scaled = vec![0.0; n];
+    let mut sigma = 0.1;
+    let mut before: Option<Calibration> = None;
+    for _ in 0..ROBUST_ROUNDS {
+        let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
+        let weights: Vec<Weight> = base
+            .iter()
+            .zip(&factor)
+            .map(|(w, f)| Weight { per_mm: w.per_mm * f, per_rad: w.per_rad * f })
+            .collect();
+        let task = match before.take() {
+            Some(task) => task.weighted(&weights),
+            None => Calibration::new(dataset, start.model, start.frames, &parameters, &priors, &weights),
+        };
+        let estimate = solver.solve(&task, &x, 0);
+        let moved: f64 = estimate
+            .x
+            .iter()
+            .zip(&x)
+            .zip(&priors)
+            .map(|((a, b), p)| ((a - b) / p.sigma).abs())
+            .fold(0.0, f64::max);
+        x = estimate.x;
+        (model, frames) = task.apply(&x);
+        let errors = task.errors_mm(&x);
+        let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
+        // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
+        let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
+        let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
+        scaled = sizes.iter().map(|s| s / spread).collect();
+        sigma = (sigma * spread).max(SMALLEST_SIGMA_MM);
+        for (f, s) in factor.iter_mut().zip(&scaled) {
+            *f = 1.0 / (1.0 + (s / CAUCHY).powi(2)).sqrt();
+        }
+        before = Some(task);
+        if moved < 1e-3 {
+            break;
+        }
+    }
+    let mut rows: Vec<(usize, f64)> =
+        scaled.iter().copied().enumerate().filter(|(_, s)| !(*s <= OUTLIER_CUT)).collect();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    if rows.len() as f64 > OUTLIER_SHARE * n as f64 {
+        return Outliers { too_many: rows.len(), rows: Vec::new() };
+    }
+    Outliers { rows, too_many: 0 }
+}
+
+const ROBUST_ROUNDS: usize = 12;
+/// Tuning constant of the Cauchy weight: 95 % efficiency on normal errors.
+const CAUCHY: f64 = 2.385;
+
+/// Errors of a fit on rows of its own task's data set or on others.
+pub fn errors_on(observed: &Observed, model: &Model, frames: &Frames) -> Vec<f64> {
+    let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; observed.dataset.rows.len()];
+    Calibration::new(&observed.dataset, model, frames, &[], &[], &weights).errors_mm(&[])
+}
+
+/// Summary of [`errors_on`].
+pub fn summary_on(observed: &Observed, model: &Model, frames: &Frames) -> ErrorSummary {
+    ErrorSummary::of(errors_on(observed, model, frames))
+}
+
+impl Fitted {
+    /// Standard deviation of each parameter; the prior's where the covariance is missing.
+    pub fn sigmas(&self) -> Vec<f64> {
+        match self.estimate.sigmas() {
+            Some(sigmas) => sigmas,
+            None => self.priors.iter().map(|p| p.sigma).collect(),
+        }
+    }
+
+    /// What the data could tell of the parameters.
+    pub fn identifiability(&self) -> Option<Identifiability> {
+        let scale: Vec<f64> = self.priors.iter().map(|p| p.sigma).collect();
+        identifiability(&self.task, &self.estimate.x, &scale)
+    }
+
+    /// How the solver ended.
+    pub fn termination(&self) -> Termination {
+        self.estimate.termination
+    }
+
+    /// The story of the last round.
+    pub fn trace(&self) -> &[Iteration] {
+        &self.estimate.trace
+    }
+}

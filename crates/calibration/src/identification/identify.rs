@@ -1,0 +1,518 @@
+//! The whole identification of one data set: sharpen, set outliers aside, split, fit, judge.
+
+use thiserror::Error;
+
+use rayon::prelude::*;
+
+use crate::identification::benefit::{Benefit, benefit, lack};
+use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::fit::{
+    Fitted, Observed, Outliers, Start, arm_parameters, errors_on, fit, frame_parameters, outliers, summary_on,
+};
+use crate::identification::identifiability::Identifiability;
+use crate::identification::rounding::{
+    AngleCovariance, NotSharpened, Sharpening, logged_covariance, sharpen,
+};
+use crate::identification::solver::{Family, Solver};
+use crate::identification::start::different_poses;
+use crate::identification::tolerance::Tolerance;
+use crate::identification::verdict::Hearing;
+use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split::{self, Split};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_arm::region::Region;
+use truegrind_estimation::estimate::Termination;
+use truegrind_estimation::problem::Problem;
+use truegrind_math::statistics::{ErrorSummary, largest, median};
+
+/// How to identify.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Priors.
+    pub tolerance: Tolerance,
+    /// Method.
+    pub solver: &'static Solver,
+    /// Share of rows held out to state errors.
+    pub held_out: f64,
+    /// Seed of the split.
+    pub seed: u64,
+    /// Whether rounded angles may be sharpened by the read-out.
+    pub sharpen: bool,
+    /// Largest held-out RMSE with which the fit passes (mm).
+    pub limit_rmse_mm: Option<f64>,
+    /// Largest held-out error with which the fit passes (mm).
+    pub limit_max_mm: Option<f64>,
+    /// Frames that were measured by other means; then raw errors exist.
+    pub stated_frames: Option<Frames>,
+}
+
+/// Why nothing could be fitted.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum IdentifyError {
+    /// Fewer scalar readings than parameters.
+    #[error(
+        "{file}: {rows} rows at {poses} different poses of the arm give {scalars} readings that count after {held_out} are \
+         held out, for {parameters} parameters: measure at least {needed} poses (some hundred are usual)"
+    )]
+    TooFewRows {
+        /// File.
+        file: String,
+        /// Rows there are.
+        rows: usize,
+        /// Different poses among them: a reading taken again tells nothing new of the arm.
+        poses: usize,
+        /// Scalar readings left for the fit.
+        scalars: usize,
+        /// Rows held out.
+        held_out: usize,
+        /// Parameters.
+        parameters: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+    /// Frames alone leave an error that no arm has.
+    #[error(
+        "{file}: with the frames fitted, robot {robot} still misses the readings by {rmse_mm:.1} mm RMS; no arm is that far \
+         from its data sheet: check that --robot is the arm that was measured, that no two columns changed places, that \
+         lengths are mm and angles are degrees, and try --angles dh"
+    )]
+    WrongArm {
+        /// File.
+        file: String,
+        /// Robot.
+        robot: String,
+        /// RMS (mm).
+        rmse_mm: f64,
+    },
+}
+
+/// Everything that identification found.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// The estimated arm, fitted to all rows that were not set aside.
+    pub estimated: Estimated,
+    /// What it promises programs; absent for methods that make no model.
+    pub benefit: Option<Benefit>,
+    /// The fit behind it.
+    pub geometry: Fitted,
+    /// The fit of the frames alone, on all rows.
+    pub registered: Fitted,
+    /// The fit of geometry on the rows that were not held out, which the held-out errors belong to.
+    pub training: Fitted,
+    /// Errors with the user's stated frames; absent without.
+    pub raw: Option<ErrorSummary>,
+    /// What the data could tell.
+    pub identifiability: Option<Identifiability>,
+    /// What the read-out brought, or why it was not used.
+    pub sharpening: Result<Sharpening, NotSharpened>,
+    /// Rows set aside.
+    pub outliers: Outliers,
+    /// Data rows that were held out, with the error before (registered) and after (geometry) (mm).
+    pub held_out: Vec<(usize, f64, f64)>,
+    /// Names and values ± σ of everything that was free, of the measurement too.
+    pub parameters: Vec<EstimatedParameter>,
+}
+
+/// More than this with frames fitted is no tolerance but a mistake (mm).
+const WRONG_ARM_MM: f64 = 25.0;
+
+/// Identifies `nominal` (catalogue name `robot`) from `dataset`, starting from `frames`; `split` divides the rows
+/// that were not set aside, given their number.
+///
+/// # Errors
+/// [`IdentifyError`] when the data cannot carry a fit at all. A poor fit is no error: its verdict says so.
+pub fn identify(
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    frames: &Frames,
+    split: &dyn Fn(&Dataset) -> Split,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let start = Start { model: nominal, frames };
+    let (observed, sharpening) = observe(dataset, nominal, options.sharpen);
+    enough(&observed.dataset, nominal, options.held_out)?;
+    // Every method sees the same rows.
+    let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
+    let prepared = options.solver.prepared(nominal, dataset);
+    let nominal = &prepared;
+    let start = Start { model: nominal, frames };
+    let observed = if outliers.rows.is_empty() {
+        observed
+    } else {
+        let mut set_aside = vec![false; dataset.rows.len()];
+        outliers.rows.iter().for_each(|(i, _)| set_aside[*i] = true);
+        let kept: Vec<usize> = (0..dataset.rows.len()).filter(|&i| !set_aside[i]).collect();
+        observed.subset(&kept)
+    };
+    let Split { train, test } = split(&observed.dataset);
+    let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
+
+    let sensing = frame_parameters(&observed.dataset);
+    let everything = options.solver.parameters(nominal, &sensing);
+    let seed = options.seed;
+    // Stages on the training rows: errors. Literal forms move frames first, then links without priors.
+    let registered =
+        fit(&fitted_rows, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
+    let rmse_mm = summary_on(&fitted_rows, &registered.model, &registered.frames).rmse;
+    if !(rmse_mm < WRONG_ARM_MM) {
+        return Err(IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm });
+    }
+    let on = |fitted: &Fitted| StageErrors {
+        fitted: summary_on(&fitted_rows, &fitted.model, &fitted.frames),
+        held_out: summary_on(&held_rows, &fitted.model, &fitted.frames),
+    };
+    let geometry_of = |rows: &Observed, registered: &Fitted| {
+        if options.solver.literal {
+            literal(rows, nominal, &registered.frames, options.solver, seed)
+        } else {
+            let frames = if options.solver.wants_registered() { &registered.frames } else { frames };
+            let from = Start { model: nominal, frames };
+            fit(rows, from, &everything, &options.solver.tolerance(&options.tolerance), options.solver, seed)
+        }
+    };
+    let training = geometry_of(&fitted_rows, &registered);
+    let (registered_errors, geometry_errors) = (on(&registered), on(&training));
+    let held_out = test
+        .iter()
+        .zip(errors_on(&held_rows, &registered.model, &registered.frames))
+        .zip(errors_on(&held_rows, &training.model, &training.frames))
+        .map(|((&i, before), after)| (observed.dataset.rows[i].number, before, after))
+        .collect();
+    // The model itself: all rows.
+    let registered = fit(&observed, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
+    let geometry = geometry_of(&observed, &registered);
+    let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
+    let identifiability = geometry.identifiability();
+    let parameters = parameter_table(&geometry, nominal);
+    let estimated = Estimated {
+        robot: robot.to_owned(),
+        nominal: nominal.clone(),
+        model: geometry.model.clone(),
+        order: arm_of(&geometry),
+        covariance: arm_covariance(&geometry),
+        provenance: Provenance {
+            file: dataset.file.clone(),
+            sha256: dataset.sha256.clone(),
+            rows: observed.dataset.rows.len(),
+            set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
+            sensor: sensor_name(dataset.sensor).to_owned(),
+            method: options.solver.name.to_owned(),
+            seed: options.seed,
+            held_out: options.held_out,
+            sharpened: sharpening.is_ok(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        },
+        parameters: parameters
+            .iter()
+            .filter(|p| p.name.starts_with("link") || p.name.starts_with("effect"))
+            .cloned()
+            .collect(),
+        registered: registered_errors,
+        geometry: geometry_errors,
+        noise_floor_mm: noise_floor(&observed, &geometry),
+        verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
+        region: Region {
+            min_deg: [0.0; 6],
+            max_deg: [0.0; 6],
+            samples_deg: Vec::new(),
+            spacing_deg: 0.0,
+            sigma_mm: 0.0,
+        },
+        condition: mean_condition(dataset),
+    };
+    let mut estimated = with_region(estimated, &observed.dataset, &geometry);
+    let benefit = if options.solver.literal {
+        None
+    } else {
+        let lack = lack(&training, &held_rows);
+        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack)
+    };
+    let case = Case {
+        training: &training,
+        geometry: &geometry,
+        registered: &registered_errors,
+        after: &geometry_errors,
+        parameters: &parameters,
+        outliers: &outliers,
+        benefit: benefit.as_ref(),
+        sensor: dataset.sensor,
+    };
+    estimated.verdict = judge(&case, options);
+    Ok(Identification {
+        estimated,
+        benefit,
+        geometry,
+        registered,
+        training,
+        raw,
+        identifiability,
+        sharpening,
+        outliers,
+        held_out,
+        parameters,
+    })
+}
+
+impl Options {
+    /// Frames are always registered soundly, so that methods differ in geometry alone.
+    fn solver_for_frames(&self) -> &'static Solver {
+        &super::solver::SOLVERS[0]
+    }
+}
+
+/// Contract name of a sensor.
+pub fn sensor_name(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Cable => "cable",
+        Sensor::Position => "position",
+        Sensor::Pose => "pose",
+    }
+}
+
+/// Sharpens what can be sharpened.
+pub fn observe(
+    dataset: &Dataset,
+    nominal: &Model,
+    wanted: bool,
+) -> (Observed, Result<Sharpening, NotSharpened>) {
+    let mut rows = dataset.clone();
+    match if wanted { sharpen(&mut rows, nominal) } else { Err(NotSharpened::Nothing) } {
+        Ok((report, angles)) => {
+            (Observed { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
+        }
+        Err(why) => {
+            let angles = logged_covariance(dataset);
+            (Observed { dataset: rows, angles }, Err(why))
+        }
+    }
+}
+
+fn enough(dataset: &Dataset, nominal: &Model, held_out: f64) -> Result<(), IdentifyError> {
+    let parameters = arm_parameters(nominal).len() + frame_parameters(dataset).len();
+    let per = match dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let rows = dataset.rows.len();
+    let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - held_out)).ceil() as usize;
+    let poses = different_poses(dataset, 2 * needed);
+    let held = (poses as f64 * held_out).round() as usize;
+    let scalars = (poses - held.min(poses)) * per;
+    if scalars > parameters {
+        return Ok(());
+    }
+    Err(IdentifyError::TooFewRows {
+        file: dataset.file.clone(),
+        rows,
+        poses,
+        scalars,
+        held_out: held,
+        parameters,
+        needed,
+    })
+}
+
+/// The papers' protocol: frames from the frame-only fit, then 24 link parameters without priors or weights
+/// (ltlm-2024, with the outlet that it takes as known).
+fn literal(rows: &Observed, nominal: &Model, frames: &Frames, solver: &Solver, seed: u64) -> Fitted {
+    let parameters = link_parameters(nominal);
+    let weights = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; rows.dataset.rows.len()];
+    // Priors for what cannot do without: first covariances of filters, boxes of swarms. The others ignore them.
+    let priors = Tolerance::default().priors(&parameters, nominal);
+    let task = Calibration::new(&rows.dataset, nominal, frames, &parameters, &priors, &weights);
+    let estimate = solver.solve(&task, &vec![0.0; parameters.len()], seed);
+    let (model, frames) = task.apply(&estimate.x);
+    let evaluations = estimate.evaluations;
+    let freedom = (task.rows() as f64 - parameters.len() as f64).max(1.0);
+    let sigma_mm = (2.0 * task.row_cost(&estimate.x) / freedom).sqrt();
+    let rounds = vec![estimate.trace.clone()];
+    Fitted {
+        parameters,
+        priors,
+        estimate,
+        model,
+        frames,
+        sigma_mm,
+        sigma_rad: 1e-3,
+        task,
+        evaluations,
+        rounds,
+    }
+}
+
+pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<EstimatedParameter> {
+    let sigmas = fitted.sigmas();
+    fitted
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(k, parameter)| {
+            let prior = fitted.priors[k].sigma;
+            let nominal_value = match *parameter {
+                Parameter::Link { joint, coordinate } => nominal.links[joint].get(coordinate),
+                _ => 0.0,
+            };
+            let value = match *parameter {
+                Parameter::Link { joint, coordinate } => fitted.model.links[joint].get(coordinate),
+                Parameter::Effect { index, parameter } => {
+                    fitted.model.effects[index].parameters()[parameter].value
+                }
+                Parameter::Tool(axis) if axis < 3 => {
+                    fitted.frames.flange_from_target.translation.vector[axis]
+                }
+                Parameter::Base(axis) if axis < 3 => fitted.frames.base_from_sensor.translation.vector[axis],
+                Parameter::Tool(axis) => fitted.frames.flange_from_target.rotation.scaled_axis()[axis - 3],
+                Parameter::Base(axis) => fitted.frames.base_from_sensor.rotation.scaled_axis()[axis - 3],
+                Parameter::Outlet { anchor, axis } => fitted.frames.outlets_mm[anchor][axis],
+                Parameter::Zero { anchor } => fitted.frames.zeros_mm[anchor],
+                Parameter::Disturbance { index, parameter } => {
+                    fitted.frames.disturbances[index].values[parameter]
+                }
+            };
+            let unit = match *parameter {
+                Parameter::Effect { index, parameter } => {
+                    fitted.model.effects[index].parameters()[parameter].unit
+                }
+                Parameter::Disturbance { index, parameter } => {
+                    fitted.frames.disturbances[index].names()[parameter].1
+                }
+                _ => parameter.unit(),
+            };
+            EstimatedParameter {
+                name: parameter.to_string(),
+                unit: unit.to_owned(),
+                nominal: nominal_value,
+                value,
+                sigma: sigmas[k],
+                prior_sigma: prior.is_finite().then_some(prior),
+                determined: (1.0 - (sigmas[k] / prior).powi(2)).clamp(0.0, 1.0),
+            }
+        })
+        .collect()
+}
+
+pub(crate) fn arm_of(fitted: &Fitted) -> Vec<Parameter> {
+    fitted.parameters.iter().copied().filter(Parameter::is_of_arm).collect()
+}
+
+/// The block of the arm's parameters: marginal over the frames.
+pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
+    let places: Vec<usize> =
+        fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
+    let n = places.len();
+    match &fitted.estimate.covariance {
+        Some(c) => nalgebra::DMatrix::from_fn(n, n, |i, j| c[(places[i], places[j])]),
+        None => nalgebra::DMatrix::from_fn(n, n, |i, j| {
+            if i == j { fitted.priors[places[i]].sigma.powi(2) } else { 0.0 }
+        }),
+    }
+}
+
+/// What repeated poses scatter by (mm), or else what the rounding of angles alone leaves in a row; `None` where
+/// neither is known.
+fn noise_floor(observed: &Observed, fitted: &Fitted) -> Option<f64> {
+    if let Some(floor) = split::noise_floor(&observed.dataset) {
+        return Some(floor.sigma_mm);
+    }
+    let shares =
+        super::rounding::angle_shares(&observed.dataset, &fitted.model, &fitted.frames, &observed.angles);
+    let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
+    (mean > 0.0).then(|| mean.sqrt())
+}
+
+pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
+    let mean = |value: fn(&Condition) -> Option<f64>| {
+        let known: Vec<f64> = dataset.rows.iter().filter_map(|r| value(&r.condition)).collect();
+        median(&known)
+    };
+    Condition {
+        time_h: mean(|c| c.time_h),
+        temperature_c: mean(|c| c.temperature_c),
+        payload_kg: mean(|c| c.payload_kg),
+        ..Condition::default()
+    }
+}
+
+pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &Fitted) -> Estimated {
+    let joints: Vec<Joints> = dataset.rows.iter().map(|r| r.joints).collect();
+    let mut region = Region::of(&joints, 0.0);
+    let condition = estimated.condition;
+    let posed = estimated.model.under(&condition);
+    let target = fitted.frames.flange_from_target;
+    let sigmas: Vec<f64> = region
+        .samples_deg
+        .par_iter()
+        .map(|q| {
+            let q = Joints::from_fn(|i, _| q[i].to_radians());
+            let variance = estimated.position_covariance(&posed, &q, &target).trace();
+            if variance <= 0.0 { 0.0 } else { variance.sqrt() }
+        })
+        .collect();
+    region.sigma_mm = largest(sigmas);
+    estimated.region = region;
+    estimated
+}
+
+struct Case<'a> {
+    training: &'a Fitted,
+    geometry: &'a Fitted,
+    registered: &'a StageErrors,
+    after: &'a StageErrors,
+    parameters: &'a [EstimatedParameter],
+    outliers: &'a Outliers,
+    benefit: Option<&'a Benefit>,
+    sensor: Sensor,
+}
+
+fn judge(case: &Case<'_>, options: &Options) -> Verdict {
+    let mut hearing = Hearing::default();
+    for (fitted, rows) in [(case.training, "the rows of the split"), (case.geometry, "all rows")] {
+        let filtered =
+            options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
+        if fitted.termination().is_converged() {
+            hearing.tell(format!("on {rows} the fit {}", fitted.termination()));
+        } else if filtered {
+            hearing.tell(format!("on {rows} the filter took in every reading; it claims no minimum"));
+        } else {
+            hearing.fail(format!("on {rows} the fit did not converge: {}", fitted.termination()));
+        }
+    }
+    if options.solver.literal {
+        hearing.fail(format!(
+            "{} has no priors: what the data cannot see moved freely, so its parameters are a comparison and no model",
+            options.solver.name
+        ));
+    }
+    hearing.strange_links(case.parameters, &options.tolerance, 0.0);
+    if case.outliers.too_many > 0 {
+        hearing.tell(format!(
+            "{} rows lie beyond ten robust standard deviations, too many to be accidents: none was set aside",
+            case.outliers.too_many
+        ));
+    }
+    let (before, held) = (case.registered.held_out.rmse, case.after.held_out.rmse);
+    hearing.held_out(before, held);
+    if !options.solver.literal {
+        hearing.benefit(case.benefit, case.sensor);
+    }
+    for (name, limit, found) in
+        [("RMSE", options.limit_rmse_mm, held), ("maximum", options.limit_max_mm, case.after.held_out.max)]
+    {
+        let Some(limit) = limit else { continue };
+        hearing.limits_stated = true;
+        if found <= limit {
+            hearing.tell(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
+        } else {
+            hearing.fail(format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
+        }
+    }
+    if !hearing.limits_stated {
+        hearing.tell("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
+    }
+    hearing.verdict()
+}

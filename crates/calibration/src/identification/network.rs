@@ -1,0 +1,37 @@
+//! The network as part of an arm: a smooth correction whose centres are spread over the measured poses.
+
+use crate::measurement::dataset::Dataset;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::smooth::Smooth;
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::network::rbf::{Layout, Options};
+
+/// The arm with a correction that does nothing yet, its centres spread over the poses of `dataset`. Without poses the
+/// arm as it is. The layout is always the sound one: a model must end where its measurements end.
+pub fn with_network(model: &Model, dataset: &Dataset, options: &Options) -> Model {
+    let wrists: Vec<[f64; 3]> = dataset
+        .rows
+        .iter()
+        .map(|row| {
+            let u = model.joint_map * row.joints;
+            [u[0], u[1], u[2]]
+        })
+        .collect();
+    let layout = Layout::of(&wrists, &Options { form: Default::default(), ..*options });
+    let mut out = model.clone();
+    if !layout.centres.is_empty() {
+        out.effects.push(Effect::SmoothCorrection(Smooth::still(layout.centres, layout.reach)));
+    }
+    out
+}
+
+/// The weights of the arm's last effect, where that is a network.
+pub fn network_parameters(model: &Model) -> Vec<Parameter> {
+    match model.effects.split_last() {
+        Some((effect @ Effect::SmoothCorrection(_), before)) => (0..effect.parameters().len())
+            .map(|parameter| Parameter::Effect { index: before.len(), parameter })
+            .collect(),
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,289 @@
+//! The methods that identification can use, by name: one line for each, as its paper prints it and as a numerical
+//! analyst would set it up.
+//!
+//! Every method minimises the cost of a [`Problem`] or filters its rows. What a method costs is counted in rows
+//! evaluated, with and without derivatives ([`Estimate::evaluations`]).
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::identification::fit::arm_parameters;
+use crate::identification::network::{network_parameters, with_network};
+use crate::identification::tolerance::{SMOOTH_SIGMA_RAD, Tolerance};
+use crate::measurement::dataset::Dataset;
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::estimate::Estimate;
+use truegrind_estimation::filter::{ekf, pf, rls, ukf, ukf_vslm};
+use truegrind_estimation::least_squares::{gauss_newton, lm, ltlm, sslm, vslm};
+use truegrind_estimation::network::rbf;
+use truegrind_estimation::problem::Problem;
+use truegrind_estimation::swarm::{bas, de, pso, qibas, sca};
+
+/// What a method is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// All rows at once, with derivatives; has tests of convergence.
+    LeastSquares,
+    /// One observation at a time; ends when all were taken in.
+    Filter,
+    /// The cost alone; ends when its budget is spent.
+    Swarm,
+    /// A smooth function with many weights.
+    Network,
+}
+
+/// What a network is fitted together with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// Links and frames: what they cannot explain is left to the network.
+    WithLinks,
+    /// Nothing: links stay nominal, frames as registered.
+    Alone,
+}
+
+/// A method of identification.
+#[derive(Debug, Clone, Copy)]
+pub struct Solver {
+    /// Name on the command line and in reports.
+    pub name: &'static str,
+    /// One line for a list.
+    pub about: &'static str,
+    /// Whether the method is a paper's literal form: without priors, so that what the data cannot see moves freely.
+    /// Such a fit is a comparison, never a model.
+    pub literal: bool,
+    /// What kind of method it is.
+    pub family: Family,
+    /// Whether the arm gets a network, and with what.
+    pub network: Option<Scope>,
+    run: fn(&dyn Problem, &[f64], u64) -> Estimate,
+    configure: fn(&toml::Table) -> Result<Configured, String>,
+}
+
+/// A method's call: problem, start, seed.
+pub type Run = Box<dyn Fn(&dyn Problem, &[f64], u64) -> Estimate + Send + Sync>;
+
+/// A method with settings of its own.
+pub struct Configured {
+    /// The call.
+    pub run: Run,
+    /// All settings, those that were not changed too.
+    pub settings: toml::Table,
+}
+
+impl Solver {
+    /// Minimises the cost of `problem` from `start`.
+    pub fn solve(&self, problem: &dyn Problem, start: &[f64], seed: u64) -> Estimate {
+        (self.run)(problem, start, seed)
+    }
+
+    /// The method with `changes` to its settings (the fields of its `Options`, in kebab-case).
+    ///
+    /// # Errors
+    /// What the settings are, where a name or a type is wrong.
+    pub fn configured(&self, changes: &toml::Table) -> Result<Configured, String> {
+        (self.configure)(changes).map_err(|why| format!("settings of {}: {why}", self.name))
+    }
+
+    /// The arm that the method fits: with a network that does nothing yet, where the method has one.
+    pub fn prepared(&self, nominal: &Model, dataset: &Dataset) -> Model {
+        match self.network {
+            Some(_) => with_network(nominal, dataset, &network_options()),
+            None => nominal.clone(),
+        }
+    }
+
+    /// Whether frames must be registered before the method begins: it explores the whole of its priors, or leaves
+    /// frames alone.
+    pub fn wants_registered(&self) -> bool {
+        matches!(self.family, Family::Filter | Family::Swarm) || self.network == Some(Scope::Alone)
+    }
+
+    /// What the method moves: everything of the arm and of the measurement, or a network that stands alone.
+    pub fn parameters(&self, prepared: &Model, sensing: &[Parameter]) -> Vec<Parameter> {
+        match self.network {
+            Some(Scope::Alone) => network_parameters(prepared),
+            _ => arm_parameters(prepared).into_iter().chain(sensing.iter().copied()).collect(),
+        }
+    }
+
+    /// Priors for the method: where frames are registered beforehand they lie within what links of ordinary tolerance
+    /// can shift them by (1 mm and 0.3° at some 0.7 m).
+    pub fn tolerance(&self, tolerance: &Tolerance) -> Tolerance {
+        if self.wants_registered() {
+            Tolerance { target_mm: 10.0, target_rad: 0.02, frame_mm: 10.0, frame_rad: 0.02, ..*tolerance }
+        } else {
+            *tolerance
+        }
+    }
+}
+
+/// How the network of a method is laid out.
+pub fn network_options() -> rbf::Options {
+    rbf::Options { weight_sigma: SMOOTH_SIGMA_RAD, ..rbf::Options::default() }
+}
+
+/// `base` with the fields of `changes` in place of its own, tables inside tables too.
+fn changed<T: Serialize + DeserializeOwned>(
+    base: &T,
+    changes: &toml::Table,
+) -> Result<(T, toml::Table), String> {
+    let mut table = toml::Table::try_from(base).map_err(|e| e.to_string())?;
+    merge(&mut table, changes);
+    let options = table.clone().try_into::<T>().map_err(|e| e.message().replace('\n', " "))?;
+    Ok((options, table))
+}
+
+fn merge(into: &mut toml::Table, changes: &toml::Table) {
+    for (key, value) in changes {
+        match (into.get_mut(key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(changes)) => merge(inner, changes),
+            _ => {
+                into.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// A line of the list: its module gives `Options` and `solve`.
+macro_rules! method {
+    ($name:literal, $about:literal, $family:ident, $literal:literal, $network:expr, $module:ident, $options:expr) => {
+        Solver {
+            name: $name,
+            about: $about,
+            literal: $literal,
+            family: Family::$family,
+            network: $network,
+            run: |problem, start, seed| {
+                let mut options: $module::Options = $options;
+                options.seed = seed;
+                $module::solve(problem, start, &options)
+            },
+            configure: |changes| {
+                let base: $module::Options = $options;
+                let (options, settings) = changed(&base, changes)?;
+                let run: Run = Box::new(move |problem, start, seed| {
+                    let mut options = Clone::clone(&options);
+                    options.seed = seed;
+                    $module::solve(problem, start, &options)
+                });
+                Ok(Configured { run, settings })
+            },
+        }
+    };
+    ($name:literal, $about:literal, $family:ident, sound $module:ident) => {
+        method!($name, $about, $family, false, None, $module, $module::Options::default())
+    };
+    ($name:literal, $about:literal, $family:ident, printed $module:ident) => {
+        method!($name, $about, $family, true, None, $module, $module::Options::as_printed())
+    };
+}
+
+/// The methods that are compared by default, the default one first.
+pub const SOLVERS: &[Solver] = &[
+    method!("lm", "Levenberg–Marquardt, scaled, gain-ratio damping, with priors", LeastSquares, sound lm),
+    method!("ltlm", "logistic-tent chaotic LM on the same scaled steps, with priors", LeastSquares, sound ltlm),
+    method!("lm-as-printed", "LM of ltlm-2024 eq. 10: fixed mu = 5, unscaled, no priors", LeastSquares, printed lm),
+    method!(
+        "ltlm-as-printed",
+        "LTLM of ltlm-2024 Algorithm I: fixed mu = 5, unscaled, no priors",
+        LeastSquares,
+        printed ltlm
+    ),
+];
+
+/// All others.
+pub const FURTHER: &[Solver] = &[
+    method!("sslm", "LM with a step size found by line search", LeastSquares, sound sslm),
+    method!("vslm", "variable step-size LM that grows back to whole steps", LeastSquares, sound vslm),
+    method!("least-squares", "Gauss–Newton with halved steps, with priors", LeastSquares, sound gauss_newton),
+    method!("ekf", "extended Kalman filter, one sweep, each row counted once", Filter, sound ekf),
+    method!("ukf", "scaled unscented Kalman filter with Q and R", Filter, sound ukf),
+    method!("ukf-vslm", "scaled UKF, then step-size LM until it converges", LeastSquares, sound ukf_vslm),
+    method!("pf", "particle filter, tempered, with a kernel that moves its particles", Filter, sound pf),
+    method!(
+        "rls",
+        "recursive least squares in square-root form, linearised three times",
+        Filter,
+        false,
+        None,
+        rls,
+        rls::Options { linearisations: 3, ..rls::Options::default() }
+    ),
+    method!("pso", "particle swarm with constriction", Swarm, sound pso),
+    method!("de", "differential evolution, current-to-best", Swarm, sound de),
+    method!("sca", "sine cosine algorithm that keeps what is better", Swarm, sound sca),
+    method!("bas", "beetle antennae search that keeps what is better", Swarm, sound bas),
+    method!("qibas", "beetle antennae search with quadratic interpolation", Swarm, sound qibas),
+    Solver {
+        name: "rbf",
+        about: "LM on links and a radial basis function network together, with priors",
+        literal: false,
+        family: Family::Network,
+        network: Some(Scope::WithLinks),
+        run: |problem, start, seed| lm::solve(problem, start, &lm::Options { seed, ..Default::default() }),
+        configure: |changes| {
+            let (options, settings) = changed(&lm::Options::default(), changes)?;
+            let run: Run = Box::new(move |problem, start, seed| {
+                lm::solve(problem, start, &lm::Options { seed, ..options })
+            });
+            Ok(Configured { run, settings })
+        },
+    },
+    method!(
+        "rbf-alone",
+        "radial basis function network on registered frames, links nominal (ukf-vslm-2023 M5)",
+        Network,
+        false,
+        Some(Scope::Alone),
+        rbf,
+        network_options()
+    ),
+    method!("sslm-as-printed", "ukf-vslm-2023 eq. 15, step size decaying per iteration", LeastSquares, printed sslm),
+    method!(
+        "vslm-as-printed",
+        "ukf-vslm-2023 Algorithm 1 lines 16 to 21: step size decaying per sample",
+        LeastSquares,
+        printed vslm
+    ),
+    method!(
+        "least-squares-as-printed",
+        "rls-2025 eq. 9: one step, no priors",
+        LeastSquares,
+        printed gauss_newton
+    ),
+    method!("ekf-as-printed", "EKF that sweeps the same rows twelve times as if new", Filter, printed ekf),
+    method!("ukf-as-printed", "ukf-vslm-2023 eq. 8 to 12 to the letter", Filter, printed ukf),
+    method!("ukf-vslm-as-printed", "ukf-vslm-2023 Algorithm 1 to the letter", LeastSquares, printed ukf_vslm),
+    method!("pf-as-printed", "particle filter of 1993, particles never move", Filter, printed pf),
+    method!(
+        "rls-as-printed",
+        "rls-2025 eq. 14: P itself, begun with the first 30 observations",
+        Filter,
+        true,
+        None,
+        rls,
+        rls::Options::as_printed(30)
+    ),
+    method!("pso-as-printed", "particle swarm of 1998", Swarm, printed pso),
+    method!("de-as-printed", "differential evolution rand/1/bin of 1997", Swarm, printed de),
+    method!("sca-as-printed", "sine cosine algorithm of 2016", Swarm, printed sca),
+    method!("bas-as-printed", "beetle antennae search of 2017", Swarm, printed bas),
+    method!("qibas-as-printed", "the same with quadratic interpolation", Swarm, printed qibas),
+];
+
+/// Every method there is, the default one first.
+pub fn all() -> impl Iterator<Item = &'static Solver> {
+    SOLVERS.iter().chain(FURTHER)
+}
+
+/// The solver of that name.
+///
+/// # Errors
+/// A sentence that lists the names that exist.
+pub fn by_name(name: &str) -> Result<&'static Solver, String> {
+    all().find(|s| s.name == name).ok_or_else(|| {
+        let names: Vec<&str> = all().map(|s| s.name).collect();
+        format!("unknown method \"{name}\"; the methods are {}", names.join(", "))
+    })
+}

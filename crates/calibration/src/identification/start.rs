@@ -1,0 +1,129 @@
+//! Where a fit starts: sensor frame, outlet and touched point from closed forms under the nominal arm.
+
+use std::collections::HashSet;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use thiserror::Error;
+
+use crate::identification::calibration::Frames;
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::registration;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Model;
+use truegrind_math::se3::Pose;
+
+/// The rows do not place the sensor.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "{file}: the {rows} rows, at {poses} different poses of the arm, do not tell where the {what} is: measure at least \
+     {needed} poses that are not all in one line and turn the wrist between them"
+)]
+pub struct NoStart {
+    /// File.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// Different poses among them.
+    pub poses: usize,
+    /// Outlet or frame.
+    pub what: &'static str,
+    /// Least number of poses.
+    pub needed: usize,
+}
+
+impl NoStart {
+    pub(super) fn of(dataset: &Dataset, what: &'static str, needed: usize) -> Self {
+        let poses = different_poses(dataset, usize::MAX);
+        Self { file: dataset.file.clone(), rows: dataset.rows.len(), poses, what, needed }
+    }
+}
+
+/// Starting frames for a data set, best first: cable lengths seen from one side may leave a second outlet.
+///
+/// # Errors
+/// [`NoStart`] when the rows do not determine them.
+pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart> {
+    let none = |what, needed| NoStart::of(dataset, what, needed);
+    let (what, needed) = match dataset.sensor {
+        Sensor::Cable => ("cable outlet", 4),
+        Sensor::Position => ("sensor frame", 4),
+        Sensor::Pose => ("sensor frame", 3),
+    };
+    if different_poses(dataset, needed) < needed {
+        return Err(none(what, needed));
+    }
+    let posed = nominal.under(&Condition::default());
+    let flanges: Vec<Pose> = dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect();
+    let mut frames = Frames::at_origin(dataset.anchors());
+    match dataset.sensor {
+        Sensor::Cable => {
+            let mut rival: Option<Frames> = None;
+            for anchor in 0..dataset.anchors() {
+                let (mut hooks, mut lengths) = (Vec::new(), Vec::new());
+                for (row, flange) in dataset.rows.iter().zip(&flanges).filter(|(r, _)| r.anchor == anchor) {
+                    if let Reading::Cable(length) = row.reading {
+                        hooks.push(flange.translation.vector);
+                        lengths.push(length);
+                    }
+                }
+                let found = registration::cable(&hooks, &lengths).ok_or_else(|| none("cable outlet", 4))?;
+                frames.outlets_mm[anchor] = found.outlet_mm;
+                frames.zeros_mm[anchor] = found.zero_mm;
+                if let Some((outlet, zero)) = found.rival {
+                    let other = rival.get_or_insert_with(|| frames.clone());
+                    other.outlets_mm[anchor] = outlet;
+                    other.zeros_mm[anchor] = zero;
+                } else if let Some(other) = &mut rival {
+                    other.outlets_mm[anchor] = found.outlet_mm;
+                    other.zeros_mm[anchor] = found.zero_mm;
+                }
+            }
+            Ok(std::iter::once(frames).chain(rival).collect())
+        }
+        Sensor::Position => {
+            let measured: Vec<Vector3<f64>> = positions(dataset);
+            let found =
+                registration::touching_point(&flanges, &measured).ok_or_else(|| none("sensor frame", 4))?;
+            frames.base_from_sensor = found.base_from_sensor;
+            frames.flange_from_target =
+                Pose::from_parts(found.on_flange_mm.into(), UnitQuaternion::identity());
+            Ok(vec![frames])
+        }
+        Sensor::Pose => {
+            let measured: Vec<Pose> = dataset
+                .rows
+                .iter()
+                .filter_map(|r| if let Reading::Pose(p) = r.reading { Some(p) } else { None })
+                .collect();
+            let found = registration::poses(&flanges, &measured).ok_or_else(|| none("sensor frame", 3))?;
+            frames.base_from_sensor = found.base_from_sensor;
+            frames.flange_from_target = found.flange_from_target;
+            Ok(vec![frames])
+        }
+    }
+}
+
+/// How many rows differ in their joint angles or their cable; counted up to `enough`.
+pub fn different_poses(dataset: &Dataset, enough: usize) -> usize {
+    let mut met = HashSet::new();
+    for row in &dataset.rows {
+        let angles: [i64; 6] = std::array::from_fn(|j| (row.joints[j] * 1e6).round() as i64);
+        met.insert((angles, row.anchor));
+        if met.len() >= enough {
+            break;
+        }
+    }
+    met.len()
+}
+
+fn positions(dataset: &Dataset) -> Vec<Vector3<f64>> {
+    dataset
+        .rows
+        .iter()
+        .map(|r| match r.reading {
+            Reading::Position(p) => p,
+            Reading::Pose(p) => p.translation.vector,
+            Reading::Cable(_) => Vector3::zeros(),
+        })
+        .collect()
+}

@@ -1,0 +1,76 @@
+//! What the angles of a file mean: the controller's own, or DH angles with the links' offsets in them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::dataset::Dataset;
+use truegrind_arm::model::{Joints, Model};
+
+/// The meaning of `q1` to `q6` in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AngleConvention {
+    /// The controller's angles, as its display shows them.
+    #[default]
+    Logged,
+    /// The angles θ of the DH table: joint map and theta offsets are in them already.
+    Dh,
+}
+
+impl AngleConvention {
+    /// The other one.
+    pub fn other(self) -> Self {
+        match self {
+            AngleConvention::Logged => AngleConvention::Dh,
+            AngleConvention::Dh => AngleConvention::Logged,
+        }
+    }
+
+    /// The controller's angles (rad) for angles of the file (rad): the inverse of `θ = joint_map · q + offset`.
+    /// `None` when the arm's joint map cannot be inverted.
+    pub fn controller_angles(self, model: &Model, file: &Joints) -> Option<Joints> {
+        match self {
+            AngleConvention::Logged => Some(*file),
+            AngleConvention::Dh => {
+                let offsets = Joints::from_fn(|j, _| model.links[j].theta_rad);
+                model.joint_map.try_inverse().map(|inverse| inverse * (file - offsets))
+            }
+        }
+    }
+
+    /// The data set with the controller's angles in place of the file's, and a note where they differ.
+    /// `None` when the arm's joint map cannot be inverted.
+    pub fn apply(self, data: &Dataset, model: &Model) -> Option<Dataset> {
+        let mut out = data.clone();
+        for row in &mut out.rows {
+            row.joints = self.controller_angles(model, &row.joints)?;
+        }
+        if self == AngleConvention::Dh {
+            out.notes.push("the angles are DH angles: joint map and theta offsets were taken out".into());
+        }
+        Some(out)
+    }
+}
+
+impl fmt::Display for AngleConvention {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            AngleConvention::Logged => "logged",
+            AngleConvention::Dh => "dh",
+        })
+    }
+}
+
+impl FromStr for AngleConvention {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "logged" => Ok(AngleConvention::Logged),
+            "dh" => Ok(AngleConvention::Dh),
+            other => Err(format!("found angle convention \"{other}\", expected logged or dh")),
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Rows of a table as measured rows: every cell checked, units converted.
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+
+use super::Options;
+use super::cell::{Cell, Line, Table};
+use super::columns::Columns;
+use super::error::{ImportError, Place};
+use super::rounding;
+use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+
+/// Largest difference of a quaternion's length from 1: four decimals still pass.
+const QUATERNION_TOLERANCE: f64 = 1e-3;
+
+pub(super) fn dataset(
+    file: &str,
+    table: &Table,
+    columns: &Columns,
+    options: &Options,
+) -> Result<Dataset, ImportError> {
+    let mut notes = columns.notes.clone();
+    let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
+    let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
+    let lines = &table.rows[columns.header + 1..];
+    for (number, line) in lines.iter().enumerate() {
+        let extra = line.cells.iter().skip(columns.width).filter(|c| !c.is_empty()).count();
+        if extra > 0 && table.sheet.is_none() {
+            let place = Place { row: Some(line.number), ..reader.place() };
+            let expected = columns.width;
+            return Err(ImportError::LongRow { place, found: line.cells.len(), expected });
+        }
+        let headed = |i: usize| reader.header.cells.get(i).is_some_and(|c| !c.is_empty());
+        if line.cells.iter().enumerate().all(|(i, c)| c.is_empty() || !headed(i)) {
+            blank += 1;
+            continue;
+        }
+        let widest = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
+        unnamed = unnamed.max((0..widest).filter(|&i| !headed(i) && !line.cells[i].is_empty()).count());
+        as_text += line.cells.iter().filter(|c| matches!(c, Cell::Number { as_text: true, .. })).count();
+        rows.push(reader.row(number, line, columns)?);
+    }
+    if rows.is_empty() {
+        return Err(ImportError::Empty { place: reader.place() });
+    }
+    let headed = reader.header.cells.iter().filter(|c| !c.is_empty()).count();
+    let width = reader.header.cells.len().max(table.width);
+    let nameless = (width - headed).max(unnamed) + table.blank_columns;
+    if nameless > 0 {
+        notes.push(format!("{nameless} column(s) without a header skipped"));
+    }
+    if blank > 0 {
+        notes.push(format!("{blank} blank row(s) skipped"));
+    }
+    if as_text > 0 {
+        notes.push(format!("{as_text} number(s) stored as text were read as numbers"));
+    }
+    if let Some(note) = number_anchors(&mut rows) {
+        notes.push(note);
+    }
+    if !options.allow_odd_units {
+        check_units(&reader, &rows, columns.sensor)?;
+    }
+    let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>());
+    let angle_step_rad = rounding::step(degrees).map(f64::to_radians);
+    let readouts: Vec<f64> = rows.iter().filter_map(|r| r.readout_mm).flat_map(|v| [v.x, v.y, v.z]).collect();
+    let readings: Vec<f64> = rows
+        .iter()
+        .flat_map(|r| match r.reading {
+            Reading::Cable(l) => vec![l],
+            Reading::Position(v) => vec![v.x, v.y, v.z],
+            Reading::Pose(p) => p.translation.vector.as_slice().to_vec(),
+        })
+        .collect();
+    Ok(Dataset {
+        file: file.into(),
+        sheet: table.sheet.clone(),
+        sha256: String::new(),
+        sensor: columns.sensor,
+        rows,
+        other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
+        notes,
+        angle_step_rad,
+        readout_step_mm: rounding::step(readouts.iter().copied()),
+        reading_step_mm: rounding::step(readings.iter().copied()),
+    })
+}
+
+/// No joint angle is larger: ten turns.
+const LARGEST_DEG: f64 = 3600.0;
+/// No reading is larger: a kilometre.
+const LARGEST_MM: f64 = 1e6;
+const LENGTH: &str = "a length in mm, below a kilometre";
+/// No arm carries more.
+const LARGEST_KG: f64 = 1e4;
+
+struct Reader<'a> {
+    file: &'a str,
+    sheet: Option<&'a str>,
+    header: &'a Line,
+}
+
+impl Reader<'_> {
+    fn place(&self) -> Place {
+        Place { sheet: self.sheet.map(Into::into), ..Place::file(self.file) }
+    }
+
+    fn cell_place(&self, line: &Line, column: usize) -> Place {
+        let column = self.header.cells.get(column).map(|c| c.to_string().into());
+        Place { row: Some(line.number), column, ..self.place() }
+    }
+
+    fn wrong(&self, line: &Line, column: usize, expected: &'static str, remedy: &'static str) -> ImportError {
+        let found = match line.cells.get(column) {
+            None | Some(Cell::Empty) => "an empty cell".into(),
+            Some(cell) => format!("`{cell}`").into(),
+        };
+        ImportError::Cell { place: self.cell_place(line, column), found, expected, remedy }
+    }
+
+    /// A finite number that must be there.
+    fn number(&self, line: &Line, column: usize) -> Result<f64, ImportError> {
+        const EXPECTED: &str = "a finite number";
+        match line.cells.get(column) {
+            Some(Cell::Number { value, .. }) if value.is_finite() => Ok(*value),
+            Some(Cell::Text(text)) if text.contains(',') => {
+                let remedy =
+                    "write it with a decimal point (a decimal comma needs columns separated by semicolons)";
+                Err(self.wrong(line, column, EXPECTED, remedy))
+            }
+            _ => Err(self.wrong(line, column, EXPECTED, "correct the cell, or delete the row")),
+        }
+    }
+
+    /// A number that no measurement exceeds.
+    fn bounded(
+        &self,
+        line: &Line,
+        column: usize,
+        largest: f64,
+        expected: &'static str,
+    ) -> Result<f64, ImportError> {
+        let value = self.number(line, column)?;
+        if value.abs() <= largest {
+            return Ok(value);
+        }
+        Err(self.wrong(line, column, expected, "correct the cell, or delete the row"))
+    }
+
+    /// A number that may be absent.
+    fn optional(&self, line: &Line, column: Option<usize>) -> Result<Option<f64>, ImportError> {
+        match column {
+            Some(i) if !line.cells.get(i).is_none_or(Cell::is_empty) => self.number(line, i).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    fn row(&self, number: usize, line: &Line, columns: &Columns) -> Result<Row, ImportError> {
+        let mut joints = Joints::zeros();
+        for (q, &column) in joints.iter_mut().zip(&columns.joints) {
+            let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
+            *q = angle.to_radians();
+        }
+        let values: Vec<f64> = columns
+            .reading
+            .iter()
+            .map(|&c| self.bounded(line, c, LARGEST_MM, LENGTH))
+            .collect::<Result<_, _>>()?;
+        let reading = match (columns.sensor, values.as_slice()) {
+            (Sensor::Cable, [length]) => Reading::Cable(*length),
+            (_, [x, y, z]) => Reading::Position(Vector3::new(*x, *y, *z)),
+            (_, [x, y, z, w, i, j, k]) => {
+                let rotation = self.quaternion(line, columns, Quaternion::new(*w, *i, *j, *k))?;
+                Reading::Pose(Pose::from_parts(Translation3::new(*x, *y, *z), rotation))
+            }
+            // The columns were chosen for the sensor: one, three or seven.
+            _ => return Err(ImportError::Empty { place: self.place() }),
+        };
+        let readout_mm = match columns.readout {
+            Some(c) if c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty)) => {
+                Some(Vector3::new(
+                    self.bounded(line, c[0], LARGEST_MM, LENGTH)?,
+                    self.bounded(line, c[1], LARGEST_MM, LENGTH)?,
+                    self.bounded(line, c[2], LARGEST_MM, LENGTH)?,
+                ))
+            }
+            _ => None,
+        };
+        let mut approach = [0i8; 6];
+        for (side, column) in approach.iter_mut().zip(columns.approach) {
+            *side = match self.optional(line, column)? {
+                Some(-1.0) => -1,
+                Some(1.0) => 1,
+                None | Some(0.0) => 0,
+                Some(_) => {
+                    let remedy = "the sign says from which side the joint came, 0 where that is not known";
+                    return Err(self.wrong(line, column.unwrap_or_default(), "-1, 0 or 1", remedy));
+                }
+            };
+        }
+        let payload_kg = self.optional(line, columns.payload)?;
+        if payload_kg.is_some_and(|kg| !(0.0..=LARGEST_KG).contains(&kg)) {
+            let remedy = "state what hangs on the flange, or leave the cell empty";
+            return Err(self.wrong(
+                line,
+                columns.payload.unwrap_or_default(),
+                "a mass in kg, 0 to 10,000",
+                remedy,
+            ));
+        }
+        let condition = Condition {
+            time_h: self.optional(line, columns.time)?,
+            temperature_c: self.optional(line, columns.temperature)?,
+            payload_kg,
+            approach,
+            ..Condition::default()
+        };
+        let anchor = match columns.anchor {
+            None => 0,
+            Some(column) => {
+                let value = self.number(line, column)?;
+                if value < 0.0 || value.fract() != 0.0 || value > 1e6 {
+                    let remedy = "number the cable outlets 1, 2, 3, …";
+                    return Err(self.wrong(line, column, "the number of a cable outlet", remedy));
+                }
+                value as usize
+            }
+        };
+        let text = |i: usize| line.cells.get(i).map(Cell::to_string).unwrap_or_default();
+        Ok(Row {
+            number,
+            line: line.number,
+            joints,
+            reading,
+            readout_mm,
+            condition,
+            anchor,
+            session: columns.session.map(text).filter(|s| !s.is_empty()),
+            other: columns.other.iter().map(|(_, i)| text(*i)).collect(),
+        })
+    }
+
+    fn quaternion(
+        &self,
+        line: &Line,
+        columns: &Columns,
+        q: Quaternion<f64>,
+    ) -> Result<UnitQuaternion<f64>, ImportError> {
+        if (q.norm() - 1.0).abs() <= QUATERNION_TOLERANCE {
+            return Ok(UnitQuaternion::from_quaternion(q));
+        }
+        let mut place = self.cell_place(line, columns.reading[3]);
+        place.column = Some("measured_qw to measured_qz".into());
+        Err(ImportError::Cell {
+            place,
+            found: format!("a quaternion of length {:.4} ({}, {}, {}, {})", q.norm(), q.w, q.i, q.j, q.k)
+                .into(),
+            expected: "a unit quaternion, scalar first",
+            remedy: "export unit quaternions; Euler angles or a rotation vector have to be converted first",
+        })
+    }
+}
+
+/// Outlets count from 0 inside, whatever numbers the file uses for them.
+fn number_anchors(rows: &mut [Row]) -> Option<String> {
+    let mut labels: Vec<usize> = rows.iter().map(|r| r.anchor).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    for row in rows.iter_mut() {
+        row.anchor = labels.binary_search(&row.anchor).unwrap_or_default();
+    }
+    let plain = labels.iter().enumerate().all(|(i, l)| *l == i)
+        || labels.iter().enumerate().all(|(i, l)| *l == i + 1);
+    (!plain).then(|| {
+        let names: Vec<String> = labels.iter().map(usize::to_string).collect();
+        format!("cable outlets {} are numbered 1 to {}", names.join(", "), labels.len())
+    })
+}
+
+/// Units that show without a model of the arm. What only the arm can tell is the business of
+/// `plausibility`.
+fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), ImportError> {
+    let units = |columns: &str, found: String, expected, remedy| {
+        let place = Place { column: Some(columns.into()), ..reader.place() };
+        Err(ImportError::Units { place, found: found.into(), expected, remedy })
+    };
+    let largest_deg = rows.iter().map(|r| r.joints.amax().to_degrees()).fold(0.0, f64::max);
+    let spread_deg = (0..6)
+        .map(|j| {
+            let angles = || rows.iter().map(|r| r.joints[j].to_degrees());
+            angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min)
+        })
+        .fold(0.0, f64::max);
+    // Over a whole file no joint ever leaves ±2π "degrees", yet joints do move: nobody measures an arm so.
+    if rows.len() >= 3 && spread_deg > 0.05 && largest_deg <= 2.0 * std::f64::consts::PI + 1e-6 {
+        return units(
+            "q1 to q6",
+            format!("no angle exceeds {largest_deg:.3}: these look like radians"),
+            "degrees",
+            "convert the angles to degrees, or allow odd units if the arm really moved so little",
+        );
+    }
+    let Some(spread_mm) = spread(rows) else { return Ok(()) };
+    let columns = if sensor == Sensor::Cable { "L" } else { "measured_x to measured_z" };
+    // An arm whose joints turn by tens of degrees moves its flange by more than 5 mm.
+    if rows.len() >= 3 && spread_deg > 20.0 && spread_mm < 5.0 && magnitude(rows) < 20.0 {
+        return units(
+            columns,
+            format!(
+                "the readings span {spread_mm:.4} while joints turn by {spread_deg:.0}°: these look like metres"
+            ),
+            "millimetres",
+            "multiply the readings by 1000, or allow odd units if the sensor really saw so little",
+        );
+    }
+    let readout = |r: &Row| r.readout_mm;
+    let largest = rows.iter().filter_map(readout).map(|v| v.amax()).fold(0.0, f64::max);
+    if rows.iter().filter_map(readout).count() >= 3 && spread_deg > 20.0 && largest > 0.0 && largest < 10.0 {
+        return units(
+            "x, y, z",
+            format!(
+                "no coordinate of the controller's read-out exceeds {largest:.3}: these look like metres"
+            ),
+            "millimetres",
+            "multiply the read-out by 1000, or allow odd units if the read-out is right",
+        );
+    }
+    Ok(())
+}
+
+/// Largest range of any coordinate of the readings (mm).
+fn spread(rows: &[Row]) -> Option<f64> {
+    let mut low = [f64::MAX; 3];
+    let mut high = [f64::MIN; 3];
+    for row in rows {
+        let values = coordinates(&row.reading);
+        for k in 0..3 {
+            low[k] = low[k].min(values[k]);
+            high[k] = high[k].max(values[k]);
+        }
+    }
+    (0..3).map(|k| high[k] - low[k]).reduce(f64::max)
+}
+
+fn magnitude(rows: &[Row]) -> f64 {
+    rows.iter().map(|r| coordinates(&r.reading).amax()).fold(0.0, f64::max)
+}
+
+fn coordinates(reading: &Reading) -> Vector3<f64> {
+    match reading {
+        Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
+        Reading::Position(v) => *v,
+        Reading::Pose(p) => p.translation.vector,
+    }
+}

@@ -1,0 +1,348 @@
+//! Whether a file means what its format says: units, angle convention and quaternion order, judged by the arm itself.
+//!
+//! Method: the nominal arm is registered to the sensor (and to the controller's read-out, where there is one) under
+//! every combination of {degrees, radians} × {mm, m, inch, cm} × {logged, DH angles} × {scalar first, scalar last,
+//! inverted}. What remains is taken relative to how far the flange travels under that meaning, since in a wrong unit the
+//! arm may hardly move. A data sheet is good to some tenths of a percent, a wrong unit to tens: when another meaning of
+//! the file fits ten times better than the stated one, it is named.
+//!
+//! Shapes: up to 120 rows, evenly taken. Stops: closed forms and [`registration`]. Departures: none, there is no paper;
+//! a hook, reflector or tool of unknown place is fitted along, so that its stand-off is not taken for a unit.
+//! Checked against: simulated files in every wrong unit, and the real ones.
+
+use std::fmt;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::convention::AngleConvention;
+use super::dataset::{Dataset, Reading, Row};
+use super::registration;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Model;
+use truegrind_math::se3::Pose;
+
+/// How much better another meaning of the file has to fit.
+const FACTOR: f64 = 10.0;
+/// Share of the travel to which a stated meaning may fail without being doubted: no wrong unit comes so close.
+const FINE: f64 = 0.01;
+/// Another meaning that leaves more than this share explains nothing.
+const USELESS: f64 = 0.1;
+/// Rows that are looked at.
+const ROWS: usize = 120;
+/// Lever that turns an error of orientation into one of position [mm/rad].
+const LEVER_MM: f64 = 300.0;
+
+/// Unit of the file's angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AngleUnit {
+    /// As the format says.
+    Degrees,
+    /// Radians.
+    Radians,
+}
+
+/// Unit of the file's lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LengthUnit {
+    /// As the format says.
+    Millimetres,
+    /// Metres.
+    Metres,
+    /// Inches.
+    Inches,
+    /// Centimetres.
+    Centimetres,
+}
+
+impl LengthUnit {
+    /// The unit in mm.
+    pub fn millimetres(self) -> f64 {
+        match self {
+            LengthUnit::Millimetres => 1.0,
+            LengthUnit::Metres => 1000.0,
+            LengthUnit::Inches => 25.4,
+            LengthUnit::Centimetres => 10.0,
+        }
+    }
+}
+
+/// Meaning of the four numbers of an orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Orientation {
+    /// Scalar first, target seen by the sensor, as the format says.
+    ScalarFirst,
+    /// The scalar stands in the last column.
+    ScalarLast,
+    /// The sensor seen by the target.
+    Inverted,
+}
+
+/// One way to read a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Meaning {
+    /// Unit of q1 to q6.
+    pub angles: AngleUnit,
+    /// Unit of the sensor's (or read-out's) lengths.
+    pub lengths: LengthUnit,
+    /// What the angles are.
+    pub convention: AngleConvention,
+    /// What the quaternion is; only of full poses.
+    pub orientation: Orientation,
+}
+
+/// What spoke against the stated meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Evidence {
+    /// The sensor's readings.
+    Sensor,
+    /// The controller's Cartesian read-out.
+    Readout,
+}
+
+/// Another meaning of the file fits by an order of magnitude better than the stated one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitSuspicion {
+    /// The file.
+    pub file: String,
+    /// What was compared with the arm.
+    pub evidence: Evidence,
+    /// The meaning that the format and the caller state.
+    pub stated: Meaning,
+    /// The meaning that fits.
+    pub likely: Meaning,
+    /// Error of the registered nominal arm under the stated meaning.
+    pub stated_error: MeaningError,
+    /// Error under the likely meaning.
+    pub likely_error: MeaningError,
+}
+
+/// How badly a meaning fits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeaningError {
+    /// Root mean square of what the registered nominal arm leaves (mm).
+    pub rmse_mm: f64,
+    /// The same as a share of the flange's travel, its root mean square distance from its mean position.
+    pub share: f64,
+}
+
+/// Other meanings of a file that fit the nominal arm far better than the stated one: at most one for the sensor and
+/// one for the read-out. `data` holds the file's angles as they were read, before any
+/// [`AngleConvention::apply`]; `stated` is the convention they are taken for.
+///
+/// Empty when all is well, and when too few rows are there to tell.
+pub fn plausibility(data: &Dataset, model: &Model, stated: AngleConvention) -> Vec<UnitSuspicion> {
+    let stride = data.rows.len().div_ceil(ROWS).max(1);
+    let rows: Vec<&Row> = data.rows.iter().step_by(stride).collect();
+    let sensor = [Evidence::Sensor, Evidence::Readout];
+    sensor.into_iter().filter_map(|evidence| suspicion(data, &rows, model, stated, evidence)).collect()
+}
+
+fn suspicion(
+    data: &Dataset,
+    rows: &[&Row],
+    model: &Model,
+    convention: AngleConvention,
+    evidence: Evidence,
+) -> Option<UnitSuspicion> {
+    let stated = Meaning {
+        angles: AngleUnit::Degrees,
+        lengths: LengthUnit::Millimetres,
+        convention,
+        orientation: Orientation::ScalarFirst,
+    };
+    let stated_error = error(rows, model, &stated, evidence)?;
+    if stated_error.share <= FINE {
+        return None;
+    }
+    let poses = evidence == Evidence::Sensor && matches!(rows.first()?.reading, Reading::Pose(_));
+    let orientations: &[Orientation] = if poses {
+        &[Orientation::ScalarFirst, Orientation::ScalarLast, Orientation::Inverted]
+    } else {
+        &[Orientation::ScalarFirst]
+    };
+    let mut others = Vec::new();
+    for angles in [AngleUnit::Degrees, AngleUnit::Radians] {
+        for convention in [convention, convention.other()] {
+            for lengths in
+                [LengthUnit::Millimetres, LengthUnit::Metres, LengthUnit::Inches, LengthUnit::Centimetres]
+            {
+                for &orientation in orientations {
+                    let meaning = Meaning { angles, lengths, convention, orientation };
+                    let fits = error(rows, model, &meaning, evidence).filter(|e| e.share.is_finite());
+                    others.extend(fits.filter(|_| meaning != stated).map(|e| (meaning, e)));
+                }
+            }
+        }
+    }
+    let lowest = others.iter().map(|(_, e)| e.share).fold(f64::INFINITY, f64::min);
+    // Of meanings that fit about equally well the one that is nearest to the stated one.
+    let (likely, likely_error) =
+        others.into_iter().filter(|(_, e)| e.share <= 2.0 * lowest).min_by(|a, b| {
+            a.0.changes(&stated).cmp(&b.0.changes(&stated)).then(a.1.share.total_cmp(&b.1.share))
+        })?;
+    // An arm that stands still under the stated meaning leaves an infinite share.
+    let better = likely_error.share * FACTOR < stated_error.share;
+    (better && likely_error.share < USELESS).then(|| UnitSuspicion {
+        file: data.file.clone(),
+        evidence,
+        stated,
+        likely,
+        stated_error,
+        likely_error,
+    })
+}
+
+/// Error of the registered nominal arm under a meaning; `None` where too few rows are there to tell.
+fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) -> Option<MeaningError> {
+    let arm = model.under(&Condition::default());
+    let scale = meaning.lengths.millimetres();
+    let (mut flanges, mut lengths, mut positions, mut poses) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for row in rows {
+        if evidence == Evidence::Readout && row.readout_mm.is_none() {
+            continue;
+        }
+        let file = match meaning.angles {
+            AngleUnit::Degrees => row.joints,
+            // The import took the numbers for degrees.
+            AngleUnit::Radians => row.joints.map(f64::to_degrees),
+        };
+        flanges.push(arm.forward(&meaning.convention.controller_angles(model, &file)?));
+        match (evidence, &row.reading, row.readout_mm) {
+            (Evidence::Readout, _, Some(p)) => positions.push(p * scale),
+            (_, Reading::Cable(l), _) => lengths.push(l * scale),
+            (_, Reading::Position(p), _) => positions.push(p * scale),
+            (_, Reading::Pose(pose), _) => poses.push(meaning.orientation.of(pose, scale)),
+        }
+    }
+    let mean =
+        flanges.iter().map(|f| f.translation.vector).sum::<Vector3<f64>>() / flanges.len().max(1) as f64;
+    let square: f64 = flanges.iter().map(|f| (f.translation.vector - mean).norm_squared()).sum();
+    let travel = (square / flanges.len().max(1) as f64).sqrt();
+    let of = |rmse_mm: f64| Some(MeaningError { rmse_mm, share: rmse_mm / travel });
+    // Twice as many numbers as are fitted.
+    if !poses.is_empty() {
+        let fit = registration::poses(&flanges, &poses).filter(|_| poses.len() >= 4)?;
+        return of(fit.rmse_mm.hypot(LEVER_MM * fit.rmse_rad));
+    }
+    if !positions.is_empty() {
+        let fit = registration::touching_point(&flanges, &positions).filter(|_| positions.len() >= 6)?;
+        return of(fit.rmse_mm);
+    }
+    // Several outlets: each on its own rows; most files have one.
+    let mut anchors: Vec<usize> = rows.iter().map(|r| r.anchor).collect();
+    anchors.sort_unstable();
+    anchors.dedup();
+    let (mut square, mut count) = (0.0, 0);
+    for anchor in anchors {
+        let of_anchor = |i: &usize| rows[*i].anchor == anchor;
+        let indices: Vec<usize> = (0..lengths.len()).filter(of_anchor).collect();
+        if indices.len() < 14 {
+            continue;
+        }
+        let own: Vec<Pose> = indices.iter().map(|&i| flanges[i]).collect();
+        let read: Vec<f64> = indices.iter().map(|&i| lengths[i]).collect();
+        let (fit, _) = registration::cable_and_hook(&own, &read)?;
+        square += fit.rmse_mm.powi(2) * read.len() as f64;
+        count += read.len();
+    }
+    if count == 0 { None } else { of((square / count as f64).sqrt()) }
+}
+
+impl Orientation {
+    /// The pose that was meant, of one that was read scalar first.
+    fn of(self, pose: &Pose, scale: f64) -> Pose {
+        let q = pose.rotation;
+        let rotation = match self {
+            Orientation::ScalarFirst => q,
+            Orientation::ScalarLast => UnitQuaternion::from_quaternion(Quaternion::new(q.k, q.w, q.i, q.j)),
+            Orientation::Inverted => q.inverse(),
+        };
+        Pose::from_parts(Vector3::from(pose.translation.vector * scale).into(), rotation)
+    }
+}
+
+impl Meaning {
+    fn changes(&self, other: &Meaning) -> usize {
+        usize::from(self.angles != other.angles)
+            + usize::from(self.lengths != other.lengths)
+            + usize::from(self.convention != other.convention)
+            + usize::from(self.orientation != other.orientation)
+    }
+}
+
+impl UnitSuspicion {
+    /// What differs, and what to do: one pair for each.
+    pub fn differences(&self) -> Vec<(&'static str, &'static str)> {
+        let mut out = Vec::new();
+        let (stated, likely) = (&self.stated, &self.likely);
+        if stated.angles != likely.angles {
+            out.push(("q1 to q6 look like radians", "convert the angles to degrees"));
+        }
+        if stated.lengths != likely.lengths {
+            out.push(match (likely.lengths, self.evidence) {
+                (LengthUnit::Metres, Evidence::Sensor) => {
+                    ("the sensor's lengths look like metres", "multiply them by 1000")
+                }
+                (LengthUnit::Inches, Evidence::Sensor) => {
+                    ("the sensor's lengths look like inches", "multiply them by 25.4")
+                }
+                (LengthUnit::Centimetres, Evidence::Sensor) => {
+                    ("the sensor's lengths look like centimetres", "multiply them by 10")
+                }
+                (LengthUnit::Metres, Evidence::Readout) => {
+                    ("the read-out x, y, z looks like metres", "multiply it by 1000")
+                }
+                (LengthUnit::Inches, Evidence::Readout) => {
+                    ("the read-out x, y, z looks like inches", "multiply it by 25.4")
+                }
+                (_, _) => ("the read-out x, y, z looks like centimetres", "multiply it by 10"),
+            });
+        }
+        if stated.convention != likely.convention {
+            out.push(match likely.convention {
+                AngleConvention::Dh => {
+                    ("q1 to q6 look like DH angles, offsets included", "read the file with --angles dh")
+                }
+                AngleConvention::Logged => {
+                    ("q1 to q6 look like the controller's own angles", "read the file with --angles logged")
+                }
+            });
+        }
+        if stated.orientation != likely.orientation {
+            out.push(match likely.orientation {
+                Orientation::Inverted => (
+                    "the quaternions look inverted (sensor seen by the target)",
+                    "write measured_qw to measured_qz as the target seen by the sensor",
+                ),
+                _ => (
+                    "the quaternions look scalar-last",
+                    "put the scalar into measured_qw and the vector into measured_qx to measured_qz",
+                ),
+            });
+        }
+        out
+    }
+}
+
+impl fmt::Display for UnitSuspicion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, remedies): (Vec<_>, Vec<_>) = self.differences().into_iter().unzip();
+        let evidence = match self.evidence {
+            Evidence::Sensor => "the sensor",
+            Evidence::Readout => "the controller's read-out",
+        };
+        write!(
+            f,
+            "{}: {}: so read, the nominal arm meets {evidence} to {:.1} mm ({:.1} % of its travel), as the file stands \
+             only to {:.1} mm ({:.0} %); {}",
+            self.file,
+            what.join(" and "),
+            self.likely_error.rmse_mm,
+            100.0 * self.likely_error.share,
+            self.stated_error.rmse_mm,
+            100.0 * self.stated_error.share,
+            remedies.join(" and ")
+        )
+    }
+}

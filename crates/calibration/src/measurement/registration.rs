@@ -1,0 +1,450 @@
+//! Where the sensor stands and what it touches, from nominal poses: the start of every identification.
+//!
+//! Method: closed forms where there are any, then a few damped Gauss–Newton steps on the true residual.
+//!
+//! - [`points`]: base_from_sensor from point pairs (Umeyama 1991, eq. 34 to 43, without scale).
+//! - [`touching_point`]: base_from_sensor B and the point t on the flange with Fᵢ t = B mᵢ; linear in (R_B, b, t), with
+//!   R_B projected to the nearest rotation.
+//! - [`poses`]: B and flange_from_target T with B Mᵢ = Fᵢ T (Shah 2013: the rotations from the first singular
+//!   vectors of Σ R_Mᵢᵀ ⊗ R_Fᵢᵀ).
+//! - [`cable`]: outlet o and zero z with lᵢ = |pᵢ − o| + z; linear in (o, z, |o|² − z²) after squaring, and starts
+//!   all around, since poses near a plane cannot tell an outlet from its mirror image.
+//!
+//! Shapes: n poses of the flange in the base and as many readings, paired by index. Stops: `fit`. Departures: none
+//! weights rows; every closed form has a second start beside it for the cases in which it is degenerate.
+//! Checked against: known truth, and the UR arms' residuals with frames alone.
+
+mod fit;
+
+use nalgebra::{
+    DMatrix, DVector, Matrix3, Point3, SMatrix, SVector, SymmetricEigen, Translation3, UnitQuaternion,
+    Vector3, Vector6,
+};
+
+use self::fit::{Normal, fit};
+use truegrind_math::se3::{Pose, difference, moved, rotation_from_matrix, skew};
+
+/// Lever that turns an error of orientation into one of position [mm/rad] where both are summed.
+const LEVER_MM: f64 = 300.0;
+
+/// A sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameRegistration {
+    /// The sensor's frame in the arm's base.
+    pub base_from_sensor: Pose,
+    /// Root mean square of the distances that remain (mm).
+    pub rmse_mm: f64,
+}
+
+/// A sensor's frame and the point that it sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointRegistration {
+    /// The sensor's frame in the arm's base.
+    pub base_from_sensor: Pose,
+    /// The point on the flange (mm).
+    pub on_flange_mm: Vector3<f64>,
+    /// Root mean square of the distances that remain (mm).
+    pub rmse_mm: f64,
+}
+
+/// A sensor's frame and the frame of its target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseRegistration {
+    /// The sensor's frame in the arm's base.
+    pub base_from_sensor: Pose,
+    /// The target on the flange.
+    pub flange_from_target: Pose,
+    /// Root mean square of the distances that remain (mm).
+    pub rmse_mm: f64,
+    /// Root mean square of the rotations that remain (rad).
+    pub rmse_rad: f64,
+}
+
+/// A cable's outlet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CableRegistration {
+    /// The outlet in the arm's base (mm).
+    pub outlet_mm: Vector3<f64>,
+    /// Reading at length zero (mm).
+    pub zero_mm: f64,
+    /// Root mean square of the lengths that remain (mm).
+    pub rmse_mm: f64,
+    /// The best other outlet, where another valley of the cost lies within twice the error: the poses hardly tell
+    /// the two apart.
+    pub rival: Option<(Vector3<f64>, f64)>,
+}
+
+/// The rotation nearest to a matrix, proper in any case (Umeyama 1991, eq. 43). `None` when the matrix leaves more
+/// than one direction open.
+fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
+    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    if !matrix.iter().all(|v| v.abs() < 1e100) {
+        return None;
+    }
+    let svd = matrix.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let s = svd.singular_values;
+    if s[1].is_nan() || s[1] <= 1e-9 * s[0] {
+        return None;
+    }
+    let sign = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant().signum()));
+    Some(rotation_from_matrix(&(u * sign * v_t)))
+}
+
+/// The motion that carries points seen by the sensor onto points in the base, in the least-squares sense.
+///
+/// `None` for fewer than three points, points on a line, or numbers that are not finite.
+pub fn points(base_mm: &[Vector3<f64>], sensor_mm: &[Vector3<f64>]) -> Option<FrameRegistration> {
+    let n = base_mm.len().min(sensor_mm.len());
+    if n < 3 || base_mm.iter().chain(sensor_mm).any(|p| !p.iter().all(|v| v.is_finite())) {
+        return None;
+    }
+    let mean = |list: &[Vector3<f64>]| list[..n].iter().sum::<Vector3<f64>>() / n as f64;
+    let (centre_base, centre_sensor) = (mean(base_mm), mean(sensor_mm));
+    let mut covariance = Matrix3::zeros();
+    for (b, s) in base_mm.iter().zip(sensor_mm) {
+        covariance += (b - centre_base) * (s - centre_sensor).transpose();
+    }
+    let rotation = nearest_rotation(&covariance)?;
+    let translation = Translation3::from(centre_base - rotation * centre_sensor);
+    let base_from_sensor = Pose::from_parts(translation, rotation);
+    let square = base_mm
+        .iter()
+        .zip(sensor_mm)
+        .map(|(b, s)| (base_from_sensor * Point3::from(*s) - Point3::from(*b)).norm_squared())
+        .sum::<f64>();
+    Some(FrameRegistration { base_from_sensor, rmse_mm: (square / n as f64).sqrt() })
+}
+
+/// The sensor's frame and the unknown point on the flange that it sees.
+///
+/// Where the orientation of the flange hardly changes, the point cannot be told from the frame; then the point stays
+/// near the flange's origin.
+pub fn touching_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<PointRegistration> {
+    let n = base_from_flange.len().min(measured_mm.len());
+    let origins: Vec<_> = base_from_flange.iter().map(|f| f.translation.vector).collect();
+    let plain = points(&origins, measured_mm)?;
+    let mut starts = vec![(plain.base_from_sensor, Vector3::zeros())];
+    starts.extend(linear_point(base_from_flange, measured_mm));
+    let rows = |state: &(Pose, Vector3<f64>), normal: &mut Normal| {
+        let (base_from_sensor, t) = state;
+        for (flange, m) in base_from_flange.iter().zip(measured_mm) {
+            let seen = base_from_sensor.rotation * m;
+            let residual =
+                flange.rotation * t + flange.translation.vector - seen - base_from_sensor.translation.vector;
+            let turn = skew(&seen);
+            let to_base = flange.rotation.to_rotation_matrix();
+            for k in 0..3 {
+                let mut row = [0.0; 9];
+                row[k] = -1.0;
+                for c in 0..3 {
+                    row[3 + c] = turn[(k, c)];
+                    row[6 + c] = to_base[(k, c)];
+                }
+                normal.add(&row, residual[k]);
+            }
+        }
+    };
+    let step = |state: &(Pose, Vector3<f64>), d: &DVector<f64>| {
+        let twist = Vector6::from_iterator(d.iter().take(6).copied());
+        (moved(&state.0, &twist), state.1 + Vector3::new(d[6], d[7], d[8]))
+    };
+    let (cost, (base_from_sensor, on_flange_mm)) = best(starts, 9, rows, step)?;
+    Some(PointRegistration { base_from_sensor, on_flange_mm, rmse_mm: (cost / n as f64).sqrt() })
+}
+
+/// R_B, b, t from Rᵢ t − R_B mᵢ − b = −pᵢ as if the nine entries of R_B were free.
+fn linear_point(base_from_flange: &[Pose], measured_mm: &[Vector3<f64>]) -> Option<(Pose, Vector3<f64>)> {
+    // Metres keep the columns of one size.
+    let mut normal = Normal::new(15);
+    for (flange, m) in base_from_flange.iter().zip(measured_mm) {
+        let to_base = flange.rotation.to_rotation_matrix();
+        for k in 0..3 {
+            let mut row = [0.0; 15];
+            for c in 0..3 {
+                row[3 * k + c] = -m[c] * 1e-3;
+                row[12 + c] = to_base[(k, c)];
+            }
+            row[9 + k] = -1.0;
+            normal.add(&row, flange.translation.vector[k] * 1e-3);
+        }
+    }
+    let x = normal.least_norm_step(1e-10)?;
+    let rotation = nearest_rotation(&Matrix3::from_fn(|k, c| x[3 * k + c]))?;
+    let b = Vector3::new(x[9], x[10], x[11]) * 1e3;
+    let t = Vector3::new(x[12], x[13], x[14]) * 1e3;
+    Some((Pose::from_parts(Translation3::from(b), rotation), t))
+}
+
+/// The sensor's frame and its target's frame on the flange, from full poses: B Mᵢ ≈ Fᵢ T.
+pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<PoseRegistration> {
+    let n = base_from_flange.len().min(sensor_from_target.len());
+    let measured: Vec<_> = sensor_from_target.iter().map(|m| m.translation.vector).collect();
+    let point = touching_point(base_from_flange, &measured)?;
+    let mut rotations = vec![point.base_from_sensor.rotation];
+    rotations.extend(shah(base_from_flange, sensor_from_target));
+    let starts = rotations
+        .into_iter()
+        .filter_map(|rotation| {
+            // With the sensor's rotation known: the target's as the mean, both translations linear.
+            let target = mean_rotation(
+                base_from_flange
+                    .iter()
+                    .zip(sensor_from_target)
+                    .map(|(f, m)| f.rotation.inverse() * rotation * m.rotation),
+            )?;
+            let mut normal = Normal::new(6);
+            for (f, m) in base_from_flange.iter().zip(&measured) {
+                let residual = f.translation.vector - rotation * m;
+                let to_base = f.rotation.to_rotation_matrix();
+                for k in 0..3 {
+                    let mut row = [0.0; 6];
+                    row[k] = -1.0;
+                    for c in 0..3 {
+                        row[3 + c] = to_base[(k, c)];
+                    }
+                    normal.add(&row, residual[k]);
+                }
+            }
+            let x = normal.least_norm_step(1e-10)?;
+            let base_from_sensor = Pose::from_parts(Translation3::new(x[0], x[1], x[2]), rotation);
+            Some((base_from_sensor, Pose::from_parts(Translation3::new(x[3], x[4], x[5]), target)))
+        })
+        .collect();
+    let rows = |state: &(Pose, Pose), normal: &mut Normal| {
+        for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
+            let (predicted, seen) = (f * state.1, state.0 * m);
+            let residual = difference(&seen, &predicted);
+            let turn_seen = skew(&(seen.translation.vector - state.0.translation.vector));
+            let turn_tool = skew(&(predicted.translation.vector - f.translation.vector));
+            let to_base = f.rotation.to_rotation_matrix();
+            let lever = to_base.matrix();
+            // The target's twist is given in the flange, about the flange's origin.
+            let turned = -turn_tool * lever;
+            for k in 0..3 {
+                let mut row = [0.0; 12];
+                row[k] = -1.0;
+                let mut turn = [0.0; 12];
+                turn[3 + k] = -LEVER_MM;
+                for c in 0..3 {
+                    row[3 + c] = turn_seen[(k, c)];
+                    row[6 + c] = lever[(k, c)];
+                    row[9 + c] = turned[(k, c)];
+                    turn[9 + c] = LEVER_MM * lever[(k, c)];
+                }
+                normal.add(&row, residual[k]);
+                normal.add(&turn, LEVER_MM * residual[3 + k]);
+            }
+        }
+    };
+    let step = |state: &(Pose, Pose), d: &DVector<f64>| {
+        let at = |k: usize| Vector6::from_iterator(d.iter().skip(k).take(6).copied());
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(d[9], d[10], d[11]));
+        let target = Pose::from_parts(
+            Translation3::from(turn * state.1.translation.vector + Vector3::new(d[6], d[7], d[8])),
+            turn * state.1.rotation,
+        );
+        (moved(&state.0, &at(0)), target)
+    };
+    let (_, (base_from_sensor, flange_from_target)) = best(starts, 12, rows, step)?;
+    let (mut square_mm, mut square_rad) = (0.0, 0.0);
+    for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
+        let d = difference(&(base_from_sensor * m), &(f * flange_from_target));
+        square_mm += d.fixed_rows::<3>(0).norm_squared();
+        square_rad += d.fixed_rows::<3>(3).norm_squared();
+    }
+    let root = |square: f64| (square / n as f64).sqrt();
+    Some(PoseRegistration {
+        base_from_sensor,
+        flange_from_target,
+        rmse_mm: root(square_mm),
+        rmse_rad: root(square_rad),
+    })
+}
+
+/// The sensor's rotation in the base from rotations alone (Shah 2013, eq. 22 to 28).
+fn shah(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<UnitQuaternion<f64>> {
+    let mut sum = SMatrix::<f64, 9, 9>::zeros();
+    for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
+        let (f, m) = (f.rotation.to_rotation_matrix(), m.rotation.to_rotation_matrix());
+        sum += m.matrix().transpose().kronecker(&f.matrix().transpose());
+    }
+    // sum · vec(R_B) = n · vec(R_T), columns stacked.
+    if !sum.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(sum.transpose() * sum);
+    let v: SVector<f64, 9> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let matrix = Matrix3::from_column_slice(v.as_slice());
+    // The vector's sign is open; a rotation has a positive determinant.
+    nearest_rotation(&(matrix * matrix.determinant().signum()))
+}
+
+/// Mean of rotations: the first eigenvector of Σ q qᵀ (Markley et al. 2007).
+fn mean_rotation(rotations: impl Iterator<Item = UnitQuaternion<f64>>) -> Option<UnitQuaternion<f64>> {
+    let sum = rotations.fold(SMatrix::<f64, 4, 4>::zeros(), |sum, q| sum + q.coords * q.coords.transpose());
+    if !sum.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(sum);
+    let v = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    Some(UnitQuaternion::from_quaternion(nalgebra::Quaternion::from(SVector::<f64, 4>::from(v))))
+}
+
+/// Prior standard deviation of a cable's zero and of its hook [mm per mm of residual]: lengths seen from one side
+/// hardly tell them from the outlet's distance.
+const PRIOR_SIGMA: f64 = 200.0;
+
+/// A cable's outlet and zero from the hook's positions in the base and the lengths read.
+///
+/// `None` for fewer than four rows or numbers that are not finite. The zero has a weak prior (σ 200 mm for residuals
+/// of 1 mm).
+pub fn cable(hook_mm: &[Vector3<f64>], lengths_mm: &[f64]) -> Option<CableRegistration> {
+    let n = hook_mm.len().min(lengths_mm.len());
+    if n < 4
+        || hook_mm.iter().any(|p| !p.iter().all(|v| v.is_finite()))
+        || lengths_mm.iter().any(|l| !l.is_finite())
+    {
+        return None;
+    }
+    let (hook_mm, lengths_mm) = (&hook_mm[..n], &lengths_mm[..n]);
+    let centre = hook_mm.iter().sum::<Vector3<f64>>() / n as f64;
+    let reach = lengths_mm.iter().sum::<f64>() / n as f64;
+    let mut starts: Vec<(Vector3<f64>, f64)> = Vec::new();
+    for (i, j, k) in (0..27).map(|c| (c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1)).filter(|d| *d != (0, 0, 0)) {
+        let direction = Vector3::new(f64::from(i), f64::from(j), f64::from(k)).normalize();
+        starts.push((centre + direction * reach.abs().max(1.0), 0.0));
+    }
+    if let Some((outlet, zero)) = squared_lengths(hook_mm, lengths_mm, &centre) {
+        let spread: Matrix3<f64> = hook_mm.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();
+        let eigen = SymmetricEigen::new(spread);
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        starts.push((outlet, zero));
+        starts.push((outlet - normal * 2.0 * normal.dot(&(outlet - centre)), zero));
+    }
+    let rows =
+        |points: &[Vector3<f64>], lengths: &[f64], state: &(Vector3<f64>, f64), normal: &mut Normal| {
+            for (p, l) in points.iter().zip(lengths) {
+                let away = state.0 - p;
+                let distance = away.norm().max(1e-6);
+                let u = away / distance;
+                normal.add(&[u.x, u.y, u.z, 1.0], distance + state.1 - l);
+            }
+            normal.add(&[0.0, 0.0, 0.0, 1.0 / PRIOR_SIGMA], state.1 / PRIOR_SIGMA);
+        };
+    let step = |state: &(Vector3<f64>, f64), d: &DVector<f64>| {
+        (state.0 + Vector3::new(d[0], d[1], d[2]), state.1 + d[3])
+    };
+    // The valleys show in a sample; only the candidates are worked out on all rows.
+    let stride = n.div_ceil(80);
+    let thin_points: Vec<_> = hook_mm.iter().step_by(stride).copied().collect();
+    let thin_lengths: Vec<_> = lengths_mm.iter().step_by(stride).copied().collect();
+    let mut valleys: Vec<(f64, (Vector3<f64>, f64))> = Vec::new();
+    for start in starts {
+        let (cost, state) = fit(start, 4, |s, normal| rows(&thin_points, &thin_lengths, s, normal), step);
+        let known = valleys.iter().any(|(_, other)| (other.0 - state.0).norm() < 1.0);
+        if cost.is_finite() && !known {
+            valleys.push((cost, state));
+        }
+    }
+    valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut refined: Vec<_> = valleys
+        .into_iter()
+        .take(3)
+        .map(|(_, state)| fit(state, 4, |s, normal| rows(hook_mm, lengths_mm, s, normal), step))
+        .collect();
+    refined.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let rmse = |cost: f64| (cost / n as f64).sqrt();
+    let (cost, (outlet_mm, zero_mm)) = *refined.first()?;
+    let rival = refined
+        .iter()
+        .skip(1)
+        .find(|(c, (o, _))| rmse(*c) < 2.0 * rmse(cost).max(1e-3) && (o - outlet_mm).norm() > 1.0)
+        .map(|(_, state)| *state);
+    Some(CableRegistration { outlet_mm, zero_mm, rmse_mm: rmse(cost), rival })
+}
+
+/// A cable's outlet and zero together with the hook on the flange, all unknown.
+///
+/// The hook has a prior about the flange's origin (σ 200 mm for residuals of 1 mm): one cable sees one direction of
+/// each pose, and the hook is told from the outlet only by turning the flange.
+pub fn cable_and_hook(
+    base_from_flange: &[Pose],
+    lengths_mm: &[f64],
+) -> Option<(CableRegistration, Vector3<f64>)> {
+    let n = base_from_flange.len().min(lengths_mm.len());
+    let origins: Vec<_> = base_from_flange[..n].iter().map(|f| f.translation.vector).collect();
+    let plain = cable(&origins, lengths_mm)?;
+    let mut starts = vec![(plain.outlet_mm, plain.zero_mm, Vector3::zeros())];
+    starts.extend(plain.rival.map(|(outlet, zero)| (outlet, zero, Vector3::zeros())));
+    let rows = |(outlet, zero, hook): &(Vector3<f64>, f64, Vector3<f64>), normal: &mut Normal| {
+        for (flange, length) in base_from_flange.iter().zip(lengths_mm) {
+            let away = flange.rotation * hook + flange.translation.vector - outlet;
+            let distance = away.norm().max(1e-6);
+            let u = away / distance;
+            let on_flange = flange.rotation.inverse_transform_vector(&u);
+            let row = [-u.x, -u.y, -u.z, 1.0, on_flange.x, on_flange.y, on_flange.z];
+            normal.add(&row, distance + zero - length);
+        }
+        for (k, value) in [(3, *zero), (4, hook.x), (5, hook.y), (6, hook.z)] {
+            let mut row = [0.0; 7];
+            row[k] = 1.0 / PRIOR_SIGMA;
+            normal.add(&row, value / PRIOR_SIGMA);
+        }
+    };
+    let step = |(outlet, zero, hook): &(Vector3<f64>, f64, Vector3<f64>), d: &DVector<f64>| {
+        (outlet + Vector3::new(d[0], d[1], d[2]), zero + d[3], hook + Vector3::new(d[4], d[5], d[6]))
+    };
+    let (cost, (outlet_mm, zero_mm, hook_mm)) = best(starts, 7, rows, step)?;
+    let rmse_mm = (cost / n as f64).sqrt();
+    Some((CableRegistration { outlet_mm, zero_mm, rmse_mm, rival: None }, hook_mm))
+}
+
+/// o, z from lᵢ² − |pᵢ|² = 2 lᵢ z − 2 pᵢ·o + (|o|² − z²), the last bracket free.
+fn squared_lengths(
+    hook_mm: &[Vector3<f64>],
+    lengths_mm: &[f64],
+    centre: &Vector3<f64>,
+) -> Option<(Vector3<f64>, f64)> {
+    let mut normal = Normal::new(5);
+    for (p, l) in hook_mm.iter().zip(lengths_mm) {
+        let (p, l) = ((p - centre) * 1e-3, l * 1e-3);
+        normal.add(&[-2.0 * p.x, -2.0 * p.y, -2.0 * p.z, 2.0 * l, 1.0], p.norm_squared() - l * l);
+    }
+    let x = normal.least_norm_step(1e-10)?;
+    Some((centre + Vector3::new(x[0], x[1], x[2]) * 1e3, x[3] * 1e3))
+}
+
+/// The best of several starts; a later one has to be better by more than rounding, so that where the data leave a
+/// direction open the first, plainest start decides.
+fn best<S: Clone>(
+    starts: Vec<S>,
+    size: usize,
+    rows: impl Fn(&S, &mut Normal),
+    step: impl Fn(&S, &DVector<f64>) -> S,
+) -> Option<(f64, S)> {
+    starts
+        .into_iter()
+        .map(|start| fit(start, size, &rows, &step))
+        .filter(|(cost, _)| cost.is_finite())
+        .reduce(|best, next| if next.0 + 1e-9 < 0.999 * best.0 { next } else { best })
+}
+
+impl Normal {
+    /// The least-squares step of least length: directions with a share below `relative` of the strongest stay put.
+    fn least_norm_step(&self, relative: f64) -> Option<DVector<f64>> {
+        let matrix: DMatrix<f64> = self.matrix.clone();
+        if !matrix.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let eigen = SymmetricEigen::new(matrix);
+        let floor = eigen.eigenvalues.max() * relative;
+        let mut out = DVector::zeros(self.gradient.len());
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > floor {
+                out -= vector * (vector.dot(&self.gradient) / value);
+            }
+        }
+        Some(out)
+    }
+}

@@ -1,0 +1,200 @@
+//! Measurements of an arm that is known in every detail, so that whatever identifies it can be judged.
+//!
+//! A [`Recipe`] states the actual arm (nominal plus deviations, effects, masses), where it is measured, with what
+//! sensor, noise, rounding and faults. The same recipe gives the same bytes: three independent ChaCha8 streams of one
+//! seed draw poses, circumstances and noise, and a seed of its own draws the arm.
+//!
+//! What is logged: the encoder's angles and, where asked for, the read-out that the controller computes from them with
+//! the nominal model, both rounded as the recipe says. The arm itself stands at the unrounded angles.
+
+pub mod recipe;
+mod arm;
+mod poses;
+mod fault;
+mod table;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, Normal, StandardNormal, StudentT};
+use thiserror::Error;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use self::recipe::{Noise, Recipe};
+use super::dataset::{Reading, Sensor};
+use super::sensor::Rig;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model};
+
+/// What a recipe gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// The measurement file, with header.
+    pub csv: String,
+    /// The arm that was measured.
+    pub actual: Model,
+    /// The arm of the data sheet.
+    pub nominal: Model,
+    /// The sensor as it stood before any fault.
+    pub rig: Rig,
+    /// The rows before rounding and noise.
+    pub rows: Vec<SimulatedRow>,
+}
+
+/// One row as it really was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedRow {
+    /// Angles of the encoders (rad).
+    pub joints: Joints,
+    /// The circumstances of the actual arm, logged or not.
+    pub condition: Condition,
+    /// Cable outlet, 0-based.
+    pub anchor: usize,
+    /// The reading that a perfect sensor would give.
+    pub reading: Reading,
+}
+
+/// Why a recipe gives no measurements.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RecipeError {
+    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
+    #[error("{file}: line {line}: {message}")]
+    Syntax {
+        /// File.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// What the TOML reader found and expected.
+        message: String,
+    },
+    /// A value that cannot be used.
+    #[error("{key}: found {found}, expected {expected}")]
+    Invalid {
+        /// Key, as a path.
+        key: String,
+        /// Value.
+        found: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// The robot is not known.
+    #[error("robot: {message}")]
+    Robot {
+        /// What the catalogue says.
+        message: String,
+    },
+    /// No pose satisfies the recipe.
+    #[error(
+        "poses: found {found} of {wanted} poses after {tries} tries; expected poses inside the joint ranges that the \
+         sensor sees; widen the joint box, `view.box_mm`, `view.distance_mm` or `view.tilt_deg`"
+    )]
+    NoPose {
+        /// Poses found.
+        found: usize,
+        /// Poses asked for.
+        wanted: usize,
+        /// Draws.
+        tries: usize,
+    },
+}
+
+/// Independent streams of one seed.
+enum Stream {
+    Poses,
+    Circumstances,
+    Noise,
+}
+
+fn stream(seed: u64, stream: Stream) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream as u64 + 1);
+    rng
+}
+
+impl Recipe {
+    /// Measures the actual arm. `resolve` gives the nominal model of a robot by name.
+    pub fn simulate(
+        &self,
+        resolve: impl Fn(&str) -> Result<Model, String>,
+    ) -> Result<Simulation, RecipeError> {
+        self.check()?;
+        let nominal = resolve(&self.robot).map_err(|message| RecipeError::Robot { message })?;
+        let actual = arm::actual(&nominal, &self.arm)?;
+        let rig = self.sensor.rig();
+        let mut rng = stream(self.seed, Stream::Noise);
+        let mut rows = Vec::new();
+        let mut lines = Vec::new();
+        for planned in poses::plan(self, &nominal, &rig)? {
+            let number = rows.len();
+            let mut truth = planned.condition;
+            let mut seen_by = rig.clone();
+            for fault in &self.fault {
+                fault.before(number, &mut seen_by, &mut truth);
+            }
+            let mut stands = planned.joints;
+            for q in stands.iter_mut() {
+                let wobble: f64 = StandardNormal.sample(&mut rng);
+                *q += wobble * self.noise.joints_deg.to_radians();
+            }
+            let flange = actual.forward(&stands, &truth);
+            let exact = seen_by.predict(&flange, planned.anchor).ok_or(RecipeError::Invalid {
+                key: "sensor.outlets_mm".into(),
+                found: "no outlet".into(),
+                expected: "one at least",
+            })?;
+            let distance = seen_by.distance_mm(&flange, planned.anchor).unwrap_or_default();
+            let mut reading = noisy(&exact, distance, &self.noise, &mut rng);
+            let mut readout = nominal.forward(&planned.joints, &Condition::default()).translation.vector;
+            for fault in &self.fault {
+                fault.after(number, &seen_by, &flange, planned.anchor, &mut reading, &mut readout);
+            }
+            lines.push(table::Logged {
+                joints: planned.joints,
+                reading,
+                readout,
+                condition: planned.condition,
+                anchor: planned.anchor,
+            });
+            rows.push(SimulatedRow {
+                joints: planned.joints,
+                condition: truth,
+                anchor: planned.anchor,
+                reading: exact,
+            });
+        }
+        let csv = table::csv(self, &rig, &lines);
+        Ok(Simulation { csv, actual, nominal, rig, rows })
+    }
+}
+
+/// A reading with the sensor's noise. A heavy tail keeps the stated standard deviation.
+fn noisy(exact: &Reading, distance_mm: f64, noise: &Noise, rng: &mut ChaCha8Rng) -> Reading {
+    let sigma = noise.sigma_mm + noise.per_metre_mm * distance_mm * 1e-3;
+    // The degrees of freedom were checked to be above 2.
+    let tail =
+        noise.student_t.and_then(|dof| StudentT::new(dof).ok().map(|t| (t, ((dof - 2.0) / dof).sqrt())));
+    let normal = Normal::new(0.0, 1.0).ok();
+    let mut draw = |sigma: f64| match (&tail, &normal) {
+        (Some((t, scale)), _) => t.sample(rng) * scale * sigma,
+        (None, Some(normal)) => normal.sample(rng) * sigma,
+        (None, None) => 0.0,
+    };
+    match exact {
+        Reading::Cable(length) => Reading::Cable(length + draw(sigma)),
+        Reading::Position(p) => Reading::Position(p + Vector3::from_fn(|_, _| draw(sigma))),
+        Reading::Pose(pose) => {
+            let mut out = *pose;
+            out.translation.vector += Vector3::from_fn(|_, _| draw(sigma));
+            let turn = Vector3::from_fn(|_, _| draw(noise.sigma_deg.to_radians()));
+            out.rotation = UnitQuaternion::from_scaled_axis(turn) * out.rotation;
+            Reading::Pose(out)
+        }
+    }
+}
+
+impl Simulation {
+    /// Which sensor the file is of.
+    pub fn sensor(&self) -> Sensor {
+        self.rig.sensor()
+    }
+}

@@ -1,0 +1,136 @@
+//! Which poses a recipe measures, in which order and under which circumstances.
+
+use nalgebra::Point3;
+use rand::RngExt;
+
+use super::recipe::{Approach, Circumstances, Poses, Recipe};
+use super::{RecipeError, Stream, stream};
+use crate::measurement::sensor::Rig;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model};
+
+/// Draws for each pose before the recipe counts as impossible.
+const TRIES: usize = 10_000;
+/// But no more than this in all, or than a hundred for each pose where that is more.
+const MOST_TRIES: usize = 5_000_000;
+
+/// One row to be measured.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Planned {
+    pub(super) joints: Joints,
+    pub(super) condition: Condition,
+    pub(super) anchor: usize,
+}
+
+pub(super) fn plan(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<Vec<Planned>, RecipeError> {
+    let (poses, repeats) = distinct(recipe, nominal, rig)?;
+    let mut rng = stream(recipe.seed, Stream::Circumstances);
+    let mut out = Vec::new();
+    let mut before: Option<Joints> = None;
+    // Repeats come after the whole round, so that they see the drift of the run.
+    for joints in (0..repeats.max(1)).flat_map(|_| &poses) {
+        let sides: Vec<[i8; 6]> = match recipe.circumstances.approach {
+            Approach::Unknown => vec![[0; 6]],
+            Approach::Random => vec![std::array::from_fn(|_| if rng.random_bool(0.5) { 1 } else { -1 })],
+            // A joint that moves up comes to rest from below.
+            Approach::Sequence => vec![std::array::from_fn(|j| match &before {
+                Some(from) if joints[j] > from[j] => -1,
+                Some(from) if joints[j] < from[j] => 1,
+                _ => 0,
+            })],
+            Approach::Both => vec![[-1; 6], [1; 6]],
+        };
+        before = Some(*joints);
+        for approach in sides {
+            for anchor in 0..recipe.sensor.anchors() {
+                let condition = Condition { approach, ..Condition::default() };
+                out.push(Planned { joints: *joints, condition, anchor });
+            }
+        }
+    }
+    set_circumstances(&mut out, &recipe.circumstances);
+    Ok(out)
+}
+
+fn set_circumstances(rows: &mut [Planned], circumstances: &Circumstances) {
+    let last = rows.len().saturating_sub(1).max(1) as f64;
+    for (i, row) in rows.iter_mut().enumerate() {
+        let condition = &mut row.condition;
+        condition.time_h = circumstances.hours.map(|hours| hours * i as f64 / last);
+        condition.temperature_c = circumstances
+            .temperature
+            .zip(condition.time_h)
+            .map(|(warm, t)| warm.end_c + (warm.start_c - warm.end_c) * (-t / warm.time_constant_h).exp());
+        let payloads = &circumstances.payload_kg;
+        condition.payload_kg = (!payloads.is_empty()).then(|| payloads[i % payloads.len()]);
+        condition.payload_centre_mm = circumstances.payload_centre_mm;
+    }
+}
+
+/// The different poses, and how often each is measured.
+fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>, usize), RecipeError> {
+    let arm = nominal.under(&Condition::default());
+    let seen = |q: &Joints| {
+        let flange = arm.forward(q);
+        let at = flange * Point3::from(rig.touched_mm());
+        let inside =
+            recipe.view.box_mm.is_none_or(|[low, high]| (0..3).all(|k| (low[k]..=high[k]).contains(&at[k])));
+        let sight = recipe.view.sight();
+        inside && (0..recipe.sensor.anchors()).all(|anchor| rig.sees(&sight, &flange, anchor))
+    };
+    let from_degrees = |q: &[f64; 6]| Joints::from_fn(|j, _| q[j].to_radians());
+    let (poses, repeats, wanted, tries) = match &recipe.poses {
+        Poses::Random { count, margin_deg, min_deg, max_deg, repeats } => {
+            let limits = &nominal.limits;
+            let margin = margin_deg.to_radians();
+            let low: [f64; 6] = std::array::from_fn(|j| {
+                let own = min_deg.map_or(f64::MIN, |m| m[j].to_radians());
+                own.max(limits.min_rad[j] + margin)
+            });
+            let high: [f64; 6] = std::array::from_fn(|j| {
+                let own = max_deg.map_or(f64::MAX, |m| m[j].to_radians());
+                own.min(limits.max_rad[j] - margin)
+            });
+            if let Some(j) = (0..6).find(|&j| (low[j]..=high[j]).is_empty()) {
+                return Err(RecipeError::Invalid {
+                    key: format!("poses, joint {j}"),
+                    found: format!("{:.3}° to {:.3}°", low[j].to_degrees(), high[j].to_degrees()),
+                    expected: "a range inside the joint limits and their margin",
+                });
+            }
+            let mut rng = stream(recipe.seed, Stream::Poses);
+            let mut poses = Vec::with_capacity(*count);
+            let mut tries = 0;
+            let most = (TRIES * count).min(MOST_TRIES.max(100 * count));
+            while poses.len() < *count && tries < most {
+                tries += 1;
+                let q = Joints::from_fn(|j, _| low[j] + (high[j] - low[j]) * rng.random::<f64>());
+                if seen(&q) {
+                    poses.push(q);
+                }
+            }
+            (poses, *repeats, *count, tries)
+        }
+        Poses::Grid { min_deg, max_deg, steps, repeats } => {
+            let count: usize = steps.iter().product();
+            let at = |mut index: usize| {
+                let mut q = [0.0; 6];
+                for j in (0..6).rev() {
+                    let step = index % steps[j];
+                    index /= steps[j];
+                    let share = if steps[j] > 1 { step as f64 / (steps[j] - 1) as f64 } else { 0.5 };
+                    q[j] = min_deg[j] + (max_deg[j] - min_deg[j]) * share;
+                }
+                from_degrees(&q)
+            };
+            ((0..count).map(at).filter(seen).collect(), *repeats, 1, count)
+        }
+        Poses::List { joints_deg, repeats } => {
+            (joints_deg.iter().map(from_degrees).filter(seen).collect(), *repeats, 1, joints_deg.len())
+        }
+    };
+    if poses.len() < wanted.max(1) {
+        return Err(RecipeError::NoPose { found: poses.len(), wanted: wanted.max(1), tries });
+    }
+    Ok((poses, repeats))
+}

@@ -1,0 +1,213 @@
+//! What the types of a recipe leave open: numbers that are none, arms that cannot be, and more rows than anyone measures.
+
+use super::{Circumstances, Frame, Poses, Recipe, SensorFault as Fault, SensorSetup, View};
+use crate::measurement::simulation::RecipeError;
+use truegrind_arm::bounds::{self, Bound, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, Unfit, shown};
+use truegrind_arm::effect::bounds::effects;
+
+/// Most rows of a simulated file.
+pub const MOST_ROWS: usize = 1_000_000;
+/// Most faults, and most rows that lists of faults name.
+const MOST_FAULTS: usize = 10_000;
+
+const LENGTH_SIGMA_MM: Bound = Bound::new(0.0, 200.0, "a standard deviation in mm, 0 to 200");
+const ANGLE_SIGMA_DEG: Bound = Bound::new(0.0, 45.0, "a standard deviation in degrees, 0 to 45");
+const LENGTH_OFF_MM: Bound = Bound::new(-200.0, 200.0, "a deviation in mm, within ±200");
+const ANGLE_OFF_DEG: Bound = Bound::new(-45.0, 45.0, "a deviation in degrees, within ±45");
+const TILT_DEG: Bound = Bound::new(0.0, 180.0, "an angle from 0 to 180 degrees");
+const TURN_DEG: Bound = Bound::new(-720.0, 720.0, "an angle in degrees, within ±720");
+const HOURS: Bound = Bound::new(0.0, 1e6, "hours, 0 to 1,000,000");
+const TIME_H: Bound = Bound::new(1e-6, 1e6, "a time in hours, above 0");
+const TEMPERATURE_C: Bound = Bound::new(-273.15, 2000.0, "a temperature in °C");
+const SIGMA: Bound = Bound::new(0.0, 1e4, "a standard deviation, 0 or more");
+const FREEDOM: Bound = Bound::new(2.000_001, 1e9, "more than 2 degrees of freedom");
+const STEP: Bound = Bound::new(1e-9, 1e4, "a step above 0");
+const SCALE: Bound = Bound::new(-0.5, 0.5, "a share within ±0.5");
+const SAG_PER_M: Bound = Bound::new(-10.0, 10.0, "weight over tension in 1/m, within ±10");
+
+impl From<Unfit> for RecipeError {
+    fn from(unfit: Unfit) -> Self {
+        RecipeError::Invalid { key: unfit.key, found: unfit.found, expected: unfit.expected }
+    }
+}
+
+impl Recipe {
+    /// Checks what the types leave open.
+    pub fn check(&self) -> Result<(), RecipeError> {
+        self.check_arm().map_err(|unfit| unfit.within("arm"))?;
+        self.check_poses().map_err(|unfit| unfit.within("poses"))?;
+        view(&self.view).map_err(|unfit| unfit.within("view"))?;
+        circumstances(&self.circumstances).map_err(|unfit| unfit.within("circumstances"))?;
+        sensor(&self.sensor).map_err(|unfit| unfit.within("sensor"))?;
+        for (key, sigma) in [
+            ("noise.sigma_mm", self.noise.sigma_mm),
+            ("noise.per_metre_mm", self.noise.per_metre_mm),
+            ("noise.sigma_deg", self.noise.sigma_deg),
+            ("noise.joints_deg", self.noise.joints_deg),
+        ] {
+            SIGMA.check(|| key.to_owned(), sigma)?;
+        }
+        FREEDOM.check_all("noise.student_t", &self.noise.student_t)?;
+        for (key, step) in [
+            ("rounding.angles_deg", self.rounding.angles_deg),
+            ("rounding.readout_mm", self.rounding.readout_mm),
+            ("rounding.reading_mm", self.rounding.reading_mm),
+        ] {
+            STEP.check_all(key, &step)?;
+        }
+        faults(&self.fault)?;
+        self.check_company()
+    }
+
+    fn check_arm(&self) -> Result<(), Unfit> {
+        if let Some(random) = &self.arm.random {
+            for (key, bound, value) in [
+                ("a_mm", LENGTH_SIGMA_MM, random.a_mm),
+                ("d_mm", LENGTH_SIGMA_MM, random.d_mm),
+                ("alpha_deg", ANGLE_SIGMA_DEG, random.alpha_deg),
+                ("beta_deg", ANGLE_SIGMA_DEG, random.beta_deg),
+                ("theta_deg", ANGLE_SIGMA_DEG, random.theta_deg),
+            ] {
+                bound.check(|| format!("random.{key}"), value)?;
+            }
+        }
+        for link in &self.arm.link {
+            if link.joint > 5 {
+                return Err(Unfit::new("link.joint", link.joint.to_string(), "a joint from 0 to 5"));
+            }
+            for (key, bound, value) in [
+                ("a_mm", LENGTH_OFF_MM, link.a_mm),
+                ("d_mm", LENGTH_OFF_MM, link.d_mm),
+                ("alpha_deg", ANGLE_OFF_DEG, link.alpha_deg),
+                ("beta_deg", ANGLE_OFF_DEG, link.beta_deg),
+                ("theta_deg", ANGLE_OFF_DEG, link.theta_deg),
+            ] {
+                bound.check(|| format!("link.{key} of joint {}", link.joint), value)?;
+            }
+        }
+        effects(&self.arm.effect)?;
+        let Some(bodies) = &self.arm.body else { return Ok(()) };
+        if bodies.len() != 6 {
+            return Err(Unfit::new("body", format!("{} bodies", bodies.len()), "six"));
+        }
+        bounds::bodies(bodies)
+    }
+
+    fn check_poses(&self) -> Result<(), Unfit> {
+        let repeats = match &self.poses {
+            Poses::Random { margin_deg, min_deg, max_deg, repeats, .. } => {
+                JOINT_DEG.check(|| "margin_deg".to_owned(), *margin_deg)?;
+                JOINT_DEG.check_all("min_deg", min_deg.iter().flatten())?;
+                JOINT_DEG.check_all("max_deg", max_deg.iter().flatten())?;
+                *repeats
+            }
+            Poses::Grid { min_deg, max_deg, repeats, .. } => {
+                JOINT_DEG.check_all("min_deg", min_deg)?;
+                JOINT_DEG.check_all("max_deg", max_deg)?;
+                *repeats
+            }
+            Poses::List { joints_deg, repeats } => {
+                JOINT_DEG.check_all("joints_deg", joints_deg.as_flattened())?;
+                *repeats
+            }
+        };
+        let poses = match &self.poses {
+            Poses::Random { count, .. } => Some(*count),
+            Poses::Grid { steps, .. } => steps.iter().try_fold(1_usize, |all, step| all.checked_mul(*step)),
+            Poses::List { joints_deg, .. } => Some(joints_deg.len()),
+        };
+        let sides = if self.circumstances.approach == super::Approach::Both { 2 } else { 1 };
+        let rows = [repeats.max(1), sides, self.sensor.anchors()];
+        let rows = rows.iter().try_fold(poses.unwrap_or(usize::MAX), |all, times| all.checked_mul(*times));
+        if rows.is_some_and(|rows| rows <= MOST_ROWS) && poses.is_some_and(|poses| poses <= MOST_ROWS) {
+            return Ok(());
+        }
+        let found = rows.map_or_else(|| "more rows than can be counted".to_owned(), |n| format!("{n} rows"));
+        Err(Unfit::new("count, steps and repeats", found, "at most 1,000,000 rows in all"))
+    }
+}
+
+fn view(view: &View) -> Result<(), Unfit> {
+    PLACE_MM.check_all("box_mm", view.box_mm.iter().flatten().flatten())?;
+    PLACE_MM.check_all("distance_mm", view.distance_mm.iter().flatten())?;
+    TILT_DEG.check_all("tilt_deg", &view.tilt_deg)
+}
+
+fn circumstances(circumstances: &Circumstances) -> Result<(), Unfit> {
+    HOURS.check_all("hours", &circumstances.hours)?;
+    if let Some(warm) = &circumstances.temperature {
+        if circumstances.hours.is_none() {
+            return Err(Unfit::new("temperature", "no hours", "`hours` beside a temperature"));
+        }
+        TEMPERATURE_C.check(|| "temperature.start_c".to_owned(), warm.start_c)?;
+        TEMPERATURE_C.check(|| "temperature.end_c".to_owned(), warm.end_c)?;
+        TIME_H.check(|| "temperature.time_constant_h".to_owned(), warm.time_constant_h)?;
+    }
+    MASS_KG.check_all("payload_kg", &circumstances.payload_kg)?;
+    LENGTH_MM.check_all("payload_centre_mm", &circumstances.payload_centre_mm)
+}
+
+fn frame(key: &str, frame: &Frame) -> Result<(), Unfit> {
+    PLACE_MM.check_all(&format!("{key}.position_mm"), &frame.position_mm)?;
+    let length = frame.wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if (1e-3..=1e3).contains(&length) {
+        return Ok(());
+    }
+    let expected = "a quaternion whose length is not 0";
+    Err(Unfit::new(format!("{key}.wxyz"), format!("a length of {}", shown(length)), expected))
+}
+
+fn sensor(sensor: &SensorSetup) -> Result<(), Unfit> {
+    match sensor {
+        SensorSetup::Cable { outlets_mm, zeros_mm, hook_mm } => {
+            if outlets_mm.is_empty() || zeros_mm.len() > outlets_mm.len() {
+                let found = format!("{} outlets, {} zeros", outlets_mm.len(), zeros_mm.len());
+                let expected = "one outlet at least, and no more zeros than outlets";
+                return Err(Unfit::new("outlets_mm", found, expected));
+            }
+            PLACE_MM.check_all("outlets_mm", outlets_mm.as_flattened())?;
+            PLACE_MM.check_all("zeros_mm", zeros_mm)?;
+            LENGTH_MM.check_all("hook_mm", hook_mm)
+        }
+        SensorSetup::Position { frame: stands, reflector_mm } => {
+            frame("frame", stands)?;
+            LENGTH_MM.check_all("reflector_mm", reflector_mm)
+        }
+        SensorSetup::Pose { frame: stands, target } => {
+            frame("frame", stands)?;
+            frame("target", target)
+        }
+    }
+}
+
+fn faults(list: &[Fault]) -> Result<(), Unfit> {
+    let mut named = list.len();
+    for (i, fault) in list.iter().enumerate() {
+        numbers(fault).map_err(|unfit| unfit.within(&format!("fault {}", i + 1)))?;
+        if let Fault::Outliers { row_list, .. } | Fault::ReadoutMismatch { row_list, .. } = fault {
+            named = named.saturating_add(row_list.len());
+        }
+    }
+    if named <= MOST_FAULTS {
+        return Ok(());
+    }
+    Err(Unfit::new("fault", format!("{named} faults and rows in lists"), "at most 10,000"))
+}
+
+fn numbers(fault: &Fault) -> Result<(), Unfit> {
+    match fault {
+        Fault::SensorZeroShift { offset_mm, .. } => PLACE_MM.check(|| "offset_mm".to_owned(), *offset_mm),
+        Fault::SensorFrameShift { shift_mm, turn_deg, .. } => {
+            PLACE_MM.check_all("shift_mm", shift_mm)?;
+            TURN_DEG.check_all("turn_deg", turn_deg)
+        }
+        Fault::ToolShift { shift_mm, .. } => LENGTH_MM.check_all("shift_mm", shift_mm),
+        Fault::SensorScale { error } => SCALE.check(|| "error".to_owned(), *error),
+        Fault::CableSag { weight_over_tension_per_m } => {
+            SAG_PER_M.check(|| "weight_over_tension_per_m".to_owned(), *weight_over_tension_per_m)
+        }
+        Fault::Outliers { size_mm, .. } => PLACE_MM.check(|| "size_mm".to_owned(), *size_mm),
+        Fault::ReadoutMismatch { shift_mm, .. } => PLACE_MM.check_all("shift_mm", shift_mm),
+        Fault::PayloadChange { payload_kg, .. } => MASS_KG.check(|| "payload_kg".to_owned(), *payload_kg),
+    }
+}

@@ -1,0 +1,73 @@
+//! The model that a track writes: the one it began with, moved to where the filter stands, with its covariance.
+
+use super::Tracker;
+use crate::identification::calibration::Calibration;
+use crate::measurement::dataset::{Dataset, Sensor};
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Verdict};
+use truegrind_math::statistics::ErrorSummary;
+
+impl Tracker {
+    /// The model as it stands now.
+    pub fn model(&self) -> Estimated {
+        let x = self.recursion.x.as_slice();
+        let task = Calibration::new(
+            &Dataset::new("track", Sensor::Position, Vec::new()),
+            &self.begun.model,
+            &self.frames,
+            &self.parameters,
+            &[],
+            &[],
+        );
+        let (model, _) = task.apply(x);
+        let arm = self.begun.order.len();
+        let whole = self.recursion.covariance();
+        let covariance = whole.view((0, 0), (arm, arm)).into_owned();
+        let mut out = self.begun.clone();
+        for (k, parameter) in self.begun.order.iter().enumerate() {
+            let name = parameter.to_string();
+            if let Some(row) = out.parameters.iter_mut().find(|p| p.name == name) {
+                update_row(row, x[k], covariance[(k, k)].max(0.0).sqrt());
+            }
+        }
+        out.model = model;
+        out.covariance = covariance;
+        out.provenance.method = "track".to_owned();
+        out.provenance.rows = self.begun.provenance.rows + self.state.poses;
+        if let Some(last) = self.state.consumed.last() {
+            out.provenance.file.clone_from(&last.file);
+            out.provenance.sha256.clone_from(&last.digest);
+        }
+        if !self.state.history.is_empty() {
+            out.geometry.fitted = ErrorSummary::of(self.state.history.iter().map(|s| s.error_mm));
+        }
+        out.condition = self.condition;
+        out.region.clone_from(&self.state.region);
+        out.verdict = Verdict {
+            status: match self.begun.verdict.status {
+                // What was wrong with the beginning is not mended by following it.
+                bad @ (Judgement::Fail | Judgement::Doubtful) => bad,
+                Judgement::Pass | Judgement::NotEvaluated => Judgement::NotEvaluated,
+            },
+            reasons: self.reasons(),
+        };
+        out
+    }
+
+    fn reasons(&self) -> Vec<String> {
+        let mut reasons = vec![format!(
+            "tracked over {} poses since {}, {} set aside as accidents; held-out errors are those of the first \
+             identification",
+            self.state.poses, self.begun.provenance.file, self.state.accidents
+        )];
+        reasons.extend(self.state.alarms.iter().map(ToString::to_string));
+        reasons
+    }
+}
+
+fn update_row(row: &mut EstimatedParameter, deviation: f64, sigma: f64) {
+    row.value += deviation;
+    row.sigma = sigma;
+    if let Some(prior) = row.prior_sigma {
+        row.determined = (1.0 - (sigma / prior).powi(2)).clamp(0.0, 1.0);
+    }
+}

@@ -1,0 +1,201 @@
+//! What must outlive a stop: the filter with every bit of its root, the latest poses, the files taken in.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::{Alarm, Options};
+use crate::measurement::dataset::{Reading, Row};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_arm::region::Region;
+use truegrind_estimation::filter::rls::Recursion;
+use truegrind_math::se3::{pose_from_vector, vector_from_pose};
+
+/// Schema of the state file.
+pub const SCHEMA: &str = "truegrind.track/1";
+
+/// One pose as it is kept in the history.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seen {
+    /// File it came from.
+    pub file: String,
+    /// Data row in that file, from 0.
+    pub row: usize,
+    /// Time, where logged (h).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_h: Option<f64>,
+    /// Joint angles (rad).
+    pub(super) joints: [f64; 6],
+    /// Length, position, or position and rotation vector.
+    pub(super) reading: Vec<f64>,
+    pub(super) condition: Condition,
+    pub(super) anchor: usize,
+    pub(super) per_mm: f64,
+    pub(super) per_rad: f64,
+    /// Normalised innovation squared when the pose came.
+    pub nis: f64,
+    /// Error of the pose with the state after it (mm): signed for a cable, the norm otherwise.
+    pub error_mm: f64,
+}
+
+impl Seen {
+    pub(super) fn row_of(&self, sensor: &str) -> Row {
+        let reading = match (sensor, self.reading.as_slice()) {
+            ("cable", [length, ..]) => Reading::Cable(*length),
+            ("position", [x, y, z, ..]) => Reading::Position(nalgebra::Vector3::new(*x, *y, *z)),
+            (_, [x, y, z, a, b, c, ..]) => Reading::Pose(pose_from_vector(&[*x, *y, *z, *a, *b, *c])),
+            _ => Reading::Cable(f64::NAN),
+        };
+        let mut row = Row::new(self.row, Joints::from(self.joints), reading);
+        row.condition = self.condition;
+        row.anchor = self.anchor;
+        row
+    }
+}
+
+/// Rows of a file that were taken in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Consumed {
+    /// Name of the file.
+    pub file: String,
+    /// Rows.
+    pub rows: usize,
+    /// Hash of these rows: a file that is changed behind its end is noticed.
+    pub digest: String,
+}
+
+/// A state with a root of its covariance, as it stands in the file: every bit of both, so that a stop changes nothing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Snapshot {
+    pub(super) x: Vec<f64>,
+    /// S with SSᵀ the covariance, row by row.
+    pub(super) root: Vec<Vec<f64>>,
+    /// Poses of the history that came before.
+    pub(super) before: usize,
+}
+
+impl Snapshot {
+    pub(super) fn of(recursion: &Recursion, before: usize) -> Self {
+        let rows = |s: &DMatrix<f64>| s.row_iter().map(|r| r.iter().copied().collect()).collect();
+        Self {
+            x: recursion.x.as_slice().to_vec(),
+            root: recursion.root().map(rows).unwrap_or_default(),
+            before,
+        }
+    }
+
+    fn root(&self) -> Option<DMatrix<f64>> {
+        let p = self.x.len();
+        let whole = self.root.len() == p && self.root.iter().all(|r| r.len() == p);
+        let finite = self.root.iter().flatten().chain(&self.x).all(|v| v.is_finite());
+        (whole && finite).then(|| DMatrix::from_fn(p, p, |i, j| self.root[i][j]))
+    }
+
+    pub(super) fn covariance(&self) -> Option<DMatrix<f64>> {
+        self.root().map(|s| &s * s.transpose())
+    }
+
+    pub(super) fn recursion(&self) -> Option<Recursion> {
+        Some(Recursion::from_root(DVector::from_column_slice(&self.x), self.root()?))
+    }
+}
+
+/// Everything that must outlive a stop.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct State {
+    pub(super) schema: String,
+    /// Hash of the model that tracking began with.
+    pub model_hash: String,
+    /// Sensor.
+    pub sensor: String,
+    /// Poses taken in.
+    pub poses: usize,
+    /// Poses set aside as accidents.
+    pub accidents: usize,
+    /// Settings.
+    pub options: Options,
+    pub(super) outlets_mm: Vec<[f64; 3]>,
+    pub(super) zeros_mm: Vec<f64>,
+    pub(super) base_from_sensor: [f64; 6],
+    pub(super) flange_from_target: [f64; 6],
+    pub(super) sigma_mm: f64,
+    pub(super) sigma_rad: f64,
+    /// The present state.
+    pub(super) now: Snapshot,
+    /// Where the history begins, and where its middle stood.
+    pub(super) reference: Snapshot,
+    pub(super) middle: Snapshot,
+    /// Where the arm was measured: the model's region, and what the track reached beyond it.
+    pub region: Region,
+    /// Number of poses before which no further alarm is raised, after one that no parameter explained.
+    pub quiet_until: usize,
+    /// Number of poses when the window left its bounds, while what moved is waited for; 0 otherwise.
+    #[serde(default)]
+    pub pending_since: usize,
+    /// Files and rows taken in.
+    pub consumed: Vec<Consumed>,
+    /// Changes noticed so far.
+    pub alarms: Vec<Alarm>,
+    /// The latest poses.
+    pub history: Vec<Seen>,
+}
+
+impl State {
+    /// The file.
+    ///
+    /// # Errors
+    /// A sentence, when a number cannot be written.
+    pub fn to_toml(&self) -> Result<String, String> {
+        let text = toml::to_string(self).map_err(|e| format!("the state cannot be written: {e}"))?;
+        Ok(format!("# The state of a track, written by truegrind {}.\n{text}", env!("CARGO_PKG_VERSION")))
+    }
+
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// A sentence that says what cannot be used.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        toml::from_str(text)
+            .map_err(|e| format!("not a track of truegrind: {}", e.message().replace('\n', " ")))
+    }
+}
+
+/// A short hash of rows, by their bits.
+pub(super) fn digest(rows: &[Row]) -> String {
+    use sha2::{Digest, Sha256};
+    let mut hash = Sha256::new();
+    for row in rows {
+        let mut number = |v: f64| hash.update(v.to_bits().to_le_bytes());
+        row.joints.iter().for_each(|q| number(*q));
+        match &row.reading {
+            Reading::Cable(length) => number(*length),
+            Reading::Position(p) => p.iter().for_each(|v| number(*v)),
+            Reading::Pose(pose) => vector_from_pose(pose).iter().for_each(|v| number(*v)),
+        }
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Most samples of a region that a track adds to.
+const SAMPLES: usize = 2_000;
+
+/// Adds a pose to the measured region: a sample where none is within the samples' own spacing. One pose after the other, so
+/// that the region does not depend on how the poses were divided among runs.
+pub(super) fn reach(region: &mut Region, joints: &[f64; 6]) {
+    let degrees = joints.map(f64::to_degrees);
+    for (i, q) in degrees.iter().enumerate() {
+        region.min_deg[i] = region.min_deg[i].min(*q);
+        region.max_deg[i] = region.max_deg[i].max(*q);
+    }
+    let near = |sample: &[f64; 6]| {
+        let square: f64 = sample.iter().zip(&degrees).map(|(a, b)| (a - b) * (a - b)).sum();
+        square <= region.spacing_deg * region.spacing_deg
+    };
+    if region.samples_deg.len() < SAMPLES && !region.samples_deg.iter().any(near) {
+        region.samples_deg.push(degrees);
+    }
+}

@@ -1,0 +1,212 @@
+//! Points of a program's path and how far an arm is off at each.
+//!
+//! Frames: the *intended* pose of the tool is where the program's author wants the TCP, in the base. A deviation is
+//! reached minus intended, its vector in the axes of the work object, in which programs and parts are measured.
+
+use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use truegrind_arm::model::Joints;
+use truegrind_arm::region::Outside;
+use truegrind_math::se3::Pose;
+use truegrind_math::statistics::ErrorSummary;
+use truegrind_programs::motion::MotionKind;
+
+/// How far the tool is off at one point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviation {
+    /// Reached minus intended, in the axes of the work object (mm).
+    pub vector_mm: Vector3<f64>,
+    /// Angle between reached and intended orientation (rad).
+    pub angle_rad: f64,
+    /// Signed along the outward surface normal (mm); `None` where no surface is known.
+    pub normal_mm: Option<f64>,
+}
+
+impl Deviation {
+    /// Deviation of `reached` from `intended`, both in the base, seen in the axes of `base_from_object`.
+    /// `normal` is the outward surface normal in the work object.
+    pub fn between(
+        intended: &Pose,
+        reached: &Pose,
+        base_from_object: &Pose,
+        normal: Option<&Vector3<f64>>,
+    ) -> Self {
+        let in_base = reached.translation.vector - intended.translation.vector;
+        let vector_mm = base_from_object.rotation.inverse() * in_base;
+        Self {
+            vector_mm,
+            angle_rad: intended.rotation.angle_to(&reached.rotation),
+            normal_mm: normal.map(|n| n.dot(&vector_mm)),
+        }
+    }
+
+    /// Length of the vector (mm).
+    pub fn norm_mm(&self) -> f64 {
+        self.vector_mm.norm()
+    }
+
+    /// The signed figure that a summary uses: along the normal where there is one, else the norm.
+    pub fn signed_mm(&self) -> f64 {
+        self.normal_mm.unwrap_or_else(|| self.norm_mm())
+    }
+}
+
+/// What became of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// Rewritten.
+    Changed,
+    /// Left as it is: nothing to change, or not known before run time.
+    Left,
+    /// Not rewritten, because that would be wrong or dangerous.
+    Refused,
+    /// Rewritten, with a warning.
+    Flagged,
+}
+
+/// One point of a path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPoint {
+    /// Position in the path, from 0.
+    pub index: usize,
+    /// Line of the program, from 1; 0 for a point that no line of a program holds (between targets).
+    pub line: u32,
+    /// Instruction.
+    pub instruction: String,
+    /// How the arm goes to this point.
+    pub kind: MotionKind,
+    /// Whether the tool cuts on the way to this point; approaches and links do not.
+    pub cutting: bool,
+    /// Work object in the base.
+    pub base_from_object: Pose,
+    /// Tool on the flange.
+    pub flange_from_tool: Pose,
+    /// Where the TCP shall be, in the base.
+    pub intended: Pose,
+    /// Outward surface normal in the work object, where a surface is known.
+    pub normal: Option<Vector3<f64>>,
+    /// Controller joints for the program as it was.
+    pub joints_before: Option<Joints>,
+    /// Controller joints for the rewritten program.
+    pub joints_after: Option<Joints>,
+    /// Where the arm goes with the program as it was.
+    pub before: Option<Deviation>,
+    /// Where the arm goes with the rewritten program.
+    pub after: Option<Deviation>,
+    /// Predicted standard deviation of the position (mm), from the covariance of the estimate.
+    pub sigma_mm: Option<f64>,
+    /// How the point leaves the region in which the arm was measured.
+    pub outside: Option<Outside>,
+    /// What became of it.
+    pub status: Status,
+    /// Why, where it was not simply rewritten.
+    pub reason: Option<String>,
+}
+
+impl PathPoint {
+    /// The reason without its measured figures, which have a decimal point; numbers of joints stay. Points with the same
+    /// fate for the same kind of reason are told of together.
+    pub fn kind_of_reason(&self) -> Option<String> {
+        let plain = |word: &&str| !(word.contains('.') && word.bytes().any(|b| b.is_ascii_digit()));
+        self.reason.as_ref().map(|reason| reason.split(' ').filter(plain).collect::<Vec<_>>().join(" "))
+    }
+}
+
+/// What the column "after" of a table is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum After {
+    /// Under the model that made the correction: rounding, interpolation and inverse kinematics alone.
+    PredictedRemainder,
+    /// On a simulated actual arm that the correction knew nothing of.
+    Achieved,
+}
+
+/// The path of one program under one model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathReport {
+    /// Name of the program.
+    pub program: String,
+    /// Name of the model (file, or method).
+    pub model: String,
+    /// What "after" means.
+    pub after: After,
+    /// The points.
+    pub points: Vec<PathPoint>,
+    /// Held-out error of the model [mm RMSE], where it has one.
+    pub held_out_mm: Option<f64>,
+}
+
+/// The summary block of ltlm-2024 Table 8: five points, mean, SD; TRAPS of that table: its mean is signed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Block {
+    /// Signed deviations at five points spread evenly over the cut (mm).
+    pub five_mm: [f64; 5],
+    /// Over all cut points: signed mean, mean absolute, standard deviation (n − 1), maximum (mm).
+    pub all: ErrorSummary,
+}
+
+impl PathReport {
+    /// Signed deviations of the cut points that have one, before or after.
+    pub fn signed_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Vec<f64> {
+        let cut = |p: &&PathPoint| p.cutting || !self.has_cuts();
+        self.points.iter().filter(cut).filter_map(|p| which(p).map(|d| d.signed_mm())).collect()
+    }
+
+    fn has_cuts(&self) -> bool {
+        self.points.iter().any(|p| p.cutting)
+    }
+
+    /// The Table-8 block; `None` without deviations.
+    pub fn block(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<Block> {
+        let values = self.signed_mm(which);
+        let last = values.len().checked_sub(1)?;
+        // At the middles of five equal sections of the cut.
+        let five_mm = std::array::from_fn(|k| values[(last * (2 * k + 1)) / 10]);
+        Some(Block { five_mm, all: ErrorSummary::of(values) })
+    }
+
+    /// What remains of the deviations after the rigid motion that fits them best: the shape error of the path, when
+    /// the base was not measured in the work object. RMS (mm) of the vectors; `None` for fewer than three points.
+    pub fn registered_rms_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Option<f64> {
+        let pairs: Vec<Pair> = self
+            .points
+            .iter()
+            .filter_map(|p| {
+                let intended = p.base_from_object.inverse() * Point3::from(p.intended.translation.vector);
+                which(p).map(|d| (intended, intended + d.vector_mm))
+            })
+            .collect();
+        let motion = best_motion(&pairs)?;
+        let rest = pairs.iter().map(|(to, from)| (motion * from - to).norm_squared()).sum::<f64>();
+        Some((rest / pairs.len() as f64).sqrt())
+    }
+}
+
+/// Where a point should be, and where it is.
+type Pair = (Point3<f64>, Point3<f64>);
+
+/// The rigid motion that carries the second points onto the first best (Kabsch); `None` for fewer than three.
+fn best_motion(pairs: &[Pair]) -> Option<Pose> {
+    if pairs.len() < 3 {
+        return None;
+    }
+    let n = pairs.len() as f64;
+    let mean =
+        |side: fn(&Pair) -> Point3<f64>| pairs.iter().map(|p| side(p).coords).sum::<Vector3<f64>>() / n;
+    let (to, from) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: Matrix3<f64> =
+        pairs.iter().map(|p| (p.1.coords - from) * (p.0.coords - to).transpose()).sum();
+    // Squares of these numbers must stay finite: the iteration does not end otherwise.
+    if !spread.iter().all(|v| v.abs() < 1e100) {
+        return None;
+    }
+    let svd = SVD::new(spread, true, true);
+    let (u, v) = (svd.u?, svd.v_t?.transpose());
+    let sign = (v * u.transpose()).determinant().signum();
+    let rotation = v * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * u.transpose();
+    let rotation: UnitQuaternion<f64> = truegrind_math::se3::rotation_from_matrix(&rotation);
+    Some(Isometry3::from_parts(Translation3::from(to - rotation * from), rotation))
+}

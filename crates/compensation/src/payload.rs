@@ -1,0 +1,439 @@
+//! What the arm carries at each motion: the load of the tool, and what the program says that it grips.
+//!
+//! A tool brings its own load (`tload`). `GripLoad` adds what the gripper holds until the next one, its centre in the
+//! tool frame (in the work object where the robot holds that); `\TLoad` of a motion stands for both together, unless it
+//! is `load0`. The grip is followed statement by statement through branches, loops, calls and functions, and from the end
+//! of main to its next cycle; where ways that join do not agree it is not known, and the tool alone is counted.
+//!
+//! Source: ABB RAPID instruction reference (RobotWare 6), GripLoad, MoveL, loaddata, tooldata.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use truegrind_arm::model::Model;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Motion, ToolValue, WorkObjectValue};
+use truegrind_programs::rapid::Task;
+use truegrind_programs::rapid::evaluate::{Context, Evaluator, Known};
+use truegrind_programs::rapid::predefined;
+use truegrind_programs::rapid::symbol::Unit;
+use truegrind_programs::rapid::syntax::{RapidTree, Syntax, arguments, parts, token_kind};
+use truegrind_programs::rapid::token::{Token, same_name};
+use truegrind_programs::rapid::value::Value;
+use truegrind_programs::reading::Program;
+use truegrind_programs::tree::Child;
+
+/// A mass at the end of the arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Load {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Its centre in the last frame of the arm (mm).
+    pub centre_mm: [f64; 3],
+}
+
+/// What the gripper holds at a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Grip {
+    /// Nothing.
+    Empty,
+    /// This much, its centre in the tool frame (or in the work object that the robot holds).
+    Holds(Load),
+    /// Not known from the text.
+    Unknown,
+}
+
+/// The loads that a program states beside those of its tools, one entry for each motion of the listing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Loads {
+    /// What the gripper holds; shorter than the listing where nothing is ever gripped.
+    pub grips: Vec<Grip>,
+    /// `\TLoad` of a motion: tool and grip together, its centre on the flange.
+    pub totals: HashMap<usize, Load>,
+}
+
+impl Loads {
+    /// The loads of a program. NC programs do not state any.
+    pub fn of(program: &Program<'_>) -> Self {
+        match program {
+            Program::Rapid(task) => Self::of_task(task),
+            Program::Nc(_) => Self::default(),
+        }
+    }
+
+    /// The loads of RAPID modules.
+    pub fn of_task(task: &Task<'_>) -> Self {
+        if says_nothing(task) { Self::default() } else { Walk::new(task).run() }
+    }
+
+    fn grip(&self, motion: usize) -> Grip {
+        self.grips.get(motion).copied().unwrap_or(Grip::Empty)
+    }
+
+    /// What the arm carries at a motion, in the last frame of `arm`; `None` where the program does not say.
+    pub fn at(&self, index: usize, motion: &Motion, listing: &Listing, arm: &Model) -> Option<Load> {
+        let in_last = |centre: Point3<f64>| -> [f64; 3] { (arm.flange * centre).coords.into() };
+        if let Some(total) = self.totals.get(&index) {
+            return Some(Load { centre_mm: in_last(total.centre_mm.into()), ..*total });
+        }
+        let tool: &ToolValue = listing.tool(motion)?.value.as_ref().ok()?;
+        let own = (tool.mass_kg > 0.0)
+            .then(|| Load { mass_kg: tool.mass_kg, centre_mm: in_last(tool.centre_of_gravity_mm.into()) });
+        let Grip::Holds(held) = self.grip(index) else { return own };
+        let object: &WorkObjectValue = listing.work_object(motion)?.value.as_ref().ok()?;
+        let frame: Pose = if tool.robhold { tool.frame.pose() } else { object.user_frame.pose() };
+        let held = Load { centre_mm: in_last(frame * Point3::from(held.centre_mm)), ..held };
+        Some(match own {
+            Some(own) => together(&own, &held),
+            None => held,
+        })
+    }
+
+    /// At how many motions it is not known what the gripper holds.
+    pub fn unknown(&self) -> usize {
+        self.grips.iter().filter(|grip| **grip == Grip::Unknown).count()
+    }
+}
+
+/// Two loads as one.
+fn together(a: &Load, b: &Load) -> Load {
+    let mass_kg = a.mass_kg + b.mass_kg;
+    let centre_mm = std::array::from_fn(|k| {
+        (a.mass_kg * a.centre_mm[k] + b.mass_kg * b.centre_mm[k]) / mass_kg.max(f64::MIN_POSITIVE)
+    });
+    Load { mass_kg, centre_mm }
+}
+
+/// Whether no statement grips anything and no motion states its load.
+fn says_nothing(task: &Task<'_>) -> bool {
+    const PORTION: usize = 1 << 16;
+    let names = |tree: &RapidTree<'_>, token: usize| {
+        let text = tree.text(token as u32);
+        same_name(text, b"GripLoad") || same_name(text, b"TLoad")
+    };
+    task.trees.iter().all(|tree| {
+        tree.kinds().par_chunks(PORTION).enumerate().all(|(portion, kinds)| {
+            let named = kinds.iter().enumerate().filter(|(_, kind)| **kind == Token::Ident);
+            named.into_iter().all(|(index, _)| !names(tree, portion * PORTION + index))
+        })
+    })
+}
+
+/// What is held at a place of a routine. `None`: as at the entry of the routine.
+type State = Option<Grip>;
+
+/// What a way that joins another leaves known.
+fn joined(a: State, b: State) -> State {
+    if a == b { a } else { Some(Grip::Unknown) }
+}
+
+/// One walk through all statements of a task.
+struct Walk<'t, 's> {
+    task: &'t Task<'s>,
+    evaluator: Evaluator<'t, 's>,
+    /// Motions by file and first byte.
+    motions: HashMap<(u32, u32), usize>,
+    /// At each motion met: its index, what is held, and the unit.
+    met: Vec<(usize, State, usize)>,
+    /// Calls of routines: the unit called, what is held there, and the calling unit.
+    calls: Vec<(usize, State, usize)>,
+    /// What is held when a unit ends; asked for while it is worked out it is not known.
+    exits: Vec<Option<State>>,
+    totals: HashMap<usize, Load>,
+    unit: usize,
+    silent: bool,
+}
+
+/// What `load0` weighs, which stands for no load (kg).
+const NOTHING_KG: f64 = 0.001;
+
+/// How deeply calls are followed.
+const DEPTH: usize = 12;
+
+impl<'t, 's> Walk<'t, 's> {
+    fn new(task: &'t Task<'s>) -> Self {
+        let motions = task.listing.motions.iter().enumerate();
+        Self {
+            task,
+            evaluator: Evaluator::new(&task.trees, &task.symbols),
+            motions: motions.map(|(i, m)| ((m.place.file, m.statement.start), i)).collect(),
+            met: Vec::new(),
+            calls: Vec::new(),
+            exits: vec![None; task.symbols.units.len()],
+            totals: HashMap::new(),
+            unit: 0,
+            silent: false,
+        }
+    }
+
+    fn run(mut self) -> Loads {
+        for unit in 0..self.task.symbols.units.len() {
+            self.unit = unit;
+            let exit = self.walk(self.task.symbols.units[unit], 0);
+            self.exits[unit] = Some(exit);
+        }
+        for unit in 0..self.exits.len() {
+            // The next cycle begins with what this one holds.
+            if let Some(exit) = self.exits[unit].filter(|_| self.is_main(unit)) {
+                self.calls.push((unit, exit, unit));
+            }
+        }
+        let mut grips = vec![Grip::Unknown; self.task.listing.motions.len()];
+        if self.task.symbols.interrupting.iter().any(|routine| self.may_grip_in(*routine)) {
+            return Loads { grips, totals: self.totals };
+        }
+        let entries = self.entries();
+        for (motion, state, unit) in &self.met {
+            grips[*motion] = state.unwrap_or(entries[*unit]);
+        }
+        Loads { grips, totals: self.totals }
+    }
+
+    /// What is held where each unit begins: nothing at the start of main; elsewhere what all calls agree on.
+    fn entries(&self) -> Vec<Grip> {
+        let units = &self.task.symbols.units;
+        let begins = |unit: usize| units[unit].routine.is_none() || self.is_main(unit);
+        let mut entries: Vec<Option<Grip>> =
+            (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
+        for _ in 0..=units.len() {
+            let mut changed = false;
+            for (callee, state, caller) in &self.calls {
+                let Some(arriving) = state.or(entries[*caller]) else { continue };
+                let new = match entries[*callee] {
+                    None => arriving,
+                    Some(old) if old == arriving => old,
+                    Some(_) => Grip::Unknown,
+                };
+                changed |= entries[*callee] != Some(new);
+                entries[*callee] = Some(new);
+            }
+            if !changed {
+                break;
+            }
+        }
+        // Nothing in these files calls it.
+        entries.into_iter().map(|entry| entry.unwrap_or(Grip::Unknown)).collect()
+    }
+
+    fn is_main(&self, unit: usize) -> bool {
+        let routine = self.task.symbols.units[unit].routine;
+        routine.is_some_and(|routine| self.task.symbols.is_main(&self.task.trees, routine))
+    }
+
+    fn tree(&self, unit: Unit) -> &'t RapidTree<'s> {
+        &self.task.trees[unit.file as usize]
+    }
+
+    fn walk(&mut self, unit: Unit, depth: usize) -> State {
+        let mut exits: Vec<State> = Vec::new();
+        let end = self.block(unit, unit.node, Some(None), &mut exits, depth);
+        let all = exits.into_iter().chain(end);
+        all.reduce(joined).flatten()
+    }
+
+    /// The statements under a node; the state is `None` where no way leads on.
+    fn block(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        mut state: Option<State>,
+        exits: &mut Vec<State>,
+        depth: usize,
+    ) -> Option<State> {
+        let tree = self.tree(unit);
+        let (mut child, end) = (node + 1, node + tree.nodes[node as usize].size);
+        while child < end {
+            let kind = tree.nodes[child as usize].kind;
+            if !(unit.routine.is_none() && (kind.is_routine() || kind == Syntax::Module)) {
+                state = self.statement(unit, child, state, exits, depth);
+            }
+            child += tree.nodes[child as usize].size;
+        }
+        state
+    }
+
+    fn statement(
+        &mut self,
+        unit: Unit,
+        node: u32,
+        state: Option<State>,
+        exits: &mut Vec<State>,
+        depth: usize,
+    ) -> Option<State> {
+        let tree = self.tree(unit);
+        let either = |a: Option<State>, b: Option<State>| match (a, b) {
+            (Some(a), Some(b)) => Some(joined(a, b)),
+            (a, b) => a.or(b),
+        };
+        let unsure = |changes: bool| if changes { Some(Some(Grip::Unknown)) } else { state };
+        match tree.nodes[node as usize].kind {
+            Syntax::Body => self.block(unit, node, state, exits, depth),
+            Syntax::Call => self.call(unit, node, state, depth),
+            Syntax::LateCall => unsure(true),
+            Syntax::CompactIf => {
+                let state = unsure(self.asks_first(unit, node));
+                either(self.block(unit, node, state, exits, depth), state)
+            }
+            Syntax::If | Syntax::Test => {
+                let (mut out, mut complete) = (None, false);
+                // The conditions are asked first.
+                let asks = |node: u32| self.asks_first(unit, node);
+                let state = unsure(asks(node) || tree.child_nodes(node).any(asks));
+                for branch in tree.child_nodes(node) {
+                    if !matches!(tree.nodes[branch as usize].kind, Syntax::Branch | Syntax::Case) {
+                        continue;
+                    }
+                    let first = parts(tree, branch).next().and_then(|first| token_kind(tree, first));
+                    complete |= matches!(first, Some(Token::Else | Token::Default));
+                    out = either(out, self.block(unit, branch, state, exits, depth));
+                }
+                if complete { out } else { either(out, state) }
+            }
+            Syntax::For | Syntax::While => {
+                // What the loop grips is held, or not yet, where it begins again.
+                let entry = unsure(self.changes(unit, node));
+                let passed = if self.asks_first(unit, node) { entry } else { state };
+                either(self.block(unit, node, entry, exits, depth), passed)
+            }
+            Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
+                let anywhere = if self.changes(unit, unit.node) { Some(Some(Grip::Unknown)) } else { state };
+                self.block(unit, node, anywhere, exits, depth);
+                state
+            }
+            Syntax::Label => {
+                if self.changes(unit, unit.node) {
+                    Some(Some(Grip::Unknown))
+                } else {
+                    state.or(Some(None))
+                }
+            }
+            Syntax::Return | Syntax::Raise | Syntax::Leave => {
+                exits.extend(state);
+                None
+            }
+            Syntax::Goto => None,
+            Syntax::Opaque | Syntax::Unwritten => unsure(true),
+            _ => unsure(self.asks(unit, node)),
+        }
+    }
+
+    /// Whether a condition or bound of a statement may grip something else.
+    fn asks_first(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        tree.child_nodes(node)
+            .any(|child| tree.nodes[child as usize].kind.is_expression() && self.asks(unit, child))
+    }
+
+    /// Whether a function under a node may grip something else.
+    fn asks(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        (node..node + tree.nodes[node as usize].size)
+            .any(|node| tree.nodes[node as usize].kind == Syntax::Function && self.may_grip(unit, node))
+    }
+
+    /// Whether a call or function may grip something else.
+    fn may_grip(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        let name = tree.text(tree.nodes[node as usize].first);
+        let own = self.task.symbols.called(unit.scope, name);
+        own.iter().any(|routine| self.may_grip_in(*routine))
+            || own.is_empty()
+                && predefined::calls_by_name(name)
+                && self.task.symbols.late_of(unit).iter().any(|routine| self.may_grip_in(*routine))
+    }
+
+    /// Whether a routine may grip something else, by itself or in what it calls.
+    fn may_grip_in(&self, routine: u32) -> bool {
+        self.task.symbols.routines[routine as usize].reach.grips
+    }
+
+    /// Whether statements under a node may grip something else.
+    fn changes(&self, unit: Unit, node: u32) -> bool {
+        let tree = self.tree(unit);
+        let end = node + tree.nodes[node as usize].size;
+        (node..end).any(|node| match tree.nodes[node as usize].kind {
+            Syntax::LateCall | Syntax::Opaque => true,
+            Syntax::Call => {
+                predefined::grips(tree.text(tree.nodes[node as usize].first)) || self.may_grip(unit, node)
+            }
+            Syntax::Function => self.may_grip(unit, node),
+            _ => false,
+        })
+    }
+
+    fn load(&self, unit: Unit, value: Child) -> Option<Load> {
+        let known = Known::new();
+        let context = Context::new(unit.file, unit.scope, &known);
+        load_of(&self.evaluator.value(context, value))
+    }
+
+    fn call(&mut self, unit: Unit, node: u32, state: Option<State>, depth: usize) -> Option<State> {
+        let state = state?;
+        let tree = self.tree(unit);
+        let name = tree.text(tree.nodes[node as usize].first);
+        if predefined::grips(name) {
+            let value = arguments(tree, node).find(|a| !a.optional).and_then(|a| a.value);
+            return Some(Some(match value.and_then(|value| self.load(unit, value)) {
+                Some(load) if load.mass_kg > NOTHING_KG => Grip::Holds(load),
+                Some(_) => Grip::Empty,
+                None => Grip::Unknown,
+            }));
+        }
+        let start = tree.node_span(node).start;
+        if let Some(&motion) = self.motions.get(&(unit.file, start))
+            && !self.silent
+        {
+            self.met.push((motion, state, self.unit));
+            let option = arguments(tree, node)
+                .find(|a| a.optional && a.name.is_some_and(|name| same_name(tree.text(name), b"TLoad")));
+            let total = option.and_then(|a| a.value).and_then(|value| self.load(unit, value));
+            // load0 leaves the tool's own load in force.
+            if let Some(total) = total.filter(|total| total.mass_kg > NOTHING_KG) {
+                self.totals.insert(motion, total);
+            }
+        }
+        let state = if self.asks(unit, node) { Some(Grip::Unknown) } else { state };
+        let routine = match *self.task.symbols.called(unit.scope, name) {
+            [] if self.may_grip(unit, node) => return Some(Some(Grip::Unknown)),
+            [] => return Some(state),
+            [routine] => routine,
+            // One of several.
+            _ => return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state }),
+        };
+        let callee = self.task.symbols.units.iter().position(|unit| unit.routine == Some(routine));
+        let Some(callee) = callee else { return Some(Some(Grip::Unknown)) };
+        if !self.silent {
+            self.calls.push((callee, state, self.unit));
+        }
+        Some(match self.exit_of(callee, depth) {
+            None => state,
+            known => known,
+        })
+    }
+
+    /// What is held when a unit ends.
+    fn exit_of(&mut self, unit: usize, depth: usize) -> State {
+        if let Some(exit) = self.exits[unit] {
+            return exit;
+        }
+        if depth >= DEPTH {
+            return Some(Grip::Unknown);
+        }
+        // A routine that calls itself is not followed further.
+        self.exits[unit] = Some(Some(Grip::Unknown));
+        let silent = std::mem::replace(&mut self.silent, true);
+        let exit = self.walk(self.task.symbols.units[unit], depth + 1);
+        self.silent = silent;
+        self.exits[unit] = Some(exit);
+        exit
+    }
+}
+
+/// A loaddata.
+fn load_of(value: &Value) -> Option<Load> {
+    let Value::List(parts) = value else { return None };
+    let [mass, centre, ..] = parts.as_slice() else { return None };
+    Some(Load { mass_kg: mass.number().ok()?, centre_mm: centre.numbers().ok()? })
+}

@@ -1,0 +1,84 @@
+//! What a controller makes of numbers that it holds in single precision, as RAPID's `num` is.
+
+use rayon::prelude::*;
+
+use truegrind_programs::motion::Frame;
+use truegrind_programs::rewrite::{Change, NewTarget};
+
+/// The most by which a target moves when its numbers are rounded to single precision.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SinglePrecision {
+    /// Of the position (mm).
+    pub position_mm: f64,
+    /// Of the orientation (°).
+    pub orientation_deg: f64,
+    /// Of a joint (°).
+    pub joint_deg: f64,
+}
+
+/// Changes that one thread takes at a time.
+const PORTION: usize = 4096;
+
+/// The largest of all new targets; `None` without any.
+pub fn single_precision(changes: &[Change]) -> Option<SinglePrecision> {
+    let most = changes.par_chunks(PORTION).map(|changes| {
+        let targets = changes
+            .iter()
+            .flat_map(|change| change.targets.iter().chain(change.before.iter().map(|extra| &extra.target)));
+        targets.filter_map(of).reduce(SinglePrecision::max)
+    });
+    most.flatten().reduce_with(SinglePrecision::max)
+}
+
+/// By how much one target moves.
+fn of(target: &NewTarget) -> Option<SinglePrecision> {
+    let short = |value: f64| f64::from(value as f32);
+    match *target {
+        NewTarget::Keep | NewTarget::Drop => None,
+        NewTarget::Cartesian { position_mm, quaternion, .. } => {
+            let off = position_mm.map(|value| short(value) - value);
+            let written = Frame { position_mm, quaternion };
+            let held = Frame { position_mm, quaternion: quaternion.map(short) };
+            Some(SinglePrecision {
+                position_mm: off.iter().map(|off| off * off).sum::<f64>().sqrt(),
+                orientation_deg: written.pose().rotation.angle_to(&held.pose().rotation).to_degrees(),
+                joint_deg: 0.0,
+            })
+        }
+        NewTarget::Joint { robot_deg } => Some(SinglePrecision {
+            joint_deg: robot_deg.iter().map(|angle| (short(*angle) - angle).abs()).fold(0.0, f64::max),
+            ..SinglePrecision::default()
+        }),
+    }
+}
+
+impl SinglePrecision {
+    /// The larger of each.
+    fn max(self, other: Self) -> Self {
+        Self {
+            position_mm: self.position_mm.max(other.position_mm),
+            orientation_deg: self.orientation_deg.max(other.orientation_deg),
+            joint_deg: self.joint_deg.max(other.joint_deg),
+        }
+    }
+
+    /// One sentence for a report.
+    pub fn text(&self) -> String {
+        // A bound is rounded up.
+        let up = |value: f64, decimals: i32| (value * 10f64.powi(decimals)).ceil() / 10f64.powi(decimals);
+        let mut parts = Vec::new();
+        if self.position_mm > 0.0 || self.orientation_deg > 0.0 {
+            parts.push(format!("{:.5} mm and {:.5}°", up(self.position_mm, 5), up(self.orientation_deg, 5)));
+        }
+        if self.joint_deg > 0.0 {
+            parts.push(format!("{:.6}° per joint", up(self.joint_deg, 6)));
+        }
+        if parts.is_empty() {
+            parts.push("nothing".to_owned());
+        }
+        format!(
+            "read in single precision, as RAPID holds numbers, targets are off by at most {} beyond what is stated here",
+            parts.join(", ")
+        )
+    }
+}

@@ -1,0 +1,622 @@
+//! Rewriting: for every target what was meant, which joints make the estimated arm reach it, and what the controller
+//! must be told.
+//!
+//! With P the target in the work object, T and W tool and work object (as told t, w; as real t*, w*), N the nominal and
+//! E the estimated forward map: the program as it is reaches E(N⁻¹(w P t⁻¹)); meant is w* P in the base; the joints that
+//! reach it are q = E⁻¹(w* P t*⁻¹); the controller goes there when it is told P′ = w⁻¹ N(q) t, or q itself.
+//!
+//! Between two ends of a straight line the told path is a straight line of the *nominal* arm; the estimated arm bends
+//! it a little. The bend is sampled, and where it exceeds the tolerance targets are put in, by bisection.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::cell::Cell;
+use super::circumstance::Circumstances;
+use super::corner::{CUT_MM, cut_of_lines};
+use super::cut::Cuts;
+use super::deviation::{PathPoint, Status};
+use super::mounting::Mounting;
+use super::mountings::Mountings;
+use super::notes::{load_notes, open_notes, play_note};
+use super::passage::{Passage, corner};
+use super::payload::{Load, Loads};
+use super::segment::{Ends, Path, middles_off};
+use super::solve::{Solved, SolvedTargets, as_joints, solve_all, take_room};
+use super::speed::{Pace, fastest};
+use super::staying::{obstacle, staying};
+use super::why::Why;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::inverse::{Inverse, InverseError};
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::region::Outside;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{
+    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
+};
+use truegrind_programs::rewrite::{Change, NewTarget};
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Emit {
+    /// Moved robtargets: the program keeps its form.
+    #[default]
+    Targets,
+    /// Joint targets, for controllers whose own model should have no say.
+    Joints,
+}
+
+/// What becomes of circular motions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Circles {
+    /// Three corrected points make a circle again; the path is checked by sampling it.
+    #[default]
+    Keep,
+    /// Straight pieces within the tolerance, where the language and the arm allow it.
+    Segments,
+}
+
+/// Bounds of a rewrite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// What is written.
+    pub emit: Emit,
+    /// What becomes of circular motions.
+    pub circles: Circles,
+    /// How far the path between two targets may leave the intended line (mm).
+    pub tolerance_mm: f64,
+    /// Largest correction of a position that is written (mm).
+    pub max_correction_mm: f64,
+    /// Largest correction of an orientation that is written (rad).
+    pub max_turn_rad: f64,
+    /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
+    pub min_singularity: f64,
+    /// How far a correction may turn a joint: so many times the size of the correction, which is the shift of the flange
+    /// over half the length of the arm's links (so that it is in rad) plus its turn (rad). An arm far from singularities
+    /// needs once that, hardly ever five times; 1/sin θ5 and the like make it more near a singularity.
+    pub joint_gain: f64,
+    /// A joint may turn by this for any correction (rad), so that rounding and small corrections are let through where
+    /// what they cost does no harm.
+    pub joint_free_rad: f64,
+    /// Whether joint targets are rewritten too: a home position says joints, not a pose.
+    pub joint_targets: bool,
+    /// Decimals of positions as they will be written, to state what rounding leaves.
+    pub position_decimals: u8,
+    /// What circumstances the program will run under. The sides from which joints come follow from its motion.
+    pub condition: Condition,
+    /// What the program says that the arm carries; absent where the payload of `condition` counts throughout.
+    pub loads: Option<Loads>,
+    /// What becomes of a cut of which not every motion can be corrected.
+    pub cuts: Cuts,
+    /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
+    pub points: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            emit: Emit::Targets,
+            circles: Circles::Keep,
+            tolerance_mm: 0.05,
+            max_correction_mm: 10.0,
+            max_turn_rad: 2.0_f64.to_radians(),
+            min_singularity: 1e-3,
+            joint_gain: 8.0,
+            joint_free_rad: 0.5_f64.to_radians(),
+            joint_targets: false,
+            position_decimals: 4,
+            condition: Condition::default(),
+            loads: None,
+            cuts: Cuts::Whole,
+            points: true,
+        }
+    }
+}
+
+/// What became of one motion, for the contract's JSON and the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionOutcome {
+    /// Index into the listing.
+    pub motion: u32,
+    /// What became of it.
+    pub status: Status,
+    /// Why.
+    pub reason: Option<Why>,
+    /// Deviation of its end before and after (mm).
+    pub before_mm: Option<f64>,
+    /// See `before_mm`; a predicted remainder.
+    pub after_mm: Option<f64>,
+    /// Predicted standard deviation (mm).
+    pub sigma_mm: Option<f64>,
+    /// Largest bend of the path to this end that is left between targets (mm).
+    pub bend_mm: Option<f64>,
+    /// Targets put in before it.
+    pub inserted: usize,
+}
+
+/// A planned rewrite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// What shall change.
+    pub changes: Vec<Change>,
+    /// One entry for each motion of the listing.
+    pub outcomes: Vec<MotionOutcome>,
+    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`].
+    pub points: Vec<PathPoint>,
+    /// What was assumed of tools and work objects.
+    pub notes: Vec<String>,
+}
+
+/// The two arms and their inverses, shared by all targets.
+pub(super) struct Arms<'a> {
+    pub(super) nominal: Inverse<'a>,
+    /// The arm in the middle of every play, under the stated condition.
+    pub(super) estimated: Inverse<'a>,
+    /// The same under each condition that the program brings about.
+    pub(super) acting: Circumstances<'a>,
+    pub(super) knowledge: Option<&'a Estimated>,
+}
+
+impl<'a> Arms<'a> {
+    pub(super) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
+        let arms = Self::simulated(&estimated.nominal, &estimated.model, condition);
+        Self { knowledge: Some(estimated), ..arms }
+    }
+
+    pub(super) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
+        let condition = Condition { approach: [0; 6], ..*condition };
+        Self {
+            nominal: Inverse::new(nominal, &Condition::default(), nominal),
+            estimated: Inverse::new(actual, &condition, nominal),
+            acting: Circumstances::new(actual, nominal, &condition),
+            knowledge: None,
+        }
+    }
+
+    /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
+    pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
+        let model = self.estimated.arm().model;
+        let Some(loads) = loads.filter(|_| model.effects.iter().any(Effect::needs_torque)) else {
+            return Vec::new();
+        };
+        let motions = listing.motions.iter().enumerate();
+        motions.map(|(index, motion)| loads.at(index, motion, listing, model)).collect()
+    }
+}
+
+/// Plans the rewrite of a program.
+///
+/// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
+/// before; the result does not depend on the number of threads.
+pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    plan_without(listing, estimated, cell, options, &BTreeMap::new())
+}
+
+/// [`plan`], where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the cuts
+/// that they are part of.
+pub(super) fn plan_without(
+    listing: &Listing,
+    estimated: &Estimated,
+    cell: &Cell,
+    options: &Options,
+    refused: &BTreeMap<u32, Why>,
+) -> Plan {
+    let mut arms = Arms::of(estimated, &options.condition);
+    let mountings = Mountings::of(listing, &arms, cell);
+    let mut solved = solve_all(listing, &mut arms, &mountings, options);
+    let stays = staying(listing, &mut solved, &mountings, &arms, options, refused);
+    let job = Job { listing, solved: &solved, stays: &stays, mountings: &mountings, arms: &arms, options };
+    let portions: Vec<Portion> = (0..listing.motions.len())
+        .into_par_iter()
+        .step_by(PORTION)
+        .map(|first| job.portion(first..(first + PORTION).min(listing.motions.len())))
+        .collect();
+    let mut notes = mountings.notes();
+    notes.extend(play_note(&arms, &solved));
+    notes.extend(load_notes(listing, &arms, options));
+    let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
+    notes.extend(open_notes(listing, &solved, &unchecked));
+    let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
+    plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
+    plan.outcomes.reserve_exact(listing.motions.len());
+    plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
+    for mut portion in portions {
+        plan.changes.append(&mut portion.changes);
+        plan.outcomes.append(&mut portion.outcomes);
+        plan.points.append(&mut portion.points);
+    }
+    plan.points.iter_mut().enumerate().for_each(|(index, point)| point.index = index);
+    plan
+}
+
+/// Motions that one thread takes at a time.
+const PORTION: usize = 64;
+
+/// What the motions of a program are worked out from.
+struct Job<'a> {
+    listing: &'a Listing,
+    solved: &'a SolvedTargets,
+    /// Motions that stay though their targets could be corrected.
+    stays: &'a BTreeMap<u32, Why>,
+    mountings: &'a Mountings,
+    arms: &'a Arms<'a>,
+    options: &'a Options,
+}
+
+/// What became of some motions that follow each other.
+struct Portion {
+    /// Lines and arcs that are written without their path having been checked.
+    unchecked: Vec<u32>,
+    changes: Vec<Change>,
+    outcomes: Vec<MotionOutcome>,
+    points: Vec<PathPoint>,
+}
+
+/// The joints that the controller takes for a flange pose with a target's configuration.
+pub(super) fn configured(
+    nominal: &Inverse<'_>,
+    flange: &Pose,
+    target: &RobTarget,
+    monitored: Switch,
+    near: Option<&Joints>,
+) -> Result<Joints, Why> {
+    let [cf1, cf4, cf6, cfx] = target.conf;
+    let wanted = Configuration { cf1, cf4, cf6, cfx };
+    if monitored == Switch::Off
+        && let Some(near) = near
+    {
+        return nominal.solve_near(flange, near).map(|s| s.joints).map_err(Why::of_inverse);
+    }
+    match nominal.solve_configured(flange, &wanted, near) {
+        Ok(solution) => Ok(solution.joints),
+        // Some arms do not use cfx: the quarter turns alone may still single out one solution.
+        Err(error @ InverseError::OtherConfiguration { nearest, .. }) => {
+            let all = nominal.all(flange);
+            // Where no configuration reaches it, none was asked for in vain: what forbids the nearest is the reason.
+            if all.is_empty() {
+                let other = nominal.solve_configured(flange, &nearest, near).err();
+                return Err(Why::of_inverse(other.unwrap_or(error)));
+            }
+            let mut fitting = all.iter().filter(|s| wanted.overshoot_rad(&s.joints) <= 1e-6);
+            match (fitting.next(), fitting.next(), monitored) {
+                (Some(only), None, _) => Ok(only.joints),
+                // Not monitored and nothing to be near to: the branch that keeps to the quarters best.
+                (_, _, Switch::Off) => all
+                    .iter()
+                    .min_by(|a, b| {
+                        wanted.overshoot_rad(&a.joints).total_cmp(&wanted.overshoot_rad(&b.joints))
+                    })
+                    .map(|s| s.joints)
+                    .ok_or_else(|| Why::of_inverse(error)),
+                _ => Err(Why::of_inverse(error)),
+            }
+        }
+        Err(error) => Err(Why::of_inverse(error)),
+    }
+}
+
+/// Whether the controller checks the configuration of a motion.
+pub(super) fn monitored(motion: &Motion) -> Switch {
+    match motion.kind {
+        MotionKind::Joint => motion.modal.conf_joint,
+        _ => motion.modal.conf_linear,
+    }
+}
+
+/// The corrected end of a motion, where its last target was worked out.
+fn ends_of<'a>(
+    motion: &'a Motion,
+    targets: &[Result<Solved, Why>],
+    mountings: &'a Mountings,
+) -> Option<Ends<'a>> {
+    let Some(Ok(to)) = targets.last() else { return None };
+    let stated = motion.to().and_then(|target| target.value.as_ref().ok());
+    let cartesian = stated.and_then(TargetValue::cartesian);
+    Some(Ends {
+        mounted: &mountings.list[to.mounted],
+        index: to.mounted,
+        meant: to.meant,
+        told: to.told,
+        joints: to.after,
+        place: to.place,
+        before: to.before,
+        conf: cartesian.filter(|_| monitored(motion) != Switch::Off).map(|target| target.conf),
+        external: stated.map(TargetValue::external),
+    })
+}
+
+struct Worked {
+    change: Option<Change>,
+    outcome: MotionOutcome,
+    point: Option<PathPoint>,
+    /// Its way, where its targets are all corrected.
+    passage: Option<Passage>,
+}
+
+impl<'a> Job<'a> {
+    fn portion(&self, motions: std::ops::Range<usize>) -> Portion {
+        take_room();
+        let count = motions.len();
+        let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
+        // Whether lines are straight shows in their middles, which are worked out together.
+        let straight = |index: usize| self.listing.motions[index].kind == MotionKind::Linear;
+        let lines: Vec<&Path<'a>> = motions
+            .clone()
+            .zip(&paths)
+            .filter(|(i, _)| straight(*i))
+            .filter_map(|(_, p)| p.as_ref())
+            .collect();
+        let mut middles = middles_off(&lines, self.arms, self.options.emit).into_iter();
+        // The way of the motion before, which a corner asks for.
+        let mut last: Option<(u32, Passage)> = None;
+        let mut out = Portion {
+            unchecked: Vec::new(),
+            changes: Vec::with_capacity(count),
+            outcomes: Vec::with_capacity(count),
+            points: Vec::with_capacity(if self.options.points { count } else { 0 }),
+        };
+        for (index, path) in motions.zip(&paths) {
+            let middle = if straight(index) && path.is_some() { middles.next() } else { None };
+            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY), last.as_ref());
+            last = worked.passage.map(|passage| (index as u32, passage));
+            let motion = &self.listing.motions[index];
+            let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+            if curve && path.is_none() && worked.change.is_some() {
+                out.unchecked.push(index as u32);
+            }
+            out.changes.extend(worked.change);
+            out.outcomes.push(worked.outcome);
+            out.points.extend(worked.point);
+        }
+        out
+    }
+
+    /// The path to the end of a motion; `None` where it is not one between two corrected ends in one work object.
+    fn path(&self, index: usize) -> Option<Path<'a>> {
+        let motion = &self.listing.motions[index];
+        if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
+            return None;
+        }
+        let previous = motion.previous? as usize;
+        let before = &self.listing.motions[previous];
+        let targets = self.solved.of(previous);
+        let changes =
+            |target: &Result<Solved, Why>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+        if !may_change(before, self.options)
+            || !targets.iter().all(changes)
+            || self.stays.contains_key(&(previous as u32))
+        {
+            return None;
+        }
+        let from = ends_of(before, targets, self.mountings)?;
+        let to = ends_of(motion, self.solved.of(index), self.mountings)?;
+        let way = self.solved.way(index, to.place);
+        (from.index == to.index).then_some(Path { from, to, way })
+    }
+
+    /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
+    /// the motion that was worked out before this one.
+    fn corner(
+        &self,
+        motion: &Motion,
+        path: Option<&Path<'a>>,
+        passage: &Passage,
+        last: Option<&(u32, Passage)>,
+    ) -> Option<f64> {
+        let Path { from: point, to, way } = path?;
+        passage.courses.as_ref()?;
+        let previous = motion.previous? as usize;
+        let before = &self.listing.motions[previous];
+        let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
+        if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
+            // Nearly all lines go on nearly straight: that is told by three points.
+            let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;
+            let points = [&first.meant, &point.meant, &to.meant].map(|pose| pose.translation.vector);
+            if !(cut_of_lines(&points, zone_mm) > CUT_MM) {
+                return None;
+            }
+        }
+        let places = [point.place, way.at(0.0)];
+        let bend =
+            |way_in: &Passage| corner(point, way_in, passage, zone_mm, places, self.arms, self.options.emit);
+        if let Some((index, way_in)) = last
+            && Some(*index) == motion.previous
+        {
+            return bend(way_in);
+        }
+        let path = self.path(previous)?;
+        let middle = middles_off(&[&path], self.arms, self.options.emit)[0];
+        let good: Vec<&Solved> = self.solved.of(previous).iter().filter_map(|t| t.as_ref().ok()).collect();
+        bend(&Passage::of(before, Some(&path), &good, middle, self.arms, self.options))
+    }
+
+    /// What becomes of one motion. `middle_mm`: how far its told line bends in the middle. `last`: the way of the motion
+    /// that was worked out before this one.
+    fn work(
+        &self,
+        index: usize,
+        path: Option<&Path<'a>>,
+        middle_mm: f64,
+        last: Option<&(u32, Passage)>,
+    ) -> Worked {
+        work(index, self, path, middle_mm, last)
+    }
+}
+
+fn work<'a>(
+    index: usize,
+    job: &Job<'a>,
+    path: Option<&Path<'a>>,
+    middle_mm: f64,
+    last: Option<&(u32, Passage)>,
+) -> Worked {
+    let Job { listing, solved, arms, options, .. } = *job;
+    let motion = &listing.motions[index];
+    let mut outcome = MotionOutcome {
+        motion: index as u32,
+        status: Status::Left,
+        reason: None,
+        before_mm: None,
+        after_mm: None,
+        sigma_mm: None,
+        bend_mm: None,
+        inserted: 0,
+    };
+    let finish = |mut outcome: MotionOutcome, status, reason, change, point: Option<PathPoint>| {
+        outcome.status = status;
+        outcome.reason = reason;
+        let point = point.map(|mut p| {
+            p.status = status;
+            p.reason = reason.map(|r| r.to_string());
+            if !matches!(status, Status::Changed | Status::Flagged) {
+                (p.after, p.joints_after) = (p.before, p.joints_before);
+            }
+            p
+        });
+        Worked { change, outcome, point, passage: None }
+    };
+    let targets = solved.of(index);
+    let point = match targets.last() {
+        Some(Ok(to)) => {
+            outcome.before_mm = Some(to.deviation_before.norm_mm());
+            outcome.after_mm = outcome.before_mm;
+            outcome.sigma_mm = Some(to.sigma_mm);
+            options.points.then(|| path_point(motion, to, &job.mountings.list[to.mounted].real))
+        }
+        _ => None,
+    };
+    if let Some((status, why)) = obstacle(index as u32, listing, solved, options, job.stays) {
+        return finish(outcome, status, Some(why), None, point);
+    }
+    let good: Vec<&Solved> = targets.iter().filter_map(|t| t.as_ref().ok()).collect();
+    // Then the path from the motion before.
+    let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
+    (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
+    let mut flag = passage.flag;
+    if let Some(corner) = job.corner(motion, path, &passage, last) {
+        outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
+        if !(corner <= options.tolerance_mm) {
+            flag = flag.or(Some(Why::Corner { mm: corner }));
+        }
+    }
+    let flag = flag.or_else(|| path.and_then(|path| too_fast(index, motion, listing, path, &passage, arms)));
+    let flag = flag.or_else(|| good.iter().find_map(|s| doubtful(s, arms)));
+    let new = |(target, solved): (&MotionTarget, &&Solved)| match target.role {
+        Role::Via if passage.straight => NewTarget::Drop,
+        _ => new_target(target, solved, motion, options),
+    };
+    let new_targets: Vec<NewTarget> = motion.targets.iter().zip(&good).map(new).collect();
+    outcome.after_mm = good.last().map(|s| s.deviation_after.norm_mm());
+    let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
+    let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
+    Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
+}
+
+/// Whether a motion is of a kind that is rewritten at all.
+pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
+    motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
+}
+
+/// Why a corrected target must not be written.
+pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
+    let shift = solved.shift_mm();
+    if !(shift <= options.max_correction_mm) {
+        return Some(Why::TooFar { mm: shift });
+    }
+    let turn = solved.told.rotation.angle_to(&solved.meant.rotation);
+    if !(turn <= options.max_turn_rad) {
+        return Some(Why::TooMuchTurn { deg: turn.to_degrees() });
+    }
+    if let Some(joint) = arms.nominal.arm().model.limits.violated(&solved.after) {
+        return Some(Why::OutsideLimits { joint });
+    }
+    if solved.singularity < options.min_singularity {
+        return Some(Why::NearSingularity);
+    }
+    // Without branches cfx is 0 everywhere.
+    if solved.conf_before.cfx != solved.conf.cfx {
+        return Some(Why::OtherBranch);
+    }
+    None
+}
+
+/// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
+fn too_fast(
+    index: usize,
+    motion: &Motion,
+    listing: &Listing,
+    Path { from, to, .. }: &Path<'_>,
+    passage: &Passage,
+    arms: &Arms<'_>,
+) -> Option<Why> {
+    let pace = if motion.timed {
+        Pace::Duration(*listing.durations_s.get(&(index as u32))?.as_ref().ok()?)
+    } else {
+        Pace::Speed(listing.speed(motion)?.value.as_ref().ok()?)
+    };
+    let [_, told] = passage.courses.as_ref()?;
+    let (joint, ratio) = fastest(from, to, told, &pace, arms)?;
+    (ratio > 1.0).then_some(Why::TooFast { joint, ratio })
+}
+
+fn doubtful(solved: &Solved, arms: &Arms<'_>) -> Option<Why> {
+    match solved.outside {
+        Some(Outside::Joint { joint, by_deg }) => return Some(Why::JointNotMeasured { joint, by_deg }),
+        Some(Outside::Coverage { ratio }) => return Some(Why::NotCovered { ratio }),
+        None => {}
+    }
+    let reference = arms.knowledge.map_or(f64::INFINITY, |k| k.region.sigma_mm);
+    (solved.sigma_mm > SIGMA_GROWTH * reference).then_some(Why::Uncertain { sigma_mm: solved.sigma_mm })
+}
+
+/// A pose whose predicted σ exceeds the worst measured pose's by this factor is flagged.
+const SIGMA_GROWTH: f64 = 2.0;
+
+fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: &Options) -> NewTarget {
+    if as_joints(motion, target, options.emit) {
+        return NewTarget::Joint { robot_deg: std::array::from_fn(|i| solved.after[i].to_degrees()) };
+    }
+    let q = solved.told.rotation.quaternion();
+    let old = target.value.ok().and_then(|v| v.cartesian().map(|t| t.conf));
+    let new = [solved.conf.cf1, solved.conf.cf4, solved.conf.cf6, solved.conf.cfx];
+    // A dummy configuration that nobody monitors stays as it is; cfx stays where only the quarters are used.
+    let conf = match old {
+        Some(old) if monitored(motion) != Switch::Off && old[..3] != new[..3] => {
+            Some([new[0], new[1], new[2], old[3]])
+        }
+        _ => None,
+    };
+    NewTarget::Cartesian {
+        position_mm: solved.told.translation.vector.into(),
+        quaternion: [q.w, q.i, q.j, q.k],
+        conf,
+    }
+}
+
+fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
+    let flange = real.flange_for(&solved.meant);
+    let base_from_object = real.base_from_object(&flange);
+    PathPoint {
+        index: 0,
+        line: motion.place.line,
+        instruction: motion.instruction.to_string(),
+        kind: motion.kind,
+        cutting: matches!(motion.kind, MotionKind::Linear | MotionKind::Circular),
+        base_from_object,
+        flange_from_tool: real.flange_from_tool(&flange),
+        intended: base_from_object * solved.meant,
+        normal: None,
+        joints_before: Some(solved.before),
+        joints_after: Some(solved.after),
+        before: Some(solved.deviation_before),
+        after: Some(solved.deviation_after),
+        sigma_mm: Some(solved.sigma_mm),
+        outside: solved.outside,
+        status: Status::Changed,
+        reason: None,
+    }
+}

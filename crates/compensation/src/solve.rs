@@ -1,0 +1,693 @@
+//! Every target worked out: which joints the program as it is leads to, which joints reach what was meant, and what the
+//! controller must be told for them.
+//!
+//! Targets go in blocks, so that the kinematics runs in lanes. First the joints of the program as it is: along runs of
+//! neighbours, each from the one before. Then everything else, target by target, each under the condition in which the
+//! arm comes there ([`Circumstances`](super::circumstance::Circumstances)). Blocks are cut by count alone, so the result
+//! does not depend on the number of threads.
+//!
+//! Where joints have play, the sides from which they come follow from the motion, and the corrected motion depends on the
+//! sides: both are worked out in turn, from the sides of the program as it is, until the sides stay as they are. A side
+//! that does not settle counts as not known.
+
+use rayon::prelude::*;
+
+use super::circumstance::picked;
+use super::course::{Course, Reached, Sides, Stop, courses};
+use super::deviation::Deviation;
+use super::mountings::Mountings;
+use super::payload::Load;
+use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
+use super::segment::Way;
+use super::singular::{Replay, at_target};
+use super::why::Why;
+use truegrind_arm::estimated::RidingPoint;
+use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::model::Joints;
+use truegrind_arm::region::{Nearest, Outside};
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{
+    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
+};
+
+/// Motions that one thread takes at a time.
+const PORTION: usize = 64;
+
+/// About the memory that a portion keeps (bytes).
+const KEPT: usize = 100 << 10;
+
+/// Makes the allocator take the room for a portion from the system at once. Left alone it asks for each few thousand bytes
+/// by themselves, and every thread waits while it does.
+pub(super) fn take_room() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(KEPT)));
+}
+
+/// Targets along which the program as it is is followed in one go: the first one has no neighbour and costs as much as
+/// hundreds of others.
+const STRETCH: usize = 4096;
+
+/// One target worked out.
+#[derive(Debug, Clone)]
+pub(super) struct Solved {
+    pub(super) mounted: usize,
+    pub(super) meant: Pose,
+    pub(super) before: Joints,
+    pub(super) after: Joints,
+    pub(super) told: Pose,
+    pub(super) conf_before: Configuration,
+    pub(super) conf: Configuration,
+    pub(super) deviation_before: Deviation,
+    pub(super) deviation_after: Deviation,
+    pub(super) sigma_mm: f64,
+    /// What of it comes from joints whose side is not known (mm).
+    pub(super) in_play_mm: f64,
+    pub(super) outside: Option<Outside>,
+    pub(super) singularity: f64,
+    /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
+    pub(super) margins: [[f64; 3]; 2],
+    /// Why it must not be written.
+    pub(super) forbidden: Option<Why>,
+    /// The condition under which the arm comes there.
+    pub(super) place: usize,
+}
+
+impl Solved {
+    /// How far the commanded position lies from the intended one (mm): what the program's numbers move by.
+    pub(super) fn shift_mm(&self) -> f64 {
+        (self.told.translation.vector - self.meant.translation.vector).norm()
+    }
+}
+
+/// The targets of all motions.
+pub(super) struct SolvedTargets {
+    /// Where the targets of each motion begin, and the end of the last.
+    first: Vec<usize>,
+    /// The targets of so many motions each: one list of all would be copied together once more.
+    portions: Vec<Vec<Result<Solved, Why>>>,
+    /// The conditions on the way to the end of each motion; empty where no joint has play.
+    ways: Vec<Way>,
+    /// Motions of which the configuration is not checked and the start not known.
+    pub(super) guessed: Vec<u32>,
+}
+
+impl SolvedTargets {
+    /// Forbids that a motion is changed; of no effect where its last target was not worked out.
+    pub(super) fn forbid(&mut self, motion: usize, why: Why) {
+        let portion = motion / PORTION;
+        let end = self.first[motion + 1] - self.first[portion * PORTION];
+        if end > 0
+            && let Some(Ok(solved)) = self.portions[portion].get_mut(end - 1)
+        {
+            solved.forbidden = Some(why);
+        }
+    }
+
+    /// The targets of one motion; none where the motion must be left.
+    pub(super) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
+        let portion = motion / PORTION;
+        let begin = self.first[portion * PORTION];
+        &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
+    }
+
+    /// The conditions on the way to the end of a motion, at which the arm comes under `place`.
+    pub(super) fn way(&self, motion: usize, place: usize) -> Way {
+        self.ways.get(motion).cloned().unwrap_or(Way { first: place, later: Vec::new() })
+    }
+
+    /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
+    pub(super) fn in_play(&self) -> (usize, f64) {
+        let open = self.portions.iter().flatten().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
+        open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
+    }
+}
+
+/// A target and the motion to which it belongs.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    motion: &'a Motion,
+    target: &'a MotionTarget,
+}
+
+/// What a target means, and the joints that the program as it is leads to.
+#[derive(Clone, Copy)]
+struct Start {
+    mounted: usize,
+    meant: Pose,
+    joints: Joints,
+    conf: Configuration,
+    /// [`Solved::margins`] before.
+    margins: [f64; 3],
+    /// Whether the controller takes the solution next to where the arm stands, which is not known, and there are others.
+    guessed: bool,
+}
+
+/// Works out all targets.
+pub(super) fn solve_all(
+    listing: &Listing,
+    arms: &mut Arms<'_>,
+    mountings: &Mountings,
+    options: &Options,
+) -> SolvedTargets {
+    let mut first = Vec::with_capacity(listing.motions.len() + 1);
+    let mut asked: Vec<Asked<'_>> = Vec::with_capacity(listing.motions.len());
+    for motion in &listing.motions {
+        first.push(asked.len());
+        if motion.left.is_none() {
+            asked.extend(motion.targets.iter().map(|target| Asked { motion, target }));
+        }
+    }
+    first.push(asked.len());
+    let starts = starts(listing, &first, &asked, arms, mountings);
+    let work = Work { listing, first, asked, starts, mountings, options };
+    work.solve(arms)
+}
+
+/// What all targets are worked out from.
+struct Work<'a> {
+    listing: &'a Listing,
+    first: Vec<usize>,
+    asked: Vec<Asked<'a>>,
+    starts: Starts,
+    mountings: &'a Mountings,
+    options: &'a Options,
+}
+
+/// How often sides and motion are worked out in turn.
+const ROUNDS: usize = 4;
+
+impl Work<'_> {
+    fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets {
+        let count = self.listing.motions.len();
+        let loads = arms.loads(self.listing, self.options.loads.as_ref());
+        let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
+        if !arms.acting.has_play() {
+            let places: Vec<usize> = if loads.iter().all(Option::is_none) {
+                let only = arms.acting.place([0; 6], None);
+                vec![only; self.asked.len()]
+            } else {
+                let motions = (0..count).flat_map(|m| (self.first[m]..self.first[m + 1]).map(move |_| m));
+                motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
+            };
+            let portions = self.portions(arms, &places, &places, None);
+            let guessed = self.guessed();
+            return SolvedTargets { first: self.first, portions, ways: Vec::new(), guessed };
+        }
+        let as_is = self.sides(arms, None);
+        let before = self.places(arms, &as_is, &load);
+        let mut sides = as_is;
+        let mut places = before.clone();
+        let mut portions = self.portions(arms, &before, &places, None);
+        for round in 1..=ROUNDS {
+            let mut next = self.sides(arms, Some(&portions));
+            if round == ROUNDS {
+                // What still goes to and fro is not known.
+                for (next, last) in next.iter_mut().zip(&sides) {
+                    next.agree(last);
+                }
+            }
+            sides = next;
+            let new = self.places(arms, &sides, &load);
+            if new == places {
+                break;
+            }
+            let stale: Vec<bool> = (0..count)
+                .step_by(PORTION)
+                .map(|begin| {
+                    let targets = self.targets(begin);
+                    new[targets.clone()] != places[targets]
+                })
+                .collect();
+            places = new;
+            let fresh = self.portions(arms, &before, &places, Some(&stale));
+            for ((portion, fresh), stale) in portions.iter_mut().zip(fresh).zip(stale) {
+                if stale {
+                    *portion = fresh;
+                }
+            }
+        }
+        let ways = sides.iter().enumerate().map(|(m, course)| {
+            let mut later =
+                course.turns.iter().map(|(share, sides)| (*share, arms.acting.place(*sides, load(m))));
+            let first = later.next().map(|turn| turn.1);
+            let later: Vec<(f64, usize)> = later.collect();
+            Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
+        });
+        let ways = ways.collect();
+        let guessed = self.guessed();
+        SolvedTargets { first: self.first, portions, ways, guessed }
+    }
+
+    /// Motions of which a target was reached by guess.
+    fn guessed(&self) -> Vec<u32> {
+        let guessed = |m: &usize| {
+            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guessed)
+        };
+        (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
+    }
+
+    /// The targets of the portion that begins with a motion.
+    fn targets(&self, begin: usize) -> std::ops::Range<usize> {
+        self.first[begin]..self.first[(begin + PORTION).min(self.listing.motions.len())]
+    }
+
+    /// All targets, `before` under the conditions of the program as it is, or those portions that are `stale`.
+    fn portions(
+        &self,
+        arms: &Arms<'_>,
+        before: &[usize],
+        places: &[usize],
+        stale: Option<&[bool]>,
+    ) -> Vec<Vec<Result<Solved, Why>>> {
+        (0..self.listing.motions.len())
+            .into_par_iter()
+            .step_by(PORTION)
+            .map(|begin| {
+                if stale.is_some_and(|stale| !stale[begin / PORTION]) {
+                    return Vec::new();
+                }
+                take_room();
+                let targets = self.targets(begin);
+                let places = [&before[targets.clone()], &places[targets.clone()]];
+                let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
+                finish(asked, starts, places, arms, self.mountings, self.options)
+            })
+            .collect()
+    }
+
+    /// The sides along the program: as it is, or as rewritten.
+    fn sides(&self, arms: &Arms<'_>, solved: Option<&[Vec<Result<Solved, Why>>]>) -> Vec<Course> {
+        let motions = &self.listing.motions;
+        let stop = |m: usize| {
+            let motion = &motions[m];
+            if motion.kind == MotionKind::External {
+                return Stop::Stays;
+            }
+            let rewritten = solved.filter(|_| may_change(motion, self.options));
+            let begin = self.first[m / PORTION * PORTION];
+            // What the controller is told, and the joints there.
+            let at = |target: usize| match rewritten {
+                Some(portions) => match portions[m / PORTION].get(target - begin)? {
+                    Ok(solved) if solved.forbidden.is_none() => {
+                        Some((solved.mounted, solved.told, solved.after))
+                    }
+                    // A target that is refused stays as it is.
+                    _ => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
+                },
+                None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
+            };
+            let targets = self.first[m]..self.first[m + 1];
+            let role = |target: &usize| self.asked[*target].target.role;
+            let Some((mounted, told, joints)) =
+                targets.clone().rev().find(|t| role(t) == Role::To).and_then(at)
+            else {
+                return Stop::Lost;
+            };
+            let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
+            Stop::At(Reached { kind: motion.kind, mounted, told, joints, via })
+        };
+        let stops: Vec<Stop> = (0..motions.len()).map(stop).collect();
+        let before: Vec<Option<u32>> = motions.iter().map(|m| m.previous).collect();
+        courses(&stops, &before, &arms.nominal, &|mounted| self.mountings.list[mounted].told)
+    }
+
+    /// The condition of each target.
+    fn places<'l>(
+        &self,
+        arms: &mut Arms<'_>,
+        sides: &[Course],
+        load: &dyn Fn(usize) -> Option<&'l Load>,
+    ) -> Vec<usize> {
+        let mut out = Vec::with_capacity(self.asked.len());
+        for (m, course) in sides.iter().enumerate() {
+            for target in self.first[m]..self.first[m + 1] {
+                let sides: Sides = match self.asked[target].target.role {
+                    // Somewhere on the arc: half way is near enough for a point that is passed, not reached.
+                    Role::Via => course.at(0.5),
+                    Role::To => course.end,
+                };
+                out.push(arms.acting.place(sides, load(m)));
+            }
+        }
+        out
+    }
+}
+
+// ---- the program as it is ----
+
+type Starts = Vec<Result<Start, Why>>;
+
+/// The joints of the program as it is. A target whose configuration the controller checks says by itself where the arm
+/// goes; one whose configuration it does not check is reached from the motion before.
+fn starts(
+    listing: &Listing,
+    first: &[usize],
+    asked: &[Asked<'_>],
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+) -> Starts {
+    let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
+    // A place holder for those that depend on the motion before.
+    let mut out: Starts = asked.par_iter().map(|_| Err(Why::JointTarget)).collect();
+    out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).for_each(|(mut out, asked)| {
+        let mut near = None;
+        for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
+            let (here, rest) = out.split_at_mut(run.len());
+            out = rest;
+            if !depends(&run[0]) {
+                along(run, &mut near, arms, mountings, here);
+            }
+        }
+    });
+    // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
+    let mut motion = 0;
+    while motion < listing.motions.len() {
+        let chained =
+            |m: usize| listing.motions[m].left.is_none() && monitored(&listing.motions[m]) == Switch::Off;
+        if !chained(motion) {
+            motion += 1;
+            continue;
+        }
+        let mut end = motion + 1;
+        while end < listing.motions.len()
+            && chained(end)
+            && listing.motions[end].previous == Some(end as u32 - 1)
+            && end - motion < STRETCH
+        {
+            end += 1;
+        }
+        let previous = listing.motions[motion].previous.map(|p| p as usize);
+        let mut near = previous.and_then(|p| {
+            let reached = &out[first[p]..first[p + 1]];
+            reached.last().and_then(|start| start.as_ref().ok().map(|s| s.joints))
+        });
+        let run = first[motion]..first[end];
+        along(&asked[run.clone()], &mut near, arms, mountings, &mut out[run]);
+        motion = end;
+    }
+    out
+}
+
+/// Shortest and longest run of targets that are taken together.
+const RUNS: [usize; 2] = [8, 64];
+
+/// The starts of targets that follow each other. `near`: the joints from which the first one is reached, if known; left
+/// at the joints of the last.
+fn along(
+    asked: &[Asked<'_>],
+    near: &mut Option<Joints>,
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    out: &mut [Result<Start, Why>],
+) {
+    let mut at = 0;
+    let mut run = RUNS[0];
+    while at < asked.len() {
+        let here = &asked[at..(at + run).min(asked.len())];
+        let whole = match near {
+            Some(last) => {
+                let cartesian: Vec<Told<'_>> =
+                    here.iter().map_while(|asked| Told::of(asked, mountings)).collect();
+                let taken = together(&cartesian, last, arms, &mut out[at..]);
+                at += taken;
+                taken == here.len()
+            }
+            None => false,
+        };
+        if whole {
+            run = (2 * run).min(RUNS[1]);
+            continue;
+        }
+        run = RUNS[0];
+        if at < asked.len() {
+            let start = start(&asked[at], near.as_ref(), arms, mountings);
+            if let Ok(start) = &start {
+                *near = Some(start.joints);
+            }
+            out[at] = start;
+            at += 1;
+        }
+    }
+}
+
+/// A Cartesian target with the pose of the flange that the controller computes.
+struct Told<'a> {
+    target: &'a RobTarget,
+    monitored: Switch,
+    mounted: usize,
+    meant: Pose,
+    flange: Pose,
+}
+
+impl<'a> Told<'a> {
+    fn of(asked: &Asked<'a>, mountings: &Mountings) -> Option<Self> {
+        let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
+        let mounted = mountings.of_motion(asked.motion).ok()?;
+        if mountings.moving_base(target).is_some() {
+            return None;
+        }
+        let meant = target.pose();
+        let flange = mountings.list[mounted].told.flange_for(&meant);
+        Some(Self { target, monitored: monitored(asked.motion), mounted, meant, flange })
+    }
+}
+
+fn wanted(target: &RobTarget) -> Configuration {
+    let [cf1, cf4, cf6, cfx] = target.conf;
+    Configuration { cf1, cf4, cf6, cfx }
+}
+
+/// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
+/// were, and leaves `last` at the joints of the last of them.
+fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
+    if told.is_empty() {
+        return 0;
+    }
+    let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
+    let mut taken = 0;
+    for (told, reached) in told.iter().zip(arms.nominal.reach_path(&flanges, last)) {
+        let Ok(reached) = reached else { break };
+        if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
+            break;
+        }
+        let (joints, conf, margins) = (reached.joints, reached.configuration, reached.margins());
+        out[taken] =
+            Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, margins, guessed: false });
+        *last = joints;
+        taken += 1;
+    }
+    taken
+}
+
+/// One target by itself.
+fn start(
+    asked: &Asked<'_>,
+    near: Option<&Joints>,
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+) -> Result<Start, Why> {
+    let value = asked.target.value.map_err(Why::Program)?;
+    let mounted = mountings.of_motion(asked.motion)?;
+    let told = &mountings.list[mounted].told;
+    match value {
+        TargetValue::Cartesian(t) => {
+            if let Some(why) = mountings.moving_base(&t) {
+                return Err(why);
+            }
+            let meant = t.pose();
+            let flange = told.flange_for(&meant);
+            let monitored = monitored(asked.motion);
+            let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
+            let conf = arms.nominal.configuration(&joints);
+            let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
+            let margins = arms.nominal.branch_margins(&joints);
+            Ok(Start { mounted, meant, joints, conf, margins, guessed })
+        }
+        TargetValue::Joint(t) => {
+            let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
+            let nominal = arms.nominal.arm();
+            if let Some(joint) = nominal.model.limits.violated(&joints) {
+                return Err(Why::OutsideLimits { joint });
+            }
+            let meant = told.target_of(&nominal.forward(&joints));
+            let conf = arms.nominal.configuration(&joints);
+            let margins = arms.nominal.branch_margins(&joints);
+            Ok(Start { mounted, meant, joints, conf, margins, guessed: false })
+        }
+    }
+}
+
+// ---- the corrected program ----
+
+/// The rest of the work on one portion of targets.
+fn finish(
+    asked: &[Asked<'_>],
+    starts: &[Result<Start, Why>],
+    places: [&[usize]; 2],
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    options: &Options,
+) -> Vec<Result<Solved, Why>> {
+    let (nominal, acting) = (arms.nominal.arm(), &arms.acting);
+    let mut out: Vec<Result<Solved, Why>> = Vec::with_capacity(asked.len());
+    // What is still on its way, and where in `out` it belongs.
+    let mut open: Vec<(usize, Start)> = Vec::with_capacity(asked.len());
+    for (index, start) in starts.iter().enumerate() {
+        if let Ok(start) = start {
+            open.push((index, *start));
+        }
+        // A place holder for those on their way.
+        out.push(Err(start.as_ref().err().copied().unwrap_or(Why::JointTarget)));
+    }
+    let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
+    let real = |start: &Start| &mountings.list[start.mounted].real;
+    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
+    let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
+    let reached_before = acting.forward(&places_before, &before);
+    // Joints that reach what was meant.
+    let solutions = acting.each(&places, |place, items| match items {
+        None => acting.inverse(place).solve_beside(&flanges, &before),
+        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
+    });
+    let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
+    for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
+        match solution {
+            Ok(solution) => way.push(OnItsWay {
+                index: *index,
+                start: *start,
+                place: places[k],
+                flange: flanges[k],
+                after: solution.joints,
+                singularity: solution.singularity,
+                reached_before: real(start).target_of(&reached_before[k]),
+            }),
+            Err(error) => out[*index] = Err(Why::of_inverse(error)),
+        }
+    }
+    // What the controller is told, and where it goes when the told numbers are rounded.
+    let after: Vec<Joints> = way.iter().map(|w| w.after).collect();
+    let told_flanges = nominal.forward_many(&after);
+    let told: Vec<Pose> = way
+        .iter()
+        .zip(&told_flanges)
+        .map(|(w, flange)| mountings.list[w.start.mounted].told.target_of(flange))
+        .collect();
+    let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
+    let heard: Vec<Pose> = way
+        .iter()
+        .zip(&told)
+        .map(|(w, told)| {
+            mountings.list[w.start.mounted].told.flange_for(&rounded(told, options.position_decimals))
+        })
+        .collect();
+    let replayed =
+        if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
+    let mut last: Vec<Joints> = Vec::with_capacity(way.len());
+    let mut failed: Vec<Option<Why>> = vec![None; way.len()];
+    for (k, w) in way.iter().enumerate() {
+        last.push(match replayed.get(k) {
+            Some(Ok(reached)) if !joint_form(w) => reached.joints,
+            Some(Err(error)) if !joint_form(w) => {
+                failed[k] = Some(Why::of_inverse(*error));
+                w.after
+            }
+            _ => w.after,
+        });
+    }
+    let places: Vec<usize> = way.iter().map(|w| w.place).collect();
+    let reached_after = acting.forward(&places, &last);
+    let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
+    let sigmas = match arms.knowledge {
+        Some(knowledge) => {
+            let points: Vec<RidingPoint<'_>> = way
+                .iter()
+                .zip(&tools)
+                .map(|(w, tool)| RidingPoint {
+                    joints: w.after,
+                    flange_from_tool: *tool,
+                    carried: mountings.list[w.start.mounted].carried.as_ref(),
+                })
+                .collect();
+            acting.each(&places, |place, items| match items {
+                None => knowledge.position_sigmas_mm(acting.arm(place), &points),
+                Some(items) => knowledge.position_sigmas_mm(acting.arm(place), &picked(&points, items)),
+            })
+        }
+        None => vec![0.0; way.len()],
+    };
+    let mut near = Nearest::default();
+    for (k, w) in way.iter().enumerate() {
+        if let Some(why) = failed[k] {
+            out[w.index] = Err(why);
+            continue;
+        }
+        let real = real(&w.start);
+        let meant = w.start.meant;
+        let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
+        let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
+        let (conf, margins) = match replayed.get(k) {
+            Some(Ok(reached)) if !joint_form(w) => (reached.configuration, reached.margins()),
+            _ => (arms.nominal.configuration(&w.after), arms.nominal.branch_margins(&w.after)),
+        };
+        let mut solved = Solved {
+            mounted: w.start.mounted,
+            meant,
+            before: w.start.joints,
+            after: w.after,
+            told: told[k],
+            conf_before: w.start.conf,
+            conf,
+            margins: [w.start.margins, margins],
+            deviation_before: in_object(&w.reached_before),
+            deviation_after: in_object(&real.target_of(&reached_after[k])),
+            sigma_mm: sigmas[k].hypot(in_play_mm),
+            in_play_mm,
+            place: w.place,
+            outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
+            singularity: w.singularity,
+            forbidden: None,
+        };
+        solved.forbidden = forbidden(&solved, arms, options).or_else(|| {
+            let told = &mountings.list[solved.mounted].told;
+            let flanges = [told.flange_for(&meant), told_flanges[k]];
+            let stated = if joint_form(w) { None } else { stated(&asked[w.index]) };
+            let replay = Replay { flanges, heard: &heard[k], joints: &last[k], stated };
+            at_target(&solved, &replay, arms, options)
+        });
+        out[w.index] = Ok(solved);
+    }
+    out
+}
+
+/// Whether a target is written as joints.
+pub(super) fn as_joints(motion: &Motion, target: &MotionTarget, emit: Emit) -> bool {
+    let may = target.role == Role::To && motion.kind != MotionKind::Circular;
+    matches!(target.value, Ok(TargetValue::Joint(_))) || (emit == Emit::Joints && may)
+}
+
+/// The target, where the controller may go by the configuration that it states.
+fn stated<'a>(asked: &Asked<'a>) -> Option<&'a RobTarget> {
+    let Ok(TargetValue::Cartesian(target)) = &asked.target.value else { return None };
+    (monitored(asked.motion) != Switch::Off).then_some(target)
+}
+
+/// A target whose joints are found.
+struct OnItsWay {
+    index: usize,
+    start: Start,
+    place: usize,
+    flange: Pose,
+    after: Joints,
+    singularity: f64,
+    reached_before: Pose,
+}
+
+/// A pose as it will be read back: positions with so many decimals, quaternions with seven.
+fn rounded(pose: &Pose, decimals: u8) -> Pose {
+    let scale = 10f64.powi(i32::from(decimals));
+    let position = pose.translation.vector.map(|v| (v * scale).round() / scale);
+    let q = pose.rotation.quaternion().coords.map(|v| (v * 1e7).round() / 1e7);
+    Pose::from_parts(
+        position.into(),
+        nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(q)),
+    )
+}

@@ -1,0 +1,91 @@
+//! Which motions stay as they are, and why: each for a reason of its own, or since another one stays.
+
+use std::collections::BTreeMap;
+
+use super::cut::{self, Cuts};
+use super::deviation::Status;
+use super::mountings::Mountings;
+use super::rewrite::{Arms, Options};
+use super::singular::forbid_ways;
+use super::solve::{Solved, SolvedTargets};
+use super::strayed::strayed;
+use super::why::Why;
+use truegrind_programs::motion::{Listing, MotionKind, Reason};
+
+/// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
+/// circles that would become others, and the rest of a cut of which a part stays; ways past a singularity are forbidden
+/// among the targets. What stays moves the start of what follows, so each may bring about another, until none does.
+pub(super) fn staying(
+    listing: &Listing,
+    solved: &mut SolvedTargets,
+    mountings: &Mountings,
+    arms: &Arms<'_>,
+    options: &Options,
+    refused: &BTreeMap<u32, Why>,
+) -> BTreeMap<u32, Why> {
+    let mut stays = refused.clone();
+    let cuts = cut::of(listing);
+    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None);
+    loop {
+        let before = stays.len();
+        for motion in strayed(listing, solved, mountings, options, &stays) {
+            stays.insert(motion, Why::NoCircle);
+        }
+        let solved_so_far = &*solved;
+        let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
+        let more = match options.cuts {
+            Cuts::Whole => cut::rest_of_cuts(listing, &cuts, &kept),
+            Cuts::Partial => cut::steps(listing, &cuts, &kept, options.tolerance_mm, &|motion| {
+                solved
+                    .of(motion as usize)
+                    .last()
+                    .and_then(|to| to.as_ref().ok())
+                    .map_or(0.0, Solved::shift_mm)
+            }),
+            Cuts::Single => Vec::new(),
+        };
+        stays.extend(more);
+        if stays.len() == before && !forbidden {
+            return stays;
+        }
+        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays));
+    }
+}
+
+/// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
+pub(super) fn obstacle(
+    index: u32,
+    listing: &Listing,
+    solved: &SolvedTargets,
+    options: &Options,
+    stays: &BTreeMap<u32, Why>,
+) -> Option<(Status, Why)> {
+    let motion = &listing.motions[index as usize];
+    if let Some(reason) = motion.left {
+        let why = Why::Program(reason);
+        return Some((unchanged(why), why));
+    }
+    let targets = solved.of(index as usize);
+    let errors = || targets.iter().filter_map(|target| target.as_ref().err().copied());
+    let unknown = errors().find(|why| matches!(why, Why::Program(_)));
+    if let Some(why) = unknown.or_else(|| errors().next()) {
+        return Some((unchanged(why), why));
+    }
+    if targets.is_empty() {
+        return Some((Status::Left, Why::Program(Reason::ExternalOnly)));
+    }
+    if motion.kind == MotionKind::AbsoluteJoint && !options.joint_targets {
+        return Some((Status::Left, Why::JointTarget));
+    }
+    let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
+    forbidden.or_else(|| stays.get(&index).copied()).map(|why| (Status::Refused, why))
+}
+
+/// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.
+fn unchanged(why: Why) -> Status {
+    match why {
+        Why::Program(Reason::BeyondReach | Reason::NumberRange) => Status::Refused,
+        Why::Program(_) => Status::Left,
+        _ => Status::Refused,
+    }
+}

@@ -1,0 +1,110 @@
+//! Circular motions that stay because their corrected points make no circle, or one that strays from what was meant.
+//!
+//! A circle hangs on where it starts. Where the motion before is corrected as well the circle moves as a whole; where it
+//! is not, two points of three move, and of a circle that is small against the correction another one becomes.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::curve::{CLOSED_MM, Curve};
+use super::mountings::Mountings;
+use super::rewrite::{Options, may_change};
+use super::segment::gap;
+use super::solve::{Solved, SolvedTargets};
+use super::why::Why;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, Motion, MotionKind, TargetValue};
+
+/// How much more or less of a turn the told circle may be than the one that was meant (rad).
+const TURN_RAD: f64 = 0.5;
+
+/// How far it may leave that one, in corrections.
+const SHARE: f64 = 1.5;
+
+/// The same for points that are not corrected at all (mm).
+const NEAR_MM: f64 = 5e-3;
+
+/// The largest correction of a circle whose start is not known, in distances of its two points.
+const UNKNOWN_SHARE: f64 = 0.25;
+
+/// Places on a circle that are looked at.
+const SAMPLES: u8 = 12;
+
+/// The circular motions of a listing that cannot be corrected for such a reason, by index. `stays`: motions that are not
+/// corrected for other reasons than their own targets.
+pub(super) fn strayed(
+    listing: &Listing,
+    solved: &SolvedTargets,
+    mountings: &Mountings,
+    options: &Options,
+    stays: &BTreeMap<u32, Why>,
+) -> BTreeSet<u32> {
+    let mut strayed = BTreeSet::new();
+    for (index, motion) in (0_u32..).zip(&listing.motions) {
+        if motion.kind != MotionKind::Circular || !may_change(motion, options) || stays.contains_key(&index) {
+            continue;
+        }
+        let ([Ok(via), Ok(to)], Some(previous)) = (solved.of(index as usize), motion.previous) else {
+            continue;
+        };
+        let before = &listing.motions[previous as usize];
+        let targets = solved.of(previous as usize);
+        let from =
+            targets.last().and_then(|from| from.as_ref().ok()).filter(|from| from.mounted == to.mounted);
+        if from.is_some_and(|from| no_circle(from, via, to, motion)) {
+            strayed.insert(index);
+            continue;
+        }
+        let changes =
+            |target: &Result<Solved, _>| target.as_ref().is_ok_and(|solved| solved.forbidden.is_none());
+        let corrected = may_change(before, options)
+            && !targets.is_empty()
+            && targets.iter().all(changes)
+            && !strayed.contains(&previous)
+            && !stays.contains_key(&previous);
+        if corrected {
+            continue;
+        }
+        let start = match from {
+            Some(from) => Some(from.meant),
+            None => stated(before, to.mounted, mountings),
+        };
+        if strays(start, via, to, motion) {
+            strayed.insert(index);
+        }
+    }
+    strayed
+}
+
+/// Whether a circle has a known start with which its points make none. One that closes is another matter: its ends say
+/// nothing of its plane.
+fn no_circle(from: &Solved, via: &Solved, to: &Solved, motion: &Motion) -> bool {
+    gap(&from.meant.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
+        && Curve::round(from.meant, &via.meant, to.meant, motion).is_none()
+}
+
+/// Where a motion that stays ends, in the frames of the one after it.
+fn stated(before: &Motion, mounted: usize, mountings: &Mountings) -> Option<Pose> {
+    let Ok(TargetValue::Cartesian(target)) = before.to()?.value else { return None };
+    (mountings.of_motion(before).ok()? == mounted).then(|| target.pose())
+}
+
+/// Whether the circle from a start that is not corrected through two corrected points is another one than was meant.
+fn strays(start: Option<Pose>, via: &Solved, to: &Solved, motion: &Motion) -> bool {
+    let shift = via.shift_mm().max(to.shift_mm());
+    let Some(start) = start else {
+        return shift > UNKNOWN_SHARE * gap(&via.meant.translation.vector, &to.meant.translation.vector);
+    };
+    if gap(&start.translation.vector, &to.meant.translation.vector) < CLOSED_MM {
+        // A whole circle whose ends do not meet is none.
+        return shift > CLOSED_MM;
+    }
+    let meant = Curve::round(start, &via.meant, to.meant, motion);
+    let told = Curve::round(start, &via.told, to.told, motion);
+    let (Some(meant), Some(told)) = (meant, told) else { return true };
+    let turn = |curve: &Curve| curve.arc().map_or(0.0, |arc| arc.sweep);
+    let off = |k: u8| {
+        let s = f64::from(k) / f64::from(SAMPLES);
+        meant.distance(&told.at(s), s)
+    };
+    (turn(&meant) - turn(&told)).abs() > TURN_RAD || (1..SAMPLES).any(|k| off(k) > SHARE * shift + NEAR_MM)
+}

@@ -1,0 +1,599 @@
+//! Frames that were taught with the arm: what the teaching joints say under the nominal and under a better arm.
+//!
+//! The controller worked out a taught frame from joints with the nominal arm N. Under N the teaching joints therefore give
+//! the frame that the program tells, but for rounding; where they do not, another tool touched the points, another frame
+//! was taught, or the joints are another arm's, and the frame must not be moved ([`contradictions`]). Where they do, the
+//! frame moves by what the better arm E makes of the same joints: F* = F_E F_N⁻¹ F. What rounding leaves between F_N and
+//! the told F is kept, so that angles of two decimals do as well as those of ten.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+
+use super::cell::{Cell, CellFrame, FrameOrigin, Teaches, stated_of};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model, Posed};
+use truegrind_math::se3::{Pose, rotation_from_matrix};
+use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjectValue};
+
+/// What programs round away when they write a frame, and constructions of the same frame may differ by (mm, rad).
+const WRITTEN: Apart = Apart { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
+/// However coarsely the teaching joints are written, a told frame that is farther away is not theirs (mm, rad).
+const MOST: Apart = Apart { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
+/// Controllers show joint angles with two decimals at least (°): coarser ones are not taken for rounded.
+const COARSEST_DEG: f64 = 0.01;
+/// Poses whose orientations tell the TCP less than this are too much alike (smallest singular value).
+const ALIKE: f64 = 1e-3;
+
+/// Distance of two frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Apart {
+    mm: f64,
+    rad: f64,
+}
+
+impl Apart {
+    fn of(one: &Pose, other: &Pose) -> Self {
+        Self {
+            mm: (one.translation.vector - other.translation.vector).norm(),
+            rad: one.rotation.angle_to(&other.rotation),
+        }
+    }
+
+    fn within(self, bound: Apart) -> bool {
+        self.mm <= bound.mm && self.rad <= bound.rad
+    }
+}
+
+/// The point that stays where it is over several poses, on the flange and in the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FixedPoint {
+    on_flange: Vector3<f64>,
+    in_base: Vector3<f64>,
+    /// Standard deviations of the two that the scatter of the poses tells (mm).
+    sigma_mm: [f64; 2],
+}
+
+/// By linear least squares (the n-point method). `None` for poses that do not fix it: too few, orientations too much
+/// alike, or no finite numbers.
+fn fixed_point(arm: &Posed<'_>, teaching: &[Joints]) -> Option<FixedPoint> {
+    // R_i t + p_i = c for all i: unknown t and c.
+    let n = teaching.len();
+    if n < 3 {
+        return None;
+    }
+    let mut a = DMatrix::zeros(3 * n, 6);
+    let mut b = DVector::zeros(3 * n);
+    for (i, q) in teaching.iter().enumerate() {
+        let flange = arm.forward(q);
+        a.view_mut((3 * i, 0), (3, 3)).copy_from(flange.rotation.to_rotation_matrix().matrix());
+        a.view_mut((3 * i, 3), (3, 3)).copy_from(&-Matrix3::<f64>::identity());
+        b.rows_mut(3 * i, 3).copy_from(&-flange.translation.vector);
+    }
+    if !a.iter().chain(b.iter()).all(|v| v.is_finite()) {
+        return None;
+    }
+    let svd = a.clone().svd(true, true);
+    if !(svd.singular_values.min() >= ALIKE) {
+        return None;
+    }
+    let x = svd.solve(&b, 0.0).ok()?;
+    let freedom = (3 * n).saturating_sub(6).max(1) as f64;
+    let variance = (&a * &x - &b).norm_squared() / freedom;
+    let directions = svd.v_t.as_ref()?;
+    let spread = |first: usize| {
+        let of =
+            |k: usize| directions.row(k).columns(first, 3).norm_squared() / svd.singular_values[k].powi(2);
+        (variance * (0..6).map(of).sum::<f64>()).sqrt()
+    };
+    Some(FixedPoint {
+        on_flange: x.fixed_rows::<3>(0).into_owned(),
+        in_base: x.fixed_rows::<3>(3).into_owned(),
+        sigma_mm: [spread(0), spread(3)],
+    })
+}
+
+/// The TCP that stays at one point over all poses (mm, on the flange), by linear least squares (the n-point method).
+/// `None` for poses that do not fix it: fewer than three, or orientations too much alike.
+pub fn taught_tcp(arm: &Posed<'_>, teaching: &[Joints]) -> Option<Vector3<f64>> {
+    fixed_point(arm, teaching).map(|found| found.on_flange)
+}
+
+/// The frame through three taught points: the first two on x, the third on y (the origin is its foot on x).
+/// `None` where the points are in line.
+pub fn taught_frame(points: &[Point3<f64>; 3]) -> Option<Pose> {
+    let x = (points[1] - points[0]).try_normalize(1e-9)?;
+    let along = x.dot(&(points[2] - points[0]));
+    let origin = points[0] + x * along;
+    let y = (points[2] - origin).try_normalize(1e-9)?;
+    let rotation = rotation_from_matrix(&Matrix3::from_columns(&[x, y, x.cross(&y)]));
+    Some(Pose::from_parts(origin.coords.into(), rotation))
+}
+
+/// A tool that touched teaching points.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pointer {
+    pub(super) name: String,
+    /// Whether the robot holds it; otherwise it stands.
+    pub(super) held: bool,
+    /// Its tip as the controller holds it (mm), on the flange or in the base.
+    told: Vector3<f64>,
+    /// As it is.
+    pub(super) real: Vector3<f64>,
+}
+
+/// A tool as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RealTool {
+    pub(super) pose: Pose,
+    /// By how much its TCP moved (mm), where it was re-evaluated.
+    pub(super) moved_mm: Option<f64>,
+}
+
+/// A work object as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RealObject {
+    /// Where targets stand.
+    pub(super) pose: Pose,
+    /// The taught points under the better arm, and their frame; absent where it was not re-evaluated.
+    pub(super) taught: Option<TaughtFrame>,
+}
+
+/// The re-evaluated frame of a work object.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct TaughtFrame {
+    pub(super) pointer: Pointer,
+    pub(super) joints: [Joints; 3],
+    pub(super) points: [Point3<f64>; 3],
+    pub(super) frame: Pose,
+}
+
+/// What teaching points are judged by: the two arms, the cell, and the tools that are known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Teaching<'a> {
+    pub(super) nominal: &'a Posed<'a>,
+    pub(super) estimated: &'a Posed<'a>,
+    pub(super) cell: &'a Cell,
+    pub(super) listing: &'a Listing,
+}
+
+/// What the cell file says of tools and work objects and this program does not bear out, one sentence each; nothing may
+/// be corrected before it is put right. `nominal` is the arm that the controller computes with.
+pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
+    let condition = Condition::default();
+    let arm = nominal.under(&condition);
+    let teaching = Teaching { nominal: &arm, estimated: &arm, cell, listing };
+    let mut seen = BTreeSet::new();
+    let mut out: Vec<String> = Vec::new();
+    for motion in &listing.motions {
+        let (Some(tool), Some(object)) = (listing.tool(motion), listing.work_object(motion)) else {
+            continue;
+        };
+        if !seen.insert((motion.tool, motion.work_object)) || listing.left_by_frames(motion).is_some() {
+            continue;
+        }
+        let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
+        let found = [
+            twice("tool", &cell.tool, &tool.name, tool.place.is_some(), listing),
+            twice("wobj", &cell.wobj, &object.name, object.place.is_some(), listing),
+            teaching.tool(tool, value).err(),
+            teaching.object(object, place).err(),
+        ];
+        for fault in found.into_iter().flatten() {
+            if !out.contains(&fault) {
+                out.push(fault);
+            }
+        }
+    }
+    out
+}
+
+/// Two entries of the cell file that mean one frame of the program.
+fn twice(kind: &str, frames: &[CellFrame], name: &str, in_text: bool, listing: &Listing) -> Option<String> {
+    let mut found = stated_of(frames, name, in_text, listing);
+    let first = found.next()?;
+    // Saying the same again contradicts nothing.
+    let second = found.find(|other| **other != CellFrame::of(&other.name, first.origin))?;
+    Some(format!(
+        "cell file: {kind} \"{}\" and {kind} \"{}\" are both {name} of the program: keep one of the two",
+        first.name, second.name
+    ))
+}
+
+/// Joints in rad.
+fn radians(deg: &[[f64; 6]]) -> Vec<Joints> {
+    deg.iter().map(|q| Joints::from_fn(|i, _| q[i].to_radians())).collect()
+}
+
+/// Half of the last decimal that any of these angles states (rad).
+fn half_step_rad(deg: &[[f64; 6]]) -> f64 {
+    let decimals = |angle: &f64| {
+        let text = angle.to_string();
+        text.split_once('.').map_or(0, |(_, decimals)| decimals.len())
+    };
+    let most = deg.iter().flatten().map(decimals).max().unwrap_or(0);
+    0.5 * 10f64.powi(-(most as i32)).min(COARSEST_DEG).to_radians()
+}
+
+/// By how much a frame can move that is worked out from rounded joints: each of them off by half its last decimal, all
+/// of them to the worst side.
+fn rounded(joints: &[Joints], half_rad: f64, frame: impl Fn(&[Joints]) -> Option<Pose>) -> Apart {
+    let mut all = Apart { mm: 0.0, rad: 0.0 };
+    let Some(base) = frame(joints) else { return all };
+    let mut off = joints.to_vec();
+    for point in 0..joints.len() {
+        for joint in 0..6 {
+            off[point][joint] += half_rad;
+            if let Some(moved) = frame(&off) {
+                let apart = Apart::of(&base, &moved);
+                all = Apart { mm: all.mm + apart.mm, rad: all.rad + apart.rad };
+            }
+            off[point][joint] = joints[point][joint];
+        }
+    }
+    all
+}
+
+/// What is explained: what is written, what rounding makes of the joints, and `scatter_mm`.
+fn explained(rounded: Apart, scatter_mm: f64) -> Apart {
+    Apart {
+        mm: (WRITTEN.mm + rounded.mm + scatter_mm).min(MOST.mm),
+        rad: (WRITTEN.rad + rounded.rad).min(MOST.rad),
+    }
+}
+
+fn list(position: &Vector3<f64>) -> String {
+    format!("[{:.3}, {:.3}, {:.3}]", position.x, position.y, position.z)
+}
+
+fn at(position: &Vector3<f64>) -> Pose {
+    Pose::from_parts((*position).into(), nalgebra::UnitQuaternion::identity())
+}
+
+impl<'a> Teaching<'a> {
+    /// A tool as it is.
+    ///
+    /// # Errors
+    /// What the cell file says of it and cannot be.
+    pub(super) fn tool(&self, tool: &Tool, value: &ToolValue) -> Result<RealTool, String> {
+        let told = value.frame.pose();
+        let stands = RealTool { pose: told, moved_mm: None };
+        let Some(stated) = self.cell.tool_of(tool, self.listing) else { return Ok(stands) };
+        if tool.place.is_some() {
+            agrees("tool", stated, &told)?;
+        }
+        self.told_tool(stated, &told, value.robhold)
+    }
+
+    /// A tool of the cell file that the controller holds as `told`.
+    fn told_tool(&self, stated: &CellFrame, told: &Pose, held: bool) -> Result<RealTool, String> {
+        if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
+            return Ok(RealTool { pose: *told, moved_mm: None });
+        }
+        let name = &stated.name;
+        let joints = radians(&stated.teaching_deg);
+        let half = half_step_rad(&stated.teaching_deg);
+        let told_tip = told.translation.vector;
+        let (nominal, estimated, bound) = match (&stated.taught_with, held) {
+            (Some(pointer), true) => {
+                return Err(format!(
+                    "cell file: tool \"{name}\": taught_with = \"{pointer}\", but the robot holds {name}: its own poses about \
+                     one point tell its TCP; remove taught_with (it is for work objects, and for tools that stand)"
+                ));
+            }
+            (Some(_), false) => {
+                let pointer = self.pointer("tool", stated, true)?;
+                let tip = |arm: &Posed<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
+                    let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
+                    touched.sum::<Vector3<f64>>() / joints.len() as f64
+                };
+                let nominal = tip(self.nominal, &joints, &pointer.told);
+                let off = |q: &Joints| {
+                    ((self.nominal.forward(q) * Point3::from(pointer.told)).coords - nominal).norm_squared()
+                };
+                let scatter = 3.0 * joints.iter().map(off).sum::<f64>().sqrt() / joints.len() as f64;
+                let round = rounded(&joints, half, |q| Some(at(&tip(self.nominal, q, &pointer.told))));
+                (nominal, tip(self.estimated, &joints, &pointer.real), explained(round, scatter))
+            }
+            (None, _) => {
+                let pick = |found: FixedPoint| if held { found.on_flange } else { found.in_base };
+                let alike = || {
+                    format!(
+                        "cell file: tool \"{name}\": its {} teaching points are too much alike to tell the TCP: give four or \
+                         more with the tool turned by 30° and more between them",
+                        joints.len()
+                    )
+                };
+                if joints.len() < 4 {
+                    return Err(format!(
+                        "cell file: tool \"{name}\": {} teaching points, expected at least 4 (a tool that stands needs fewer \
+                         with taught_with)",
+                        joints.len()
+                    ));
+                }
+                let nominal = fixed_point(self.nominal, &joints).ok_or_else(alike)?;
+                let estimated = fixed_point(self.estimated, &joints).ok_or_else(alike)?;
+                let round =
+                    rounded(&joints, half, |q| fixed_point(self.nominal, q).map(|found| at(&pick(found))));
+                let scatter = 3.0 * nominal.sigma_mm[usize::from(!held)];
+                (pick(nominal), pick(estimated), explained(round, scatter))
+            }
+        };
+        let apart = (nominal - told_tip).norm();
+        if !(apart <= bound.mm) {
+            return Err(format!(
+                "cell file: tool \"{name}\": with the arm of the data sheet its teaching points put the TCP at {}, {apart:.2} mm \
+                 and 0° away from what the program tells, {} (up to {:.2} mm is explained by rounding and by the scatter of the \
+                 points): these are the joint angles of another tool or another arm, or the TCP was changed since; teach it \
+                 anew, or write origin = \"metrology\" without teaching_deg where its numbers are true",
+                list(&nominal),
+                list(&told_tip),
+                bound.mm
+            ));
+        }
+        let shift = estimated - nominal;
+        let mut pose = *told;
+        pose.translation.vector += shift;
+        Ok(RealTool { pose, moved_mm: Some(shift.norm()) })
+    }
+
+    /// A work object as it is.
+    ///
+    /// # Errors
+    /// What the cell file says of it and cannot be.
+    pub(super) fn object(&self, object: &WorkObject, value: &WorkObjectValue) -> Result<RealObject, String> {
+        let user = value.user_frame.pose();
+        let within = value.object_frame.pose();
+        let as_told = RealObject { pose: user * within, taught: None };
+        let Some(stated) = self.cell.wobj_of(object, self.listing) else { return Ok(as_told) };
+        // A displacement was not taught: it is on top of what was.
+        let displaced = object.displacement.map_or_else(Pose::identity, |frame| frame.pose());
+        let undisplaced = user * within * displaced.inverse();
+        if object.place.is_some() {
+            agrees("wobj", stated, &user)?;
+        }
+        if stated.origin == FrameOrigin::Metrology || stated.teaching_deg.is_empty() {
+            return Ok(as_told);
+        }
+        let Ok(joints) = <[Joints; 3]>::try_from(radians(&stated.teaching_deg)) else {
+            return Err(format!(
+                "cell file: wobj \"{}\": {} teaching points, expected 3: two on x, one on y",
+                stated.name,
+                stated.teaching_deg.len()
+            ));
+        };
+        let teaches = stated.teaches.unwrap_or_default();
+        let (told, on_top) = match teaches {
+            Teaches::Uframe => (user, within),
+            Teaches::Oframe => (undisplaced, displaced),
+        };
+        let part = value.robhold;
+        let pointer = self.pointer("wobj", stated, !part)?;
+        let in_line = || {
+            format!(
+                "cell file: wobj \"{}\": its three teaching points are in line: the third must lie beside the x axis",
+                stated.name
+            )
+        };
+        let nominal = frame_of(self.nominal, &joints, &pointer.told, part).ok_or_else(in_line)?;
+        let half = half_step_rad(&stated.teaching_deg);
+        let round = rounded(&joints, half, |q| frame_of(self.nominal, q, &pointer.told, part));
+        let bound = explained(round, 0.0);
+        if !Apart::of(&nominal, &told).within(bound) {
+            let other = match teaches {
+                Teaches::Uframe => undisplaced,
+                Teaches::Oframe => user,
+            };
+            return Err(self.other_frame(stated, &joints, part, (&nominal, &told, &other), bound, &pointer));
+        }
+        let points = touched(self.estimated, &joints, &pointer.real, part);
+        let frame = taught_frame(&points).ok_or_else(in_line)?;
+        let pose = frame * nominal.inverse() * told * on_top;
+        Ok(RealObject { pose, taught: Some(TaughtFrame { pointer, joints, points, frame }) })
+    }
+
+    /// The sentence for teaching points that make another frame than the one that is told, with the cause that explains
+    /// it, where one does.
+    fn other_frame(
+        &self,
+        stated: &CellFrame,
+        joints: &[Joints; 3],
+        part: bool,
+        (nominal, told, other): (&Pose, &Pose, &Pose),
+        bound: Apart,
+        pointer: &Pointer,
+    ) -> String {
+        let teaches = stated.teaches.unwrap_or_default();
+        let (frame, instead) = match teaches {
+            Teaches::Uframe => ("user frame (uframe)", "oframe"),
+            Teaches::Oframe => ("user frame with its object frame (uframe · oframe)", "uframe"),
+        };
+        let fits = |known: &&Known| {
+            known.held != part
+                && frame_of(self.nominal, joints, &known.frame.translation.vector, part)
+                    .is_some_and(|found| Apart::of(&found, told).within(bound))
+        };
+        let known = self.known();
+        let cause = if Apart::of(nominal, other).within(bound) {
+            let place =
+                if instead == "oframe" { "with its object frame" } else { "without its object frame" };
+            format!("they make the frame {place}: write teaches = \"{instead}\"")
+        } else if let Some(tool) = known.iter().find(fits) {
+            format!("they fit tool {}: write taught_with = \"{}\"", tool.name, tool.name)
+        } else {
+            "another tool touched them, they are the joint angles of another arm, or the frame was changed since: correct \
+             taught_with or teaching_deg, or write origin = \"metrology\" without them where the frame's numbers are true"
+                .to_owned()
+        };
+        let apart = Apart::of(nominal, told);
+        format!(
+            "cell file: wobj \"{}\": with the arm of the data sheet and tool {} its teaching points make a frame at {}, {:.2} mm \
+             and {:.3}° away from the {frame} that the program tells, at {} (up to {:.2} mm and {:.3}° is explained by rounding): \
+             {cause}",
+            stated.name,
+            pointer.name,
+            list(&nominal.translation.vector),
+            apart.mm,
+            apart.rad.to_degrees(),
+            list(&told.translation.vector),
+            bound.mm,
+            bound.rad.to_degrees()
+        )
+    }
+
+    /// The tool that touched the teaching points of `stated`; `held`: the robot must have held it.
+    fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<Pointer, String> {
+        let here = format!("cell file: {kind} \"{}\"", stated.name);
+        let known = self.known();
+        let holds = if held { "that the robot holds" } else { "that stands" };
+        let found = match &stated.taught_with {
+            Some(name) => {
+                let mut same = known.iter().filter(|known| known.is(name));
+                let Some(found) = same.next() else {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": no such tool has a known value, neither in the program nor in the \
+                         cell file: declare it in a module that is given, or write [[tool]] name = \"{name}\" with origin and \
+                         position_mm"
+                    ));
+                };
+                if same.any(|other| !Apart::of(&other.frame, &found.frame).within(WRITTEN)) {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": the program has several tools of that name with different values: \
+                         give the module of the one that touched the points alone"
+                    ));
+                }
+                if found.held != held {
+                    return Err(format!(
+                        "{here}: taught_with = \"{name}\": its points are touched by a tool {holds}, and {name} is none"
+                    ));
+                }
+                found
+            }
+            None => {
+                let fit = |known: &&Known| known.held == held && !known.name.eq_ignore_ascii_case("tool0");
+                let mut fitting: Vec<&Known> = known.iter().filter(fit).collect();
+                fitting.dedup_by(|a, b| a.is(&b.name));
+                match fitting[..] {
+                    [only] => only,
+                    [] => {
+                        return Err(format!(
+                            "{here}: which tool touched its teaching points is not said, and no tool {holds} is known: write \
+                             taught_with = \"NAME\""
+                        ));
+                    }
+                    _ => {
+                        let names: Vec<&str> = fitting.iter().map(|known| known.name.as_str()).collect();
+                        return Err(format!(
+                            "{here}: which tool touched its teaching points is not said, and it may have been any of {}: write \
+                             taught_with = \"NAME\"",
+                            names.join(", ")
+                        ));
+                    }
+                }
+            }
+        };
+        let real = match found.stated {
+            Some(stated) => self.told_tool(stated, &found.frame, found.held)?.pose,
+            None => found.frame,
+        };
+        Ok(Pointer {
+            name: found.name.clone(),
+            held,
+            told: found.frame.translation.vector,
+            real: real.translation.vector,
+        })
+    }
+
+    /// Every tool whose value is known, in the order of names: those of the program, those that the cell file places,
+    /// and tool0.
+    fn known(&self) -> Vec<Known<'a>> {
+        let mut out: Vec<Known<'a>> = Vec::new();
+        let tools = self.listing.declared_tools.iter().chain(&self.listing.tools);
+        for tool in tools {
+            let Ok(value) = &tool.value else { continue };
+            let known = Known {
+                name: tool.name.clone(),
+                in_text: tool.place.is_some(),
+                frame: value.frame.pose(),
+                held: value.robhold,
+                labels: self.listing.labels_of(&tool.name).collect(),
+                stated: self.cell.tool_of(tool, self.listing),
+            };
+            if !out.contains(&known) {
+                out.push(known);
+            }
+        }
+        for stated in &self.cell.tool {
+            if let Some(frame) = stated.pose()
+                && !out.iter().any(|known| known.is(&stated.name))
+            {
+                let name = stated.name.clone();
+                out.push(Known {
+                    name,
+                    in_text: false,
+                    frame,
+                    held: true,
+                    labels: Vec::new(),
+                    stated: Some(stated),
+                });
+            }
+        }
+        if !out.iter().any(|known| known.is("tool0")) {
+            let (name, frame) = ("tool0".to_owned(), Pose::identity());
+            out.push(Known { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
+        }
+        out.sort_by_key(|known| known.name.to_ascii_lowercase());
+        out
+    }
+}
+
+/// A tool whose value is known.
+#[derive(Debug, Clone, PartialEq)]
+struct Known<'a> {
+    name: String,
+    /// Whether the program's text declares it.
+    in_text: bool,
+    frame: Pose,
+    held: bool,
+    /// How comments call it.
+    labels: Vec<&'a str>,
+    stated: Option<&'a CellFrame>,
+}
+
+impl Known<'_> {
+    fn is(&self, name: &str) -> bool {
+        super::cell::same_name(&self.name, name, self.in_text)
+            || self.stated.is_some_and(|stated| stated.name.eq_ignore_ascii_case(name))
+            || (!self.in_text && self.labels.iter().any(|label| label.eq_ignore_ascii_case(name)))
+    }
+}
+
+/// Teaching points: touched by a tool that the robot holds, or on a part that it holds to a tool that stands.
+fn touched(arm: &Posed<'_>, joints: &[Joints; 3], tip: &Vector3<f64>, part: bool) -> [Point3<f64>; 3] {
+    std::array::from_fn(|i| {
+        let flange = arm.forward(&joints[i]);
+        if part { flange.inverse() * Point3::from(*tip) } else { flange * Point3::from(*tip) }
+    })
+}
+
+fn frame_of(arm: &Posed<'_>, joints: &[Joints], tip: &Vector3<f64>, part: bool) -> Option<Pose> {
+    taught_frame(&touched(arm, joints.try_into().ok()?, tip, part))
+}
+
+/// Whether the cell file places a frame where the program does, if it places it at all.
+fn agrees(kind: &str, stated: &CellFrame, told: &Pose) -> Result<(), String> {
+    let Some(placed) = stated.pose() else { return Ok(()) };
+    let apart = Apart::of(&placed, told);
+    if apart.within(WRITTEN) {
+        return Ok(());
+    }
+    let what = if kind == "tool" { "frame" } else { "user frame" };
+    Err(format!(
+        "cell file: {kind} \"{}\": position_mm and quaternion_wxyz are {:.2} mm and {:.3}° away from the {what} that the program \
+         declares, at {}: a RAPID program says where it is; remove them, or correct the one that is wrong",
+        stated.name,
+        apart.mm,
+        apart.rad.to_degrees(),
+        list(&told.translation.vector)
+    ))
+}

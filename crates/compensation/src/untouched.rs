@@ -1,0 +1,32 @@
+//! A program without an arm to correct it for: nothing changes, and each motion says what the text tells of it.
+
+use super::deviation::Status;
+use super::rewrite::{MotionOutcome, Options, Plan, may_change};
+use super::why::Why;
+use truegrind_programs::motion::{Listing, Motion, Reason};
+
+/// The plan that changes nothing. A motion that a model could correct is [`Why::Same`]; any other has the reason that it
+/// would have with a model too.
+pub fn untouched(listing: &Listing, options: &Options) -> Plan {
+    let outcomes = (0..).zip(&listing.motions).map(|(index, motion)| MotionOutcome {
+        motion: index,
+        status: Status::Left,
+        reason: Some(why(listing, motion, options)),
+        before_mm: None,
+        after_mm: None,
+        sigma_mm: None,
+        bend_mm: None,
+        inserted: 0,
+    });
+    Plan { changes: Vec::new(), outcomes: outcomes.collect(), points: Vec::new(), notes: Vec::new() }
+}
+
+fn why(listing: &Listing, motion: &Motion, options: &Options) -> Why {
+    let unknown = || motion.targets.iter().find_map(|target| target.value.as_ref().err().copied());
+    let external = || motion.targets.is_empty().then_some(Reason::ExternalOnly);
+    let frames = || listing.left_by_frames(motion);
+    if let Some(reason) = motion.left.or_else(unknown).or_else(external).or_else(frames) {
+        return Why::Program(reason);
+    }
+    if may_change(motion, options) { Why::Same } else { Why::JointTarget }
+}

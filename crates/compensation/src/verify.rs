@@ -1,0 +1,277 @@
+//! Running a program on an arm that is not the controller's: what the tool does, against what was meant.
+//!
+//! The controller computes joints with the nominal arm; the acting arm (estimated, or a simulated actual one) goes
+//! where those joints take it, from the sides from which they come. Intended poses come from the original program.
+
+use nalgebra::{Point3, Vector3};
+
+use super::cell::Cell;
+use super::course::{Reached, Stop, courses};
+use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use super::mountings::Mountings;
+use super::payload::Loads;
+use super::rewrite::{Arms, configured, monitored};
+use super::why::Why;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_arm::model::{Joints, Model};
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, MotionKind, Reason, Role, TargetValue};
+use truegrind_surfaces::Surface;
+
+/// Where the controller sends the arm at the end of a motion.
+#[derive(Debug, Clone)]
+struct Sent {
+    motion: usize,
+    mounted: usize,
+    /// Told pose in the work object.
+    told: Pose,
+    joints: Joints,
+}
+
+/// One end of a motion, run.
+#[derive(Debug, Clone)]
+struct Run {
+    motion: usize,
+    /// Told pose in the work object.
+    told: Pose,
+    joints: Joints,
+    /// Reached pose in the work object.
+    reached: Pose,
+    base_from_object: Pose,
+    flange_from_tool: Pose,
+    carried: Option<Carried>,
+    /// The condition under which the arm came there.
+    place: usize,
+}
+
+/// The arm that runs a program.
+#[derive(Debug, Clone, Copy)]
+pub struct Acting<'a> {
+    /// What the controller computes with.
+    pub nominal: &'a Model,
+    /// The arm that moves.
+    pub model: &'a Model,
+    /// Its covariance and region, where it is an estimate.
+    pub knowledge: Option<&'a Estimated>,
+    /// Under what circumstances.
+    pub condition: Condition,
+}
+
+/// A program with what it is judged by.
+#[derive(Debug, Clone, Copy)]
+pub struct Judged<'a> {
+    /// States what was meant, and gives the deviations before.
+    pub original: &'a Listing,
+    /// The rewritten program, which gives the deviations after; absent when only the original is judged.
+    pub rewritten: Option<&'a Listing>,
+    /// Origins of tools and work objects.
+    pub cell: &'a Cell,
+    /// The surface that is ground, in the frame of the work object.
+    pub surface: Option<&'a Surface>,
+    /// Name of the program.
+    pub program: &'a str,
+    /// Name of the model.
+    pub name: &'a str,
+    /// What "after" means.
+    pub after: After,
+    /// What the two programs say that the arm carries; absent where the payload of the condition counts throughout.
+    pub loads: [Option<&'a Loads>; 2],
+}
+
+/// Runs a program on an arm.
+pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
+    let mut arms = Arms::simulated(acting.nominal, acting.model, &acting.condition);
+    arms.knowledge = acting.knowledge;
+    let before = run(task.original, task.loads[0], &mut arms, task.cell);
+    let after = task.rewritten.map(|listing| (listing, run(listing, task.loads[1], &mut arms, task.cell)));
+    let partners = after.as_ref().map(|(_, runs)| align(&before, runs));
+    let points = before
+        .iter()
+        .enumerate()
+        .map(|(index, first)| {
+            let motion = &task.original.motions[first.motion];
+            let contact = task.surface.and_then(|s| s.foot(&Point3::from(first.told.translation.vector)));
+            let on_surface = contact.as_ref().is_some_and(|f| f.normal_mm.abs() < ON_SURFACE_MM);
+            let normal: Option<Vector3<f64>> = contact.map(|f| f.contact.normal.into_inner());
+            let deviation =
+                |reached: &Pose| Deviation::between(&first.told, reached, &Pose::identity(), normal.as_ref());
+            let second = match (&after, &partners) {
+                (Some((_, runs)), Some(partners)) => partners[index].map(|k| &runs[k]),
+                _ => None,
+            };
+            let (joints, place) = second.map_or((first.joints, first.place), |s| (s.joints, s.place));
+            let linear = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+            PathPoint {
+                index,
+                line: motion.place.line,
+                instruction: motion.instruction.to_string(),
+                kind: motion.kind,
+                cutting: if task.surface.is_some() { linear && on_surface } else { linear },
+                base_from_object: first.base_from_object,
+                flange_from_tool: first.flange_from_tool,
+                intended: first.base_from_object * first.told,
+                normal,
+                joints_before: Some(first.joints),
+                joints_after: second.map(|s| s.joints),
+                before: Some(deviation(&first.reached)),
+                after: second.map(|s| deviation(&s.reached)),
+                sigma_mm: acting.knowledge.map(|k| {
+                    let (tool, carried) = (&first.flange_from_tool, first.carried.as_ref());
+                    let known = k.position_sigma_mm(arms.acting.arm(place), &joints, tool, carried);
+                    known.hypot(arms.acting.in_play_mm(place, &joints, tool))
+                }),
+                outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
+                status: if second.is_some() { Status::Changed } else { Status::Left },
+                reason: None,
+            }
+        })
+        .collect();
+    PathReport {
+        program: task.program.to_owned(),
+        model: task.name.to_owned(),
+        after: task.after,
+        points,
+        held_out_mm: acting.knowledge.map(|k| k.geometry.held_out.rmse),
+    }
+}
+
+/// A point nearer to the surface than this is a cut (mm).
+const ON_SURFACE_MM: f64 = 0.5;
+
+fn run(listing: &Listing, loads: Option<&Loads>, arms: &mut Arms<'_>, cell: &Cell) -> Vec<Run> {
+    let mountings = Mountings::of(listing, arms, cell);
+    let mut sent: Vec<Sent> = Vec::new();
+    let mut near: Option<Joints> = None;
+    for (index, motion) in listing.motions.iter().enumerate() {
+        if motion.left.is_some() {
+            continue;
+        }
+        if let Ok(there) = send(index, listing, arms, &mountings, near.as_ref()) {
+            near = Some(there.joints);
+            sent.push(there);
+        }
+    }
+    let places = places(listing, loads, &sent, arms, &mountings);
+    let joints: Vec<Joints> = sent.iter().map(|s| s.joints).collect();
+    let flanges = arms.acting.forward(&places, &joints);
+    sent.into_iter()
+        .zip(flanges)
+        .zip(places)
+        .map(|((sent, flange), place)| {
+            let mounted = &mountings.list[sent.mounted];
+            Run {
+                motion: sent.motion,
+                told: sent.told,
+                joints: sent.joints,
+                reached: mounted.real.target_of(&flange),
+                base_from_object: mounted.real.base_from_object(&flange),
+                flange_from_tool: mounted.real.flange_from_tool(&flange),
+                carried: mounted.carried.clone(),
+                place,
+            }
+        })
+        .collect()
+}
+
+/// The condition under which the arm comes to each end.
+fn places(
+    listing: &Listing,
+    loads: Option<&Loads>,
+    sent: &[Sent],
+    arms: &mut Arms<'_>,
+    mountings: &Mountings,
+) -> Vec<usize> {
+    let loads = arms.loads(listing, loads);
+    let load = |motion: usize| loads.get(motion).and_then(Option::as_ref);
+    if !arms.acting.has_play() {
+        return sent.iter().map(|s| arms.acting.place([0; 6], load(s.motion))).collect();
+    }
+    let mut stops: Vec<Stop> = listing
+        .motions
+        .iter()
+        .map(|m| if m.kind == MotionKind::External { Stop::Stays } else { Stop::Lost })
+        .collect();
+    for there in sent {
+        let motion = &listing.motions[there.motion];
+        let via = motion.targets.iter().find(|target| target.role == Role::Via);
+        stops[there.motion] = Stop::At(Reached {
+            kind: motion.kind,
+            mounted: there.mounted,
+            told: there.told,
+            joints: there.joints,
+            via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
+        });
+    }
+    let before: Vec<Option<u32>> = listing.motions.iter().map(|m| m.previous).collect();
+    let courses = courses(&stops, &before, &arms.nominal, &|mounted| mountings.list[mounted].told);
+    sent.iter().map(|s| arms.acting.place(courses[s.motion].end, load(s.motion))).collect()
+}
+
+fn send(
+    index: usize,
+    listing: &Listing,
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    near: Option<&Joints>,
+) -> Result<Sent, Why> {
+    let motion = &listing.motions[index];
+    let target = motion.to().ok_or(Why::Program(Reason::ExternalOnly))?;
+    let value = target.value.map_err(Why::Program)?;
+    let mounted = mountings.of_motion(motion)?;
+    let mounting = &mountings.list[mounted].told;
+    let (told, joints) = match value {
+        TargetValue::Cartesian(t) => {
+            if let Some(why) = mountings.moving_base(&t) {
+                return Err(why);
+            }
+            let told = t.pose();
+            let flange = mounting.flange_for(&told);
+            (told, configured(&arms.nominal, &flange, &t, monitored(motion), near)?)
+        }
+        TargetValue::Joint(t) => {
+            let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
+            (mounting.target_of(&arms.nominal.arm().forward(&joints)), joints)
+        }
+    };
+    Ok(Sent { motion: index, mounted, told, joints })
+}
+
+/// The rewritten run that belongs to each original one: the same number means one to one; where targets were put in,
+/// the monotone matching with the least total distance, by dynamic programming over the targets put in.
+fn align(before: &[Run], after: &[Run]) -> Vec<Option<usize>> {
+    let (n, m) = (before.len(), after.len());
+    if n == m {
+        return (0..n).map(Some).collect();
+    }
+    if m < n || n == 0 {
+        return vec![None; n];
+    }
+    let extra = m - n;
+    let distance =
+        |i: usize, k: usize| (before[i].told.translation.vector - after[k].told.translation.vector).norm();
+    // cost[e]: least total distance with runs 0..=i matched and e of the extra runs passed so far.
+    let mut cost: Vec<f64> = (0..=extra).map(|e| distance(0, e)).collect();
+    let mut from: Vec<Vec<usize>> = vec![(0..=extra).collect()];
+    for i in 1..n {
+        let mut next = vec![f64::INFINITY; extra + 1];
+        let mut origin = vec![0; extra + 1];
+        let mut best = (f64::INFINITY, 0);
+        for e in 0..=extra {
+            if cost[e] < best.0 {
+                best = (cost[e], e);
+            }
+            next[e] = best.0 + distance(i, i + e);
+            origin[e] = best.1;
+        }
+        cost = next;
+        from.push(origin);
+    }
+    let mut e = (0..=extra).min_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
+    let mut out = vec![None; n];
+    for i in (0..n).rev() {
+        out[i] = Some(i + e);
+        e = from[i][e];
+    }
+    out
+}

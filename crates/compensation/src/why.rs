@@ -1,0 +1,245 @@
+//! Why a motion was left, refused or flagged: a closed list.
+
+use std::fmt;
+
+use truegrind_arm::inverse::InverseError;
+use truegrind_programs::motion::Reason;
+
+/// A reason.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Why {
+    /// The program does not say enough, or says what must not be touched.
+    Program(Reason),
+    /// An external axis carries the robot's base, which is not followed.
+    MovingBase {
+        /// Its place among the external axes, 0-based.
+        axis: usize,
+    },
+    /// The cell file says of its tool or work object what the program does not bear out
+    /// ([`contradictions`](super::taught::contradictions) says what).
+    Contradicted,
+    /// A joint target states joints, not a pose; rewritten only when asked.
+    JointTarget,
+    /// The new numbers are the old ones, to the decimals that are written; said once the program is rewritten.
+    Same,
+    /// No joints reach the target.
+    Inverse(InverseError),
+    /// A joint would leave its range.
+    OutsideLimits {
+        /// Joint, 0-based.
+        joint: usize,
+    },
+    /// The correction of the position is larger than the stated bound.
+    TooFar {
+        /// The correction (mm).
+        mm: f64,
+    },
+    /// The correction of the orientation is larger than the stated bound.
+    TooMuchTurn {
+        /// The correction (°).
+        deg: f64,
+    },
+    /// Near a singularity small corrections become large joint motions.
+    NearSingularity,
+    /// The correction turns a joint by much more than it would elsewhere on the arm: at the target, or on the way to it.
+    JointJump {
+        /// Joint, 0-based.
+        joint: usize,
+        /// By how much the correction turns it (°).
+        deg: f64,
+        /// The most that a correction of this size may turn it by (°).
+        most_deg: f64,
+        /// Whether this happens on the way, not at the target.
+        on_the_way: bool,
+    },
+    /// The corrected way comes to a singularity.
+    SingularWay,
+    /// The corrected target lies in another configuration.
+    OtherBranch,
+    /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
+    OpenBranch,
+    /// The path between two targets leaves the intended one by more than the tolerance.
+    Bend {
+        /// By how much (mm).
+        mm: f64,
+    },
+    /// The robot rounds the point before, and the corner leaves the intended one by more than the tolerance.
+    Corner {
+        /// By how much (mm).
+        mm: f64,
+    },
+    /// Straight pieces were asked for, but the circle stays.
+    CircleKept,
+    /// At the programmed speed a joint turns faster than it can.
+    TooFast {
+        /// Joint, 0-based.
+        joint: usize,
+        /// Its speed over its limit, above 1.
+        ratio: f64,
+    },
+    /// The three points of a circular motion lie on a line, two of them coincide, or the circle through them leaves the way
+    /// that was meant.
+    NoCircle,
+    /// A whole circle: its ends say nothing of its plane, so its path is not checked.
+    WholeCircle,
+    /// A joint stands outside the range in which it was measured.
+    JointNotMeasured {
+        /// Joint, 0-based.
+        joint: usize,
+        /// By how much (°).
+        by_deg: f64,
+    },
+    /// It is part of a cut of which another motion stays as it is: half a correction would be a step in the part.
+    PartOfCut {
+        /// The line of the motion that stays for a reason of its own, from 1.
+        line: u32,
+        /// That reason, without its figures.
+        because: &'static str,
+    },
+    /// The motion before or after it in the same cut stays as it is, and the step to that one would be too large.
+    Step {
+        /// The line of that motion, from 1.
+        line: u32,
+        /// The step (mm).
+        mm: f64,
+    },
+    /// No measured pose is near.
+    NotCovered {
+        /// Distance over that of measured poses, above 1.
+        ratio: f64,
+    },
+    /// The model is much less certain here than where the arm was measured.
+    Uncertain {
+        /// Predicted σ (mm).
+        sigma_mm: f64,
+    },
+}
+
+impl Why {
+    /// The reason of an inverse that failed.
+    pub fn of_inverse(error: InverseError) -> Self {
+        match error {
+            InverseError::OutsideLimits { joint, .. } => Why::OutsideLimits { joint },
+            InverseError::NearSingularity { .. } => Why::NearSingularity,
+            other => Why::Inverse(other),
+        }
+    }
+
+    /// The reason without the figures of one motion.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Why::Program(reason) => reason.text(),
+            Why::MovingBase { .. } => "an external axis carries the robot's base",
+            Why::Contradicted => "cell file and program contradict each other",
+            Why::JointTarget => "a joint target",
+            Why::Same => "nothing to change",
+            Why::Inverse(InverseError::Unreachable { .. }) => "out of reach",
+            Why::Inverse(InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. }) => {
+                "not reachable in its configuration"
+            }
+            Why::Inverse(_) => "no joints were found",
+            Why::OutsideLimits { .. } => "a joint would leave its range",
+            Why::TooFar { .. } => "correction exceeds the bound (--max-correction)",
+            Why::TooMuchTurn { .. } => "correction of the orientation exceeds the bound",
+            Why::NearSingularity => "too close to a singularity",
+            Why::OtherBranch => "the corrected target lies in another configuration",
+            Why::Bend { .. } => "the path between targets leaves the intended one",
+            Why::Corner { .. } => "the rounded corner leaves the intended one",
+            Why::CircleKept => "the circle stays a circle",
+            Why::TooFast { .. } => "a joint turns faster than it can",
+            Why::NoCircle => "no circle through its points keeps to the way that was meant",
+            Why::WholeCircle => "a whole circle",
+            Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
+            Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
+            Why::SingularWay => "the way to it passes too close to a singularity",
+            Why::OpenBranch => "which configuration the controller takes is open",
+            Why::PartOfCut { because, .. } => because,
+            Why::Step { .. } => "the step to its neighbour is too large",
+            Why::NotCovered { .. } => "no measured pose is near",
+            Why::Uncertain { .. } => "the model is uncertain here",
+        }
+    }
+}
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Why::Program(reason) => reason.fmt(f),
+            Why::Same => f.write_str("its numbers are right to the last decimal that is written"),
+            Why::JointTarget => {
+                f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
+            }
+            Why::Contradicted => {
+                f.write_str("what the cell file says of its tool or work object and what the program says do not agree")
+            }
+            Why::MovingBase { axis } => write!(
+                f,
+                "external axis {} carries the robot's base: where that stands is not followed",
+                char::from(b'a' + *axis as u8)
+            ),
+            Why::Inverse(error) => error.fmt(f),
+            Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
+            Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
+            Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
+            Why::NearSingularity => f.write_str("too close to a singularity"),
+            Why::JointJump { joint, deg, most_deg, on_the_way } => write!(
+                f,
+                "{}the correction would turn joint {} by {deg:.1}°, more than {most_deg:.1}°, which is enough away from \
+                 singularities: keep farther from the singular configuration",
+                if *on_the_way { "on the way to it " } else { "" },
+                joint + 1
+            ),
+            Why::SingularWay => f.write_str("on the corrected way to it the arm comes too close to a singularity"),
+            Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
+            Why::OpenBranch => f.write_str(
+                "the controller may take another configuration, since none is stated and another lies as near: state it, or \
+                 come nearer before",
+            ),
+            Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
+            Why::Corner { mm } if !mm.is_finite() => {
+                f.write_str("the arm cannot follow the rounded corner before it: make the zone smaller")
+            }
+            Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
+            Why::Corner { mm } => {
+                write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: make the zone smaller")
+            }
+            Why::CircleKept => f.write_str(
+                "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
+                 straight pieces keep to it",
+            ),
+            Why::TooFast { joint, ratio } => {
+                write!(
+                    f,
+                    "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
+                    joint + 1
+                )
+            }
+            Why::NoCircle => f.write_str("its three points make no circle, or none that keeps to the way that was meant"),
+            Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
+            Why::JointNotMeasured { joint, by_deg } => {
+                write!(
+                    f,
+                    "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
+                    joint + 1
+                )
+            }
+            Why::PartOfCut { line, because } => {
+                write!(
+                    f,
+                    "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
+                     corrects the rest)"
+                )
+            }
+            Why::Step { line, mm } => write!(
+                f,
+                "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
+            ),
+            Why::NotCovered { ratio } => {
+                write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")
+            }
+            Why::Uncertain { sigma_mm } => {
+                write!(f, "the model is uncertain here: predicted standard deviation {sigma_mm:.3} mm")
+            }
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Extended Kalman filter for constant or drifting parameters.
+//!
+//! **Method.** For each observation with residual r and Jacobian J at x: S = JPJᵀ + R, K = PJᵀS⁻¹, x ← x − Kr,
+//! P ← (I − KJ)P(I − KJ)ᵀ + KRKᵀ (Joseph's form, multiplied out so that it costs p²m); before it P ← P + Q.
+//! `iterations` above 1 repeats the linearisation at the new state within one observation (iterated filter).
+//! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, P carried on: every row is
+//!   counted as often as there are sweeps, and the covariance is too small by that factor.
+//! - [`Form::Sound`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep
+//!   only corrects the linearisation of the earlier ones. One sweep by default.
+//!
+//! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
+//!
+//! **Stops.** *DataProcessed* after the sweeps; *NotFinite* at the first observation whose update is not
+//! finite.
+//!
+//! **Source and departures.** M2 of ltlm-2024 and M1 of ukf-vslm-2023, "the conventional extended Kalman
+//! filter", without equations; U's Table IX has it iterate 12 to 14 times, taken here as sweeps of the printed
+//! form. Equations: Simon, *Optimal State Estimation*, 2006, ch. 13.
+//!
+//! **Checked against** batch least squares with the same priors on linear problems (equal to rounding).
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::filter::{Innovation, entry, finish, prior_state, symmetrise};
+use crate::least_squares::Form;
+use crate::objective::Objective;
+use crate::problem::{Problem, observations};
+
+/// How [`solve`] filters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// Times that all observations are gone through.
+    pub sweeps: usize,
+    /// Linearisations within one observation.
+    pub iterations: usize,
+    /// Standard deviation of what a parameter drifts from one observation to the next: one for each, or none at
+    /// all.
+    pub process_sigma: Vec<f64>,
+    /// First standard deviation of a parameter without a prior.
+    pub unknown_sigma: f64,
+    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            sweeps: 1,
+            iterations: 1,
+            process_sigma: Vec::new(),
+            unknown_sigma: 1.0,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// Twelve sweeps that each count the data as new.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, sweeps: 12, ..Self::default() }
+    }
+}
+
+/// The running filter, for those who feed it themselves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filter {
+    /// State: the parameters.
+    pub x: DVector<f64>,
+    /// Covariance of the state, p × p.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Filter {
+    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`.
+    pub fn predict(&mut self, sigma: &[f64]) {
+        for (k, sigma) in sigma.iter().enumerate().take(self.x.len()) {
+            self.covariance[(k, k)] += sigma * sigma;
+        }
+    }
+
+    /// Takes in one observation, `rows` of `problem`, whose noise has the variance `noise` (1 for whitened
+    /// rows). The state stays as it was and the answer is `None` where anything is not finite.
+    pub fn update(
+        &mut self,
+        problem: &dyn Problem,
+        rows: Range<usize>,
+        noise: f64,
+        iterations: usize,
+    ) -> Option<Innovation> {
+        let (p, m) = (self.x.len(), rows.len());
+        let (mut r, mut j) = (DVector::zeros(m), DMatrix::zeros(m, p));
+        let mut x = self.x.clone();
+        let mut first: Option<Innovation> = None;
+        let mut gain = DMatrix::zeros(p, m);
+        let (mut cross, mut spread) = (DMatrix::zeros(p, m), DMatrix::zeros(m, m));
+        for _ in 0..iterations.max(1) {
+            problem.jacobian(x.as_slice(), rows.clone(), r.as_mut_slice(), j.as_mut_slice());
+            cross = &self.covariance * j.transpose();
+            spread = &j * &cross;
+            symmetrise(&mut spread);
+            (0..m).for_each(|i| spread[(i, i)] += noise);
+            let factor = spread.clone().cholesky()?;
+            gain = factor.solve(&cross.transpose()).transpose();
+            // Residual that the linearisation at x foretells for the state before this observation.
+            let residual = &r + &j * (&self.x - &x);
+            let step = &gain * &residual;
+            if first.is_none() {
+                let nis = residual.dot(&factor.solve(&residual));
+                first = Some(Innovation { residual, covariance: spread.clone(), nis });
+            }
+            x = &self.x - step;
+        }
+        // (I − KJ)P(I − KJ)ᵀ + KRKᵀ = P − K(PJᵀ)ᵀ − (PJᵀ)Kᵀ + KSKᵀ.
+        let shared = &gain * cross.transpose();
+        let mut covariance =
+            &self.covariance - &shared - shared.transpose() + &gain * &spread * gain.transpose();
+        symmetrise(&mut covariance);
+        if !x.iter().chain(covariance.iter()).all(|v| v.is_finite()) {
+            return None;
+        }
+        self.x = x;
+        self.covariance = covariance;
+        first
+    }
+}
+
+/// Filters all observations of `problem` in order.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let mut objective = Objective::new(problem, start, true);
+    let (x, covariance) = prior_state(problem, start, options.unknown_sigma);
+    let mut filter = Filter { x, covariance };
+    let mut trace: Vec<Iteration> = vec![entry(&mut objective, &filter.x, 0.0)];
+    let noise = if options.form == Form::Sound { options.sweeps.max(1) as f64 } else { 1.0 };
+    for _ in 0..options.sweeps {
+        let before = filter.x.clone();
+        for rows in observations(problem) {
+            filter.predict(&options.process_sigma);
+            objective.evaluations.jacobians += (rows.len() * options.iterations.max(1)) as u64;
+            if filter.update(problem, rows, noise, options.iterations).is_none() {
+                trace.push(entry(&mut objective, &filter.x, (&filter.x - before).norm()));
+                return finish(&objective, &filter.x, Some(filter.covariance), Termination::NotFinite, trace);
+            }
+        }
+        trace.push(entry(&mut objective, &filter.x, (&filter.x - before).norm()));
+    }
+    let end = if trace.iter().all(|i| i.cost.is_finite()) {
+        Termination::DataProcessed
+    } else {
+        Termination::NotFinite
+    };
+    finish(&objective, &filter.x, Some(filter.covariance), end, trace)
+}

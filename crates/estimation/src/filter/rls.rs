@@ -1,0 +1,253 @@
+//! Recursive least squares.
+//!
+//! **Method** (rls-2025 eq. 8 to 14). For each row with derivatives a and residual e: k = Pa / (ϕ + aᵀPa), x ←
+//! x − k e, P ← (P − k aᵀP)/ϕ, where ϕ ≤ 1 is the forgetting factor. Rows are linearised once, at the point of
+//! linearisation ξ: e = r(ξ) + aᵀ(x − ξ).
+//! - [`Memory::Covariance`]: P itself, by the formula of Sherman and Morrison as printed (eq. 14). Rounding can
+//!   make it indefinite.
+//! - [`Memory::SquareRoot`]: S with SSᵀ = P (Potter): f = Sᵀa, d = ϕ + fᵀf, k = Sf/d, S ← (S − Sf fᵀ/(d +
+//!   √(ϕd)))/√ϕ. P cannot become indefinite.
+//!
+//! Without forgetting this *is* batch least squares of one linearisation, to rounding. `linearisations` above 1
+//! begins again from the prior with ξ at the last result: Gauss–Newton, one row at a time.
+//!
+//! **Shapes.** x has p entries, P is p × p; rows are taken in one by one.
+//!
+//! **Stops.** *DataProcessed* after the last linearisation; *Singular* where the first rows do not determine
+//! the parameters ([`Initial::FirstRows`]); *NotFinite*.
+//!
+//! **Source and departures.** Qiao et al. 2025. The text at hand lost eq. 1 to 13: reconstructed from the
+//! definitions around them. The denominator of eq. 14 is a scalar, which holds for one row; a pose brings
+//! several, taken in one after the other, each divided by its own standard deviation. P₀ = (A₀ᵀA₀)⁻¹ from the
+//! first poses is near singular with few of them: `Initial::FirstRows` has it, the default starts from the
+//! prior. The paper has no forgetting factor in eq. 14; 1 by default. Forgetting without excitation lets P grow
+//! without bound (wind-up): use process noise per parameter in [`ekf`](crate::filter::ekf) where
+//! that can happen. Potter's form: Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
+//! ch. II.
+//!
+//! **Checked against** batch least squares of one linearisation (equal to rounding), and Bierman's example,
+//! where the printed form loses positive definiteness.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Termination};
+use crate::filter::{entry, finish, prior_state, symmetrise};
+use crate::least_squares::damped::inverse_of_normal;
+use crate::objective::Objective;
+use crate::problem::{NormalEquations, Problem, observations};
+
+/// How the covariance is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Memory {
+    /// P, as printed.
+    Covariance,
+    /// A square root of P.
+    #[default]
+    SquareRoot,
+}
+
+/// What the recursion begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Initial {
+    /// The priors of the problem.
+    #[default]
+    Prior,
+    /// Batch least squares of that many first observations, without priors (as the paper has it).
+    FirstRows(usize),
+}
+
+/// How [`solve`] filters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// How the covariance is kept.
+    pub memory: Memory,
+    /// What the recursion begins with.
+    pub initial: Initial,
+    /// ϕ: 1 remembers everything, 0.99 about the last hundred rows.
+    pub forgetting: f64,
+    /// Passes over the data, each linearised at the result of the one before.
+    pub linearisations: usize,
+    /// First standard deviation of a parameter without a prior.
+    pub unknown_sigma: f64,
+    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            memory: Memory::SquareRoot,
+            initial: Initial::Prior,
+            forgetting: 1.0,
+            linearisations: 1,
+            unknown_sigma: 1e3,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// Equation 14 from P₀ = (A₀ᵀA₀)⁻¹ of the first `observations`.
+    pub fn as_printed(observations: usize) -> Self {
+        Self { memory: Memory::Covariance, initial: Initial::FirstRows(observations), ..Self::default() }
+    }
+}
+
+/// The running recursion, for those who feed it themselves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recursion {
+    /// The parameters.
+    pub x: DVector<f64>,
+    memory: Memory,
+    /// P or S, as `memory` says.
+    matrix: DMatrix<f64>,
+}
+
+impl Recursion {
+    /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is
+    /// not positive definite.
+    pub fn new(x: DVector<f64>, covariance: DMatrix<f64>, memory: Memory) -> Option<Self> {
+        let matrix = match memory {
+            Memory::Covariance => covariance,
+            Memory::SquareRoot => covariance.cholesky()?.unpack(),
+        };
+        Some(Self { x, memory, matrix })
+    }
+
+    /// Goes on in square-root form from a state and the root S of its covariance, as [`Recursion::root`] gave it.
+    pub fn from_root(x: DVector<f64>, root: DMatrix<f64>) -> Self {
+        Self { x, memory: Memory::SquareRoot, matrix: root }
+    }
+
+    /// S of the square-root form, to be saved without a loss of bits; `None` in the other.
+    pub fn root(&self) -> Option<&DMatrix<f64>> {
+        (self.memory == Memory::SquareRoot).then_some(&self.matrix)
+    }
+
+    /// The covariance P.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        match self.memory {
+            Memory::Covariance => self.matrix.clone(),
+            Memory::SquareRoot => &self.matrix * self.matrix.transpose(),
+        }
+    }
+
+    /// Takes in one row: derivatives `a` and residual `e` at the present `x`. Gives the variance ϕ + aᵀPa that
+    /// the residual was expected to have.
+    pub fn update(&mut self, a: &DVector<f64>, e: f64, forgetting: f64) -> f64 {
+        match self.memory {
+            Memory::Covariance => {
+                let pa = &self.matrix * a;
+                let d = forgetting + a.dot(&pa);
+                self.x.axpy(-e / d, &pa, 1.0);
+                // Written out as in eq. 14, which also keeps P exactly symmetric.
+                for (mut column, right) in self.matrix.column_iter_mut().zip(pa.iter()) {
+                    column.iter_mut().zip(pa.iter()).for_each(|(entry, left)| *entry -= left * right / d);
+                }
+                if forgetting != 1.0 {
+                    self.matrix /= forgetting;
+                }
+                d
+            }
+            Memory::SquareRoot => {
+                let f = self.matrix.tr_mul(a);
+                let d = forgetting + f.norm_squared();
+                let sf = &self.matrix * &f;
+                self.x.axpy(-e / d, &sf, 1.0);
+                self.matrix.ger(-1.0 / (d + (forgetting * d).sqrt()), &sf, &f, 1.0);
+                if forgetting != 1.0 {
+                    self.matrix /= forgetting.sqrt();
+                }
+                d
+            }
+        }
+    }
+
+    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`; the square root is made
+    /// anew (p³). Not finite sigmas leave everything as it was.
+    pub fn predict(&mut self, sigma: &[f64]) {
+        let mut covariance = self.covariance();
+        for (k, sigma) in sigma.iter().enumerate().take(self.x.len()) {
+            covariance[(k, k)] += sigma * sigma;
+        }
+        symmetrise(&mut covariance);
+        match self.memory {
+            Memory::Covariance => self.matrix = covariance,
+            Memory::SquareRoot => {
+                if let Some(factor) = covariance.cholesky() {
+                    self.matrix = factor.unpack();
+                }
+            }
+        }
+    }
+}
+
+/// Filters all rows of `problem` in order.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let mut objective = Objective::new(problem, start, options.initial == Initial::Prior);
+    let per = problem.rows_per_observation().max(1);
+    let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
+    let mut point = DVector::from_column_slice(start);
+    let mut trace = vec![entry(&mut objective, &point, 0.0)];
+    let mut covariance = None;
+    for _ in 0..options.linearisations {
+        let begun = match options.initial {
+            Initial::Prior => {
+                let (x, covariance) = prior_state(problem, start, options.unknown_sigma);
+                Recursion::new(x, covariance, options.memory).map(|recursion| (recursion, 0))
+            }
+            Initial::FirstRows(count) => first_rows(&mut objective, &point, count, options.memory),
+        };
+        let Some((mut recursion, taken)) = begun else {
+            return finish(&objective, &point, None, Termination::Singular, trace);
+        };
+        let mut a = DVector::zeros(p);
+        for rows in observations(problem).skip(taken) {
+            objective.jacobian(point.as_slice(), rows, &mut r, &mut j);
+            for i in 0..per {
+                (0..p).for_each(|k| a[k] = j[k * per + i]);
+                let e = r[i] + a.dot(&recursion.x) - a.dot(&point);
+                recursion.update(&a, e, options.forgetting);
+            }
+        }
+        if !recursion.x.iter().all(|x| x.is_finite()) {
+            return finish(&objective, &point, None, Termination::NotFinite, trace);
+        }
+        let moved = (&recursion.x - &point).norm();
+        point = recursion.x.clone();
+        covariance = Some(recursion.covariance());
+        let mut last = entry(&mut objective, &point, moved);
+        last.damping = Some(options.forgetting);
+        trace.push(last);
+    }
+    let finite = trace.iter().all(|i| i.cost.is_finite());
+    let end = if finite { Termination::DataProcessed } else { Termination::NotFinite };
+    finish(&objective, &point, covariance, end, trace)
+}
+
+/// x₀ = ξ − (A₀ᵀA₀)⁻¹A₀ᵀr and P₀ = (A₀ᵀA₀)⁻¹ of the first observations.
+fn first_rows(
+    objective: &mut Objective<'_>,
+    point: &DVector<f64>,
+    count: usize,
+    memory: Memory,
+) -> Option<(Recursion, usize)> {
+    let p = point.len();
+    let per = objective.problem.rows_per_observation().max(1);
+    let n = (count * per).min(objective.problem.rows() / per * per);
+    let (mut r, mut j) = (vec![0.0; n], vec![0.0; n * p]);
+    objective.jacobian(point.as_slice(), 0..n, &mut r, &mut j);
+    let (j, r) = (DMatrix::from_vec(n, p, j), DVector::from_vec(r));
+    let equations = NormalEquations { matrix: j.tr_mul(&j), gradient: j.tr_mul(&r), cost: 0.0 };
+    let covariance = inverse_of_normal(&equations.matrix)?;
+    let x = point - &covariance * equations.gradient;
+    Recursion::new(x, covariance, memory).map(|recursion| (recursion, n / per))
+}

@@ -1,0 +1,137 @@
+//! Least squares of one linearisation, and Gauss–Newton.
+//!
+//! **Method.** x ← x − (JᵀJ)⁻¹ Jᵀr (rls-2025 eq. 9; ukf-vslm-2023 eq. 13).
+//! - [`Form::AsPrinted`]: one step from the start, nothing else.
+//! - [`Form::Sound`]: repeated, with scaled columns and priors, each step halved until it lowers the cost.
+//!
+//! **Shapes.** As in [`lm`](crate::least_squares::lm).
+//!
+//! **Stops.** As printed: after `max_iterations` steps (1), or *Singular* where JᵀJ cannot be inverted. Sound:
+//! *Cost*, *Gradient* and *SmallResidual* as in `lm`; *Stalled* where thirty halvings do not help.
+//!
+//! **Source and departures.** Qiao et al. 2025, eq. 8 and 9 (the printed equations are lost in the text at hand
+//! and reconstructed from their definitions); Li et al. 2023, eq. 13. Sound: Nocedal and Wright, *Numerical
+//! Optimization*, 2nd ed., §10.3.
+//!
+//! **Checked against** linear problems (one step is exact) and the published minima that Gauss–Newton can
+//! reach.
+
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::lm::Point;
+use crate::least_squares::{Factorisation, Form};
+use crate::objective::Objective;
+use crate::problem::Problem;
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// How the step is computed.
+    pub factorisation: Factorisation,
+    /// Whether the priors of the problem take part.
+    pub priors: bool,
+    /// Most steps.
+    pub max_iterations: usize,
+    /// Stop where what is left to gain is below this share of the cost (sound).
+    pub cost_tolerance: f64,
+    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    pub gradient_tolerance: f64,
+    /// Stop where the cost itself is below this (sound).
+    pub small_cost: f64,
+    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            factorisation: Factorisation::Cholesky,
+            priors: true,
+            max_iterations: 50,
+            cost_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// One step without priors.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, max_iterations: 1, ..Self::default() }
+    }
+}
+
+/// Most halvings of one step.
+const HALVINGS: usize = 30;
+
+/// Minimises the cost of `problem` from `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let printed = options.form == Form::AsPrinted;
+    let mut objective = Objective::new(problem, start, options.priors);
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    if !here.at.is_finite() {
+        return here.finish(&objective, Termination::NotFinite, trace);
+    }
+    let mut system = if printed { DampedSystem::unscaled(p) } else { DampedSystem::new(p) };
+    let mut trial = vec![0.0; p];
+    for _ in 0..options.max_iterations {
+        let cosine = system.enter(&here.at);
+        let cost = here.at.cost();
+        if !printed && cost <= options.small_cost {
+            return here.finish(&objective, Termination::SmallResidual, trace);
+        }
+        if !printed && cosine <= options.gradient_tolerance {
+            return here.finish(&objective, Termination::Gradient, trace);
+        }
+        let Some(promise) = system.step(&here.at, 0.0, &here.x, &mut trial) else {
+            return here.finish(&objective, Termination::Singular, trace);
+        };
+        if !printed && promise.reduction <= options.cost_tolerance * cost {
+            return here.finish(&objective, Termination::Cost, trace);
+        }
+        let mut at = Linearisation::at(&mut objective, &trial, options.factorisation);
+        let mut length = promise.step_norm;
+        let mut halvings = 0;
+        while !(printed || at.is_finite() && at.cost() < cost) {
+            halvings += 1;
+            if halvings > HALVINGS {
+                return here.finish(&objective, Termination::Stalled, trace);
+            }
+            length *= 0.5;
+            trial.iter_mut().zip(&here.x).for_each(|(trial, x)| *trial = x + 0.5 * (*trial - x));
+            let new = objective.cost(&trial);
+            if new.is_finite() && new < cost {
+                at = Linearisation::at(&mut objective, &trial, options.factorisation);
+            }
+        }
+        if !at.is_finite() {
+            return here.finish(&objective, Termination::NotFinite, trace);
+        }
+        here = Point { x: trial.clone(), at };
+        trace.push(Iteration {
+            cost: here.at.cost(),
+            step_norm: length,
+            damping: None,
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+    }
+    let end = if printed { Termination::DataProcessed } else { Termination::IterationLimit };
+    here.finish(&objective, end, trace)
+}

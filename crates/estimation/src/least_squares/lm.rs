@@ -1,0 +1,392 @@
+//! Levenberg–Marquardt.
+//!
+//! **Method.** x ← x − (JᵀJ + μI)⁻¹ Jᵀr (ltlm-2024 eq. 10).
+//! - [`Form::AsPrinted`]: μ fixed (5 in the paper), parameters unscaled, every step taken.
+//! - [`Form::Sound`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
+//!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A
+//!   step is accepted where it lowers the cost. An accepted step costs one pass over the rows, which brings
+//!   cost and normal equations together; after a refused step the next trial is first tried by its cost alone.
+//!
+//! A task of very many observations with a prior for every parameter is first solved on one in eight of them, drawn
+//! without order and thinned again while they are many, where the first step on all of them promises more than a tenth
+//! of the cost: a pass over few rows costs little, and from there the way to the optimum of all rows is short. This is
+//! also the way round a curved valley. Many rows make what they see so stiff that steps along what only priors hold (an
+//! outlet and the base turning together) bend away from the valley's floor at once and are refused; few rows leave the
+//! valley wide. For the same reason μ then starts at nothing: damping relative to what many rows see, however light, is
+//! heavy next to a prior, and would leave the search far along the valley. All tests of convergence are made on all rows.
+//!
+//! **Shapes.** x has p entries, J is n × p and is never held: the normal equations (p × p) or, with
+//! [`Factorisation::Qr`], the triangular factor of J come from a pass over the rows. Priors are further rows.
+//!
+//! **Stops** (sound). *Cost*: the undamped model promises less than `cost_tolerance` · cost. *Gradient*: no
+//! column of J makes a cosine above `gradient_tolerance` with r. *Step*: ‖D h‖ below `step_tolerance` · ‖D x‖.
+//! *SmallResidual*: cost below `small_cost`. As printed: relative change of cost or of x below tolerance, or
+//! the iteration limit ("the desired accuracy or the maximum number of iterations"); neither number is stated
+//! in the paper.
+//!
+//! **Source and departures.** Liu et al. 2024, eq. 10 (as printed). Its μ = 5 has no unit: next to JᵀJ of
+//! parameters in radians it is nothing, next to some hundred rows of millimetres per degree it slows every
+//! step; damping slows, it is no prior. Eq. 8's 1/n does not change the step and is left out. Sound: Moré, "The
+//! Levenberg–Marquardt algorithm" (1978) for the scaling, Madsen, Nielsen, Tingleff, *Methods for non-linear
+//! least squares problems* (2004), algorithm 3.16, for μ. Departures from the latter: μ starts near zero
+//! (`initial_damping`), since priors regularise here; a step with less damping than 10⁻³ must keep a quarter of
+//! its promise, and a refusal lifts μ to at least 10⁻³ at once; an almost perfect gain ratio divides μ by ten,
+//! not by three; the start on few rows.
+//!
+//! **Checked against** the Moré–Garbow–Hillstrom problems and NIST StRD certified values, Cholesky against QR.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation, Promise};
+use crate::least_squares::{Factorisation, Form};
+use crate::objective::Objective;
+use crate::problem::Problem;
+
+/// How [`solve`] searches. Fields that a form does not use are said so.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// How the step is computed.
+    pub factorisation: Factorisation,
+    /// μ of the printed form, in the square of residual per parameter unit; 5 in the paper.
+    pub mu: f64,
+    /// First μ of the sound form, a pure number: relative to a unit diagonal.
+    pub initial_damping: f64,
+    /// Whether the priors of the problem take part. The paper has none.
+    pub priors: bool,
+    /// Most trial steps.
+    pub max_iterations: usize,
+    /// Stop where what is left to gain is below this share of the cost.
+    pub cost_tolerance: f64,
+    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    pub gradient_tolerance: f64,
+    /// Stop where the step is below this share of the parameters.
+    pub step_tolerance: f64,
+    /// Stop where the cost itself is below this. Residuals are counted in their σ, so this is an absolute
+    /// figure.
+    pub small_cost: f64,
+    /// Which observations a task of very many is first solved on; not used otherwise.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            factorisation: Factorisation::Cholesky,
+            mu: 5.0,
+            initial_damping: 1e-6,
+            priors: true,
+            max_iterations: 200,
+            cost_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            step_tolerance: 1e-14,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// The paper's setting: μ = 5, unscaled, no prior.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, ..Self::default() }
+    }
+}
+
+/// Minimises the cost of `problem` from `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let mut objective = Objective::new(problem, start, options.priors);
+    match options.form {
+        Form::AsPrinted => fixed_damping(&mut objective, start, options),
+        Form::Sound => gain_ratio(&mut objective, start, options),
+    }
+}
+
+/// Where a search stands.
+pub(crate) struct Point {
+    pub(crate) x: Vec<f64>,
+    pub(crate) at: Linearisation,
+}
+
+impl Point {
+    pub(crate) fn finish(
+        self,
+        objective: &Objective<'_>,
+        termination: Termination,
+        trace: Vec<Iteration>,
+    ) -> Estimate {
+        let covariance = if self.at.is_finite() { self.at.covariance() } else { None };
+        let (cost, evaluations) = (self.at.cost(), objective.evaluations);
+        Estimate { x: self.x, covariance, cost, evaluations, termination, trace }
+    }
+}
+
+/// Nielsen's rule for μ.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Damping {
+    pub(crate) mu: f64,
+    growth: f64,
+}
+
+/// Smallest and largest μ that mean anything next to a unit diagonal in double precision.
+const DAMPING_RANGE: (f64, f64) = (1e-16, 1e16);
+
+/// μ after the first refusal: less would hardly change the step that was refused.
+const FIRST_REFUSAL: f64 = 1e-3;
+
+impl Damping {
+    pub(crate) fn new(mu: f64) -> Self {
+        Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
+    }
+
+    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
+    /// its promise: otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
+        gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
+    }
+
+    /// `gain` is actual over predicted reduction of a step that was taken.
+    pub(crate) fn accept(&mut self, gain: f64) {
+        let factor =
+            if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
+        self.mu = (self.mu * factor).max(DAMPING_RANGE.0);
+        self.growth = 2.0;
+    }
+
+    pub(crate) fn refuse(&mut self) {
+        self.mu = (self.mu * self.growth).max(FIRST_REFUSAL).min(DAMPING_RANGE.1);
+        self.growth *= 2.0;
+    }
+
+    pub(crate) fn is_exhausted(&self) -> bool {
+        self.mu >= DAMPING_RANGE.1
+    }
+}
+
+/// A first step that promises more than this share of the cost is taken on few rows.
+const FAR: f64 = 0.1;
+
+/// Observations that are few, for one parameter.
+const FEW_PER_PARAMETER: usize = 150;
+
+/// One out of so many observations is taken; what is left may be thinned again.
+const ONE_OF: usize = 8;
+
+/// The optimum of some of the observations: one out of each of as many equal parts, which one by chance, so that no
+/// period of the record is met again.
+fn on_few_rows(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Option<Vec<f64>> {
+    // Without priors few rows say far less than all of them, and their optimum may lie far off in what they hardly see.
+    let held = objective.priors.len() == start.len() && objective.priors.iter().all(|p| p.sigma.is_finite());
+    if !held {
+        return None;
+    }
+    let problem = objective.problem;
+    let all = problem.rows() / problem.rows_per_observation().max(1);
+    let few = all / ONE_OF;
+    if few < FEW_PER_PARAMETER * start.len().max(1) {
+        return None;
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+    let part = |k: usize| k * all / few;
+    let chosen: Vec<usize> = (0..few).map(|k| random.random_range(part(k)..part(k + 1))).collect();
+    let thinned = problem.thinned(&chosen)?;
+    // Damping is relative to what the rows say. Any that is more than what the priors say lets go of what they hold.
+    let options = Options { initial_damping: DAMPING_RANGE.0, ..*options };
+    let found = solve(thinned.as_ref(), start, &options);
+    objective.evaluations.residuals += found.evaluations.residuals;
+    objective.evaluations.jacobians += found.evaluations.jacobians;
+    found.x.iter().all(|x| x.is_finite()).then_some(found.x)
+}
+
+fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    if !here.at.is_finite() {
+        return here.finish(objective, Termination::NotFinite, trace);
+    }
+    let mut system = DampedSystem::new(p);
+    let mut damping = Damping::new(options.initial_damping);
+    let mut trial = vec![0.0; p];
+    let mut cosine = system.enter(&here.at);
+    trace[0].gradient_norm = Some(cosine);
+    if let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut trial)
+        && promise.reduction > FAR * here.at.cost()
+        && let Some(x) = on_few_rows(objective, &here.x, options)
+    {
+        damping = Damping::new(DAMPING_RANGE.0);
+        let at = Linearisation::at(objective, &x, options.factorisation);
+        if at.is_finite() && at.cost() < here.at.cost() {
+            here = Point { x, at };
+            cosine = system.enter(&here.at);
+            trace.push(Iteration {
+                cost: here.at.cost(),
+                gradient_norm: Some(cosine),
+                evaluations: objective.evaluations,
+                ..Iteration::default()
+            });
+        }
+    }
+    let mut refused = 0_usize;
+    for _ in 0..options.max_iterations {
+        if here.at.cost() <= options.small_cost {
+            return here.finish(objective, Termination::SmallResidual, trace);
+        }
+        if cosine <= options.gradient_tolerance {
+            return here.finish(objective, Termination::Gradient, trace);
+        }
+        let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut trial) else {
+            damping.refuse();
+            refused += 1;
+            if damping.is_exhausted() {
+                return here.finish(objective, Termination::Singular, trace);
+            }
+            continue;
+        };
+        if let Some(end) = converged(
+            &mut system,
+            &here,
+            &promise,
+            &Search {
+                mu: damping.mu,
+                refused,
+                cosine,
+                cost_tolerance: options.cost_tolerance,
+                step_tolerance: options.step_tolerance,
+            },
+        ) {
+            return here.finish(objective, end, trace);
+        }
+        let cost = here.at.cost();
+        // After a refusal the cost alone is asked for first: it is several times cheaper than the derivatives.
+        let worth_it = refused == 0 || {
+            let new = objective.cost(&trial);
+            damping.is_acceptable((cost - new) / promise.reduction)
+        };
+        let mut step_norm = 0.0;
+        let mut accepted = false;
+        if worth_it {
+            let at = Linearisation::at(objective, &trial, options.factorisation);
+            if at.is_finite() && damping.is_acceptable((cost - at.cost()) / promise.reduction) {
+                damping.accept((cost - at.cost()) / promise.reduction);
+                step_norm = promise.step_norm;
+                here.at = at;
+                std::mem::swap(&mut here.x, &mut trial);
+                cosine = system.enter(&here.at);
+                accepted = true;
+            }
+        }
+        trace.push(Iteration {
+            cost: here.at.cost(),
+            step_norm,
+            damping: Some(damping.mu),
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+        if accepted {
+            refused = 0;
+        } else {
+            damping.refuse();
+            refused += 1;
+            if damping.is_exhausted() {
+                return here.finish(objective, Termination::Stalled, trace);
+            }
+        }
+    }
+    here.finish(objective, Termination::IterationLimit, trace)
+}
+
+/// What the tests of convergence want to know of a search.
+pub(crate) struct Search {
+    pub(crate) mu: f64,
+    /// Steps refused since the last one taken.
+    pub(crate) refused: usize,
+    pub(crate) cosine: f64,
+    pub(crate) cost_tolerance: f64,
+    pub(crate) step_tolerance: f64,
+}
+
+/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the
+/// promise is asked again almost without damping. Where the undamped model promises more than the problem keeps
+/// (large residuals), a small promise after refusals counts as converged if the gradient is small too.
+pub(crate) fn converged(
+    system: &mut DampedSystem,
+    here: &Point,
+    promise: &Promise,
+    search: &Search,
+) -> Option<Termination> {
+    const LIGHT: f64 = 1e-8;
+    const SMALL_COSINE: f64 = 1e-5;
+    let enough = search.cost_tolerance * here.at.cost();
+    let tiny = search.step_tolerance * (system.scaled_norm(&here.x) + search.step_tolerance);
+    if promise.reduction > enough && promise.step_norm > tiny {
+        return None;
+    }
+    if search.mu <= LIGHT {
+        return Some(if promise.reduction <= enough { Termination::Cost } else { Termination::Step });
+    }
+    let mut unused = vec![0.0; here.x.len()];
+    match system.step(&here.at, LIGHT, &here.x, &mut unused) {
+        Some(light) if light.reduction <= enough => Some(Termination::Cost),
+        Some(light) if light.step_norm <= tiny => Some(Termination::Step),
+        _ if search.refused > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
+        _ if search.refused > 0 => Some(Termination::Stalled),
+        _ => None,
+    }
+}
+
+fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    if !here.at.is_finite() {
+        return here.finish(objective, Termination::NotFinite, trace);
+    }
+    let mut system = DampedSystem::unscaled(p);
+    let mut trial = vec![0.0; p];
+    for _ in 0..options.max_iterations {
+        let cosine = system.enter(&here.at);
+        if here.at.cost() <= options.small_cost {
+            return here.finish(objective, Termination::SmallResidual, trace);
+        }
+        let Some(promise) = system.step(&here.at, options.mu, &here.x, &mut trial) else {
+            return here.finish(objective, Termination::Singular, trace);
+        };
+        let at = Linearisation::at(objective, &trial, options.factorisation);
+        if !at.is_finite() {
+            return here.finish(objective, Termination::NotFinite, trace);
+        }
+        let (before, after) = (here.at.cost(), at.cost());
+        let size = system.scaled_norm(&here.x);
+        here = Point { x: trial.clone(), at };
+        trace.push(Iteration {
+            cost: after,
+            step_norm: promise.step_norm,
+            damping: Some(options.mu),
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+        if (before - after).abs() <= options.cost_tolerance * before {
+            return here.finish(objective, Termination::Cost, trace);
+        }
+        if promise.step_norm <= options.step_tolerance * (size + options.step_tolerance) {
+            return here.finish(objective, Termination::Step, trace);
+        }
+    }
+    here.finish(objective, Termination::IterationLimit, trace)
+}

@@ -1,0 +1,223 @@
+//! Logistic-tent chaotic Levenberg–Marquardt (LTLM).
+//!
+//! **Method** (ltlm-2024, Algorithm I). Two Levenberg–Marquardt steps x_k → x₁ → x₂ (eq. 13, 14), midpoints a =
+//! (x_k + x₁)/2 and b = (x₁ + x₂)/2 (eq. 15), chaotic numbers N_1 … N_M in [0, 1) (eq. 11), candidates x₁ − (x₁
+//! − a)N_m and x₁ + (x₂ − b)N_m (eq. 16, 17); the best of them and x₁ starts the next iteration (eq. 18).
+//!
+//! **What it is.** N_m is one scalar for a whole candidate, so this is a line search on the inner halves of
+//! [x_k, x₁] and [x₁, x₂]. Eq. 17 is right as printed: x₂ − b = b − x₁. x₂ itself is never a candidate, so that
+//! each iteration, at the price of two Jacobians, ends at best halfway between the first and the second
+//! Levenberg–Marquardt step: compare methods per Jacobian, not per iteration. An iteration asks for two
+//! Jacobian passes (the second brings the cost of x₁) and 2M passes of residuals, 2M + 1 evaluations in the
+//! paper's count.
+//!
+//! **Shapes.** As in [`lm`](crate::least_squares::lm).
+//!
+//! **Stops.** Those of `lm`; as printed, K iterations or no relative change of the cost.
+//!
+//! **Source and departures.** Liu et al. 2024. M, N₀ and K are not stated: here 10, 0.37 and 60 by default, and
+//! the sequence N runs on from iteration to iteration. Eq. 15 mixes k and k + 1 and Algorithm I writes J_{k+1}
+//! where J_{k,1} (at x₁) is meant; both are read that way. f in eq. 10, 13 is the residual vector, not the
+//! scalar of eq. 8. μ = 5 has no unit: see `lm`. The printed form does not compare with x_k and may rise. Sound
+//! form: both steps scaled and damped by Nielsen's rule as in `lm`, the iteration taken only if its best
+//! candidate lowers the cost, and x₂ a candidate too (`second_step`), without which the method throws away what
+//! its second Jacobian has bought.
+//!
+//! **Checked against** `lm` on the same published problems, and the counts above.
+
+use serde::{Deserialize, Serialize};
+
+use crate::chaos::map::{Map, Sequence};
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::lm::{Damping, Point, Search, converged};
+use crate::least_squares::{Factorisation, Form};
+use crate::objective::Objective;
+use crate::problem::Problem;
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// How the two steps are computed.
+    pub factorisation: Factorisation,
+    /// μ of the printed form; 5 in the paper.
+    pub mu: f64,
+    /// First μ of the sound form, a pure number.
+    pub initial_damping: f64,
+    /// M: candidates on each side. Not stated in the paper.
+    pub candidates: usize,
+    /// Whether x₂ is a candidate too (sound). The paper's eq. 18 does not have it.
+    pub second_step: bool,
+    /// The map that spreads the candidates: eq. 11 with r = 0.5.
+    pub map: Map,
+    /// N₀: where the sequence starts. Not stated in the paper.
+    pub first: f64,
+    /// Whether the priors of the problem take part. The paper has none.
+    pub priors: bool,
+    /// K: most iterations. Not stated in the paper.
+    pub max_iterations: usize,
+    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    pub cost_tolerance: f64,
+    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    pub gradient_tolerance: f64,
+    /// Stop where the cost itself is below this.
+    pub small_cost: f64,
+    /// Not used: the sequence is determined by `map` and `first`. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            factorisation: Factorisation::Cholesky,
+            mu: 5.0,
+            initial_damping: 1e-6,
+            candidates: 10,
+            second_step: true,
+            map: Map::LogisticTent { r: 0.5 },
+            first: 0.37,
+            priors: true,
+            max_iterations: 60,
+            cost_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// The paper's setting: μ = 5, unscaled, no prior, x₂ no candidate.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, second_step: false, ..Self::default() }
+    }
+}
+
+/// Minimises the cost of `problem` from `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let printed = options.form == Form::AsPrinted;
+    let mut objective = Objective::new(problem, start, options.priors);
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    if !here.at.is_finite() {
+        return here.finish(&objective, Termination::NotFinite, trace);
+    }
+    let mut system = if printed { DampedSystem::unscaled(p) } else { DampedSystem::new(p) };
+    let mut damping = Damping::new(if printed { options.mu } else { options.initial_damping });
+    let mut sequence = options.map.sequence(options.first);
+    let mut refused = 0;
+    let (mut x1, mut x2) = (vec![0.0; p], vec![0.0; p]);
+    for _ in 0..options.max_iterations {
+        let cost = here.at.cost();
+        let cosine = system.enter(&here.at);
+        if cost <= options.small_cost {
+            return here.finish(&objective, Termination::SmallResidual, trace);
+        }
+        if !printed && cosine <= options.gradient_tolerance {
+            return here.finish(&objective, Termination::Gradient, trace);
+        }
+        let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut x1) else {
+            if printed || damping.is_exhausted() {
+                return here.finish(&objective, Termination::Singular, trace);
+            }
+            damping.refuse();
+            refused += 1;
+            continue;
+        };
+        let search = Search {
+            mu: damping.mu,
+            refused,
+            cosine,
+            cost_tolerance: options.cost_tolerance,
+            step_tolerance: 0.0,
+        };
+        if !printed && let Some(end) = converged(&mut system, &here, &promise, &search) {
+            return here.finish(&objective, end, trace);
+        }
+        let at1 = Linearisation::at(&mut objective, &x1, options.factorisation);
+        let gain = (cost - at1.cost()) / promise.reduction;
+        let usable = at1.is_finite() && (printed || damping.is_acceptable(gain));
+        if !usable {
+            if printed {
+                return here.finish(&objective, Termination::NotFinite, trace);
+            }
+            damping.refuse();
+            refused += 1;
+            trace.push(entry(cost, 0.0, damping.mu, cosine, &objective));
+            if damping.is_exhausted() {
+                return here.finish(&objective, Termination::Stalled, trace);
+            }
+            continue;
+        }
+        if !printed {
+            damping.accept(gain);
+            refused = 0;
+        }
+        system.enter(&at1);
+        if system.step(&at1, damping.mu, &x1, &mut x2).is_none() {
+            x2.copy_from_slice(&x1);
+        }
+        let best = best_candidate(&mut objective, options, &mut sequence, [&here.x, &x1, &x2]);
+        let before = std::mem::take(&mut here.x);
+        // The cost of x₁ came with its derivatives; where x₁ stays the best they are used again.
+        here = match best {
+            Some((x, candidate_cost)) if candidate_cost < at1.cost() => {
+                let at = Linearisation::at(&mut objective, &x, options.factorisation);
+                Point { x, at }
+            }
+            _ => Point { x: x1.clone(), at: at1 },
+        };
+        if !here.at.is_finite() {
+            return here.finish(&objective, Termination::NotFinite, trace);
+        }
+        let moved = before.iter().zip(&here.x).map(|(a, b)| b - a).collect::<Vec<_>>();
+        trace.push(entry(here.at.cost(), system.scaled_norm(&moved), damping.mu, cosine, &objective));
+        if printed && (cost - here.at.cost()).abs() <= options.cost_tolerance * cost {
+            return here.finish(&objective, Termination::Cost, trace);
+        }
+    }
+    here.finish(&objective, Termination::IterationLimit, trace)
+}
+
+fn entry(cost: f64, step_norm: f64, mu: f64, cosine: f64, objective: &Objective<'_>) -> Iteration {
+    let evaluations = objective.evaluations;
+    Iteration { cost, row_cost: None, step_norm, damping: Some(mu), gradient_norm: Some(cosine), evaluations }
+}
+
+/// Equations 16 to 18 without x₁, whose cost is known: the best finite candidate.
+fn best_candidate(
+    objective: &mut Objective<'_>,
+    options: &Options,
+    sequence: &mut Sequence,
+    [x, x1, x2]: [&[f64]; 3],
+) -> Option<(Vec<f64>, f64)> {
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    let mut consider = |candidate: Vec<f64>| {
+        let cost = objective.cost(&candidate);
+        if cost.is_finite() && best.as_ref().is_none_or(|(_, lowest)| cost < *lowest) {
+            best = Some((candidate, cost));
+        }
+    };
+    let between = |from: &[f64], to: &[f64], share: f64| -> Vec<f64> {
+        from.iter().zip(to).map(|(from, to)| from + share * (to - from)).collect()
+    };
+    for n in sequence.by_ref().take(options.candidates) {
+        // x₁ − (x₁ − a)N = x₁ + ½N (x − x₁), and x₁ + (x₂ − b)N = x₁ + ½N (x₂ − x₁).
+        consider(between(x1, x, 0.5 * n));
+        consider(between(x1, x2, 0.5 * n));
+    }
+    if options.form == Form::Sound && options.second_step {
+        consider(x2.to_vec());
+    }
+    best
+}

@@ -1,0 +1,180 @@
+//! Levenberg–Marquardt with a step size found by search (SSLM).
+//!
+//! **Method.** x ← x − δ (JᵀJ + λI)⁻¹ Jᵀr with a step size δ that is adjusted as the search goes on.
+//! - [`Form::AsPrinted`]: δ decays once for each iteration, δ₀ = 0.8, factor 0.95 (ukf-vslm-2023 eq. 15).
+//! - [`Form::Sound`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0,
+//!   its slope there and the cost at 1, safeguarded to [0.1, 0.5] at each further trial until the cost falls
+//!   enough (Armijo).
+//!
+//! **Shapes.** As in [`lm`](crate::least_squares::lm).
+//!
+//! **Stops.** As `lm`; *Stalled* where no step size along the direction lowers the cost.
+//!
+//! **Source and departures.** ltlm-2024, Table 5, M6: "a dynamic adjustment mechanism for the algorithm's step
+//! size", without an equation; its reference is ukf-vslm-2023, whose eq. 15 is therefore taken as the printed
+//! form (the same recurrence as [`vslm`] with decay per iteration). What M6 ran exactly is not known. Sound:
+//! Nocedal and Wright, *Numerical Optimization*, 2nd ed., §3.5.
+//!
+//! **Checked against** published minima.
+
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::lm::Point;
+use crate::least_squares::{Factorisation, Form, vslm};
+use crate::objective::Objective;
+use crate::problem::Problem;
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// λ of the printed form.
+    pub lambda: f64,
+    /// δ₀ of the printed form.
+    pub step_size: f64,
+    /// What δ is multiplied by in the printed form.
+    pub decay_factor: f64,
+    /// Damping of the sound form, a pure number.
+    pub damping: f64,
+    /// How the sound form computes its direction.
+    pub factorisation: Factorisation,
+    /// Whether the priors of the problem take part.
+    pub priors: bool,
+    /// Most iterations.
+    pub max_iterations: usize,
+    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    pub cost_tolerance: f64,
+    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    pub gradient_tolerance: f64,
+    /// Stop where the cost itself is below this.
+    pub small_cost: f64,
+    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            lambda: 5.0,
+            step_size: 0.8,
+            decay_factor: 0.95,
+            damping: 1e-6,
+            factorisation: Factorisation::Cholesky,
+            priors: true,
+            max_iterations: 200,
+            cost_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// Equation 15 with its constants, 60 iterations, no priors.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, max_iterations: 60, ..Self::default() }
+    }
+}
+
+/// Share of the promised reduction that a step must bring (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+
+/// Most trial step sizes along one direction.
+const TRIALS: usize = 20;
+
+/// Minimises the cost of `problem` from `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    if options.form == Form::AsPrinted {
+        let printed = vslm::Options {
+            form: Form::AsPrinted,
+            decay: vslm::Decay::PerIteration,
+            lambda: options.lambda,
+            step_size: options.step_size,
+            decay_factor: options.decay_factor,
+            factorisation: options.factorisation,
+            priors: options.priors,
+            max_iterations: options.max_iterations,
+            cost_tolerance: options.cost_tolerance,
+            small_cost: options.small_cost,
+            ..vslm::Options::default()
+        };
+        return vslm::solve(problem, start, &printed);
+    }
+    let p = start.len();
+    let mut objective = Objective::new(problem, start, options.priors);
+    let mut here =
+        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
+    let mut trace =
+        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    if !here.at.is_finite() {
+        return here.finish(&objective, Termination::NotFinite, trace);
+    }
+    let mut system = DampedSystem::new(p);
+    let (mut full, mut trial) = (vec![0.0; p], vec![0.0; p]);
+    for _ in 0..options.max_iterations {
+        let cosine = system.enter(&here.at);
+        let cost = here.at.cost();
+        if cost <= options.small_cost {
+            return here.finish(&objective, Termination::SmallResidual, trace);
+        }
+        if cosine <= options.gradient_tolerance {
+            return here.finish(&objective, Termination::Gradient, trace);
+        }
+        let Some(promise) = system.step(&here.at, options.damping, &here.x, &mut full) else {
+            return here.finish(&objective, Termination::Singular, trace);
+        };
+        if promise.reduction <= options.cost_tolerance * cost {
+            return here.finish(&objective, Termination::Cost, trace);
+        }
+        // With little damping the slope along the step is −2 × the promised reduction.
+        let slope = -2.0 * promise.reduction;
+        let mut delta = 1.0;
+        let mut trials = 0;
+        let at = loop {
+            trial.iter_mut().zip(&here.x).zip(&full).for_each(|((t, x), full)| *t = x + delta * (full - x));
+            let enough = cost + SUFFICIENT * delta * slope;
+            let new = if trials == 0 {
+                let at = Linearisation::at(&mut objective, &trial, options.factorisation);
+                if at.is_finite() && at.cost() <= enough {
+                    break at;
+                }
+                at.cost()
+            } else {
+                let new = objective.cost(&trial);
+                if new <= enough {
+                    let at = Linearisation::at(&mut objective, &trial, options.factorisation);
+                    if at.is_finite() {
+                        break at;
+                    }
+                }
+                new
+            };
+            trials += 1;
+            if trials == TRIALS {
+                return here.finish(&objective, Termination::Stalled, trace);
+            }
+            let parabola = -slope * delta * delta / (2.0 * (new - cost - slope * delta));
+            delta = if parabola.is_finite() { parabola.clamp(0.1 * delta, 0.5 * delta) } else { 0.1 * delta };
+        };
+        here.at = at;
+        std::mem::swap(&mut here.x, &mut trial);
+        trace.push(Iteration {
+            cost: here.at.cost(),
+            step_norm: delta * promise.step_norm,
+            damping: Some(delta),
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+    }
+    here.finish(&objective, Termination::IterationLimit, trace)
+}

@@ -1,0 +1,296 @@
+//! Levenberg–Marquardt with a variable step size (VSLM).
+//!
+//! **Method.** x ← x − δ_t (JᵀJ + λI)⁻¹ Jᵀr, δ_{t+1} = μ δ_t (ukf-vslm-2023 eq. 15), δ₀ = 0.8, μ = 0.95.
+//! - [`Form::AsPrinted`] with [`Decay::PerSample`]: Algorithm 1 to the letter. Inside each iteration a loop
+//!   over the samples applies eq. 15 to one sample after the other (its row of J, its residual) and δ decays at
+//!   each: 0.95¹⁰⁰ = 0.006, so that after one pass over 100 rows nothing moves any more, and the first rows
+//!   decide.
+//! - [`Form::AsPrinted`] with [`Decay::PerIteration`]: eq. 15 with all rows, δ decaying once for each pass. The
+//!   steps sum to a finite length: what is left of a linear error after all of them is about e^(−δ₀/(1 − μ)) =
+//!   e^(−16).
+//! - [`Form::Sound`]: scaled columns and Nielsen's damping as in [`lm`](crate::least_squares::lm);
+//!   δ falls only where a step is refused (halved) and grows back (÷ μ, at most 1) where one is taken.
+//!
+//! **Shapes.** As in `lm`.
+//!
+//! **Stops.** Sound: as `lm`. As printed: relative change of cost below tolerance, or the iterations (20, Table
+//! IX).
+//!
+//! **Source and departures.** Li et al. 2023, eq. 15, Algorithm 1 lines 16 to 21. λ is not stated; 5 is taken
+//! over from ltlm-2024, by the same group. The paper's sign is that of E = Z − Z′. Its line 17 (X₀ = x_ukf
+//! inside the loop) undoes each iteration: `restart` has it, off unless
+//! [`ukf_vslm`](crate::filter::ukf_vslm) turns it on. A fixed decay cannot be right for every
+//! problem: it fixes how far the method can travel before it starts.
+//!
+//! **Checked against** the printed recurrence by hand, and published minima for the sound form.
+
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::lm::{Damping, Point, Search, converged};
+use crate::least_squares::{Factorisation, Form};
+use crate::objective::Objective;
+use crate::problem::{Problem, observations};
+
+/// When δ decays in the printed form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decay {
+    /// After each observation, as Algorithm 1 has it.
+    PerSample,
+    /// After each pass over all rows, as the text of eq. 15 has it.
+    #[default]
+    PerIteration,
+}
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// When δ decays (as printed).
+    pub decay: Decay,
+    /// λ of the printed form. Not stated in the paper.
+    pub lambda: f64,
+    /// δ₀: first step size.
+    pub step_size: f64,
+    /// μ: what δ is multiplied by.
+    pub decay_factor: f64,
+    /// Whether each iteration begins at the start again (Algorithm 1 line 17; as printed).
+    pub restart: bool,
+    /// How the sound form computes its step.
+    pub factorisation: Factorisation,
+    /// First damping of the sound form, a pure number.
+    pub initial_damping: f64,
+    /// Whether the priors of the problem take part.
+    pub priors: bool,
+    /// Most iterations.
+    pub max_iterations: usize,
+    /// Stop where what is left to gain (as printed: the relative change) is below this share of the cost.
+    pub cost_tolerance: f64,
+    /// Stop where the largest cosine between residuals and a column of J is below this (sound).
+    pub gradient_tolerance: f64,
+    /// Stop where the cost itself is below this.
+    pub small_cost: f64,
+    /// Not used: the method draws nothing. Here so that all methods are called alike.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            decay: Decay::PerIteration,
+            lambda: 5.0,
+            step_size: 0.8,
+            decay_factor: 0.95,
+            restart: false,
+            factorisation: Factorisation::Cholesky,
+            initial_damping: 1e-6,
+            priors: true,
+            max_iterations: 200,
+            cost_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// Algorithm 1 to the letter, 20 iterations.
+    pub fn as_printed() -> Self {
+        Self {
+            form: Form::AsPrinted,
+            decay: Decay::PerSample,
+            priors: false,
+            max_iterations: 20,
+            ..Self::default()
+        }
+    }
+}
+
+/// Minimises the cost of `problem` from `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let mut objective = Objective::new(problem, start, options.priors);
+    match (options.form, options.decay) {
+        (Form::AsPrinted, Decay::PerSample) => per_sample(&mut objective, start, options),
+        (Form::AsPrinted, Decay::PerIteration) => per_iteration(&mut objective, start, options),
+        (Form::Sound, _) => sound(&mut objective, start, options),
+    }
+}
+
+fn begin(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> (Point, Vec<Iteration>) {
+    let at = Linearisation::at(objective, start, options.factorisation);
+    let first = Iteration { cost: at.cost(), evaluations: objective.evaluations, ..Iteration::default() };
+    (Point { x: start.to_vec(), at }, vec![first])
+}
+
+fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let (mut here, mut trace) = begin(objective, start, options);
+    if !here.at.is_finite() {
+        return here.finish(objective, Termination::NotFinite, trace);
+    }
+    let per = objective.problem.rows_per_observation().max(1);
+    let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
+    let mut delta = options.step_size;
+    for _ in 0..options.max_iterations {
+        let before = here.at.cost();
+        let mut x = if options.restart { start.to_vec() } else { here.x.clone() };
+        let mut moved = 0.0;
+        for rows in observations(objective.problem) {
+            objective.jacobian(&x, rows, &mut r, &mut j);
+            for i in 0..per {
+                // (jjᵀ + λI)⁻¹ j = j / (λ + jᵀj): eq. 15 for one row.
+                let square: f64 = (0..p).map(|k| j[k * per + i].powi(2)).sum();
+                let share = delta * r[i] / (options.lambda + square);
+                (0..p).for_each(|k| x[k] -= share * j[k * per + i]);
+                moved += share * share * square;
+            }
+            delta *= options.decay_factor;
+        }
+        let at = Linearisation::at(objective, &x, options.factorisation);
+        if !at.is_finite() {
+            return here.finish(objective, Termination::NotFinite, trace);
+        }
+        here = Point { x, at };
+        trace.push(Iteration {
+            cost: here.at.cost(),
+            step_norm: moved.sqrt(),
+            damping: Some(delta),
+            row_cost: None,
+            gradient_norm: None,
+            evaluations: objective.evaluations,
+        });
+        if (before - here.at.cost()).abs() <= options.cost_tolerance * before {
+            // The step size has died out, which says nothing about a minimum.
+            return here.finish(objective, Termination::Stalled, trace);
+        }
+    }
+    here.finish(objective, Termination::IterationLimit, trace)
+}
+
+fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+    let (mut here, mut trace) = begin(objective, start, options);
+    if !here.at.is_finite() {
+        return here.finish(objective, Termination::NotFinite, trace);
+    }
+    let mut system = DampedSystem::unscaled(start.len());
+    let mut trial = vec![0.0; start.len()];
+    let mut delta = options.step_size;
+    for _ in 0..options.max_iterations {
+        let cosine = system.enter(&here.at);
+        if here.at.cost() <= options.small_cost {
+            return here.finish(objective, Termination::SmallResidual, trace);
+        }
+        let Some(promise) = system.step(&here.at, options.lambda, &here.x, &mut trial) else {
+            return here.finish(objective, Termination::Singular, trace);
+        };
+        let from = if options.restart { start } else { &here.x };
+        let x: Vec<f64> = from
+            .iter()
+            .zip(&here.x)
+            .zip(&trial)
+            .map(|((from, x), trial)| from + delta * (trial - x))
+            .collect();
+        let at = Linearisation::at(objective, &x, options.factorisation);
+        if !at.is_finite() {
+            return here.finish(objective, Termination::NotFinite, trace);
+        }
+        let (before, after) = (here.at.cost(), at.cost());
+        here = Point { x, at };
+        trace.push(Iteration {
+            cost: after,
+            step_norm: delta * promise.step_norm,
+            damping: Some(delta),
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+        delta *= options.decay_factor;
+        if (before - after).abs() <= options.cost_tolerance * before {
+            return here.finish(objective, Termination::Cost, trace);
+        }
+    }
+    here.finish(objective, Termination::IterationLimit, trace)
+}
+
+fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let (mut here, mut trace) = begin(objective, start, options);
+    if !here.at.is_finite() {
+        return here.finish(objective, Termination::NotFinite, trace);
+    }
+    let mut system = DampedSystem::new(p);
+    let mut damping = Damping::new(options.initial_damping);
+    let mut delta = options.step_size;
+    let mut trial = vec![0.0; p];
+    let mut cosine = system.enter(&here.at);
+    let mut refused = 0;
+    for _ in 0..options.max_iterations {
+        let cost = here.at.cost();
+        if cost <= options.small_cost {
+            return here.finish(objective, Termination::SmallResidual, trace);
+        }
+        if cosine <= options.gradient_tolerance {
+            return here.finish(objective, Termination::Gradient, trace);
+        }
+        let promise = system.step(&here.at, damping.mu, &here.x, &mut trial);
+        if promise.is_none() && damping.is_exhausted() {
+            return here.finish(objective, Termination::Singular, trace);
+        }
+        let Some(promise) = promise else {
+            damping.refuse();
+            refused += 1;
+            continue;
+        };
+        let search = Search {
+            mu: damping.mu,
+            refused,
+            cosine,
+            cost_tolerance: options.cost_tolerance,
+            step_tolerance: 0.0,
+        };
+        if let Some(end) = converged(&mut system, &here, &promise, &search) {
+            return here.finish(objective, end, trace);
+        }
+        trial.iter_mut().zip(&here.x).for_each(|(trial, x)| *trial = x + delta * (*trial - x));
+        // Along the step the model promises δ(2 − δ) of the whole reduction (exactly so without damping).
+        let promised = delta * (2.0 - delta) * promise.reduction;
+        let at = Linearisation::at(objective, &trial, options.factorisation);
+        let gain = (cost - at.cost()) / promised;
+        let taken = at.is_finite() && damping.is_acceptable(gain);
+        if taken {
+            damping.accept(gain);
+            here.at = at;
+            std::mem::swap(&mut here.x, &mut trial);
+            cosine = system.enter(&here.at);
+        }
+        trace.push(Iteration {
+            cost: here.at.cost(),
+            step_norm: if taken { delta * promise.step_norm } else { 0.0 },
+            damping: Some(delta),
+            row_cost: None,
+            gradient_norm: Some(cosine),
+            evaluations: objective.evaluations,
+        });
+        if taken {
+            refused = 0;
+            delta = (delta / options.decay_factor).min(1.0);
+        } else {
+            delta = (0.5 * delta).max(0.05);
+            damping.refuse();
+            refused += 1;
+            if damping.is_exhausted() {
+                return here.finish(objective, Termination::Stalled, trace);
+            }
+        }
+    }
+    here.finish(objective, Termination::IterationLimit, trace)
+}

@@ -1,0 +1,65 @@
+//! Algorithms that fit a model to measurements. Nothing here knows a robot: each algorithm is tested on
+//! published problems (Moré–Garbow–Hillstrom, NIST StRD) and serves whatever implements [`problem::Problem`].
+//!
+//! Every algorithm file has the same two items: `Options` (with a `seed` and a `Default`) and `solve(&dyn
+//! Problem, start, &Options) -> Estimate`. A solver returns whatever the data: not a number, no rows, a
+//! singular matrix end in a [`estimate::Termination`] that says so, never in a panic. Where a paper prints a
+//! weak form of a method, [`least_squares::Form`] chooses between that form, to the letter, and a sound one;
+//! the default is sound.
+//!
+//! - [`problem`] and [`estimate`]: what goes in and what comes out;
+//! - [`least_squares`]: all rows at once, with derivatives;
+//! - [`filter`]: one observation at a time, with a covariance that follows;
+//! - [`swarm`]: the cost alone;
+//! - [`network`]: a smooth function with many weights;
+//! - [`chaos`]: the maps that one of the least-squares methods draws its candidates from.
+//!
+//! ```
+//! use std::ops::Range;
+//! use crate::least_squares::lm;
+//! use crate::problem::Problem;
+//!
+//! /// y = a e^(−b t), measured at t = 0, 1, 2, 3 with σ = 0.01.
+//! struct Decay;
+//!
+//! const MEASURED: [f64; 4] = [2.00, 1.21, 0.74, 0.45];
+//! const SIGMA: f64 = 0.01;
+//!
+//! impl Problem for Decay {
+//!     fn parameters(&self) -> usize {
+//!         2
+//!     }
+//!     fn rows(&self) -> usize {
+//!         MEASURED.len()
+//!     }
+//!     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
+//!         for (out, t) in out.iter_mut().zip(rows) {
+//!             *out = (x[0] * (-x[1] * t as f64).exp() - MEASURED[t]) / SIGMA;
+//!         }
+//!     }
+//!     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+//!         self.residuals(x, rows.clone(), residuals);
+//!         let (by_a, by_b) = jacobian.split_at_mut(rows.len());
+//!         for (i, t) in rows.enumerate() {
+//!             let decay = (-x[1] * t as f64).exp() / SIGMA;
+//!             by_a[i] = decay;
+//!             by_b[i] = -x[0] * t as f64 * decay;
+//!         }
+//!     }
+//! }
+//!
+//! let estimate = lm::solve(&Decay, &[1.0, 0.0], &lm::Options::default());
+//! assert!(estimate.termination.is_converged());
+//! let sigmas = estimate.sigmas().expect("four rows determine two parameters");
+//! assert!((estimate.x[0] - 2.0).abs() < 3.0 * sigmas[0]);
+//! assert!((estimate.x[1] - 0.5).abs() < 3.0 * sigmas[1]);
+//! ```
+
+pub mod problem;
+pub mod estimate;
+pub mod objective;
+pub mod least_squares;
+pub mod filter;
+pub mod swarm;
+pub mod network;
+pub mod chaos;

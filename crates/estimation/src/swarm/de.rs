@@ -1,0 +1,143 @@
+//! Differential evolution.
+//!
+//! **Method.** For each member i a mutant from others of the population, crossed with i coordinate by
+//! coordinate (CR, one coordinate always from the mutant); the better of the two stays.
+//! - [`Form::AsPrinted`]: rand/1/bin, u_a + F(u_b − u_c), F = 0.5, CR = 0.9.
+//! - [`Form::Sound`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for
+//!   each member (dither), CR = 0.9; the start is a member.
+//!
+//! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is put halfway between the wall and where it
+//! came from.
+//!
+//! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
+//!
+//! **Source and departures.** M7 of ukf-vslm-2023, without equations. Printed: Storn and Price, "Differential
+//! evolution", 1997; its advice of ten members for each parameter is the default (`population` 0). Sound: Das
+//! and Suganthan, "Differential evolution: a survey of the state-of-the-art", 2011.
+//!
+//! **Checked against** published problems of few parameters.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::Estimate;
+use crate::least_squares::Form;
+use crate::problem::Problem;
+use crate::swarm::{Region, Search, distance, uniform_position};
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// Members; 0 for ten times the number of parameters.
+    pub population: usize,
+    /// Generations.
+    pub max_iterations: usize,
+    /// F of the printed form.
+    pub factor: f64,
+    /// CR.
+    pub crossover: f64,
+    /// The box that is searched.
+    pub region: Region,
+    /// Whether the priors of the problem count in the cost.
+    pub priors: bool,
+    /// Stop where the cost is below this.
+    pub small_cost: f64,
+    /// Seed of all draws.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            population: 0,
+            max_iterations: 300,
+            factor: 0.5,
+            crossover: 0.9,
+            region: Region::default(),
+            priors: true,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// rand/1/bin, priors not counted.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, ..Self::default() }
+    }
+}
+
+/// Searches the box around `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let n = if options.population == 0 { 10 * p } else { options.population }.max(4);
+    let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    let mut members: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();
+    if options.form == Form::Sound {
+        members[0].fill(0.0);
+    }
+    let mut costs = search.costs(&members);
+    for _ in 0..options.max_iterations {
+        if p == 0 {
+            break;
+        }
+        let best = search.best.clone();
+        let mut trials = Vec::with_capacity(n);
+        for (i, member) in members.iter().enumerate() {
+            let [a, b, c] = three_others(&mut rng, n, i);
+            let factor =
+                if options.form == Form::Sound { rng.random_range(0.5..1.0) } else { options.factor };
+            let always = rng.random_range(0..p);
+            let mut trial = member.clone();
+            for k in 0..p {
+                if k != always && rng.random::<f64>() >= options.crossover {
+                    continue;
+                }
+                let mutant = match options.form {
+                    Form::AsPrinted => members[a][k] + factor * (members[b][k] - members[c][k]),
+                    Form::Sound => {
+                        member[k] + factor * (best[k] - member[k]) + factor * (members[a][k] - members[b][k])
+                    }
+                };
+                trial[k] = if mutant.abs() > 1.0 { 0.5 * (mutant.signum() + member[k]) } else { mutant };
+            }
+            trials.push(trial);
+        }
+        let trial_costs = search.costs(&trials);
+        for (i, trial) in trials.into_iter().enumerate() {
+            if trial_costs[i] <= costs[i] {
+                costs[i] = trial_costs[i];
+                members[i] = trial;
+            }
+        }
+        let moved = distance(&best, &search.best);
+        if search.note(moved, options.factor) {
+            break;
+        }
+    }
+    search.finish()
+}
+
+/// Three different members, none of them `i`.
+fn three_others(rng: &mut ChaCha8Rng, n: usize, i: usize) -> [usize; 3] {
+    let mut chosen = [i; 3];
+    for k in 0..3 {
+        chosen[k] = loop {
+            let candidate = rng.random_range(0..n);
+            if candidate != i && !chosen[..k].contains(&candidate) {
+                break candidate;
+            }
+        };
+    }
+    chosen
+}

@@ -1,0 +1,114 @@
+//! Sine cosine algorithm.
+//!
+//! **Method.** u ← u + r₁ sin r₂ |r₃ P − u| or, with even odds, u + r₁ cos r₂ |r₃ P − u|, where P is the best
+//! position so far, r₂ uniform in [0, 2π), r₃ in [0, 2), and r₁ falls linearly from a = 2 to 0.
+//! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on where the origin is: the method is drawn to u = 0,
+//!   which here is the start. On deviations from a data sheet, most of which are small, that flatters it.
+//! - [`Form::Sound`]: r₃ = 1, so that only differences of positions count, and a member moves only where that
+//!   lowers its cost; the start is a member.
+//!
+//! **Shapes.** u in [−1, 1]ᵖ, clamped to the box.
+//!
+//! **Stops.** *IterationLimit*, *SmallResidual*, *NotFinite*.
+//!
+//! **Source and departures.** M4 of ltlm-2024, without equations: Mirjalili, "SCA: a sine cosine algorithm for
+//! solving optimization problems", 2016, eq. 3.1 to 3.4.
+//!
+//! **Checked against** published problems of few parameters, and the pull towards the origin.
+
+use std::f64::consts::TAU;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::Estimate;
+use crate::least_squares::Form;
+use crate::problem::Problem;
+use crate::swarm::{Region, Search, distance, uniform_position};
+
+/// How [`solve`] searches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Options {
+    /// As printed, or sound.
+    pub form: Form,
+    /// Members.
+    pub population: usize,
+    /// Iterations.
+    pub max_iterations: usize,
+    /// a: first size of the moves.
+    pub amplitude: f64,
+    /// The box that is searched.
+    pub region: Region,
+    /// Whether the priors of the problem count in the cost.
+    pub priors: bool,
+    /// Stop where the cost is below this.
+    pub small_cost: f64,
+    /// Seed of all draws.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            form: Form::Sound,
+            population: 30,
+            max_iterations: 500,
+            amplitude: 2.0,
+            region: Region::default(),
+            priors: true,
+            small_cost: 1e-20,
+            seed: 0,
+        }
+    }
+}
+
+impl Options {
+    /// The algorithm of 2016, priors not counted.
+    pub fn as_printed() -> Self {
+        Self { form: Form::AsPrinted, priors: false, ..Self::default() }
+    }
+}
+
+/// Searches the box around `start`.
+///
+/// # Panics
+/// Where `start` does not have one entry for each parameter.
+pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
+    let p = start.len();
+    let n = options.population.max(1);
+    let sound = options.form == Form::Sound;
+    let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    let mut members: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();
+    if sound {
+        members[0].fill(0.0);
+    }
+    let mut costs = search.costs(&members);
+    for iteration in 0..options.max_iterations {
+        let r1 = options.amplitude * (1.0 - iteration as f64 / options.max_iterations as f64);
+        let best = search.best.clone();
+        let mut moved = members.clone();
+        for member in &mut moved {
+            for (u, best) in member.iter_mut().zip(&best) {
+                let r2 = rng.random_range(0.0..TAU);
+                let r3 = if sound { 1.0 } else { rng.random_range(0.0..2.0) };
+                let wave = if rng.random::<f64>() < 0.5 { r2.sin() } else { r2.cos() };
+                *u = (*u + r1 * wave * (r3 * best - *u).abs()).clamp(-1.0, 1.0);
+            }
+        }
+        let new = search.costs(&moved);
+        for (i, member) in moved.into_iter().enumerate() {
+            if !sound || new[i] < costs[i] {
+                costs[i] = new[i];
+                members[i] = member;
+            }
+        }
+        let step = distance(&best, &search.best);
+        if search.note(step, r1) {
+            break;
+        }
+    }
+    search.finish()
+}

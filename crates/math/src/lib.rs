@@ -1,0 +1,10 @@
+//! Rigid motions, numerical differences and statistics: what every other module stands on.
+
+pub mod lanes;
+pub mod se3;
+pub mod difference;
+pub mod statistics;
+pub mod distribution;
+pub mod tail;
+pub mod radial;
+pub mod spectral;

@@ -1,0 +1,105 @@
+//! A way of calibrating through all groups of an arm, and what so many poses can tell.
+
+use std::time::Instant;
+
+use super::arm::{Arm, mean_error};
+use super::way::State;
+use super::{Count, Degradation, Journey, Step, Way};
+use truegrind_calibration::identification::fit::Observed;
+use truegrind_calibration::identification::identifiability::identifiability;
+use truegrind_estimation::least_squares::lm;
+use truegrind_math::statistics::median;
+
+fn first_poses(rows: &Observed, count: usize) -> Observed {
+    rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
+}
+
+/// One arm through all groups.
+pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Way, count: usize) -> Journey {
+    let mut state = State::new(arm);
+    let mut steps = Vec::with_capacity(settings.groups);
+    let mut seconds = 0.0;
+    for (g, group) in arm.groups.iter().enumerate() {
+        let rows = first_poses(&group.identify, count);
+        let before = state.model(arm);
+        let begun = Instant::now();
+        match way {
+            Way::Rls => state.rls(arm, &rows, 1.0),
+            Way::RlsForgetting => state.rls(arm, &rows, settings.forgetting),
+            Way::Lm => state.lm(arm, &rows, false),
+            Way::LmMemory => state.lm(arm, &rows, true),
+            Way::LmStopped => state.stopped(arm, &rows, settings.stopped_after),
+        }
+        seconds += begun.elapsed().as_secs_f64();
+        let after = state.model(arm);
+        steps.push(Step {
+            group: g,
+            identification_before_mm: mean_error(arm, &rows, &before),
+            identification_after_mm: mean_error(arm, &rows, &after),
+            verification_before_mm: mean_error(arm, &group.verify, &before),
+            verification_after_mm: mean_error(arm, &group.verify, &after),
+        });
+    }
+    let mean = steps.iter().map(|s: &Step| s.verification_after_mm).sum::<f64>() / steps.len().max(1) as f64;
+    Journey { way, count, steps, arms_mm: vec![mean], seconds }
+}
+
+/// Means over the arms.
+pub(super) fn average(way: Way, count: usize, each: &[Journey]) -> Journey {
+    let n = each.len().max(1) as f64;
+    let groups = each.first().map_or(0, |j| j.steps.len());
+    let mean = |g: usize, figure: fn(&Step) -> f64| each.iter().map(|j| figure(&j.steps[g])).sum::<f64>() / n;
+    let steps = (0..groups)
+        .map(|g| Step {
+            group: g,
+            identification_before_mm: mean(g, |s| s.identification_before_mm),
+            identification_after_mm: mean(g, |s| s.identification_after_mm),
+            verification_before_mm: mean(g, |s| s.verification_before_mm),
+            verification_after_mm: mean(g, |s| s.verification_after_mm),
+        })
+        .collect();
+    let arms_mm = each.iter().flat_map(|j| j.arms_mm.iter().copied()).collect();
+    Journey {
+        way,
+        count,
+        steps,
+        arms_mm,
+        seconds: median(&each.iter().map(|j| j.seconds).collect::<Vec<_>>()).unwrap_or(f64::NAN),
+    }
+}
+
+/// The study of counts, for one of them.
+pub(super) fn count_of(arms: &[Arm], count: usize) -> Count {
+    let mut out = Count {
+        poses: count,
+        equations: 6 * count,
+        rank: usize::MAX,
+        condition: 0.0,
+        identification_mm: 0.0,
+        verification_mm: 0.0,
+        without_prior_mm: Some(0.0),
+    };
+    let n = arms.len().max(1) as f64;
+    for arm in arms {
+        let rows = first_poses(&arm.groups[0].identify, count);
+        let mut state = State::new(arm);
+        let task = state.task(arm, &rows, arm.sigma, &[]);
+        let scale: Vec<f64> = state.covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+        if let Some(seen) = identifiability(&task, state.x.as_slice(), &scale) {
+            out.rank = out.rank.min(seen.rank);
+            out.condition = out.condition.max(seen.condition);
+        }
+        // One linearisation without priors, as eq. 9 has it.
+        let options = lm::Options { priors: false, max_iterations: 50, ..lm::Options::default() };
+        let bare = lm::solve(&task, state.x.as_slice(), &options);
+        let bare_model = task.apply(&bare.x).0;
+        state.rls(arm, &rows, 1.0);
+        let model = state.model(arm);
+        out.identification_mm += mean_error(arm, &rows, &model) / n;
+        out.verification_mm += mean_error(arm, &arm.groups[0].verify, &model) / n;
+        let error = mean_error(arm, &arm.groups[0].verify, &bare_model) / n;
+        let regular = out.condition.is_finite();
+        out.without_prior_mm = out.without_prior_mm.filter(|_| regular).map(|sum| sum + error);
+    }
+    out
+}

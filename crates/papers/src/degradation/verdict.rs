@@ -1,0 +1,83 @@
+//! Every way of calibrating against RLS with the same poses, paired over the simulated arms.
+//!
+//! The arms are drawn independently, so that Wilcoxon's test asks for no more than it is given; p is corrected by Holm over
+//! all comparisons. A difference below 2 % of the error is none that anybody would see, however sure it is.
+
+use serde::Serialize;
+
+use super::{Journey, Way};
+use crate::statistics::{holm, signed_rank};
+use crate::verdict::LEVEL;
+
+/// Differences below this share of RLS's error are of no size.
+pub(super) const SAME: f64 = 0.02;
+
+/// One way against RLS.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AgainstRls {
+    /// The way.
+    pub way: Way,
+    /// Poses of each group that both take.
+    pub count: usize,
+    /// Mean difference of the error after, way minus RLS (mm).
+    pub mean_mm: f64,
+    /// Arms on which RLS was better.
+    pub rls_better: usize,
+    /// Arms.
+    pub arms: usize,
+    /// Two-sided p of Wilcoxon's test after Holm's correction.
+    pub p: f64,
+    /// What follows.
+    pub outcome: Outcome,
+}
+
+/// What follows for a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// RLS leaves less.
+    RlsBetter,
+    /// The other way leaves less.
+    WayBetter,
+    /// Whatever the sign, the difference is below 2 % of the error.
+    Same,
+    /// Too unsure to say.
+    NotSignificant,
+}
+
+pub(super) fn against_rls(journeys: &[Journey]) -> Vec<AgainstRls> {
+    let mut out: Vec<AgainstRls> = journeys
+        .iter()
+        .filter(|j| j.way != Way::Rls)
+        .filter_map(|j| {
+            let rls = journeys.iter().find(|r| r.way == Way::Rls && r.count == j.count)?;
+            let differences: Vec<f64> = j.arms_mm.iter().zip(&rls.arms_mm).map(|(a, b)| a - b).collect();
+            let arms = differences.len();
+            let mean_mm = differences.iter().sum::<f64>() / arms.max(1) as f64;
+            let error = rls.arms_mm.iter().sum::<f64>() / arms.max(1) as f64;
+            let outcome = match mean_mm {
+                d if d.abs() < SAME * error => Outcome::Same,
+                d if d < 0.0 => Outcome::WayBetter,
+                // Not a number too.
+                _ => Outcome::RlsBetter,
+            };
+            Some(AgainstRls {
+                way: j.way,
+                count: j.count,
+                mean_mm,
+                rls_better: differences.iter().filter(|d| !(**d <= 0.0)).count(),
+                arms,
+                p: signed_rank(&differences).two_sided,
+                outcome,
+            })
+        })
+        .collect();
+    let corrected = holm(&out.iter().map(|a| a.p).collect::<Vec<_>>());
+    for (one, p) in out.iter_mut().zip(corrected) {
+        one.p = p;
+        if one.outcome != Outcome::Same && !(p < LEVEL) {
+            one.outcome = Outcome::NotSignificant;
+        }
+    }
+    out
+}

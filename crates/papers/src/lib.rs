@@ -1,0 +1,44 @@
+//! Methods side by side under the protocols of the three papers, and an arm that is watched over its life.
+//!
+//! An experiment is a TOML file under `experiments/` ([`experiment`]); a new one needs no code. Of the kinds of
+//! experiment, each in its own file:
+//!
+//! - [`protocol`]: methods over seeded splits of measured rows (ltlm-2024 Tables 6 and 7, Figs 6 to 8; ukf-vslm-2023
+//!   Tables VII to XIII, Figs 5 to 7); what differs and why is judged in [`verdict`];
+//! - [`grinding`]: a program for a surface, rewritten with what each method found (ltlm-2024 Table 8, Fig. 9);
+//! - [`uniformity`]: how evenly a chaotic map fills its interval (ltlm-2024 Figs 2 and 3);
+//! - [`signed_rank`]: a paper's own test on its own figures (ukf-vslm-2023 Tables X and XI);
+//! - [`degradation`]: an arm that warms up and wears, calibrated now and then or all the time (rls-2025).
+//!
+//! [`tracking`] keeps a model accurate as measurements come in. [`statistics`] has the tests, [`distribution`] their
+//! distributions.
+//!
+//! A method may end in numbers that are none: that is a row of the table which says so, never a missing row.
+
+pub mod statistics;
+pub mod experiment;
+pub mod rescaled;
+pub mod simulated;
+pub mod protocol;
+pub mod parameters;
+pub mod verdict;
+pub mod uniformity;
+pub mod signed_rank;
+pub mod grinding;
+pub mod degradation;
+pub mod views;
+
+/// The result of an experiment, by its kind.
+#[derive(Debug, Clone)]
+pub enum Results {
+    /// Methods over splits of measured rows.
+    Methods(Box<protocol::Study>),
+    /// A ground surface.
+    Grinding(Box<grinding::GrindingResult>),
+    /// Uniformity of a chaotic map.
+    Uniformity(uniformity::UniformityResult),
+    /// A paper's own test on its own figures.
+    SignedRank(Vec<signed_rank::TableResult>),
+    /// An arm that degrades.
+    Degradation(Box<degradation::DegradationResult>),
+}

@@ -1,0 +1,558 @@
+//! Methods over seeded cases of one measurement file.
+//!
+//! A case draws its rows from the file and divides them into rows to fit and rows to judge by, both with its own seed;
+//! every method sees the same rows. Repeated poses stay on one side. Then:
+//!
+//! 1. The frames are registered by a fit of the frames alone: outlet and cable zero, or the sensor's frame, and the
+//!    touched point. ltlm-2024 and ukf-vslm-2023 take the outlet as known; their files do not give it.
+//! 2. *As printed*: from there the 24 link parameters, every row with the same weight of 1/mm, no priors where a method
+//!    can do without. What cannot (the first covariance of a filter, the box of a swarm) takes manufacturing tolerances,
+//!    since the papers state none. R of a filter is 1 mm², not stated either.
+//! 3. *Sound*: links and frames together, rows weighed by what sensor and rounding leave, tolerances as priors. All
+//!    sound methods solve the very same problem.
+//! 4. Errors are stated on the held-out rows, signed for a cable, as the norm for a position.
+//! 5. Every least-squares method is then continued until it has converged: what it finds in the end is its problem's,
+//!    what it found before also its budget's.
+//!
+//! "STD" of the papers is the mean of the absolute errors (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so.
+//! Results are the same for any number of threads; the seconds are not, and are kept apart.
+
+use std::time::Instant;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::experiment::{Experiment, ExperimentError, Method, Methods, ReadingUsed, Treatment, Units};
+use crate::parameters::{ParameterTable, parameter_table};
+use crate::rescaled::Rescaled;
+use crate::verdict::{Judgement, judge};
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_calibration::identification::calibration::{Calibration, Weight};
+use truegrind_calibration::identification::fit::{
+    Fitted, Observed, Start, errors_on, fit, frame_parameters, summary_on,
+};
+use truegrind_calibration::identification::identify::observe;
+use truegrind_calibration::identification::register::{Registered, register};
+use truegrind_calibration::identification::rounding;
+use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver};
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::split;
+use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
+use truegrind_estimation::least_squares::{Factorisation, lm};
+use truegrind_estimation::problem::Problem;
+use truegrind_math::statistics::ErrorSummary;
+
+/// How an experiment is run.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options {
+    /// Rows of one case in place of the protocol's.
+    pub rows: Option<usize>,
+    /// Seed of the cases: case k draws with seed + k.
+    pub seed: u64,
+    /// Whether the rows are simulated, so that the paper's figures belong to another arm.
+    pub simulated: bool,
+    /// Standard deviation of a length or a coordinate (mm), where it is known because the rows are simulated.
+    pub sensor_sigma_mm: f64,
+}
+
+/// The result of an experiment.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// What was run.
+    pub experiment: Experiment,
+    /// Its section.
+    pub methods: Methods,
+    /// Measurement file.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+    /// Rows of the file.
+    pub rows_in_file: usize,
+    /// The sensor, after the protocol's choice of reading.
+    pub sensor: Sensor,
+    /// Robot.
+    pub robot: String,
+    /// Rows of one case.
+    pub rows: usize,
+    /// Whether that is fewer than the protocol asks for.
+    pub reduced: bool,
+    /// Whether the rows are simulated.
+    pub simulated: bool,
+    /// Seed of the first case.
+    pub seed: u64,
+    /// What repeated poses scatter by, else what the rounding of angles leaves in a row, with the sensor's noise where it is
+    /// simulated (mm).
+    pub noise_floor_mm: Option<f64>,
+    /// The cases.
+    pub cases: Vec<Case>,
+    /// One entry for each method.
+    pub results: Vec<MethodResult>,
+    /// What was identified in the first case; empty where not asked for.
+    pub parameters: Vec<ParameterTable>,
+    /// What differs and why.
+    pub judgement: Judgement,
+}
+
+/// One case.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Case {
+    /// Seed of its rows and split.
+    pub seed: u64,
+    /// Rows of the fit.
+    pub train: usize,
+    /// Held-out rows.
+    pub test: usize,
+    /// Errors on held-out rows with frames registered and links nominal: the only fair "before".
+    pub registered: ErrorSummary,
+    /// These errors, row by row, signed for a cable (mm).
+    pub registered_errors_mm: Vec<f64>,
+}
+
+/// A method over all cases.
+#[derive(Debug, Clone)]
+pub struct MethodResult {
+    /// What the experiment says of it.
+    pub method: Method,
+    /// The solver.
+    pub solver: &'static Solver,
+    /// How it was set to work.
+    pub treatment: Treatment,
+    /// All its settings.
+    pub settings: toml::Table,
+    /// One outcome for each case, as the experiment limits it.
+    pub outcomes: Vec<Outcome>,
+    /// The same continued until it has converged, for least-squares methods; counted from where it was stopped.
+    pub converged: Option<Vec<Outcome>>,
+}
+
+/// One method on one case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Errors on held-out rows.
+    pub held_out: ErrorSummary,
+    /// Errors on the rows of the fit.
+    pub fitted: ErrorSummary,
+    /// How the search ended.
+    pub termination: Termination,
+    /// Whether the result is none: not finite, or ten times worse than registered frames alone.
+    pub diverged: bool,
+    /// Rows evaluated.
+    pub evaluations: Evaluations,
+    /// Iterations: steps, sweeps or generations.
+    pub iterations: usize,
+    /// Cost over the iterations.
+    pub curve: Vec<CurvePoint>,
+    /// Signed errors on held-out rows (mm).
+    pub errors_mm: Vec<f64>,
+    /// Deviations of the parameters from their start.
+    pub x: Vec<f64>,
+    /// How far the farthest link parameter went, in manufacturing tolerances.
+    pub farthest: f64,
+    /// Wall clock, while other threads worked too. Not the same in every run.
+    pub seconds: f64,
+}
+
+/// A point of a convergence curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Iteration, 0 for the start.
+    pub iteration: usize,
+    /// Passes over the rows so far, those with derivatives counted too.
+    pub passes: f64,
+    /// Root of the mean square of the fit's errors (mm), by the fit's weights: of a length, or of the distance between two
+    /// positions.
+    pub rmse: f64,
+}
+
+/// A case with everything that methods start from.
+pub(super) struct Prepared {
+    train: Observed,
+    test: Observed,
+    registered: Fitted,
+    nominal: Model,
+    sound: Option<Sound>,
+}
+
+/// The problem of the sound treatment.
+struct Sound {
+    weights: Vec<Weight>,
+}
+
+/// Held-out errors this many times those of registered frames are no result.
+const DIVERGED: f64 = 10.0;
+
+/// Runs a methods experiment on `dataset`, measured on `nominal`.
+///
+/// # Errors
+/// [`ExperimentError`] where the rows cannot carry the protocol. A method that fails is no error but a row.
+pub fn run(
+    experiment: &Experiment,
+    methods: &Methods,
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    options: &Options,
+) -> Result<Study, ExperimentError> {
+    let protocol = &methods.protocol;
+    let dataset = reading_used(experiment, methods, dataset)?;
+    let rows = options.rows.unwrap_or(protocol.rows);
+    if dataset.rows.len() < rows {
+        return Err(ExperimentError::TooFewRows {
+            file: dataset.file.clone(),
+            experiment: experiment.name.clone(),
+            found: dataset.rows.len(),
+            asked: rows,
+            possible: dataset.rows.len(),
+        });
+    }
+    enough(experiment, methods, &dataset, rows, nominal)?;
+    let (observed, _) = observe(&dataset, nominal, protocol.sharpen);
+    let any_sound = methods.method.iter().any(|m| treatment_of(m, methods) == Treatment::Sound);
+    let seeds: Vec<u64> = (0..protocol.cases as u64).map(|k| options.seed + k).collect();
+    let prepared = seeds
+        .par_iter()
+        .map(|&seed| prepare(&observed, nominal, rows, protocol.held_out, seed, any_sound))
+        .collect::<Result<Vec<_>, ExperimentError>>()?;
+    let cases: Vec<Case> = prepared
+        .iter()
+        .zip(&seeds)
+        .map(|(case, &seed)| {
+            let errors = errors_on(&case.test, &case.registered.model, &case.registered.frames);
+            Case {
+                seed,
+                train: case.train.dataset.rows.len(),
+                test: case.test.dataset.rows.len(),
+                registered: ErrorSummary::of(errors.iter().copied()),
+                registered_errors_mm: errors,
+            }
+        })
+        .collect();
+
+    let mut results = Vec::with_capacity(methods.method.len());
+    for method in &methods.method {
+        let solver = method.solver();
+        let treatment = treatment_of(method, methods);
+        let fail = |found: String| ExperimentError::Invalid {
+            file: experiment.name.clone(),
+            key: method.id.clone(),
+            found,
+            expected: "settings of that method".to_owned(),
+        };
+        let configured = solver.configured(&method.settings).map_err(fail)?;
+        let (outcomes, converged): (Vec<Outcome>, Vec<Option<Outcome>>) = prepared
+            .par_iter()
+            .zip(&seeds)
+            .map(|(case, seed)| outcome(case, method, solver, treatment, &configured.run, *seed))
+            .unzip();
+        let converged: Option<Vec<Outcome>> = converged.into_iter().collect();
+        results.push(MethodResult {
+            method: method.clone(),
+            solver,
+            treatment,
+            settings: configured.settings,
+            outcomes,
+            converged,
+        });
+    }
+    let parameters = if methods.parameters {
+        results.iter().filter_map(|r| parameters_of(&prepared[0], r)).collect()
+    } else {
+        Vec::new()
+    };
+    let judgement = judge(&results, &methods.reference, protocol.held_out / (1.0 - protocol.held_out));
+    Ok(Study {
+        experiment: experiment.clone(),
+        methods: methods.clone(),
+        file: dataset.file.clone(),
+        sha256: dataset.sha256.clone(),
+        rows_in_file: dataset.rows.len(),
+        sensor: dataset.sensor,
+        robot: robot.to_owned(),
+        rows,
+        reduced: rows < protocol.rows,
+        simulated: options.simulated,
+        seed: options.seed,
+        noise_floor_mm: noise_floor(&observed, &prepared[0], options.sensor_sigma_mm),
+        cases,
+        results,
+        parameters,
+        judgement,
+    })
+}
+
+fn treatment_of(method: &Method, methods: &Methods) -> Treatment {
+    method.treatment.unwrap_or(methods.protocol.treatment)
+}
+
+/// What the result of a least-squares method becomes when it is continued, on the same rows and the same cost, by steps
+/// that neither fixed damping nor a decaying step size slows. Both leave stationary points where they are, so this is
+/// where the method itself would end, thousands of its iterations later.
+fn continued(task: &Calibration, solver: &Solver, x: &[f64]) -> Estimate {
+    let options = lm::Options {
+        factorisation: Factorisation::Qr,
+        priors: !solver.literal,
+        max_iterations: 5_000,
+        cost_tolerance: 1e-13,
+        ..lm::Options::default()
+    };
+    lm::solve(task, x, &options)
+}
+
+/// The rows with the part of the reading that the protocol uses.
+fn reading_used(
+    experiment: &Experiment,
+    methods: &Methods,
+    dataset: &Dataset,
+) -> Result<Dataset, ExperimentError> {
+    let protocol = &methods.protocol;
+    if protocol.reading == ReadingUsed::AsMeasured {
+        return Ok(dataset.clone());
+    }
+    if dataset.sensor == Sensor::Cable {
+        return Err(ExperimentError::WrongSensor {
+            file: dataset.file.clone(),
+            experiment: experiment.name.clone(),
+            found: "cable lengths",
+            expected: "positions or poses",
+        });
+    }
+    let point = nalgebra::Vector3::from(protocol.fixed_point_mm);
+    let position = |row: &Row| match row.reading {
+        Reading::Position(p) => p,
+        Reading::Pose(pose) => pose.translation.vector,
+        Reading::Cable(_) => nalgebra::Vector3::zeros(),
+    };
+    let mut out = dataset.clone();
+    for row in &mut out.rows {
+        let p = position(row);
+        row.reading = match protocol.reading {
+            ReadingUsed::Distance => Reading::Cable((p - point).norm()),
+            _ => Reading::Position(p),
+        };
+    }
+    out.sensor = if protocol.reading == ReadingUsed::Distance { Sensor::Cable } else { Sensor::Position };
+    if protocol.reading == ReadingUsed::Distance {
+        out.reading_step_mm = None;
+    }
+    Ok(out)
+}
+
+fn enough(
+    experiment: &Experiment,
+    methods: &Methods,
+    dataset: &Dataset,
+    rows: usize,
+    nominal: &Model,
+) -> Result<(), ExperimentError> {
+    let per = match dataset.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let share = methods.protocol.held_out;
+    let parameters = link_parameters(nominal).len() + frame_parameters(dataset).len();
+    let held_out = (rows as f64 * share).round() as usize;
+    let readings = rows.saturating_sub(held_out) * per;
+    if readings > parameters && held_out > 1 {
+        return Ok(());
+    }
+    let needed = (((parameters + 1).div_ceil(per)) as f64 / (1.0 - share)).ceil();
+    Err(ExperimentError::TooFewReadings {
+        file: dataset.file.clone(),
+        experiment: experiment.name.clone(),
+        rows,
+        held_out,
+        readings,
+        parameters,
+        needed: (needed as usize).max((2.0 / share).ceil() as usize),
+    })
+}
+
+/// `count` of the rows, drawn without replacement, in their order in the file.
+pub(super) fn drawn(rows: usize, count: usize, seed: u64) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut order: Vec<usize> = (0..rows).collect();
+    for i in 0..count.min(rows) {
+        order.swap(i, rng.random_range(i..rows));
+    }
+    order.truncate(count);
+    order.sort_unstable();
+    order
+}
+
+fn prepare(
+    observed: &Observed,
+    nominal: &Model,
+    rows: usize,
+    held_out: f64,
+    seed: u64,
+    sound: bool,
+) -> Result<Prepared, ExperimentError> {
+    let chosen = observed.subset(&drawn(observed.dataset.rows.len(), rows, seed));
+    let division = split::random(&chosen.dataset, held_out, seed);
+    let (train, test) = (chosen.subset(&division.train), chosen.subset(&division.test));
+    let Registered { start: frames, fitted: registered } = register(&train, nominal, &Tolerance::default())?;
+    let sound = sound.then(|| {
+        // The spread that links and frames leave; the same for every method.
+        let start = Start { model: nominal, frames: &frames };
+        let parameters: Vec<Parameter> =
+            link_parameters(nominal).into_iter().chain(frame_parameters(&train.dataset)).collect();
+        let fitted = fit(&train, start, &parameters, &Tolerance::default(), &SOLVERS[0], 0);
+        let weights = rounding::weights(
+            &train.dataset,
+            &fitted.model,
+            &fitted.frames,
+            &train.angles,
+            fitted.sigma_mm,
+            fitted.sigma_rad,
+        );
+        Sound { weights }
+    });
+    Ok(Prepared { train, test, registered, nominal: nominal.clone(), sound })
+}
+
+/// The problem that a method is given, what moves in it, and the root mean square of its rows' weights (1/mm).
+fn task_of(case: &Prepared, solver: &Solver, treatment: Treatment) -> (Calibration, Vec<Parameter>, f64) {
+    let train = &case.train.dataset;
+    let model = solver.prepared(&case.nominal, train);
+    let frames = &case.registered.frames;
+    let sensing = frame_parameters(train);
+    let tolerance = match solver.network {
+        Some(Scope::Alone) => Tolerance::default(),
+        // One problem for all: frames as registering leaves them.
+        _ => Tolerance {
+            target_mm: 10.0,
+            target_rad: 0.02,
+            frame_mm: 10.0,
+            frame_rad: 0.02,
+            ..Tolerance::default()
+        },
+    };
+    let (parameters, weights) = match (treatment, &case.sound, solver.network) {
+        (_, _, Some(Scope::Alone)) => {
+            let f = &case.registered;
+            let weights =
+                rounding::weights(train, &f.model, frames, &case.train.angles, f.sigma_mm, f.sigma_rad);
+            (solver.parameters(&model, &sensing), weights)
+        }
+        (Treatment::Sound, Some(sound), _) => (solver.parameters(&model, &sensing), sound.weights.clone()),
+        _ => {
+            let unit = Weight { per_mm: 1.0, per_rad: 1.0 };
+            (link_parameters(&model), vec![unit; train.rows.len()])
+        }
+    };
+    let priors = tolerance.priors(&parameters, &model);
+    let squares = weights.iter().map(|w| w.per_mm * w.per_mm).sum::<f64>() / weights.len().max(1) as f64;
+    let task = Calibration::new(train, &model, frames, &parameters, &priors, &weights);
+    (task, parameters, squares.sqrt().max(f64::MIN_POSITIVE))
+}
+
+fn outcome(
+    case: &Prepared,
+    method: &Method,
+    solver: &Solver,
+    treatment: Treatment,
+    run: &Run,
+    seed: u64,
+) -> (Outcome, Option<Outcome>) {
+    let (task, parameters, per_mm) = task_of(case, solver, treatment);
+    let start = vec![0.0; parameters.len()];
+    let begun = Instant::now();
+    let estimate = match method.units {
+        Units::Rad => run(&task, &start, seed),
+        Units::Deg => {
+            let scale = parameters.iter().map(|p| if p.unit() == "mm" { 1.0 } else { 1.0_f64.to_radians() });
+            let rescaled = Rescaled::new(&task, scale.collect());
+            let estimate = run(&rescaled, &start, seed);
+            rescaled.back(estimate)
+        }
+    };
+    let seconds = begun.elapsed().as_secs_f64();
+    let converged = (solver.family == Family::LeastSquares).then(|| {
+        let from = if estimate.x.iter().all(|x| x.is_finite()) { &estimate.x } else { &start };
+        judged(case, &task, per_mm, continued(&task, solver, from), 0.0)
+    });
+    (judged(case, &task, per_mm, estimate, seconds), converged)
+}
+
+/// `per_mm` is the root mean square of the rows' weights.
+fn judged(case: &Prepared, task: &Calibration, per_mm: f64, estimate: Estimate, seconds: f64) -> Outcome {
+    let (model, frames) = task.apply(&estimate.x);
+    let errors_mm = errors_on(&case.test, &model, &frames);
+    let held_out = ErrorSummary::of(errors_mm.iter().copied());
+    let fitted = summary_on(&case.train, &model, &frames);
+    let before = summary_on(&case.test, &case.registered.model, &case.registered.frames).rmse;
+    let finite = held_out.rmse.is_finite() && estimate.x.iter().all(|x| x.is_finite());
+    let diverged = !finite || estimate.termination.is_failure() || held_out.rmse > DIVERGED * before;
+    let rows = task.rows().max(1) as f64;
+    // The three coordinates of a position make one distance. The orientation of a pose has no mm: there rows are taken
+    // alike.
+    let per = task.rows_per_observation();
+    let lengths = if per == 3 { 3.0 } else { 1.0 };
+    let curve = estimate
+        .trace
+        .iter()
+        .enumerate()
+        .map(|(iteration, i)| CurvePoint {
+            iteration,
+            passes: (i.evaluations.residuals + i.evaluations.jacobians) as f64 / rows,
+            rmse: (lengths * 2.0 * i.row_cost.unwrap_or(i.cost).max(0.0) / rows).sqrt() / per_mm,
+        })
+        .collect();
+    let tolerances = Tolerance::default().priors(task.parameters_list(), task.start());
+    let farthest = task
+        .parameters_list()
+        .iter()
+        .zip(&estimate.x)
+        .zip(&tolerances)
+        .filter(|((p, _), _)| matches!(p, Parameter::Link { .. }))
+        .map(|((_, x), tolerance)| (x / tolerance.sigma).abs())
+        .fold(0.0, |most: f64, far| if far.is_nan() { f64::INFINITY } else { most.max(far) });
+    Outcome {
+        farthest,
+        held_out,
+        fitted,
+        termination: estimate.termination,
+        diverged,
+        evaluations: estimate.evaluations,
+        iterations: estimate.trace.len().saturating_sub(1),
+        curve,
+        errors_mm,
+        x: estimate.x,
+        seconds,
+    }
+}
+
+fn parameters_of(case: &Prepared, result: &MethodResult) -> Option<ParameterTable> {
+    if result.solver.network == Some(Scope::Alone) {
+        return None;
+    }
+    let outcome = result.outcomes.first()?;
+    let (task, parameters, _) = task_of(case, result.solver, result.treatment);
+    let readings = task.rows().saturating_sub(parameters.len()).max(1) as f64;
+    let variance = match result.treatment {
+        // Rows as printed are not weighed: their spread is what the fit left.
+        Treatment::Printed => 2.0 * task.row_cost(&outcome.x) / readings,
+        Treatment::Sound => 1.0,
+    };
+    Some(parameter_table(&result.method, &task, &parameters, &outcome.x, variance))
+}
+
+fn noise_floor(observed: &Observed, case: &Prepared, sensor_sigma_mm: f64) -> Option<f64> {
+    if let Some(floor) = split::noise_floor(&observed.dataset) {
+        return Some(floor.sigma_mm);
+    }
+    let registered = &case.registered;
+    let shares =
+        rounding::angle_shares(&observed.dataset, &registered.model, &registered.frames, &observed.angles);
+    let mean = shares.iter().map(|s| s.0).sum::<f64>() / shares.len().max(1) as f64;
+    // The error of a position is the norm of three coordinates.
+    let axes = if observed.dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+    let variance = axes * (mean + sensor_sigma_mm * sensor_sigma_mm);
+    (variance > 0.0).then(|| variance.sqrt())
+}

@@ -1,0 +1,155 @@
+//! Experiments of the papers: tables with the paper's figures beside ours, the verdict, and the plots.
+//!
+//! Nothing here changes from run to run but measured seconds: they have a table of their own ([`times`]), and a page shows
+//! them where it is asked to ([`Origin::timings`]).
+
+mod methods;
+mod words;
+mod grinding;
+mod uniformity;
+mod signed_rank;
+mod degradation;
+
+use serde_json::{Value, json};
+
+use crate::Results;
+use crate::experiment::Experiment;
+use truegrind_report::document::{Block, Document, Provenance, Source};
+use truegrind_report::table::Table;
+
+/// What went in, for the provenance of a page.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Origin {
+    /// Measurement file; absent where none is needed.
+    pub file: Option<String>,
+    /// SHA-256 of its bytes.
+    pub sha256: Option<String>,
+    /// Rows of the file.
+    pub rows: Option<usize>,
+    /// Robot.
+    pub robot: Option<String>,
+    /// Seed.
+    pub seed: u64,
+    /// Whether measured seconds are shown, on which no two runs agree.
+    pub timings: bool,
+}
+
+/// What the terminal shows.
+pub fn summary(experiment: &Experiment, results: &Results) -> Document {
+    let mut page = opening(experiment, results);
+    match results {
+        Results::Methods(study) => methods::summary(&mut page, study),
+        Results::Grinding(result) => grinding::summary(&mut page, result),
+        Results::Uniformity(result) => uniformity::summary(&mut page, result),
+        Results::SignedRank(tables) => signed_rank::summary(&mut page, tables),
+        Results::Degradation(result) => degradation::summary(&mut page, result),
+    }
+    page
+}
+
+/// The page, with pictures.
+pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> Document {
+    let mut page = opening(experiment, results);
+    match results {
+        Results::Methods(study) => methods::page(&mut page, study, origin.timings),
+        Results::Grinding(result) => grinding::page(&mut page, result),
+        Results::Uniformity(result) => uniformity::page(&mut page, result),
+        Results::SignedRank(tables) => signed_rank::summary(&mut page, tables),
+        Results::Degradation(result) => degradation::page(&mut page, result, origin.timings),
+    }
+    let source = origin.file.as_ref().map(|name| Source {
+        name: name.clone(),
+        role: "Measurements".to_owned(),
+        sha256: origin.sha256.clone().filter(|hash| !hash.is_empty()),
+        rows: origin.rows,
+    });
+    let mut remarks = vec![("Experiment".to_owned(), experiment.name.clone())];
+    remarks.extend(origin.robot.iter().map(|robot| ("Robot".to_owned(), robot.clone())));
+    page.push(Provenance {
+        seed: Some(origin.seed),
+        sources: source.into_iter().collect(),
+        remarks,
+        ..Provenance::here()
+    });
+    page
+}
+
+/// The table for programs.
+pub fn table(results: &Results) -> Table {
+    match results {
+        Results::Methods(study) => methods::table(study),
+        Results::Grinding(result) => grinding::table(result),
+        Results::Uniformity(result) => uniformity::table(result),
+        Results::SignedRank(tables) => signed_rank::table(tables),
+        Results::Degradation(result) => degradation::table(result),
+    }
+}
+
+/// Measured seconds, where a kind of experiment has them.
+pub fn times(results: &Results) -> Option<Table> {
+    match results {
+        Results::Methods(study) => Some(methods::times(study)),
+        Results::Degradation(result) => Some(degradation::times(result)),
+        _ => None,
+    }
+}
+
+/// Everything; schema `truegrind.comparison/1`.
+pub fn json(experiment: &Experiment, results: &Results, origin: &Origin) -> Value {
+    let (kind, result) = match results {
+        Results::Methods(study) => ("methods", methods::json(study)),
+        Results::Grinding(result) => ("grinding", grinding::json(result)),
+        Results::Uniformity(result) => ("uniformity", uniformity::json(result)),
+        Results::SignedRank(tables) => ("signed-rank", signed_rank::json(tables)),
+        Results::Degradation(result) => ("degradation", degradation::json(result)),
+    };
+    json!({
+        "schema": "truegrind.comparison/1",
+        "experiment": {
+            "name": experiment.name,
+            "title": experiment.title,
+            "paper": experiment.paper,
+            "figures": experiment.figures,
+            "caveats": experiment.caveats,
+        },
+        "dataset": {
+            "file": origin.file,
+            "sha256": origin.sha256,
+            "rows": origin.rows,
+            "robot": origin.robot,
+        },
+        "seed": origin.seed,
+        "kind": kind,
+        "result": result,
+    })
+}
+
+/// All experiments that ship: name, what is done, and what of which paper it stands for.
+pub fn list(experiments: &[Experiment]) -> Document {
+    let mut page = Document::new("Experiments");
+    page.push(Block::List(
+        experiments
+            .iter()
+            .map(|e| format!("{}: {}. Stands for {}, {}.", e.name, e.title, e.paper, e.figures.join(", ")))
+            .collect(),
+    ));
+    page
+}
+
+fn opening(experiment: &Experiment, results: &Results) -> Document {
+    let mut page = Document::new(experiment.title.clone());
+    page.subtitle = format!("{}: {}", experiment.paper, experiment.figures.join(", "));
+    if !experiment.about.is_empty() {
+        page.paragraph(experiment.about.clone());
+    }
+    // Methods over cases add what follows from the rows.
+    if !matches!(results, Results::Methods(_)) && !experiment.caveats.is_empty() {
+        page.push(Block::List(caveats(experiment)));
+    }
+    page
+}
+
+/// The caveats of an experiment.
+pub(super) fn caveats(experiment: &Experiment) -> Vec<String> {
+    experiment.caveats.clone()
+}

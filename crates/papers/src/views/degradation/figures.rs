@@ -1,0 +1,128 @@
+//! The pictures of an arm that degrades: the paper's Figs 4, 7 and 9 to 14, each with what it leaves out.
+
+use super::{SIMULATED, after_of};
+use crate::degradation::{Count, DegradationResult, Journey, Step};
+use truegrind_report::document::{Block, Document, Figure};
+use truegrind_report::plot::{Axis, Graph, Reference, Series};
+
+/// Fig. 4.
+pub(super) fn groups(page: &mut Document, result: &DegradationResult) {
+    let series = vec![
+        by_group(result, "nominal arm", &result.nominal_mm),
+        by_group(result, "calibrated once, then neglected", &result.neglected_mm),
+    ];
+    page.figure(
+        over_time(result, "Mean position error of each group", series, Axis::new("mean error", "mm")),
+        "The paper's Fig. 4 has the nominal arm. Simulated: links warm up, joint zeros wander. What the first calibration \
+         wins is lost again in hours.",
+    );
+}
+
+/// Fig. 7.
+pub(super) fn counts(page: &mut Document, result: &DegradationResult) {
+    let points = |figure: fn(&Count) -> f64| -> Vec<[f64; 2]> {
+        result.counts.iter().map(|c| [c.poses as f64, figure(c)]).collect()
+    };
+    page.figure(
+        Graph {
+            title: format!("Mean error after the first group, {SIMULATED}"),
+            x: Axis::new("poses", ""),
+            y: Axis::log("mean error", "mm"),
+            series: vec![
+                Series::line("poses that identify", points(|c| c.identification_mm)),
+                Series::line("poses that verify", points(|c| c.verification_mm)),
+            ],
+            references: vec![floor(result)],
+            ..Graph::default()
+        }
+        .svg(),
+        "The paper's Fig. 7: RLS with so many poses of the first group, frames known, tolerances as prior. Few poses explain \
+         themselves.",
+    );
+}
+
+/// All ways side by side, one picture for each count.
+pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
+    for count in super::pose_counts(result) {
+        let series = result
+            .journeys
+            .iter()
+            .filter(|j| j.count == count)
+            .map(|j| by_step(result, j, j.way.name(), after_of))
+            .collect();
+        page.figure(
+            over_time(
+                result,
+                &format!("{count} poses of each group"),
+                series,
+                Axis::log("mean error after, poses that verify", "mm"),
+            ),
+            "Each method begins where it ended in the group before.",
+        );
+    }
+}
+
+/// Figs 9 to 14: one method and count each, the poses that identify (a) and those that verify (b).
+pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
+    for stated in &result.settings.paper {
+        let Some(figure) = &stated.figure else { continue };
+        let of = |j: &&Journey| j.count == stated.count && j.way.paper_name() == Some(stated.method.as_str());
+        let Some(journey) = result.journeys.iter().find(of) else { continue };
+        let panel = |part: &str, poses: &str, before: fn(&Step) -> f64, after: fn(&Step) -> f64| {
+            let series = vec![
+                by_group(result, "nominal arm", &result.nominal_mm),
+                by_step(result, journey, "before", before),
+                by_step(result, journey, "after", after),
+            ];
+            let title = format!(
+                "{} with {} poses of each group, poses that {poses}",
+                journey.way.name(),
+                journey.count
+            );
+            Block::Figure(Figure::new(
+                over_time(result, &title, series, Axis::log("mean error", "mm")),
+                format!(
+                    "The paper's {figure}({part}). Before: with what was known when the group began, for the first group \
+                     the nominal arm."
+                ),
+            ))
+        };
+        page.push(Block::Details {
+            summary: format!("{figure}: {} with {} poses, group by group", journey.way.name(), journey.count),
+            blocks: vec![
+                panel("a", "identify", |s| s.identification_before_mm, |s| s.identification_after_mm),
+                panel("b", "verify", |s| s.verification_before_mm, after_of),
+            ],
+        });
+    }
+}
+
+fn over_time(result: &DegradationResult, title: &str, series: Vec<Series>, y: Axis) -> String {
+    Graph {
+        title: format!("{title}, {SIMULATED}"),
+        x: Axis::new("time", "h"),
+        y,
+        series,
+        references: vec![floor(result)],
+        ..Graph::default()
+    }
+    .svg()
+}
+
+fn floor(result: &DegradationResult) -> Reference {
+    Reference::Horizontal(result.noise_floor_mm, "sensor alone".to_owned())
+}
+
+fn hours(result: &DegradationResult, group: usize) -> f64 {
+    result.settings.hours_apart * group as f64
+}
+
+fn by_group(result: &DegradationResult, name: &str, values: &[f64]) -> Series {
+    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(g, v)| [hours(result, g), *v]).collect();
+    Series::line(name, points)
+}
+
+fn by_step(result: &DegradationResult, journey: &Journey, name: &str, figure: fn(&Step) -> f64) -> Series {
+    let points: Vec<[f64; 2]> = journey.steps.iter().map(|s| [hours(result, s.group), figure(s)]).collect();
+    Series::line(name, points)
+}

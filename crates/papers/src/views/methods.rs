@@ -1,0 +1,208 @@
+//! Methods over cases: errors beside the paper's, verdict, cost, convergence, parameters, plots.
+
+mod data;
+mod figures;
+mod tables;
+
+use self::figures::{curves, error_bars, rows, time_bars};
+use self::tables::{convergence, cost, errors, parameter_table, verdict, verdict_table};
+use super::caveats;
+use crate::experiment::{Treatment, Units};
+use crate::protocol::{MethodResult, Outcome, Study};
+use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_estimation::estimate::Termination;
+use truegrind_math::statistics::{ErrorSummary, median};
+use truegrind_report::document::{Block, Document, KeyFigure};
+use truegrind_report::repeated::spread;
+use truegrind_report::table::Cell;
+
+pub(super) use self::data::{json, table};
+pub(super) use self::tables::times;
+
+/// Terminal.
+pub(super) fn summary(page: &mut Document, study: &Study) {
+    head(page, study);
+    page.push(errors(study));
+    page.push(verdict_table(study));
+    page.push(verdict(study));
+    page.push(convergence(study));
+    page.push(cost(study));
+}
+
+/// Page; `timings`: with the measured seconds.
+pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
+    head(page, study);
+    page.push(verdict(study));
+    page.push(errors(study));
+    page.heading(2, "Errors");
+    page.figure(
+        error_bars(study),
+        "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The mean of |e| is \
+         what the papers call STD. A method that diverged in any case has no bar.",
+    );
+    for picture in rows(study) {
+        page.figure(
+            picture,
+            "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
+             Methods that diverged in any case are left out.",
+        );
+    }
+    page.heading(2, "Which differences are real");
+    page.push(verdict_table(study));
+    page.push(convergence(study));
+    page.heading(2, "Convergence and cost");
+    page.figure(
+        curves(study, false),
+        "Root mean square of the fit over the iterations, first case, methods as printed. An iteration of one method \
+         costs something else than one of another. A curve ends where it is ten times above its start; who is there after \
+         one step has none.",
+    );
+    page.figure(
+        curves(study, true),
+        "The same over passes through the rows, those with derivatives counted once: what an engineer pays for.",
+    );
+    page.push(cost(study));
+    if timings {
+        page.push(times(study));
+        page.figure(
+            time_bars(study),
+            "Time of one case, while other cases ran on other cores: not the same in every run.",
+        );
+    }
+    if !study.parameters.is_empty() {
+        page.heading(2, "What was identified");
+        page.paragraph(
+            "First case. σ holds tolerances as prior, whatever the method did. Parameters that the data do not see are \
+             marked: a number there is an accident of the method's path, and two methods that disagree on it do not \
+             contradict each other.",
+        );
+        for table in &study.parameters {
+            page.push(Block::Details {
+                summary: format!("{} {}", table.id, table.name),
+                blocks: vec![parameter_table(table).into()],
+            });
+        }
+    }
+}
+
+fn head(page: &mut Document, study: &Study) {
+    let mut notes = Vec::new();
+    if study.reduced {
+        notes.push(format!(
+            "Reduced protocol: {} rows in place of {}. The paper's figures beside ours belong to the whole one.",
+            study.rows, study.methods.protocol.rows
+        ));
+    }
+    if study.simulated {
+        notes.push(
+            format!(
+                "Simulated rows of {}: the paper's figures were measured on another arm and stand beside ours for the order \
+                 of the methods, not for their size.",
+                study.robot
+            ),
+        );
+    }
+    notes.extend(caveats(&study.experiment));
+    page.push(Block::List(notes));
+    let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
+    let best = study
+        .results
+        .iter()
+        .filter_map(|r| Some((r, rmse(&held_out(r)?)?)))
+        .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+    let mut figures = vec![];
+    if let Some((best, (mean, deviation))) = best {
+        figures.push(
+            KeyFigure::new("Smallest held-out RMSE", Cell::with_sigma(mean, deviation), 3, "mm")
+                .note(format!("{} {}", best.method.id, best.method.name)),
+        );
+    }
+    figures.push(
+        KeyFigure::new("Frames registered alone", rmse(&registered(study)).map(|r| r.0), 3, "mm")
+            .note("nominal links, the fair before"),
+    );
+    figures.push(KeyFigure::new("Noise floor", study.noise_floor_mm, 3, "mm").note(if study.simulated {
+        "repeated poses, else rounding and sensor"
+    } else {
+        "repeated poses, else the rounding of angles"
+    }));
+    page.push(figures);
+}
+
+/// Held-out errors of all cases; nothing of a method that diverged in any, since a mean over such cases is no figure.
+fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
+    let all = result.outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out));
+    all.collect()
+}
+
+/// The same of the start, with frames registered.
+fn registered(study: &Study) -> Vec<ErrorSummary> {
+    study.cases.iter().map(|c| c.registered).collect()
+}
+
+pub(super) fn name_of(study: &Study, id: &str) -> String {
+    let found = study.results.iter().find(|r| r.method.id == id);
+    found.map_or_else(|| id.to_owned(), |r| format!("{id} ({})", r.method.name))
+}
+
+fn title(study: &Study, what: &str) -> String {
+    let protocol = if study.reduced { "Reduced protocol: " } else { "" };
+    let simulated = if study.simulated { ", simulated" } else { "" };
+    format!("{protocol}{what}, {} cases of {} rows{simulated}", study.cases.len(), study.rows)
+}
+
+/// How the cases ended, in words.
+fn ended(outcomes: &[Outcome]) -> String {
+    let n = outcomes.len();
+    let diverged = outcomes.iter().filter(|o| o.diverged).count();
+    if diverged > 0 {
+        return format!("diverged in {diverged} of {n}");
+    }
+    let converged = outcomes.iter().filter(|o| o.termination.is_converged()).count();
+    if converged == n {
+        return "converged".to_owned();
+    }
+    let mut kinds: Vec<Termination> = Vec::new();
+    for outcome in outcomes {
+        if !kinds.contains(&outcome.termination) {
+            kinds.push(outcome.termination);
+        }
+    }
+    match kinds.as_slice() {
+        [one] => one.to_string(),
+        _ => format!("converged in {converged} of {n}"),
+    }
+}
+
+fn iterations(outcomes: &[Outcome]) -> f64 {
+    outcomes.iter().map(|o| o.iterations as f64).sum::<f64>() / outcomes.len().max(1) as f64
+}
+
+fn treatment(result: &MethodResult) -> &'static str {
+    match (result.treatment, result.method.units) {
+        (Treatment::Printed, Units::Rad) => "printed, rad",
+        (Treatment::Printed, Units::Deg) => "printed, deg",
+        (Treatment::Sound, _) => "sound",
+    }
+}
+
+/// Passes over the rows of the fit: residuals alone, and with derivatives.
+pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
+    let per = match study.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    let n = result.outcomes.len().max(1) as f64;
+    let (mut residuals, mut jacobians) = (0.0, 0.0);
+    for (outcome, case) in result.outcomes.iter().zip(&study.cases) {
+        let rows = (case.train * per).max(1) as f64;
+        residuals += outcome.evaluations.residuals as f64 / rows / n;
+        jacobians += outcome.evaluations.jacobians as f64 / rows / n;
+    }
+    (residuals, jacobians)
+}
+
+fn seconds(result: &MethodResult) -> f64 {
+    median(&result.outcomes.iter().map(|o| o.seconds).collect::<Vec<_>>()).unwrap_or(f64::NAN)
+}

@@ -1,0 +1,262 @@
+//! The tables of methods over cases: errors beside the paper's, which differences are real, budgets, parameters.
+
+use super::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
+use crate::experiment::PaperFigures;
+use crate::parameters::ParameterTable;
+use crate::protocol::{Outcome, Study};
+use crate::verdict::Conclusion;
+use crate::views::words;
+use truegrind_calibration::measurement::dataset::Sensor;
+use truegrind_report::document::Verdict;
+use truegrind_report::number::{Precision, handy};
+use truegrind_report::repeated::{self, spread};
+use truegrind_report::status::Status;
+use truegrind_report::table::{Cell, Column, Table};
+
+/// The papers' table, ours and theirs side by side.
+pub(super) fn errors(study: &Study) -> Table {
+    let paper = |key: &str| Column::number(format!("paper_{key}"), "paper", "mm", 2);
+    let mut columns = vec![Column::text("id", ""), Column::text("method", "Method")];
+    for column in repeated::columns([3, 3, 2]) {
+        let beside = paper(&column.key);
+        columns.extend([column, beside]);
+    }
+    let mut table = Table::new(title(study, "Held-out errors"), columns);
+    let mut add = |id: &str, name: &str, ours: [Cell; 3], paper: Option<PaperFigures>| {
+        let paper = paper.unwrap_or_default();
+        let printed = [paper.rmse_mm, paper.mean_absolute_mm, paper.max_mm];
+        let pairs = ours.into_iter().zip(printed).flat_map(|(ours, printed)| [ours, printed.into()]);
+        table.push([Cell::from(id), name.into()].into_iter().chain(pairs));
+    };
+    add("BC", "frames alone", repeated::cells(&registered(study)), study.methods.before);
+    for result in &study.results {
+        let ours = match held_out(result) {
+            Some(errors) => repeated::cells(&errors),
+            None => {
+                let n = result.outcomes.iter().filter(|o| o.diverged).count();
+                [format!("diverged {n}/{}", result.outcomes.len()).into(), Cell::Missing, Cell::Missing]
+            }
+        };
+        add(&result.method.id, &result.method.name, ours, result.method.paper);
+    }
+    table.notes = vec![
+        "± is the standard deviation over the cases. mean |e| is what the papers print as STD, SD or Mean (ltlm-2024 eq. \
+         20, ukf-vslm-2023 eq. 28)."
+            .to_owned(),
+        "BC, before compensation: the paper's carries the cable's constant offset; ours has its frames registered, links \
+         nominal. A method with the figures of BC found nothing better than its start."
+            .to_owned(),
+    ];
+    if study.sensor != Sensor::Cable {
+        table.notes.push("Errors are distances between positions.".to_owned());
+    }
+    if let Some(floor) = study.noise_floor_mm {
+        let floor = Precision::Significant(2).format(floor);
+        table.notes.push(format!("Noise floor {floor} mm: below it there is nothing left to explain."));
+    }
+    table
+}
+
+pub(super) fn verdict_table(study: &Study) -> Table {
+    let judgement = &study.judgement;
+    let reference = &judgement.reference;
+    let mut table = Table::new(
+        title(study, &format!("Held-out RMSE against {reference}")),
+        vec![
+            Column::text("id", ""),
+            Column::number("difference_mm", "difference", "mm", 4),
+            Column::text("better_in", format!("{reference} better")),
+            Column::text("p_signed_rank", "p, ranks"),
+            Column::text("p_t", "p, t"),
+            Column::number("converged_difference_mm", "converged", "mm", 4),
+            Column::text("conclusion", "Conclusion"),
+        ],
+    );
+    for comparison in &judgement.comparisons {
+        let test = &comparison.limited;
+        if matches!(comparison.conclusion, Conclusion::Diverged { .. } | Conclusion::ReferenceDiverged { .. })
+        {
+            let mut cells: Vec<Cell> = vec![comparison.id.as_str().into()];
+            cells.extend([const { Cell::Missing }; 5]);
+            cells.push(words::conclusion(comparison, reference).into());
+            table.push(cells);
+            continue;
+        }
+        table.push([
+            comparison.id.as_str().into(),
+            test.mean_mm.into(),
+            format!("{} of {}", test.reference_better, judgement.cases).into(),
+            words::p(test.signed_rank_holm).into(),
+            words::p(test.resampled_holm).into(),
+            comparison.converged.as_ref().map(|t| t.mean_mm).into(),
+            words::conclusion(comparison, reference).into(),
+        ]);
+    }
+    table.notes = vec![format!(
+        "difference: method minus {reference}, positive where {reference} is better. p two-sided, of the signed-rank test and \
+         of the t test corrected for cases that share rows, both after Holm's correction over {} comparisons. converged: the same once both were run until they converged.",
+        judgement.comparisons.len()
+    )];
+    table
+}
+
+pub(super) fn verdict(study: &Study) -> Verdict {
+    Verdict::new(Status::Good, words::headline(study), words::sentences(study))
+}
+
+/// What each least-squares method finds when nothing stops it.
+pub(super) fn convergence(study: &Study) -> Table {
+    let mut table = Table::new(
+        title(study, "Stopped and converged"),
+        vec![
+            Column::text("id", ""),
+            Column::number("rmse_mm", "RMSE as limited", "mm", 4),
+            Column::number("iterations", "iterations", "", 1),
+            Column::number("converged_rmse_mm", "converged", "mm", 4),
+            Column::number("converged_iterations", "further steps", "", 1),
+            Column::significant("farthest", "farthest", "", 2),
+            Column::text("converged_ended", "Ended"),
+        ],
+    );
+    for result in &study.results {
+        let Some(converged) = &result.converged else { continue };
+        table.push([
+            result.method.id.as_str().into(),
+            mean_rmse(&result.outcomes),
+            iterations(&result.outcomes).into(),
+            mean_rmse(converged),
+            iterations(converged).into(),
+            (converged.iter().map(|o| o.farthest).sum::<f64>() / converged.len().max(1) as f64).into(),
+            ended(converged).into(),
+        ]);
+    }
+    table.notes = vec![
+        "Converged: continued on the same cost by steps that neither fixed damping nor a decaying step size slows. Both \
+         leave stationary points where they are, so this is where the method itself would end, often thousands of its \
+         iterations later along what the data hardly see. A method that still had not converged after 5,000 further steps \
+         says so."
+            .to_owned(),
+        "farthest: how far the farthest link parameter is from the data sheet in the end, in manufacturing tolerances, mean \
+         over the cases. What goes tens of tolerances away fits the rows by what no arm is."
+            .to_owned(),
+    ];
+    table
+}
+
+/// Mean held-out RMSE; nothing where a case diverged, since a mean over that is no figure.
+fn mean_rmse(outcomes: &[Outcome]) -> Cell {
+    let all: Option<Vec<f64>> = outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out.rmse)).collect();
+    all.map_or_else(|| "diverged".into(), |all| spread(&all).map(|(mean, _)| mean).into())
+}
+
+/// Budgets: rows evaluated, in all and for one iteration.
+pub(super) fn cost(study: &Study) -> Table {
+    let mut table = Table::new(
+        title(study, "Budget of each method"),
+        vec![
+            Column::text("id", ""),
+            Column::text("solver", "Solver"),
+            Column::text("treatment", "Treatment"),
+            Column::number("iterations", "iterations", "", 1),
+            Column::number("residual_passes", "residuals", "", 0),
+            Column::number("residual_passes_per_iteration", "each", "", 1),
+            Column::number("jacobian_passes", "Jacobians", "", 0),
+            Column::number("jacobian_passes_per_iteration", "each", "", 1),
+            Column::text("ended", "Ended"),
+        ],
+    );
+    for result in &study.results {
+        let (residuals, jacobians) = passes(study, result);
+        let n = iterations(&result.outcomes);
+        table.push([
+            result.method.id.as_str().into(),
+            result.solver.name.into(),
+            treatment(result).into(),
+            n.into(),
+            residuals.into(),
+            (residuals / n).into(),
+            jacobians.into(),
+            (jacobians / n).into(),
+            ended(&result.outcomes).into(),
+        ]);
+    }
+    table.notes = vec![
+        "residuals, Jacobians: passes over the rows of the fit, mean over the cases; each: of them, one iteration. ukf-vslm-2023 Table VII gives Θ(iterations × \
+         rows) for all methods alike: counted, the constants differ by orders of magnitude. LTLM takes two Jacobians and \
+         2M evaluations per iteration, a filter's iteration is a sweep, a swarm's a generation."
+            .to_owned(),
+    ];
+    table
+}
+
+/// Measured seconds.
+pub(in crate::views) fn times(study: &Study) -> Table {
+    let mut table = Table::new(
+        "Time of one case, measured on this machine (not the same in every run)",
+        vec![
+            Column::text("id", ""),
+            Column::text("method", "Method"),
+            Column::significant("time_ms", "time", "ms", 2),
+            Column::significant("time_per_iteration_ms", "per iteration", "ms", 2),
+            Column::number("paper_time_s", "paper", "s", 2),
+            Column::number("paper_iterations", "paper, iterations", "", 0),
+        ],
+    );
+    for result in &study.results {
+        let paper = result.method.paper.unwrap_or_default();
+        let seconds = seconds(result);
+        table.push([
+            result.method.id.as_str().into(),
+            result.method.name.as_str().into(),
+            (1e3 * seconds).into(),
+            (1e3 * seconds / iterations(&result.outcomes)).into(),
+            paper.time_s.into(),
+            paper.iterations.into(),
+        ]);
+    }
+    table.notes = vec![
+        "Wall clock while other cases ran on other cores, median over the cases, without the search for convergence."
+            .to_owned(),
+    ];
+    table
+}
+
+pub(super) fn parameter_table(parameters: &ParameterTable) -> Table {
+    let mut table = Table::new(
+        format!("Link parameters by {} {}", parameters.id, parameters.name),
+        vec![
+            Column::text("parameter", "Parameter"),
+            Column::text("unit", "Unit"),
+            Column::number("nominal", "nominal", "", 3),
+            Column::number("compensated", "compensated", "", 3),
+            Column::significant("deviation", "deviation", "", 2),
+            Column::number("paper_deviation", "paper", "", 3),
+            Column::number("determined", "seen by the data", "", 2),
+            Column::text("observable", "Observable"),
+        ],
+    );
+    for row in &parameters.rows {
+        let (scale, unit) = handy(row.parameter.unit());
+        table.push([
+            row.parameter.to_string().into(),
+            unit.into(),
+            (row.nominal * scale).into(),
+            ((row.nominal + row.deviation) * scale).into(),
+            Cell::with_sigma(row.deviation * scale, Some(row.sigma * scale)),
+            row.paper.map(|v| v * scale).into(),
+            row.determined.into(),
+            if row.is_observable() { "yes" } else { "no" }.into(),
+        ]);
+    }
+    table.notes = vec![
+        "compensated: nominal and deviation together, as a controller would take it; ± is 1σ of the deviation.".to_owned(),
+    ];
+    if parameters.rows.iter().any(|row| row.paper.is_some()) {
+        table.notes.push(
+            "paper: the deviation that it prints for this method, on its own arm and rows; no target, since most of it lies in what the \
+             rows do not see. Its link 2 has an offset d2, ours a turn beta in its place."
+                .to_owned(),
+        );
+    }
+    table
+}

@@ -1,0 +1,202 @@
+//! Uniformity of the logistic-tent map over r.
+
+use serde_json::{Value, json};
+
+use crate::uniformity::UniformityResult;
+use truegrind_report::document::{Block, Document, Verdict};
+use truegrind_report::number::Precision;
+use truegrind_report::plot::{Axis, Graph, Histogram, Reference, Sample, Series};
+use truegrind_report::status::Status;
+use truegrind_report::table::{Cell, Column, Table};
+
+/// Terminal.
+pub(super) fn summary(page: &mut Document, result: &UniformityResult) {
+    page.push(verdict(result));
+    page.push(maps(result));
+    page.push(table(result).excerpt(24));
+}
+
+/// Page.
+pub(super) fn page(page: &mut Document, result: &UniformityResult) {
+    page.push(verdict(result));
+    page.heading(2, "Standard deviation of the counts over r");
+    for (long, points) in [(false, result.settings.points), (true, result.settings.long_points)] {
+        page.figure(
+            over_r(result, long),
+            format!(
+                "{} points in {} bins, mean of {} starts; the band is one standard deviation over the starts. The \
+                 line across is what random points give.",
+                thousands(points),
+                result.settings.bins, result.settings.starts
+            ),
+        );
+    }
+    page.heading(2, "The sequence");
+    page.figure(
+        Graph {
+            title: format!("Logistic-tent map, r = {}", result.settings.claimed),
+            x: Axis::new("step", ""),
+            y: Axis::new("value", ""),
+            series: vec![Series::points(
+                "",
+                result.points.iter().enumerate().map(|(i, x)| [i as f64 + 1.0, *x]).collect::<Vec<_>>(),
+            )],
+            ..Graph::default()
+        }
+        .svg(),
+        "The paper's Fig. 3a, from one start.",
+    );
+    page.figure(
+        Histogram {
+            title: format!("Counts of the same {} points", thousands(result.settings.points)),
+            x: Axis::new("value", ""),
+            samples: vec![Sample::new("logistic-tent", result.points.clone())],
+            bins: Some(result.settings.bins),
+        }
+        .svg(),
+        format!(
+            "The paper's Fig. 3b. {} in each bin would be even; random counts would scatter by as much as these.",
+            Precision::Significant(3).format(result.settings.points as f64 / result.settings.bins as f64)
+        ),
+    );
+    page.heading(2, "The maps beside each other");
+    page.push(maps(result));
+    page.push(Block::Details {
+        summary: format!("All {} values of r", result.settings.steps),
+        blocks: vec![table(result).into()],
+    });
+}
+
+/// 100,000.
+fn thousands(count: usize) -> String {
+    let digits = count.to_string();
+    let cut = digits.len() % 3;
+    let (head, rest) = digits.split_at(cut);
+    let groups = rest.as_bytes().chunks(3).map(|g| String::from_utf8_lossy(g).into_owned());
+    let head = Some(head.to_owned()).filter(|h| !h.is_empty());
+    head.into_iter().chain(groups).collect::<Vec<_>>().join(",")
+}
+
+/// The maps of Table 2.
+fn maps(result: &UniformityResult) -> Table {
+    let settings = &result.settings;
+    let mut table = Table::new(
+        "Standard deviation of the counts, the maps of the paper's Table 2",
+        vec![
+            Column::text("map", "Map"),
+            Column::number("short", format!("{} points", thousands(settings.points)), "", 1),
+            Column::number("short_random", "random", "", 1),
+            Column::number("long", format!("{} points", thousands(settings.long_points)), "", 0),
+            Column::number("long_random", "random", "", 0),
+        ],
+    );
+    for of in &result.maps {
+        table.push([
+            of.map.name().into(),
+            Cell::with_sigma(of.short.deviation, Some(of.short.spread)),
+            of.short.random.into(),
+            Cell::with_sigma(of.long.deviation, Some(of.long.spread)),
+            of.long.random.into(),
+        ]);
+    }
+    table.notes = vec![format!(
+        "± is the standard deviation over {} starts. Tent and Bernoulli would collapse to 0 in binary floating point; \
+             fresh digits are fed in at the far end. Logistic, sine, Chebyshev and Hénon have densities that are not \
+             uniform, and are not meant to be.",
+        settings.starts
+    )];
+    table
+}
+
+fn verdict(result: &UniformityResult) -> Verdict {
+    let verdict = &result.study.verdict;
+    let claimed = verdict.claimed;
+    let headline = if verdict.sampling_noise {
+        format!("\"r = {claimed} is the most uniform\" is sampling noise")
+    } else {
+        format!("r = {claimed} cannot be ruled out as the most uniform")
+    };
+    let all = result.settings.steps;
+    let random = result.study.points.first();
+    let mut reasons = vec![
+        format!(
+            "With {} points {} of {all} values of r lie within one sampling spread of r = {claimed}, or below; the smallest is r = {:.2}.",
+            thousands(result.settings.points),
+            verdict.indistinguishable_short,
+            verdict.best_short
+        ),
+        format!(
+            "With {} points {} values of r are more uniform by more than one sampling spread; the smallest is r = {:.2}.",
+            thousands(result.settings.long_points),
+            verdict.better_long,
+            verdict.best_long
+        ),
+    ];
+    if let Some(point) = random {
+        reasons.push(format!(
+            "Random points give {:.1} ± {:.1} and {:.1} ± {:.1}.",
+            point.short.random, point.short.random_spread, point.long.random, point.long.random_spread
+        ));
+    }
+    reasons.push(
+        "It does no harm: a line search over some ten candidates does not need even points.".to_owned(),
+    );
+    Verdict::new(if verdict.sampling_noise { Status::Warning } else { Status::Good }, headline, reasons)
+}
+
+fn over_r(result: &UniformityResult, long: bool) -> String {
+    let of = |p: &truegrind_estimation::chaos::uniformity::Point| if long { p.long } else { p.short };
+    let points: Vec<[f64; 2]> = result.study.points.iter().map(|p| [p.r, of(p).deviation]).collect();
+    let spreads: Vec<f64> = result.study.points.iter().map(|p| of(p).spread).collect();
+    let random = result.study.points.first().map_or(f64::NAN, |p| of(p).random);
+    Graph {
+        title: format!(
+            "{} points",
+            thousands(if long { result.settings.long_points } else { result.settings.points })
+        ),
+        x: Axis::new("r", ""),
+        y: Axis::log("standard deviation of the counts", ""),
+        series: vec![Series::line("logistic-tent", points).plus_minus(&spreads)],
+        references: vec![
+            Reference::Horizontal(random, "random points".to_owned()),
+            Reference::Vertical(result.settings.claimed, "the paper's choice".to_owned()),
+        ],
+        ..Graph::default()
+    }
+    .svg()
+}
+
+/// One row for each r.
+pub(super) fn table(result: &UniformityResult) -> Table {
+    let mut table = Table::new(
+        "Standard deviation of the counts",
+        vec![
+            Column::number("r", "r", "", 2),
+            Column::number("short", format!("{} points", thousands(result.settings.points)), "", 2),
+            Column::number("short_random", "random", "", 2),
+            Column::number("long", format!("{} points", thousands(result.settings.long_points)), "", 1),
+            Column::number("long_random", "random", "", 1),
+        ],
+    );
+    for point in &result.study.points {
+        table.push([
+            point.r.into(),
+            Cell::with_sigma(point.short.deviation, Some(point.short.spread)),
+            point.short.random.into(),
+            Cell::with_sigma(point.long.deviation, Some(point.long.spread)),
+            point.long.random.into(),
+        ]);
+    }
+    table.notes = vec![format!("± is the standard deviation over {} starts.", result.settings.starts)];
+    table
+}
+
+/// Everything.
+pub(super) fn json(result: &UniformityResult) -> Value {
+    json!({
+        "settings": result.settings,
+        "points": result.study.points,
+        "maps": result.maps,
+        "verdict": result.study.verdict,
+    })
+}

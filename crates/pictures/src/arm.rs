@@ -1,0 +1,271 @@
+//! The body of an arm and its motion over a time axis.
+//!
+//! **Method.** Every link is an entity inside the one before it, with the pose of its frame in the frame before as a
+//! column over time; its body is drawn once, in its own frame. In frame i the joint axis i and its origin do not move
+//! (T = Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β): the inverse's translation does not contain θ), so a link is the cylinder along d
+//! and the capsule along a, and a disc around the joint axis. Girths follow from the length of the whole arm; data sheets
+//! have no shapes. Joint effects and growth turn and move the frames, not the bodies.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rerun::components::{Color, FillMode, RotationQuat, Translation3D};
+use rerun::{Capsules3D, Cylinders3D, Points3D, Transform3D};
+
+use super::colour::Rgba;
+use super::recording::{Store, VisualError};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model, Posed};
+use truegrind_math::se3::Pose;
+
+/// Radius of each link over the length of the arm.
+const GIRTH: [f64; 6] = [0.056, 0.046, 0.042, 0.034, 0.028, 0.022];
+/// Height and radius of the foot over the length of the arm.
+const FOOT: [f64; 2] = [0.05, 0.095];
+/// Thickness of the flange's disc over the length of the arm.
+const FLANGE: f64 = 0.014;
+/// Radius of the tool's body over the length of the arm.
+const TOOL: f64 = 0.020;
+/// A link shorter than this part of the arm has no body of its own.
+const SHORT: f64 = 0.02;
+
+/// Colours of an arm.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Paint {
+    pub(super) link: Rgba,
+    pub(super) joint: Rgba,
+    pub(super) tool: Rgba,
+}
+
+impl Paint {
+    /// The arm in its own, neutral colours.
+    pub(super) const SOLID: Paint =
+        Paint { link: [205, 209, 215, 255], joint: [112, 120, 133, 255], tool: [150, 158, 170, 255] };
+
+    /// A see-through arm of one colour.
+    pub(super) fn ghost([r, g, b, _]: Rgba) -> Paint {
+        Paint { link: [r, g, b, 64], joint: [r, g, b, 90], tool: [r, g, b, 110] }
+    }
+}
+
+/// Where an arm stands at one time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stand {
+    /// Time on the axis.
+    pub(super) time: i64,
+    /// Controller joints.
+    pub(super) joints: Joints,
+    /// The tool on the flange.
+    pub(super) flange_from_tool: Pose,
+}
+
+/// Draws `model` below the entity `root`, standing where `stands` say, in the order of time.
+pub(super) fn draw(
+    store: &mut Store,
+    root: &str,
+    model: &Model,
+    condition: &Condition,
+    paint: &Paint,
+    (axis, stands): (&'static str, &[Stand]),
+) -> Result<(), VisualError> {
+    let Some(first) = stands.first() else { return Ok(()) };
+    let arm = model.under(condition);
+    let length = length_mm(model);
+    foot(store, root, length, paint)?;
+    let times: Vec<i64> = stands.iter().map(|s| s.time).collect();
+    let frames: Vec<[Pose; 7]> = stands.iter().map(|s| frames(&arm, &s.joints)).collect();
+    let mut path = root.to_owned();
+    for link in 0..6 {
+        path = format!("{path}/link{}", link + 1);
+        let poses: Vec<Pose> = frames.iter().map(|f| f[link].inverse() * f[link + 1]).collect();
+        motion(store, &path, (axis, &times), &poses)?;
+        body(store, &path, link, &poses[0].inverse(), model, length, paint)?;
+    }
+    path = format!("{path}/flange");
+    still(store, &path, &model.flange)?;
+    let disc = Cylinder {
+        from: Vector3::z() * (-FLANGE * length),
+        to: Vector3::zeros(),
+        radius: GIRTH[5] * length * 1.3,
+    };
+    cylinders(store, &format!("{path}/plate"), &[disc], paint.joint)?;
+    // The tool: logged where it changes.
+    path = format!("{path}/tool");
+    let mut last = None;
+    let mut changes: Vec<Stand> = Vec::new();
+    for stand in stands {
+        if last.replace(stand.flange_from_tool) != Some(stand.flange_from_tool) {
+            changes.push(*stand);
+        }
+    }
+    let times: Vec<i64> = changes.iter().map(|s| s.time).collect();
+    let tools: Vec<Pose> = changes.iter().map(|s| s.flange_from_tool).collect();
+    motion(store, &path, (axis, &times), &tools)?;
+    tool(store, &path, &first.flange_from_tool, length, paint)
+}
+
+/// All frames of the arm in its base: 0 is the base itself, i the end of link i.
+pub(super) fn frames(arm: &Posed<'_>, joints: &Joints) -> [Pose; 7] {
+    let chain = arm.frames(joints);
+    std::array::from_fn(|i| {
+        if i == 0 {
+            return Pose::identity();
+        }
+        let (y, z) = (Vector3::from(chain.y[i - 1]), Vector3::from(chain.z[i]));
+        let matrix = nalgebra::Matrix3::from_columns(&[y.cross(&z), y, z]);
+        Pose::from_parts(
+            Vector3::from(chain.origin[i]).into(),
+            truegrind_math::se3::rotation_from_matrix(&matrix),
+        )
+    })
+}
+
+/// Sum of the lengths and offsets of all links (mm).
+pub(super) fn length_mm(model: &Model) -> f64 {
+    model.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>().max(1.0)
+}
+
+/// Points that an arm at `joints` takes up, for placing the eye.
+pub(super) fn extent(arm: &Posed<'_>, joints: &Joints) -> Vec<Point3<f64>> {
+    frames(arm, joints).iter().map(|f| Point3::from(f.translation.vector)).collect()
+}
+
+/// A pose that changes.
+pub(super) fn motion(
+    store: &mut Store,
+    path: &str,
+    (axis, times): (&'static str, &[i64]),
+    poses: &[Pose],
+) -> Result<(), VisualError> {
+    let columns = Transform3D::new()
+        .with_many_translation(poses.iter().map(|p| translation(&p.translation.vector)))
+        .with_many_quaternion(poses.iter().map(|p| quaternion(&p.rotation)))
+        .columns_of_unit_batches()
+        .map_err(|e| VisualError::Encoding(e.to_string()))?;
+    store.over(path, (axis, times), columns)
+}
+
+/// A pose that does not change.
+pub(super) fn still(store: &mut Store, path: &str, pose: &Pose) -> Result<(), VisualError> {
+    let placed = Transform3D::new()
+        .with_translation(translation(&pose.translation.vector))
+        .with_quaternion(quaternion(&pose.rotation));
+    store.fixed(path, &placed)
+}
+
+fn translation(v: &Vector3<f64>) -> Translation3D {
+    Translation3D::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+fn quaternion(q: &UnitQuaternion<f64>) -> RotationQuat {
+    RotationQuat(rerun::Quaternion::from_xyzw(q.coords.map(|c| c as f32).into()))
+}
+
+/// A round bar between two points.
+#[derive(Debug, Clone, Copy)]
+struct Cylinder {
+    from: Vector3<f64>,
+    to: Vector3<f64>,
+    radius: f64,
+}
+
+impl Cylinder {
+    fn length(&self) -> f64 {
+        (self.to - self.from).norm()
+    }
+
+    fn rotation(&self) -> UnitQuaternion<f64> {
+        let along = self.to - self.from;
+        UnitQuaternion::rotation_between(&Vector3::z(), &along)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+    }
+}
+
+fn foot(store: &mut Store, root: &str, length: f64, paint: &Paint) -> Result<(), VisualError> {
+    let [height, radius] = FOOT.map(|part| part * length);
+    let plate = Cylinder { from: Vector3::zeros(), to: Vector3::z() * height, radius };
+    cylinders(store, &format!("{root}/foot"), &[plate], paint.joint)
+}
+
+/// The body of a link in its own frame; `own_from_previous` is the frame before it, seen from there.
+fn body(
+    store: &mut Store,
+    path: &str,
+    link: usize,
+    own_from_previous: &Pose,
+    model: &Model,
+    length: f64,
+    paint: &Paint,
+) -> Result<(), VisualError> {
+    let radius = GIRTH[link] * length;
+    let axis = own_from_previous.rotation * Vector3::z();
+    let start = own_from_previous.translation.vector;
+    let corner = start + axis * model.links[link].d_mm;
+    let bars: Vec<Cylinder> = [(start, corner), (corner, Vector3::zeros())]
+        .into_iter()
+        .map(|(from, to)| Cylinder { from, to, radius })
+        .filter(|bar| bar.length() > SHORT * length)
+        .collect();
+    // The last link ends flat, at the flange.
+    if link == 5 {
+        cylinders(store, &format!("{path}/body"), &bars, paint.link)?;
+    } else if !bars.is_empty() {
+        let capsules = Capsules3D::from_lengths_and_radii(
+            bars.iter().map(|b| b.length() as f32),
+            bars.iter().map(|b| b.radius as f32),
+        )
+        .with_translations(bars.iter().map(|b| translation(&b.from)))
+        .with_quaternions(bars.iter().map(|b| quaternion(&b.rotation())))
+        .with_colors([Color::from(paint.link)])
+        .with_fill_mode(FillMode::Solid);
+        store.fixed(format!("{path}/body"), &capsules)?;
+    }
+    // The disc of joint i lies around axis i, which passes through the origin of the frame before; the last joint's is
+    // the flange's plate.
+    if link < 5 {
+        let half = axis * (1.15 * radius);
+        let disc = Cylinder { from: start - half, to: start + half, radius: 1.12 * radius };
+        cylinders(store, &format!("{path}/joint"), &[disc], paint.joint)?;
+    }
+    Ok(())
+}
+
+/// A spindle from the flange to the TCP, in the frame of the tool, and a ball at the TCP.
+fn tool(
+    store: &mut Store,
+    path: &str,
+    flange_from_tool: &Pose,
+    length: f64,
+    paint: &Paint,
+) -> Result<(), VisualError> {
+    let mount = flange_from_tool.inverse().translation.vector;
+    let radius = TOOL * length;
+    if mount.norm() > 0.5 * SHORT * length {
+        let neck = mount * 0.35;
+        let bars = [
+            Cylinder { from: mount, to: neck, radius },
+            Cylinder { from: neck, to: Vector3::zeros(), radius: 0.4 * radius },
+        ];
+        cylinders(store, &format!("{path}/body"), &bars, paint.tool)?;
+    }
+    let tip = Points3D::new([[0.0f32; 3]]).with_radii([(0.5 * radius) as f32]).with_colors([Color::from([
+        paint.tool[0],
+        paint.tool[1],
+        paint.tool[2],
+        255,
+    ])]);
+    store.fixed(format!("{path}/tcp"), &tip)
+}
+
+fn cylinders(store: &mut Store, path: &str, bars: &[Cylinder], colour: Rgba) -> Result<(), VisualError> {
+    if bars.is_empty() {
+        return Ok(());
+    }
+    let drawn = Cylinders3D::from_lengths_and_radii(
+        bars.iter().map(|b| b.length() as f32),
+        bars.iter().map(|b| b.radius as f32),
+    )
+    .with_centers(bars.iter().map(|b| translation(&(0.5 * (b.from + b.to)))))
+    .with_quaternions(bars.iter().map(|b| quaternion(&b.rotation())))
+    .with_colors([Color::from(colour)])
+    .with_fill_mode(FillMode::Solid);
+    store.fixed(path, &drawn)
+}

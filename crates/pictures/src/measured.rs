@@ -1,0 +1,356 @@
+//! The picture of a measurement file: where the arm stood, what the sensor read, and what a fit leaves of it.
+//!
+//! | entity | what |
+//! |---|---|
+//! | `arm` | the arm at the logged joints, row by row |
+//! | `touched` | the point that the sensor touches, at all rows, coloured by the size of the residual |
+//! | `read` | where a tracker saw it, at the row of the time axis |
+//! | `sensor/…` | outlets of cables and the cable of the row, or the tracker's frame |
+//! | `set_aside` | rows that were set aside as outliers |
+//! | `residual/…` | residuals over the rows, before and after, and of rows that were held out |
+//! | `joints/…` | logged joint angles over the rows |
+//! | `summary`, `legend` | errors, verdict, parameters with their standard deviations; the colours |
+
+mod words;
+
+use nalgebra::{Point3, Vector3};
+use rerun::components::{Color, MarkerShape, Radius};
+use rerun::{LineStrips3D, Points3D, TransformAxes3D};
+
+use super::arm::{self, Paint, Stand};
+use super::colour::{BEFORE, INTENDED, JOINTS, REFUSED, Scale, after};
+use super::curve::{self, Pen, curve};
+use super::legend;
+use super::page::{Eye, Pane, View, page};
+use super::recording::{Recording, Store, VisualError};
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::Model;
+use truegrind_calibration::diagnosis::diagnose::Diagnosed;
+use truegrind_calibration::diagnosis::finding::Diagnosis;
+use truegrind_calibration::identification::calibration::Frames;
+use truegrind_calibration::identification::fit::{Observed, errors_on};
+use truegrind_calibration::identification::identify::{Identification, observe};
+use truegrind_calibration::identification::rounding::logged_covariance;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row};
+use truegrind_math::se3::Pose;
+
+/// The time axis: [`Row::number`].
+pub const AXIS: &str = "data row";
+
+/// Rows that go by in a second when the file is played.
+const ROWS_PER_SECOND: f64 = 4.0;
+
+/// Length of the axes of a tracker's frame over the length of the arm.
+const SENSOR_AXES: f64 = 0.12;
+
+/// The colour scale ends at this quantile of the residuals, so that one outlier does not make all others dark.
+const TOP_QUANTILE: f64 = 0.98;
+
+/// What one stage of a fit leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residuals {
+    /// The stage: "frames fitted", "geometry fitted".
+    pub stage: String,
+    /// Data row and error (mm): signed for a cable (model minus reading), the length of the difference otherwise.
+    pub rows: Vec<(usize, f64)>,
+}
+
+/// What is to be drawn of a measurement file.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredScene<'a> {
+    /// The file.
+    pub dataset: &'a Dataset,
+    /// The arm that is drawn.
+    pub arm: &'a Model,
+    /// What that arm is, in words.
+    pub arm_is: &'a str,
+    /// How the sensor stands to the arm, where known.
+    pub frames: Option<&'a Frames>,
+    /// What each stage leaves, the best one last; may be empty.
+    pub residuals: &'a [Residuals],
+    /// Errors of rows that the last stage had not seen: data row, error (mm).
+    pub held_out: &'a [(usize, f64)],
+    /// Data rows that were set aside as outliers.
+    pub set_aside: &'a [usize],
+    /// What was identified, for the text.
+    pub identification: Option<&'a Identification>,
+    /// What a diagnosis found in it.
+    pub diagnosis: Option<&'a Diagnosis>,
+}
+
+/// Draws a measurement file with what was identified from it.
+///
+/// # Errors
+/// [`VisualError::Empty`] without rows.
+pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Recording, VisualError> {
+    let estimated: &Estimated = &found.estimated;
+    let observed = if found.sharpening.is_ok() {
+        observe(dataset, &estimated.nominal, true).0
+    } else {
+        Observed { dataset: dataset.clone(), angles: logged_covariance(dataset) }
+    };
+    let left = |stage: &str, model: &Model, frames: &Frames| Residuals {
+        stage: stage.to_owned(),
+        rows: numbered(dataset, errors_on(&observed, model, frames)),
+    };
+    let residuals = [
+        left("before: frames fitted", &found.registered.model, &found.registered.frames),
+        left("after: geometry fitted", &found.geometry.model, &found.geometry.frames),
+    ];
+    let held_out: Vec<(usize, f64)> = found.held_out.iter().map(|(row, _, after)| (*row, *after)).collect();
+    measured_recording(&MeasuredScene {
+        dataset,
+        arm: &estimated.model,
+        arm_is: &format!("{} as estimated", estimated.robot),
+        frames: Some(&found.geometry.frames),
+        residuals: &residuals,
+        held_out: &held_out,
+        set_aside: &estimated.provenance.set_aside,
+        identification: Some(found),
+        diagnosis: None,
+    })
+}
+
+/// Draws a measurement file with what a diagnosis found: the residuals that data sheet, geometry and findings leave.
+///
+/// # Errors
+/// [`VisualError::Empty`] without rows.
+pub fn diagnosis_recording(dataset: &Dataset, found: &Diagnosed) -> Result<Recording, VisualError> {
+    let observed = &found.prepared.observed;
+    let left = |stage: &str, model: &Model, frames: &Frames| Residuals {
+        stage: stage.to_owned(),
+        rows: numbered(dataset, errors_on(observed, model, frames)),
+    };
+    let residuals = [
+        left("before: geometry fitted", &found.geometric.model, &found.geometric.frames),
+        left("after: findings in the model", &found.extended.model, &found.extended.frames),
+    ];
+    measured_recording(&MeasuredScene {
+        dataset,
+        arm: &found.estimated.model,
+        arm_is: &format!("{} with everything found", found.estimated.robot),
+        frames: Some(&found.extended.frames),
+        residuals: &residuals,
+        held_out: &[],
+        set_aside: &found.estimated.provenance.set_aside,
+        identification: None,
+        diagnosis: Some(&found.diagnosis),
+    })
+}
+
+fn numbered(dataset: &Dataset, errors: Vec<f64>) -> Vec<(usize, f64)> {
+    dataset.rows.iter().map(|r| r.number).zip(errors).collect()
+}
+
+/// Draws a measurement file.
+///
+/// # Errors
+/// [`VisualError::Empty`] without rows.
+pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, VisualError> {
+    if scene.dataset.rows.is_empty() {
+        return Err(VisualError::Empty("the measurement file has no rows"));
+    }
+    let mut store = Store::default();
+    store.fixed("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
+    let flange_from_touched = scene.frames.map_or_else(Pose::identity, |f| f.flange_from_target);
+    let stand = |row: &Row| Stand {
+        time: row.number as i64,
+        joints: row.joints,
+        flange_from_tool: flange_from_touched,
+    };
+    let stands: Vec<Stand> = scene.dataset.rows.iter().map(stand).collect();
+    let condition = scene.dataset.rows[0].condition;
+    arm::draw(&mut store, "arm", scene.arm, &condition, &Paint::SOLID, (AXIS, &stands))?;
+    let touched: Vec<Point3<f64>> = scene
+        .dataset
+        .rows
+        .iter()
+        .map(|r| scene.arm.forward(&r.joints, &r.condition) * flange_from_touched * Point3::origin())
+        .collect();
+    let scale = Scale::over([quantile(scene.residuals.last(), TOP_QUANTILE)]);
+    cloud(&mut store, scene, &touched, &scale)?;
+    sensor(&mut store, scene, &touched)?;
+    curves(&mut store, scene)?;
+    if !scene.residuals.is_empty() {
+        legend::draw(&mut store, &scale)?;
+    }
+    store.fixed("summary", &rerun::TextDocument::from_markdown(words::markdown(scene)))?;
+    let page = layout(scene, &touched)?;
+    Recording::new("truegrind measurements", &scene.dataset.file, store, page)
+}
+
+/// A quantile of the sizes of residuals; 0 of none.
+fn quantile(residuals: Option<&Residuals>, share: f64) -> f64 {
+    let mut sizes: Vec<f64> =
+        residuals.iter().flat_map(|r| &r.rows).map(|(_, e)| e.abs()).filter(|e| e.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let last = sizes.len().saturating_sub(1);
+    sizes.get((last as f64 * share).ceil() as usize).copied().unwrap_or(0.0)
+}
+
+/// All touched points, by the size of what the last stage leaves; rows that were set aside are marked.
+fn cloud(
+    store: &mut Store,
+    scene: &MeasuredScene<'_>,
+    touched: &[Point3<f64>],
+    scale: &Scale,
+) -> Result<(), VisualError> {
+    let sizes = scene.residuals.last().map(|r| &r.rows);
+    let colour = |row: &Row| match sizes.and_then(|s| s.iter().find(|(n, _)| *n == row.number)) {
+        Some((_, error)) => scale.of(error.abs()),
+        None => INTENDED,
+    };
+    let points = Points3D::new(touched.iter().map(xyz))
+        .with_colors(scene.dataset.rows.iter().map(|r| Color::from(colour(r))))
+        .with_radii([Radius::new_ui_points(3.0)]);
+    store.fixed("touched", &points)?;
+    let aside = scene.dataset.rows.iter().zip(touched).filter(|(r, _)| scene.set_aside.contains(&r.number));
+    let (labels, places): (Vec<String>, Vec<[f32; 3]>) =
+        aside.map(|(r, p)| (format!("row {} set aside", r.number), xyz(p))).unzip();
+    if places.is_empty() {
+        return Ok(());
+    }
+    let marks = Points3D::new(places)
+        .with_colors([Color::from(REFUSED)])
+        .with_radii([Radius::new_ui_points(5.0)])
+        .with_labels(labels)
+        .with_show_labels(scene.set_aside.len() <= 12);
+    store.fixed("set_aside", &marks)
+}
+
+/// Where the sensor stands, and what it reads at each row.
+fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<(), VisualError> {
+    let Some(frames) = scene.frames else { return Ok(()) };
+    let times: Vec<i64> = scene.dataset.rows.iter().map(|r| r.number as i64).collect();
+    let outlets: Vec<Option<Point3<f64>>> = scene
+        .dataset
+        .rows
+        .iter()
+        .map(|r| match r.reading {
+            Reading::Cable(_) => frames.outlets_mm.get(r.anchor).map(|o| Point3::from(*o)),
+            Reading::Position(_) | Reading::Pose(_) => None,
+        })
+        .collect();
+    if outlets.iter().all(Option::is_some) {
+        let name = |k: usize| match frames.outlets_mm.len() {
+            1 => "cable outlet".to_owned(),
+            _ => format!("cable outlet {}", k + 1),
+        };
+        let drawn = Points3D::new(frames.outlets_mm.iter().map(|o| xyz(&Point3::from(*o))))
+            .with_colors([Color::from(BEFORE)])
+            .with_radii([Radius::new_ui_points(7.0)])
+            .with_labels((0..frames.outlets_mm.len()).map(name))
+            .with_show_labels(true);
+        store.fixed("sensor/outlet", &drawn)?;
+        let cable = outlets.iter().flatten().zip(touched).map(|(o, p)| [xyz(o), xyz(p)]);
+        let columns = LineStrips3D::new(cable).columns_of_unit_batches().map_err(encoding)?;
+        store.over("sensor/cable", (AXIS, &times), columns)?;
+        let style = LineStrips3D::update_fields()
+            .with_colors([Color::from(BEFORE)])
+            .with_radii([Radius::new_ui_points(1.5)]);
+        return store.fixed("sensor/cable", &style);
+    }
+    let length = SENSOR_AXES * arm::length_mm(scene.arm);
+    arm::still(store, "sensor/frame", &frames.base_from_sensor)?;
+    store.fixed("sensor/frame", &TransformAxes3D::new(length as f32))?;
+    let seen: Vec<(i64, [f32; 3])> = scene
+        .dataset
+        .rows
+        .iter()
+        .filter_map(|r| {
+            let place = match &r.reading {
+                Reading::Position(p) => Point3::from(*p),
+                Reading::Pose(pose) => Point3::from(pose.translation.vector),
+                Reading::Cable(_) => return None,
+            };
+            Some((r.number as i64, xyz(&(frames.base_from_sensor * place))))
+        })
+        .collect();
+    let (times, places): (Vec<i64>, Vec<[f32; 3]>) = seen.into_iter().unzip();
+    let columns = Points3D::new(places).columns_of_unit_batches().map_err(encoding)?;
+    store.over("read", (AXIS, &times), columns)?;
+    let style =
+        Points3D::update_fields().with_colors([Color::from(BEFORE)]).with_radii([Radius::new_ui_points(6.0)]);
+    store.fixed("read", &style)
+}
+
+fn curves(store: &mut Store, scene: &MeasuredScene<'_>) -> Result<(), VisualError> {
+    for (k, stage) in scene.residuals.iter().enumerate() {
+        let colour = if k + 1 < scene.residuals.len() { BEFORE } else { after(0) };
+        let pen = Pen { name: &stage.stage, colour, width: 1.6 };
+        curve(store, &format!("residual/{}", k + 1), AXIS, pen, &over(&stage.rows))?;
+    }
+    let held = ("after, row held out", after(1), MarkerShape::Circle);
+    curve::points(store, "residual/held_out", AXIS, held, &over(scene.held_out))?;
+    if let Some(last) = scene.residuals.last() {
+        let aside: Vec<(usize, f64)> =
+            last.rows.iter().copied().filter(|(n, _)| scene.set_aside.contains(n)).collect();
+        let mark = ("set aside", REFUSED, MarkerShape::Cross);
+        curve::points(store, "residual/set_aside", AXIS, mark, &over(&aside))?;
+    }
+    for (joint, colour) in JOINTS.into_iter().enumerate() {
+        let name = format!("joint {}", joint + 1);
+        let angles: Vec<(i64, f64)> =
+            scene.dataset.rows.iter().map(|r| (r.number as i64, r.joints[joint].to_degrees())).collect();
+        let pen = Pen { name: &name, colour, width: 1.2 };
+        curve(store, &format!("joints/{}", joint + 1), AXIS, pen, &angles)?;
+    }
+    Ok(())
+}
+
+fn over(rows: &[(usize, f64)]) -> Vec<(i64, f64)> {
+    rows.iter().filter(|(_, e)| e.is_finite()).map(|(n, e)| (*n as i64, *e)).collect()
+}
+
+fn layout(scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<Store, VisualError> {
+    let mut seen = touched.to_vec();
+    seen.push(Point3::origin());
+    if let Some(frames) = scene.frames {
+        let at_sensor = Point3::from(frames.base_from_sensor.translation.vector);
+        match scene.dataset.rows[0].reading {
+            Reading::Cable(_) => seen.extend(frames.outlets_mm.iter().map(|o| Point3::from(*o))),
+            // A tracker stands metres away; it is in the picture, but the picture is not for it.
+            Reading::Position(_) | Reading::Pose(_) if at_sensor.coords.norm() < 2000.0 => {
+                seen.push(at_sensor)
+            }
+            Reading::Position(_) | Reading::Pose(_) => {}
+        }
+    }
+    let eye = Eye::on(&seen, Vector3::new(0.8, -0.75, 0.45), 1.25);
+    let view = View::space(
+        format!("{} [mm], row by row", scene.arm_is),
+        &["+ /arm/**", "+ /touched", "+ /read", "+ /sensor/**", "+ /set_aside"],
+        &eye,
+    );
+    let space = Pane::View(view);
+    let residuals = !scene.residuals.is_empty();
+    let space = if residuals {
+        Pane::Column(vec![
+            (5.0, space),
+            (1.0, legend::pane("Colour: size of the residual after the fit [mm]")),
+        ])
+    } else {
+        space
+    };
+    let joints = Pane::View(View::curves("Logged joint angles [°] over rows", &["+ /joints/**"], None));
+    let curves = if residuals {
+        let name = match scene.dataset.rows[0].reading {
+            Reading::Cable(_) => "Residual, model − reading [mm], over rows",
+            Reading::Position(_) | Reading::Pose(_) => "Size of the residual [mm] over rows",
+        };
+        Pane::Row(vec![(1.3, Pane::View(View::curves(name, &["+ /residual/**"], None))), (1.0, joints)])
+    } else {
+        joints
+    };
+    let left = Pane::Column(vec![(1.6, space), (1.0, curves)]);
+    let text = Pane::View(View::text("Summary", &["+ /summary"]));
+    page(Pane::Row(vec![(2.4, left), (1.0, text)]), AXIS, ROWS_PER_SECOND)
+}
+
+fn encoding(error: impl std::fmt::Display) -> VisualError {
+    VisualError::Encoding(error.to_string())
+}
+
+fn xyz(p: &Point3<f64>) -> [f32; 3] {
+    [p.x as f32, p.y as f32, p.z as f32]
+}

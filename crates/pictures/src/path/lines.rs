@@ -1,0 +1,208 @@
+//! What stands in space: the part, paths, tool axes, marks, and the bar of colours.
+
+use nalgebra::Point3;
+use rerun::components::{Color, Radius};
+use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
+
+use super::{PathScene, Plan, intended, reached};
+use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
+use crate::legend;
+use crate::recording::{Store, VisualError};
+use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport, Status};
+
+/// Tool axes that are drawn at most.
+const AXES: usize = 40;
+/// Length of a tool axis over the size of the path.
+const AXIS_LENGTH: f64 = 0.10;
+/// Marks that carry a label at most; the others are drawn without.
+const LABELS: usize = 4;
+
+pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
+    workpiece(store, scene)?;
+    let points = &plan.first.points;
+    let cut = strips(points, |p| plan.cuts(p).then(|| (intended(p), 0)));
+    plain(store, "path/intended", &cut, INTENDED, 1.0)?;
+    let travel = strips(points, |p| Some((intended(p), usize::from(plan.cuts(p)))));
+    let travel: Vec<_> = travel.into_iter().filter(|(kind, _)| *kind == 0).collect();
+    plain(store, "path/travel", &travel, TRAVEL, 0.6)?;
+    for &k in &plan.befores {
+        let name = if k == 0 { String::new() } else { format!("_{}", plan.names[k]) };
+        let title = plan.before_name(scene, k);
+        run(store, plan, &scene.reports[k], |p| p.before, (&format!("before{name}"), &title, BEFORE))?;
+    }
+    for (k, report) in scene.reports.iter().enumerate() {
+        let title = format!("after · {}", report.model);
+        run(store, plan, report, |p| p.after, (&format!("after/{}", plan.names[k]), &title, after(k)))?;
+    }
+    tool_axes(store, plan)?;
+    marks(store, plan)?;
+    legend::draw(store, &plan.scale)
+}
+
+fn workpiece(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError> {
+    let Some(work) = &scene.workpiece else { return Ok(()) };
+    if work.triangles.triangles.is_empty() {
+        return Ok(());
+    }
+    let placed = work.base_from_object;
+    let mesh = Mesh3D::new(work.triangles.vertices_mm.iter().map(|v| xyz(&(placed * v))))
+        .with_vertex_normals(work.triangles.normals.iter().map(|n| {
+            let n = placed.rotation * n.into_inner();
+            [n.x as f32, n.y as f32, n.z as f32]
+        }))
+        .with_triangle_indices(work.triangles.triangles.iter().copied())
+        .with_vertex_colors(work.triangles.vertices_mm.iter().map(|_| Color::from(WORKPIECE)));
+    store.fixed("workpiece", &mesh)
+}
+
+/// One path, at true scale and exaggerated, with a label at its largest deviation.
+fn run(
+    store: &mut Store,
+    plan: &Plan<'_>,
+    report: &PathReport,
+    which: fn(&PathPoint) -> Option<Deviation>,
+    (name, title, colour): (&str, &str, Rgba),
+) -> Result<(), VisualError> {
+    for (folder, times, width) in [("path", 1.0, 2.0), ("exaggerated", plan.times, 1.6)] {
+        let coloured = strips(&report.points, |p| {
+            let deviation = which(p).filter(|d| plan.cuts(p) && d.norm_mm().is_finite())?;
+            Some((reached(p, &deviation, times), plan.scale.step(deviation.norm_mm())))
+        });
+        if coloured.is_empty() {
+            continue;
+        }
+        let lines =
+            LineStrips3D::new(coloured.iter().map(|(_, strip)| strip.iter().map(xyz).collect::<Vec<_>>()))
+                .with_colors(coloured.iter().map(|(step, _)| Color::from(plan.scale.colour(*step))))
+                .with_radii([Radius::new_ui_points(width)]);
+        store.fixed(format!("{folder}/{name}"), &lines)?;
+        let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
+        let Some((point, deviation)) = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm())) else {
+            continue;
+        };
+        let label = Points3D::new([xyz(&reached(point, &deviation, times))])
+            .with_radii([Radius::new_ui_points(3.5)])
+            .with_colors([Color::from(colour)])
+            .with_labels([format!("{title}: at most {:.3} mm", deviation.norm_mm())])
+            .with_show_labels(true);
+        store.fixed(format!("{folder}/largest/{name}"), &label)?;
+    }
+    Ok(())
+}
+
+/// Cuts a path into strips of one kind each. A piece between two points has the kind of the second; where a point has
+/// no place, the line breaks.
+fn strips(
+    points: &[PathPoint],
+    place: impl Fn(&PathPoint) -> Option<(Point3<f64>, usize)>,
+) -> Vec<(usize, Vec<Point3<f64>>)> {
+    let mut strips: Vec<(usize, Vec<Point3<f64>>)> = Vec::new();
+    let mut last: Option<Point3<f64>> = None;
+    for point in points {
+        let Some((here, kind)) = place(point) else {
+            last = None;
+            continue;
+        };
+        if let Some(from) = last {
+            match strips.last_mut() {
+                Some((same, strip)) if *same == kind && strip.last() == Some(&from) => strip.push(here),
+                _ => strips.push((kind, vec![from, here])),
+            }
+        }
+        last = Some(here);
+    }
+    strips
+}
+
+fn plain(
+    store: &mut Store,
+    path: &str,
+    strips: &[(usize, Vec<Point3<f64>>)],
+    colour: Rgba,
+    width: f32,
+) -> Result<(), VisualError> {
+    if strips.is_empty() {
+        return Ok(());
+    }
+    let lines = LineStrips3D::new(strips.iter().map(|(_, strip)| strip.iter().map(xyz).collect::<Vec<_>>()))
+        .with_colors([Color::from(colour)])
+        .with_radii([Radius::new_ui_points(width)]);
+    store.fixed(path, &lines)
+}
+
+/// Arrows along the tool's z axis, ending at the TCP.
+fn tool_axes(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
+    let cut: Vec<&PathPoint> = plan.first.points.iter().filter(|p| plan.cuts(p)).collect();
+    let length = AXIS_LENGTH * plan.extent_mm;
+    let shown: Vec<&PathPoint> = cut.iter().step_by(cut.len().div_ceil(AXES).max(1)).copied().collect();
+    let axis = |p: &PathPoint| p.intended.rotation * nalgebra::Vector3::z() * length;
+    let arrows = Arrows3D::from_vectors(shown.iter().map(|p| {
+        let z = axis(p);
+        [z.x as f32, z.y as f32, z.z as f32]
+    }))
+    .with_origins(shown.iter().map(|p| xyz(&(intended(p) - axis(p)))))
+    .with_radii([Radius::new_ui_points(0.8)])
+    .with_colors([Color::from(TOOL)]);
+    store.fixed("tool_axes", &arrows)
+}
+
+fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
+    for (status, name, colour) in
+        [(Status::Flagged, "flagged", FLAGGED), (Status::Refused, "refused", REFUSED)]
+    {
+        let marked: Vec<&PathPoint> = plan.first.points.iter().filter(|p| p.status == status).collect();
+        if marked.is_empty() {
+            continue;
+        }
+        let points = Points3D::new(marked.iter().map(|p| xyz(&intended(p))))
+            .with_radii([Radius::new_ui_points(2.5)])
+            .with_colors([Color::from(colour)]);
+        store.fixed(format!("marks/{name}"), &points)?;
+        let labels: Vec<(Point3<f64>, String)> =
+            runs(&marked).iter().take(LABELS).map(|run| label(run, name)).collect();
+        let texts = Points3D::new(labels.iter().map(|(at, _)| xyz(at)))
+            .with_radii([Radius::new_ui_points(4.0)])
+            .with_colors([Color::from(colour)])
+            .with_labels(labels.iter().map(|(_, text)| text.as_str()))
+            .with_show_labels(true);
+        store.fixed(format!("marks/{name}/labels"), &texts)?;
+    }
+    Ok(())
+}
+
+/// Neighbouring points that are marked for the same kind of reason.
+fn runs<'a>(marked: &[&'a PathPoint]) -> Vec<Vec<&'a PathPoint>> {
+    let mut runs: Vec<Vec<&PathPoint>> = Vec::new();
+    for &point in marked {
+        match runs.last_mut() {
+            Some(run)
+                if run.last().is_some_and(|l| {
+                    l.index + 1 == point.index && l.kind_of_reason() == point.kind_of_reason()
+                }) =>
+            {
+                run.push(point);
+            }
+            _ => runs.push(vec![point]),
+        }
+    }
+    runs
+}
+
+/// Where the label of a run stands, and what it says.
+fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
+    let (first, last, middle) = (run[0], run[run.len() - 1], run[run.len() / 2]);
+    let place = match (first.line, last.line) {
+        (0, _) | (_, 0) if first.index == last.index => format!("point {}", first.index),
+        (0, _) | (_, 0) => format!("points {}–{}", first.index, last.index),
+        (a, b) if a == b => format!("line {a}"),
+        (a, b) => format!("lines {a}–{b}"),
+    };
+    let same = run.iter().all(|point| point.reason == first.reason);
+    let which = if same { "" } else { " (the first)" };
+    let reason = first.reason.as_deref().map(|r| format!(": {r}{which}")).unwrap_or_default();
+    (intended(middle), format!("{place} {status}{reason}"))
+}
+
+fn xyz(p: &Point3<f64>) -> [f32; 3] {
+    [p.x as f32, p.y as f32, p.z as f32]
+}

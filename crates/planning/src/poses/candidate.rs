@@ -1,0 +1,161 @@
+//! Poses to choose from: random joints within the limits that stay clear of singularities and that the sensor sees.
+
+use std::fmt;
+
+use nalgebra::{Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::Wanted;
+use super::rows;
+use super::sight::clearance_mm;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::Joints;
+use truegrind_calibration::identification::calibration::Frames;
+use truegrind_calibration::measurement::dataset::{Row, Sensor};
+
+/// Where poses may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// Distance that every joint keeps from its limits (rad): room to come from either side.
+    pub margin_rad: f64,
+    /// Smallest distance to singularity, as
+    /// [`Inverse::smallest_singular_value`].
+    pub min_singularity: f64,
+    /// Box for the touched point in the base: lower and upper corner (mm).
+    pub box_mm: Option<[[f64; 3]; 2]>,
+    /// Shortest and longest cable, or distance to the sensor (mm).
+    pub distance_mm: Option<[f64; 2]>,
+    /// Distance that a cable keeps from the lines between the joints (mm); `None` does not look.
+    pub clearance_mm: Option<f64>,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self {
+            margin_rad: 6.0_f64.to_radians(),
+            min_singularity: 0.05,
+            box_mm: None,
+            distance_mm: None,
+            clearance_mm: None,
+        }
+    }
+}
+
+/// A pose that may be measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Controller angles (rad).
+    pub joints: Joints,
+    /// The touched point in the base (mm).
+    pub touched_mm: Vector3<f64>,
+    /// Distance to singularity.
+    pub singularity: f64,
+    /// Which cable reads it.
+    pub anchor: usize,
+}
+
+/// What became of random poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Passed {
+    /// Drawn.
+    pub drawn: usize,
+    /// Too near to a singularity.
+    pub singular: usize,
+    /// Outside the box.
+    pub outside: usize,
+    /// The cable, or the line to the sensor, too short or too long.
+    pub distance: usize,
+    /// The cable too near to a link.
+    pub hidden: usize,
+}
+
+impl fmt::Display for Passed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} too near to a singularity, {} outside the box, {} too near to or too far from the sensor, {} with the \
+             cable too near to a link",
+            self.singular, self.outside, self.distance, self.hidden
+        )
+    }
+}
+
+/// Random poses drawn for each that is wanted, before giving up.
+const DRAWS_PER_CANDIDATE: usize = 60;
+
+/// Stretch of the cable before the hook that may pass the wrist (mm).
+pub(super) const FREE_MM: f64 = 120.0;
+
+/// Draws until `count` poses are allowed, or enough is enough. Cables take turns.
+pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (Vec<Candidate>, Passed) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let limits = &wanted.nominal.limits;
+    let posed = wanted.nominal.under(&Condition::default());
+    let inverse = Inverse::new(wanted.nominal, &Condition::default(), wanted.nominal);
+    let mut out: Vec<Candidate> = Vec::with_capacity(count);
+    let mut passed = Passed::default();
+    let anchors = if wanted.sensor == Sensor::Cable { wanted.frames.outlets_mm.len() } else { 1 };
+    while out.len() < count && passed.drawn < DRAWS_PER_CANDIDATE * count.max(20) {
+        passed.drawn += 1;
+        let joints = Joints::from_fn(|i, _| {
+            let (low, high) = (limits.min_rad[i] + bounds.margin_rad, limits.max_rad[i] - bounds.margin_rad);
+            // Joints that turn more than once say nothing new on the second turn.
+            let (low, high) = (low.max(-std::f64::consts::PI), high.min(std::f64::consts::PI));
+            if low < high { random.random_range(low..high) } else { 0.5 * (low + high) }
+        });
+        let singularity = inverse.smallest_singular_value(&joints);
+        if !(singularity >= bounds.min_singularity) {
+            passed.singular += 1;
+            continue;
+        }
+        let frames = posed.frames(&joints);
+        let flange = frames.last() * wanted.nominal.flange;
+        let touched = flange * Point3::from(wanted.frames.flange_from_target.translation.vector);
+        if let Some([low, high]) = bounds.box_mm
+            && !(0..3).all(|k| (low[k]..=high[k]).contains(&touched[k]))
+        {
+            passed.outside += 1;
+            continue;
+        }
+        let anchor = out.len() % anchors;
+        let origin = sensor_mm(wanted.sensor, wanted.frames, anchor);
+        let distance = (touched.coords - origin).norm();
+        if let Some([low, high]) = bounds.distance_mm
+            && !(low..=high).contains(&distance)
+        {
+            passed.distance += 1;
+            continue;
+        }
+        if let Some(wanted) = bounds.clearance_mm
+            && clearance_mm(&frames, &origin, &touched.coords, FREE_MM) < wanted
+        {
+            passed.hidden += 1;
+            continue;
+        }
+        out.push(Candidate { joints, touched_mm: touched.coords, singularity, anchor });
+    }
+    (out, passed)
+}
+
+/// Where the sensor stands in the base (mm).
+pub(super) fn sensor_mm(sensor: Sensor, frames: &Frames, anchor: usize) -> Vector3<f64> {
+    match sensor {
+        Sensor::Cable => frames.outlets_mm[anchor],
+        Sensor::Position | Sensor::Pose => frames.base_from_sensor.translation.vector,
+    }
+}
+
+/// Candidates as rows: at rest, nothing known of time and approach.
+pub(super) fn rows(candidates: &[Candidate]) -> Vec<Row> {
+    candidates
+        .iter()
+        .enumerate()
+        .map(|(number, candidate)| {
+            let mut row = rows::blank(number, candidate.joints, Sensor::Cable);
+            row.anchor = candidate.anchor;
+            row
+        })
+        .collect()
+}

@@ -1,0 +1,119 @@
+//! The plan as a program: to each pose by way of its approach, a wait, a comment.
+//!
+//! Joint targets say joints, so the nominal arm of the controller and the real one agree on them; no tool or work object
+//! is involved.
+
+use super::schedule::Row;
+use super::{Plan, Wanted, rows};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_programs::draft::{Draft, Step};
+use truegrind_programs::motion::{Frame, JointTarget, MotionKind, TargetValue, ToolValue, WorkObjectValue};
+
+/// How to go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// Name of the module.
+    pub name: String,
+    /// Name of the robot, for the comments.
+    pub robot: String,
+    /// Speed between poses [mm/s].
+    pub travel_mm_s: f64,
+    /// Speed of the approach [mm/s].
+    pub approach_mm_s: f64,
+    /// Time at rest before the reading (s).
+    pub settle_s: f64,
+}
+
+impl Default for Drive {
+    fn default() -> Self {
+        Self {
+            name: "Measure".to_owned(),
+            robot: String::new(),
+            travel_mm_s: 200.0,
+            approach_mm_s: 20.0,
+            settle_s: 2.0,
+        }
+    }
+}
+
+/// The program of a plan.
+pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
+    let target = |joints: &Joints| {
+        TargetValue::Joint(JointTarget {
+            robot_deg: std::array::from_fn(|i| joints[i].to_degrees()),
+            external: [None; 6],
+        })
+    };
+    let step = |joints: &Joints, speed_mm_s: f64, comment: Option<String>, wait_s: Option<f64>| Step {
+        kind: MotionKind::AbsoluteJoint,
+        to: target(joints),
+        via: None,
+        speed_mm_s,
+        zone_mm: None,
+        comment,
+        wait_s,
+    };
+    let mut steps = Vec::with_capacity(2 * plan.rows.len());
+    for (number, row) in plan.rows.iter().enumerate() {
+        let said = comment(plan, wanted, row, number);
+        steps.push(step(&row.approach_from, drive.travel_mm_s, Some(said), None));
+        steps.push(step(&plan.poses[row.pose].joints, drive.approach_mm_s, None, Some(drive.settle_s)));
+    }
+    Draft {
+        name: drive.name.clone(),
+        comments: vec![
+            format!(
+                "{} rows at {} poses of {}, to be measured.",
+                plan.rows.len(),
+                plan.poses.len(),
+                drive.robot
+            ),
+            "Checked: joint limits, singularities, cable. Not checked: collisions with anything in the cell."
+                .to_owned(),
+            "Run it slowly first. Take one reading at each WaitTime, in this order.".to_owned(),
+        ],
+        tool: (
+            "tool0".to_owned(),
+            ToolValue {
+                robhold: true,
+                frame: Frame::IDENTITY,
+                mass_kg: 0.001,
+                centre_of_gravity_mm: [0.0; 3],
+            },
+        ),
+        work_object: (
+            "wobj0".to_owned(),
+            WorkObjectValue {
+                robhold: false,
+                fixed: true,
+                mechanical_unit: String::new(),
+                user_frame: Frame::IDENTITY,
+                object_frame: Frame::IDENTITY,
+            },
+        ),
+        named_targets: false,
+        monitor_configuration: false,
+        steps,
+    }
+}
+
+fn comment(plan: &Plan, wanted: &Wanted<'_>, row: &Row, number: usize) -> String {
+    let sides: String = row.approach.iter().map(|side| if *side > 0 { '+' } else { '-' }).collect();
+    let mut text = format!("row {number}: pose {} ({}), from {sides}", row.pose + 1, row.purpose.word());
+    if let Some(Reading::Cable(length)) = reading(plan, wanted, row) {
+        text.push_str(&format!(", cable about {length:.1} mm"));
+    }
+    if row.rough_way {
+        text.push_str("; on the way here the cable leaves its range or nears a link: unhook it");
+    }
+    text
+}
+
+/// What the sensor will read of the nominal arm.
+pub fn reading(plan: &Plan, wanted: &Wanted<'_>, row: &Row) -> Option<Reading> {
+    let pose = &plan.poses[row.pose];
+    let flange = wanted.nominal.forward(&pose.joints, &Condition::default());
+    rows::rig(wanted).predict(&flange, pose.anchor)
+}

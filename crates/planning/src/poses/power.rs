@@ -1,0 +1,256 @@
+//! Which effects a measurement can decide, and from which size on.
+//!
+//! Method: with X the whitened Jacobian of geometry and frames in units of the priors, and R the whitened columns of an
+//! effect per unit of its parameters, S = RᵀR − RᵀX (I + XᵀX)⁻¹ XᵀR is what the effect shows beside everything that
+//! geometry can imitate. An effect of parameters a has non-centrality λ = aᵀ S a; the smallest one that is sure to reach
+//! λ in its worst direction (phase, axis) has |a|² = λ / smallest eigenvalue of S.
+//! Source: the non-central χ² of a likelihood ratio between nested linear models (Kay 1998, Fundamentals of Statistical
+//! Signal Processing II, section 7.7).
+//! Checked against: the drop of the fitted cost when the effect is put into simulated readings.
+
+use nalgebra::{Cholesky, DMatrix};
+
+use super::rival::{Suspect, coupling, effects_of, harmonic, thermal};
+use super::rows::jacobian;
+use super::{Options, Wanted};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::measurement::dataset::{Row, Sensor};
+use truegrind_math::spectral;
+
+/// An effect with the smallest size that the rows decide.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decidable {
+    /// Contract name.
+    pub effect: &'static str,
+    /// Which one: joint, order, cable.
+    pub which: String,
+    /// Joint, 0-based.
+    pub joint: Option<usize>,
+    /// Smallest size that is decided, in `unit`; absent where no size is.
+    pub smallest: Option<f64>,
+    /// Unit of `smallest`.
+    pub unit: &'static str,
+    /// What that size does at the most over the rows, in `shows_unit`.
+    pub shows: Option<f64>,
+    /// Unit of `shows` and `usual`: ° in a joint, mm at a sensor.
+    pub shows_unit: &'static str,
+    /// Size met in practice, to which `shows` compares.
+    pub usual: f64,
+}
+
+impl Decidable {
+    /// Whether an effect of the size that is met in practice is decided.
+    pub fn is_decided(&self) -> bool {
+        self.shows.is_some_and(|shows| shows <= self.usual)
+    }
+}
+
+/// Sizes met in practice: degrees in a joint, millimetres at a sensor, growth of links in mm over a metre.
+const USUAL_DEG: f64 = 0.05;
+const USUAL_MM: f64 = 0.3;
+
+/// A size beyond which nobody believes an effect (° or mm): then it is not decided at all.
+const ABSURD: f64 = 20.0;
+
+/// One effect, as columns.
+struct Asked {
+    effect: &'static str,
+    which: String,
+    joint: Option<usize>,
+    unit: &'static str,
+    shows_unit: &'static str,
+    usual: f64,
+    /// From the parameters' unit to `unit`.
+    to_unit: f64,
+    /// From the parameters' unit to `shows_unit`.
+    to_shows: f64,
+    columns: DMatrix<f64>,
+}
+
+/// Every effect of the catalogue, at the rows as planned.
+pub(super) fn decidable(
+    wanted: &Wanted<'_>,
+    parameters: &[Parameter],
+    rows: &[Row],
+    options: &Options,
+) -> Vec<Decidable> {
+    let (raw, scale) = jacobian(wanted, wanted.nominal, parameters, rows, options);
+    let mut x = raw.clone();
+    for (mut column, scale) in x.column_iter_mut().zip(&scale) {
+        column *= *scale;
+    }
+    let p = x.ncols();
+    let Some(factor) = Cholesky::new(DMatrix::identity(p, p) + x.tr_mul(&x)) else { return Vec::new() };
+    let mut asked = of_arm(wanted, rows, options);
+    asked.extend(of_sensor(wanted, parameters, rows, &raw, options));
+    asked
+        .into_iter()
+        .map(|a| {
+            let xr = x.tr_mul(&a.columns);
+            let shown = a.columns.tr_mul(&a.columns) - xr.tr_mul(&factor.solve(&xr));
+            // By its own symmetry, not by rounding.
+            let shown = (&shown + shown.transpose()) * 0.5;
+            let weakest = spectral::symmetric(shown).map_or(f64::NAN, |eigen| eigen.eigenvalues.min());
+            let size = (options.decisive / weakest).sqrt();
+            let shows = size * a.to_shows;
+            let known = weakest > 0.0 && shows.is_finite() && shows < ABSURD;
+            Decidable {
+                effect: a.effect,
+                which: a.which,
+                joint: a.joint,
+                smallest: known.then_some(size * a.to_unit),
+                unit: a.unit,
+                shows: known.then_some(shows),
+                shows_unit: a.shows_unit,
+                usual: a.usual,
+            }
+        })
+        .collect()
+}
+
+/// The effects of the arm.
+fn of_arm(wanted: &Wanted<'_>, rows: &[Row], options: &Options) -> Vec<Asked> {
+    let mut out = Vec::new();
+    let degrees = 1.0_f64.to_degrees();
+    let all: Vec<Effect> = ["joint-compliance", "gear-ratio", "backlash"]
+        .iter()
+        .flat_map(|name| {
+            (0..6).flat_map(|j| effects_of(&Suspect { effect: (*name).to_owned(), joints: vec![j] }))
+        })
+        .chain((0..6).flat_map(|j| [harmonic(j, 1.0), harmonic(j, 2.0)]))
+        .chain([(4, 3), (5, 4), (5, 3)].map(|(joint, driver)| coupling(joint, driver)))
+        .chain([thermal()])
+        .collect();
+    for effect in all {
+        let (shown, unit, to_unit, which) = match &effect {
+            Effect::JointCompliance(e) => {
+                // Massless arms and joints that no weight turns show nothing.
+                (0..1, "µrad/(N m)", 1e6, format!("joint {}", e.joint + 1))
+            }
+            Effect::GearEccentricity(e) => {
+                (0..2, "°", degrees, format!("joint {}, {} per turn", e.joint + 1, e.order))
+            }
+            Effect::GearRatio(e) => (0..1, "‰", 1e3, format!("joint {}", e.joint + 1)),
+            Effect::JointCoupling(e) => {
+                (0..1, "‰", 1e3, format!("joint {} into {}", e.driver + 1, e.joint + 1))
+            }
+            Effect::Backlash(e) => (0..1, "°", degrees, format!("joint {}", e.joint + 1)),
+            // By the clock; a thermometer is not planned.
+            Effect::ThermalDrift(_) => (0..1, "µm/m", 1e6, "all links, by the clock".to_owned()),
+            _ => continue,
+        };
+        let model = Model { effects: vec![effect.clone()], ..wanted.nominal.clone() };
+        let parameters: Vec<Parameter> =
+            shown.map(|parameter| Parameter::Effect { index: 0, parameter }).collect();
+        let (columns, _) = jacobian(wanted, &model, &parameters, rows, options);
+        let (to_shows, shows_unit, usual) = match &effect {
+            // Growth over a metre, about the length of a small arm.
+            Effect::ThermalDrift(_) => (1e3, "mm", USUAL_MM),
+            Effect::GearEccentricity(_) => (degrees, "°", USUAL_DEG),
+            _ => (degrees * largest_turn(&model, rows), "°", USUAL_DEG),
+        };
+        let name = effect.name();
+        let joint = effect.joint();
+        out.push(Asked { effect: name, which, joint, unit, shows_unit, usual, to_unit, to_shows, columns });
+    }
+    out
+}
+
+/// Largest rotation that the first parameter of the model's only effect gives a joint, per unit.
+fn largest_turn(model: &Model, rows: &[Row]) -> f64 {
+    let mut largest = 0.0_f64;
+    for row in rows {
+        let condition = Condition { ..row.condition };
+        let turn = model.under(&condition).effect_regressors(0, &row.joints);
+        largest = turn.first().map_or(largest, |t| largest.max(t.amax()));
+    }
+    largest
+}
+
+/// The effects of the measurement: what moves in the middle of the run, and a scale.
+fn of_sensor(
+    wanted: &Wanted<'_>,
+    parameters: &[Parameter],
+    rows: &[Row],
+    raw: &DMatrix<f64>,
+    options: &Options,
+) -> Vec<Asked> {
+    let per = raw.nrows() / rows.len().max(1);
+    let mut out = Vec::new();
+    let mut step = |effect, which: &str, of: &dyn Fn(&Parameter) -> bool| {
+        let places: Vec<usize> = (0..parameters.len()).filter(|&k| of(&parameters[k])).collect();
+        if places.is_empty() {
+            return;
+        }
+        let mut columns = raw.select_columns(&places);
+        let half = raw.nrows() / (2 * per) * per;
+        columns.rows_mut(0, half).fill(0.0);
+        out.push(Asked {
+            effect,
+            which: which.to_owned(),
+            joint: None,
+            unit: "mm",
+            shows_unit: "mm",
+            usual: USUAL_MM,
+            to_unit: 1.0,
+            to_shows: 1.0,
+            columns,
+        });
+    };
+    if wanted.sensor == Sensor::Cable {
+        step("sensor-zero-shift", "in the middle of the run", &|p| {
+            matches!(p, Parameter::Zero { anchor: 0 })
+        });
+        step("sensor-frame-shift", "outlet, in the middle of the run", &|p| {
+            matches!(p, Parameter::Outlet { anchor: 0, .. })
+        });
+    } else {
+        step(
+            "sensor-frame-shift",
+            "in the middle of the run",
+            &|p| matches!(p, Parameter::Base(k) if *k < 3),
+        );
+    }
+    step("tool-shift", "in the middle of the run", &|p| matches!(p, Parameter::Tool(k) if *k < 3));
+    let (columns, longest) = scale_column(wanted, rows, per, options);
+    out.push(Asked {
+        effect: "sensor-scale",
+        which: "all readings".to_owned(),
+        joint: None,
+        unit: "‰",
+        shows_unit: "mm",
+        usual: USUAL_MM,
+        to_unit: 1e3,
+        to_shows: longest,
+        columns,
+    });
+    out
+}
+
+/// What a relative error of the sensor's lengths adds to each whitened reading, and the longest reading (mm).
+fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options) -> (DMatrix<f64>, f64) {
+    let rig = super::rows::rig(wanted);
+    let posed = wanted.nominal.under(&Condition::default());
+    let mut column = DMatrix::zeros(per * rows.len(), 1);
+    let mut longest = 0.0_f64;
+    let weight = 1.0 / options.noise.reading_mm;
+    for (i, row) in rows.iter().enumerate() {
+        let flange = posed.forward(&row.joints);
+        let Some(distance) = rig.distance_mm(&flange, row.anchor) else { continue };
+        longest = longest.max(distance);
+        if wanted.sensor == Sensor::Cable {
+            // Residuals are model minus reading; the sign does not matter.
+            column[(i, 0)] = distance * weight;
+            continue;
+        }
+        let point = flange * nalgebra::Point3::from(rig.touched_mm());
+        let from_sensor = point.coords - wanted.frames.base_from_sensor.translation.vector;
+        for k in 0..3 {
+            column[(i * per + k, 0)] = from_sensor[k] * weight;
+        }
+    }
+    (column, longest)
+}

@@ -1,0 +1,179 @@
+//! What a diagnosis could not tell apart, and what a measurement that decides needs.
+//!
+//! Reads `truegrind.diagnosis/1`. A finding that is ambiguous becomes a question: its effect and those of its
+//! alternatives are made parameters beside the geometry, and the design weighs the poses that tell them apart. Effects
+//! that only the order or the approach of the rows can show (backlash, drift, a sensor that moved) ask for visits.
+
+use serde::Deserialize;
+
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::effect::coupling::Coupling;
+use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_arm::effect::ratio::Ratio;
+use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::parameter::Parameter;
+
+/// The format that is read.
+pub const SCHEMA: &str = "truegrind.diagnosis/1";
+
+/// An effect that may be the cause.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Suspect {
+    /// Contract name.
+    pub effect: String,
+    /// Joints, 0-based; empty where it has none.
+    pub joints: Vec<usize>,
+}
+
+/// A finding with what else explains the rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Question {
+    /// The finding, then its alternatives; one alone where an effect could not be tested.
+    pub suspects: Vec<Suspect>,
+}
+
+/// A part of the measurement whose place is in question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum OfFrames {
+    /// A cable's zero.
+    Zero,
+    /// The sensor's frame or outlet.
+    Sensor,
+    /// The touched point.
+    Touched,
+}
+
+impl OfFrames {
+    /// Whether a parameter belongs to it.
+    pub fn holds(self, parameter: &Parameter) -> bool {
+        match parameter {
+            Parameter::Zero { .. } => self == OfFrames::Zero,
+            Parameter::Base(_) | Parameter::Outlet { .. } => self == OfFrames::Sensor,
+            Parameter::Tool(_) => self == OfFrames::Touched,
+            _ => false,
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct File {
+    schema: String,
+    #[serde(default)]
+    findings: Vec<Finding>,
+    #[serde(default)]
+    not_testable: Vec<Named>,
+}
+
+#[derive(Deserialize)]
+struct Finding {
+    effect: String,
+    confidence: String,
+    joints: Option<Vec<usize>>,
+    #[serde(default)]
+    alternatives: Vec<Named>,
+}
+
+#[derive(Deserialize)]
+struct Named {
+    effect: String,
+    #[serde(default)]
+    joints: Option<Vec<usize>>,
+}
+
+fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
+    let joints = joints.into_iter().flatten().filter(|j| (1..=6).contains(*j)).map(|j| j - 1).collect();
+    Suspect { effect: effect.to_owned(), joints }
+}
+
+/// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
+///
+/// # Errors
+/// A sentence, where the text is no diagnosis.
+pub fn questions(text: &str) -> Result<Vec<Question>, String> {
+    let file: File = serde_json::from_str(text).map_err(|e| format!("not a diagnosis: {e}"))?;
+    if file.schema != SCHEMA {
+        return Err(format!("`schema` is \"{}\", expected \"{SCHEMA}\"", file.schema));
+    }
+    let ambiguous = file.findings.iter().filter(|f| f.confidence == "ambiguous").map(|f| {
+        let first = suspect(&f.effect, f.joints.as_ref());
+        let others = f.alternatives.iter().map(|a| suspect(&a.effect, a.joints.as_ref()));
+        Question { suspects: std::iter::once(first).chain(others).collect() }
+    });
+    let untested =
+        file.not_testable.iter().map(|n| Question { suspects: vec![suspect(&n.effect, n.joints.as_ref())] });
+    Ok(ambiguous.chain(untested).collect())
+}
+
+/// What an effect of that name looks like, at size zero; nothing for effects of the measurement.
+pub fn effects_of(suspect: &Suspect) -> Vec<Effect> {
+    // Where no joint is named, those that carry the arm.
+    let joints: &[usize] = if suspect.joints.is_empty() { &[1, 2] } else { &suspect.joints };
+    let each = |make: fn(usize) -> Effect| joints.iter().map(|&j| make(j)).collect();
+    match suspect.effect.as_str() {
+        "joint-compliance" => {
+            each(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 0.0 }))
+        }
+        "gear-eccentricity" => joints.iter().flat_map(|&j| [harmonic(j, 1.0), harmonic(j, 2.0)]).collect(),
+        "gear-ratio" => each(|joint| Effect::GearRatio(Ratio { joint, error: 0.0 })),
+        "joint-coupling" => match *joints {
+            [joint, driver, ..] if joint != driver => vec![coupling(joint, driver)],
+            [joint] => vec![coupling(joint, if joint == 0 { 1 } else { joint - 1 })],
+            _ => Vec::new(),
+        },
+        "backlash" => each(|joint| Effect::Backlash(Backlash { joint, play_rad: 0.0 })),
+        "thermal-drift" => vec![thermal()],
+        _ => Vec::new(),
+    }
+}
+
+/// One harmonic of one joint, of size zero.
+pub(super) fn harmonic(joint: usize, order: f64) -> Effect {
+    Effect::GearEccentricity(Harmonic { joint, order, sine_rad: 0.0, cosine_rad: 0.0 })
+}
+
+/// A coupling of size zero.
+pub(super) fn coupling(joint: usize, driver: usize) -> Effect {
+    Effect::JointCoupling(Coupling { joint, driver, factor: 0.0 })
+}
+
+/// Warming up by the clock, of size zero; half an hour is the time constant of many arms.
+pub(super) fn thermal() -> Effect {
+    Effect::ThermalDrift(Thermal { growth: 0.0, time_constant_h: 0.5, growth_per_k: 0.0, reference_c: 20.0 })
+}
+
+/// What stands in the place of sensor effects, where the poses decide.
+fn of_frames(effect: &str) -> Option<OfFrames> {
+    match effect {
+        "sensor-zero-shift" => Some(OfFrames::Zero),
+        "sensor-frame-shift" => Some(OfFrames::Sensor),
+        "tool-shift" => Some(OfFrames::Touched),
+        _ => None,
+    }
+}
+
+/// Parameters that the questions are about, as far as poses can answer: effects to be added, and frames.
+pub(super) fn columns_of(questions: &[Question]) -> (Vec<Effect>, Vec<OfFrames>) {
+    let (mut effects, mut frames): (Vec<Effect>, Vec<OfFrames>) = (Vec::new(), Vec::new());
+    for suspect in questions.iter().flat_map(|q| &q.suspects) {
+        for effect in effects_of(suspect) {
+            // Poses at rest know neither time nor side.
+            let by_order = matches!(effect, Effect::Backlash(_) | Effect::ThermalDrift(_));
+            if !by_order && !effects.contains(&effect) {
+                effects.push(effect);
+            }
+        }
+        if let Some(frame) = of_frames(&suspect.effect)
+            && !frames.contains(&frame)
+        {
+            frames.push(frame);
+        }
+    }
+    (effects, frames)
+}
+
+/// Whether an effect is asked about.
+pub(super) fn asks(questions: &[Question], effect: &str) -> bool {
+    questions.iter().flat_map(|q| &q.suspects).any(|s| s.effect == effect)
+}

@@ -1,0 +1,191 @@
+//! What readings tell: the whitened Jacobian of a calibration at planned rows, in units of the priors.
+//!
+//! Column k of row i is ∂rᵢ/∂xₖ · sₖ / σ, with σ the noise of the reading and sₖ the prior's standard deviation: a row of
+//! length 1 tells as much about its combination of parameters as the prior does, and the normal matrix with all priors
+//! is I + Σ xᵢ xᵢᵀ.
+
+use nalgebra::{Cholesky, DMatrix};
+
+use super::rival::{Question, columns_of};
+use super::{Options, Wanted};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::identification::calibration::{Calibration, Weight};
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::sensor::Rig;
+use truegrind_estimation::problem::Problem;
+use truegrind_math::se3::Pose;
+
+/// Standard deviations of a reading, everything counted: sensor, hook, repeatability of the arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a length or a coordinate (mm).
+    pub reading_mm: f64,
+    /// Of an orientation (rad).
+    pub reading_rad: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self { reading_mm: 0.03, reading_rad: 1e-4 }
+    }
+}
+
+/// What a list of rows tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// p × (rows · scalars per row): one column for each scalar reading.
+    pub readings: DMatrix<f64>,
+    /// Scalar readings of a row.
+    pub per_row: usize,
+    /// The parameters, in the order of the rows of `readings`.
+    pub parameters: Vec<Parameter>,
+    /// Prior standard deviation of each (mm, rad), by which it was scaled.
+    pub scale: Vec<f64>,
+    /// Rows of `readings` that a diagnosis asks about; the rest is geometry.
+    pub interest: Vec<usize>,
+}
+
+/// A row of joints alone, with a reading that says nothing.
+pub(super) fn blank(number: usize, joints: Joints, sensor: Sensor) -> Row {
+    let reading = match sensor {
+        Sensor::Cable => Reading::Cable(0.0),
+        Sensor::Position => Reading::Position(nalgebra::Vector3::zeros()),
+        Sensor::Pose => Reading::Pose(Pose::identity()),
+    };
+    Row::new(number, joints, reading)
+}
+
+/// The sensor as the simulator knows it.
+pub fn rig(wanted: &Wanted<'_>) -> Rig {
+    let frames = wanted.frames;
+    match wanted.sensor {
+        Sensor::Cable => Rig::Cable {
+            outlets_mm: frames.outlets_mm.clone(),
+            zeros_mm: frames.zeros_mm.clone(),
+            hook_mm: frames.flange_from_target.translation.vector,
+        },
+        Sensor::Position => Rig::Position {
+            base_from_sensor: frames.base_from_sensor,
+            reflector_mm: frames.flange_from_target.translation.vector,
+        },
+        Sensor::Pose => Rig::Pose {
+            base_from_sensor: frames.base_from_sensor,
+            flange_from_target: frames.flange_from_target,
+        },
+    }
+}
+
+/// Whitened Jacobian, one row per scalar reading, and the priors of its columns. `rows` need no readings: the nominal ones
+/// are put in.
+pub(super) fn jacobian(
+    wanted: &Wanted<'_>,
+    model: &Model,
+    parameters: &[Parameter],
+    rows: &[Row],
+    options: &Options,
+) -> (DMatrix<f64>, Vec<f64>) {
+    let rig = rig(wanted);
+    let posed = wanted.nominal.under(&Condition::default());
+    let rows: Vec<Row> = rows
+        .iter()
+        .map(|row| {
+            let flange = posed.forward(&row.joints);
+            let reading = rig.predict(&flange, row.anchor).unwrap_or(row.reading);
+            Row { reading, ..row.clone() }
+        })
+        .collect();
+    let noise = &options.noise;
+    let weight = Weight { per_mm: 1.0 / noise.reading_mm, per_rad: 1.0 / noise.reading_rad };
+    let weights = vec![weight; rows.len()];
+    let priors = options.tolerance.priors(parameters, model);
+    let dataset = Dataset::new("plan", wanted.sensor, rows);
+    let task = Calibration::new(&dataset, model, wanted.frames, parameters, &priors, &weights);
+    let count = task.rows();
+    let mut residuals = vec![0.0; count];
+    let mut columns = vec![0.0; count * parameters.len()];
+    task.jacobian(&vec![0.0; parameters.len()], 0..count, &mut residuals, &mut columns);
+    let scale = priors.iter().map(|prior| prior.sigma).collect();
+    (DMatrix::from_vec(count, parameters.len(), columns), scale)
+}
+
+/// What rows tell of the geometry, and of what `questions` are about.
+pub(super) fn told(
+    wanted: &Wanted<'_>,
+    parameters: &[Parameter],
+    rows: &[Row],
+    questions: &[Question],
+    options: &Options,
+) -> Told {
+    let (effects, of_frames) = columns_of(questions);
+    let model = Model { effects, ..wanted.nominal.clone() };
+    let mut all = parameters.to_vec();
+    for (index, effect) in model.effects.iter().enumerate() {
+        let count = effect.parameters().len();
+        all.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
+    }
+    let (mut jacobian, scale) = jacobian(wanted, &model, &all, rows, options);
+    for (mut column, scale) in jacobian.column_iter_mut().zip(&scale) {
+        column *= *scale;
+    }
+    let interest = (0..all.len())
+        .filter(|&k| k >= parameters.len() || of_frames.iter().any(|frame| frame.holds(&all[k])))
+        .collect();
+    let per_row = match wanted.sensor {
+        Sensor::Cable => 1,
+        Sensor::Position => 3,
+        Sensor::Pose => 6,
+    };
+    Told { readings: jacobian.transpose(), per_row, parameters: all, scale, interest }
+}
+
+impl Told {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.readings.ncols() / self.per_row
+    }
+
+    /// I + Σ x xᵀ over the readings of some rows.
+    pub fn information(&self, rows: &[usize]) -> DMatrix<f64> {
+        let p = self.readings.nrows();
+        let mut taken = DMatrix::zeros(p, rows.len() * self.per_row);
+        for (place, &row) in rows.iter().enumerate() {
+            taken
+                .columns_mut(place * self.per_row, self.per_row)
+                .copy_from(&self.readings.columns(row * self.per_row, self.per_row));
+        }
+        DMatrix::identity(p, p) + &taken * taken.transpose()
+    }
+
+    /// Covariance of the parameters (mm, rad) for an information matrix; `None` where that is not positive.
+    pub fn covariance(&self, information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let inverse = Cholesky::new(information.clone())?.inverse();
+        let p = inverse.nrows();
+        let finite = inverse.iter().all(|v| v.is_finite());
+        finite.then(|| DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j]))
+    }
+
+    /// Predicted standard deviation of what the fitted parameters say of the lengths read in some rows, root mean square,
+    /// in units of the noise: √ mean xᵀ M⁻¹ x. `None` where M is not positive.
+    pub fn reading_sigma(&self, information: &DMatrix<f64>, rows: &[usize]) -> Option<f64> {
+        let factor = Cholesky::new(information.clone())?;
+        // Of a pose the three coordinates, not the angles.
+        let lengths = self.per_row.min(3);
+        let sum: f64 = rows
+            .iter()
+            .map(|row| {
+                let x = self.readings.columns(row * self.per_row, lengths).into_owned();
+                x.component_mul(&factor.solve(&x)).sum()
+            })
+            .sum();
+        Some((sum / rows.len().max(1) as f64).sqrt())
+    }
+
+    /// Standard deviation of every parameter when all rows are measured.
+    pub fn sigmas(&self) -> Option<Vec<f64>> {
+        let all: Vec<usize> = (0..self.rows()).collect();
+        let covariance = self.covariance(&self.information(&all))?;
+        Some(covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect())
+    }
+}

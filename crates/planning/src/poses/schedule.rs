@@ -1,0 +1,230 @@
+//! The order of rows: what is visited again, from which side, and when.
+//!
+//! - Every pose is reached from a stated side of every joint, drawn at random, so that play does not look like geometry.
+//! - Some poses are measured at once again from the other side of all joints: the difference is play and nothing else.
+//! - Some are measured again later from the same side: their scatter is the noise floor.
+//! - One is visited again and again, often at first: what warms up shows there.
+//!
+//! Poses follow each other at random, so that time and place are not confounded; where a cable would leave its range or
+//! touch a link on the way, the next pose that is reached without is taken instead.
+
+use nalgebra::Point3;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
+use super::rival::{Question, asks};
+use super::sight::clearance_mm;
+use super::{Wanted, rows};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
+
+/// What is visited more than once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Visits {
+    /// Poses that are measured twice more, from the same side.
+    pub repeats: usize,
+    /// Poses that are measured again from the other side.
+    pub both_sides: usize,
+    /// Visits of one pose over the whole run, often at first.
+    pub warm_up: usize,
+    /// How far from a pose its approach begins, in every joint (rad).
+    pub approach_rad: f64,
+    /// Time from row to row (s).
+    pub seconds_per_row: f64,
+}
+
+impl Default for Visits {
+    fn default() -> Self {
+        Self {
+            repeats: 4,
+            both_sides: 12,
+            warm_up: 8,
+            approach_rad: 3.0_f64.to_radians(),
+            seconds_per_row: 12.0,
+        }
+    }
+}
+
+impl Visits {
+    /// More of what a diagnosis asks for.
+    pub(super) fn asked(&self, questions: &[Question]) -> Self {
+        let mut out = *self;
+        if asks(questions, "backlash") {
+            out.both_sides = out.both_sides.max(20);
+        }
+        if asks(questions, "thermal-drift") {
+            out.warm_up = out.warm_up.max(16);
+        }
+        if ["sensor-zero-shift", "sensor-frame-shift", "tool-shift"].iter().any(|e| asks(questions, e)) {
+            // A pose that comes back tells when something moved.
+            out.repeats = out.repeats.max(8);
+        }
+        out
+    }
+}
+
+/// Why a row is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// For the geometry.
+    Geometry,
+    /// From the other side, for play.
+    OtherSide,
+    /// Again, for the noise floor.
+    Repeat,
+    /// Again, for what changes with time.
+    WarmUp,
+}
+
+impl Purpose {
+    /// A word for tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Purpose::Geometry => "geometry",
+            Purpose::OtherSide => "other side",
+            Purpose::Repeat => "repeat",
+            Purpose::WarmUp => "warm-up",
+        }
+    }
+}
+
+/// A row to measure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The pose, in the order of the plan.
+    pub pose: usize,
+    /// Joints where the approach begins (rad).
+    pub approach_from: Joints,
+    /// The side from which each joint comes to rest: −1 from below, +1 from above.
+    pub approach: [i8; 6],
+    /// Why.
+    pub purpose: Purpose,
+    /// When, from the start (h).
+    pub time_h: f64,
+    /// Whether a cable leaves its range or comes too near to a link on the way here.
+    pub rough_way: bool,
+}
+
+/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited.
+pub(super) fn schedule(
+    wanted: &Wanted<'_>,
+    poses: Vec<Candidate>,
+    visits: &Visits,
+    bounds: &Bounds,
+    seed: u64,
+) -> (Vec<Candidate>, Vec<Row>) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006f_7264_6572);
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    order.shuffle(&mut random);
+    let order = smoothed(wanted, bounds, &poses, order);
+    let poses: Vec<Candidate> = order.into_iter().map(|i| poses[i].clone()).collect();
+    let count = poses.len();
+    let sides: Vec<[i8; 6]> =
+        poses.iter().map(|_| std::array::from_fn(|_| if random.random_bool(0.5) { 1 } else { -1 })).collect();
+    // Pose and purpose, with the sides of the pose or the other ones.
+    let other = visits.both_sides.min(count);
+    let mut list: Vec<(usize, Purpose)> = Vec::new();
+    for pose in 0..count {
+        list.push((pose, Purpose::Geometry));
+        // Spread evenly over the run.
+        if (pose + 1) * other / count > pose * other / count {
+            list.push((pose, Purpose::OtherSide));
+        }
+    }
+    // Repeats: in the middle, and in the end.
+    let repeats = visits.repeats.min(count);
+    let step = count.max(1) / repeats.max(1);
+    let repeated: Vec<usize> = (0..repeats).map(|k| k * step).collect();
+    let middle = list.len() / 2;
+    // Those of the first half come again in the middle; the others twice in the end.
+    for (at, pose) in repeated.iter().enumerate() {
+        let first = list.iter().position(|(p, _)| p == pose).unwrap_or(0);
+        let place = if first < middle { middle + at } else { list.len() };
+        list.insert(place.min(list.len()), (*pose, Purpose::Repeat));
+    }
+    list.extend(repeated.iter().map(|&pose| (pose, Purpose::Repeat)));
+    // Warm-up: the first pose, at times that grow by the square.
+    let total = list.len() + visits.warm_up;
+    for k in 1..visits.warm_up {
+        let share = k as f64 / (visits.warm_up - 1) as f64;
+        let place = ((share * share * total as f64) as usize).clamp(k, list.len());
+        list.insert(place, (0, Purpose::WarmUp));
+    }
+    let posed_rows = list.iter().enumerate().map(|(number, &(pose, purpose))| {
+        let sign = if purpose == Purpose::OtherSide { -1 } else { 1 };
+        let approach = sides[pose].map(|side| side * sign);
+        let target = poses[pose].joints;
+        Row {
+            pose,
+            approach_from: Joints::from_fn(|i, _| target[i] + f64::from(approach[i]) * visits.approach_rad),
+            approach,
+            purpose,
+            time_h: number as f64 * visits.seconds_per_row / 3600.0,
+            rough_way: false,
+        }
+    });
+    let mut rows: Vec<Row> = posed_rows.collect();
+    for k in 1..rows.len() {
+        let (from, to) = (poses[rows[k - 1].pose].joints, rows[k].approach_from);
+        rows[k].rough_way = !clear(wanted, bounds, &from, &to, poses[rows[k].pose].anchor);
+    }
+    (poses, rows)
+}
+
+/// The same order with poses put off that are not reached clearly from the one before.
+fn smoothed(wanted: &Wanted<'_>, bounds: &Bounds, poses: &[Candidate], mut order: Vec<usize>) -> Vec<usize> {
+    for k in 1..order.len() {
+        let from = poses[order[k - 1]].joints;
+        let good = (k..order.len()).find(|&other| {
+            let to = &poses[order[other]];
+            clear(wanted, bounds, &from, &to.joints, to.anchor)
+        });
+        if let Some(good) = good {
+            let pose = order.remove(good);
+            order.insert(k, pose);
+        }
+    }
+    order
+}
+
+/// Points of a way that are looked at.
+const ON_THE_WAY: usize = 16;
+
+/// Whether a cable stays in its range and off the links while the joints run from one pose to another.
+fn clear(wanted: &Wanted<'_>, bounds: &Bounds, from: &Joints, to: &Joints, anchor: usize) -> bool {
+    if wanted.sensor != Sensor::Cable {
+        return true;
+    }
+    let posed = wanted.nominal.under(&Condition::default());
+    let origin = sensor_mm(wanted.sensor, wanted.frames, anchor);
+    (0..=ON_THE_WAY).all(|k| {
+        let joints = from.lerp(to, k as f64 / ON_THE_WAY as f64);
+        let frames = posed.frames(&joints);
+        let flange = frames.last() * wanted.nominal.flange;
+        let touched = flange * Point3::from(wanted.frames.flange_from_target.translation.vector);
+        let distance = (touched.coords - origin).norm();
+        bounds.distance_mm.is_none_or(|[low, high]| (low..=high).contains(&distance))
+            && bounds
+                .clearance_mm
+                .is_none_or(|least| clearance_mm(&frames, &origin, &touched.coords, FREE_MM) >= least)
+    })
+}
+
+/// The rows as a measurement would log them.
+pub(super) fn data(planned: &[Row], poses: &[Candidate]) -> Vec<MeasuredRow> {
+    planned
+        .iter()
+        .enumerate()
+        .map(|(number, row)| {
+            let pose = &poses[row.pose];
+            let mut out = rows::blank(number, pose.joints, Sensor::Cable);
+            out.anchor = pose.anchor;
+            out.condition =
+                Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };
+            out
+        })
+        .collect()
+}

@@ -1,0 +1,40 @@
+//! Robot programs as bytes: read without loss, understood as motions, changed by edits. Knows no robot.
+//!
+//! - [`tree`]: a lossless syntax tree over bytes in flat arrays; reading never fails.
+//! - [`edit`]: sorted, disjoint edits; bytes outside them never change; [`diff`] prints them.
+//! - [`motion`]: what a program tells the robot to do, whatever its language: the [`motion::Listing`].
+//! - [`rewrite`]: what shall change, whatever the language, and what became of it.
+//! - [`shared`]: maps of which copies cost nothing, for what is known where ways part and meet.
+//! - [`draft`]: a program that does not exist yet, for a dialect to write.
+//! - [`rapid`]: ABB's RAPID: front end, evaluation, rewriting, writing.
+//! - [`nc`]: G-code of five-axis machines: the same.
+//! - [`reading`]: a program in whichever of them it is written.
+//!
+//! ```
+//! use crate::motion::TargetValue;
+//! use crate::rapid::Task;
+//! use crate::rewrite::{Change, NewTarget, RewriteOptions};
+//!
+//! let source = b"MODULE M\nPROC main()\n  MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\nENDPROC\nENDMODULE\n";
+//! let task = Task::read(&[("main.mod", &source[..])]);
+//! let motion = &task.listing.motions[0];
+//! assert_eq!((motion.place.line, &*motion.instruction), (3, "MoveL"));
+//! let Ok(TargetValue::Cartesian(target)) = motion.targets[0].value else { panic!() };
+//!
+//! let moved = NewTarget::Cartesian { position_mm: [500.25, 0.0, 300.0], quaternion: target.quaternion, conf: None };
+//! let change = Change { motion: 0, targets: vec![moved], before: vec![] };
+//! let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+//! let text = rewritten.files[0].edits.apply(source).unwrap();
+//! assert!(text.starts_with(b"MODULE M\nPROC main()\n  MoveL [[500.2500,0,300],[0,0,1,0]"));
+//! ```
+
+pub mod tree;
+pub mod shared;
+pub mod edit;
+pub mod diff;
+pub mod motion;
+pub mod rewrite;
+pub mod draft;
+pub mod rapid;
+pub mod nc;
+pub mod reading;

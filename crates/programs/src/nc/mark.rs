@@ -1,0 +1,92 @@
+//! The comment line that says that a file was compensated.
+//!
+//! `; truegrind 0.1.0 model 3f9a…` or `(truegrind 0.1.0 model 3f9a…)`, and `partial` behind it where
+//! cuts may be corrected in part, on a line of its own after the lines with which
+//! a file begins (tape start, program number, `BEGIN PGM`).
+
+use super::dialect::Dialect;
+use super::syntax::{NcTree, Syntax};
+use super::token::Token;
+use crate::motion::Mark;
+
+/// The mark of a file, where it has one.
+pub fn find(tree: &NcTree<'_>) -> Option<Mark> {
+    read(tree.text(token(tree)?))
+}
+
+/// The token of the mark.
+pub fn token(tree: &NcTree<'_>) -> Option<u32> {
+    let mut tokens = 0..tree.len() as u32;
+    tokens.find(|&token| tree.kind(token) == Some(Token::Comment) && read(tree.text(token)).is_some())
+}
+
+/// Reads a comment as a mark.
+pub fn read(comment: &[u8]) -> Option<Mark> {
+    let text = comment.trim_ascii();
+    let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"("))?;
+    if !text.trim_ascii_start().to_ascii_lowercase().starts_with(b"truegrind") {
+        return None;
+    }
+    let text = std::str::from_utf8(text).ok()?.trim_end_matches(')');
+    let mut words = text.split_ascii_whitespace();
+    if !words.next()?.eq_ignore_ascii_case("truegrind") {
+        return None;
+    }
+    let version = words.next()?.to_owned();
+    if !words.next()?.eq_ignore_ascii_case("model") {
+        return None;
+    }
+    let model = words.next()?.to_ascii_lowercase();
+    Some(Mark {
+        version,
+        model,
+        partial: words.next().is_some_and(|word| word.eq_ignore_ascii_case("partial")),
+    })
+}
+
+/// The comment of a mark, as the dialect writes comments.
+pub fn text(mark: &Mark, dialect: Dialect) -> String {
+    let partial = if mark.partial { " partial" } else { "" };
+    let text = format!("truegrind {} model {}{partial}", mark.version, mark.model);
+    // Fanuc knows `;` only as the end of a block.
+    if matches!(dialect, Dialect::Fanuc | Dialect::Iso) { format!("({text})") } else { format!("; {text}") }
+}
+
+/// Where the line of the mark goes: after the first lines that must stay the first.
+pub fn place(tree: &NcTree<'_>, dialect: Dialect) -> usize {
+    let source = tree.source();
+    let mut place = 0;
+    let mut at = 0;
+    let last = if source.contains(&b'\n') { b'\n' } else { b'\r' };
+    while at < source.len() {
+        let end = source[at..].iter().position(|&byte| byte == last).map_or(source.len(), |end| at + end + 1);
+        let line = source[at..end].trim_ascii();
+        let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line);
+        let upper = line.to_ascii_uppercase();
+        let digits = upper.iter().take_while(|byte| byte.is_ascii_digit() || **byte == b' ').count();
+        let stays = match dialect {
+            Dialect::Heidenhain => upper[digits..].starts_with(b"BEGIN PGM"),
+            Dialect::LinuxCnc => line.starts_with(b"%"),
+            _ => {
+                line.starts_with(b"%")
+                    || upper.starts_with(b";$PATH")
+                    || upper.starts_with(b"PROC ")
+                    || matches!(upper.first(), Some(b'O' | b':'))
+                        && upper.get(1).is_some_and(u8::is_ascii_digit)
+            }
+        };
+        // Empty lines before those lines are passed over.
+        if stays {
+            place = end;
+        } else if !line.is_empty() {
+            break;
+        }
+        at = end;
+    }
+    place
+}
+
+/// Whether a file has anything but comments and white space.
+pub fn is_program(tree: &NcTree<'_>) -> bool {
+    tree.nodes.iter().any(|node| matches!(node.kind, Syntax::Block | Syntax::Skippable))
+}

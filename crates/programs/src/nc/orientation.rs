@@ -1,0 +1,146 @@
+//! How three words turn a tool.
+//!
+//! Angles are degrees. A *tool vector* points from the tip to the spindle, as `A3= B3= C3=` (Siemens), `I J K` with
+//! G43.5 (Fanuc) and `TX TY TZ` (Heidenhain) have it; the z axis of a tool frame points the other way, out of the
+//! tool. A vector leaves the turn about itself open: it is [`spun`], the angle from the frame whose x axis lies in the
+//! plane of z and the work object's x (y, where z is along x).
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use truegrind_math::se3::rotation_from_matrix;
+
+/// What the words A, B and C mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Angles {
+    /// About z by A, the new y by B, the new x by C (KUKA).
+    Abc,
+    /// About the fixed x by A, y by B, z by C (ISO 841 letters; W, P, R of FANUC).
+    Wpr,
+    /// About x by A, the new y by B, the new z by C (Stäubli).
+    Rxyz,
+    /// A rotation vector (A, B, C) whose length is the angle.
+    RotationVector,
+}
+
+impl Angles {
+    /// The word for it in a comment.
+    pub fn text(self) -> &'static str {
+        match self {
+            Angles::Abc => "abc",
+            Angles::Wpr => "wpr",
+            Angles::Rxyz => "rxyz",
+            Angles::RotationVector => "rotation-vector",
+        }
+    }
+
+    /// The convention of that word.
+    pub fn of(text: &str) -> Option<Angles> {
+        [Angles::Abc, Angles::Wpr, Angles::Rxyz, Angles::RotationVector]
+            .into_iter()
+            .find(|angles| angles.text().eq_ignore_ascii_case(text))
+    }
+
+    /// The rotation of three angles (°).
+    pub fn rotation(self, [a, b, c]: [f64; 3]) -> UnitQuaternion<f64> {
+        let [a, b, c] = [a, b, c].map(f64::to_radians);
+        let x = |angle| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle);
+        let y = |angle| UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+        let z = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        match self {
+            Angles::Abc => z(a) * y(b) * x(c),
+            Angles::Wpr => z(c) * y(b) * x(a),
+            Angles::Rxyz => x(a) * y(b) * z(c),
+            Angles::RotationVector => UnitQuaternion::from_scaled_axis(Vector3::new(a, b, c)),
+        }
+    }
+
+    /// The three angles (°) of a rotation, of all that mean it the nearest to `near`.
+    pub fn angles(self, rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
+        if self == Angles::RotationVector {
+            return rotation_vector(rotation, near);
+        }
+        let m = rotation.to_rotation_matrix();
+        // First, middle and last angle of the product of three turns.
+        let (first, middle, last) = match self {
+            // Rz(f) Ry(m) Rx(l).
+            Angles::Abc | Angles::Wpr => (
+                m[(1, 0)].atan2(m[(0, 0)]),
+                (-m[(2, 0)]).atan2(m[(0, 0)].hypot(m[(1, 0)])),
+                m[(2, 1)].atan2(m[(2, 2)]),
+            ),
+            // Rx(f) Ry(m) Rz(l).
+            _ => (
+                (-m[(1, 2)]).atan2(m[(2, 2)]),
+                m[(0, 2)].atan2(m[(0, 0)].hypot(m[(0, 1)])),
+                (-m[(0, 1)]).atan2(m[(0, 0)]),
+            ),
+        };
+        let [first, middle, last] = [first, middle, last].map(f64::to_degrees);
+        let near = if self == Angles::Wpr { [near[2], near[1], near[0]] } else { near };
+        let candidates = if middle.abs() > 90.0 - 1e-7 {
+            // Only the sum or difference of first and last is known: the last stays.
+            let keep = near[2];
+            let first = match (self, middle > 0.0) {
+                (Angles::Rxyz, true) => m[(1, 0)].atan2(m[(1, 1)]).to_degrees() - keep,
+                (Angles::Rxyz, false) => keep - m[(1, 0)].atan2(m[(1, 1)]).to_degrees(),
+                (_, true) => (-m[(0, 1)]).atan2(m[(1, 1)]).to_degrees() + keep,
+                (_, false) => (-m[(0, 1)]).atan2(m[(1, 1)]).to_degrees() - keep,
+            };
+            [[first, middle, keep]; 2]
+        } else {
+            [[first, middle, last], [first + 180.0, 180.0 - middle, last + 180.0]]
+        };
+        let nearest = candidates.map(|angles| {
+            std::array::from_fn(|i| {
+                let turns = ((near[i] - angles[i]) / 360.0_f64).round();
+                angles[i] + 360.0 * turns
+            })
+        });
+        let distance = |angles: &[f64; 3]| (0..3).map(|i| (angles[i] - near[i]).abs()).sum::<f64>();
+        let [a, b] = nearest;
+        let best = if distance(&a) <= distance(&b) { a } else { b };
+        if self == Angles::Wpr { [best[2], best[1], best[0]] } else { best }
+    }
+}
+
+/// The rotation vector (°) nearest to an old one: its direction, or the other way round.
+fn rotation_vector(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
+    let vector = rotation.scaled_axis().map(f64::to_degrees);
+    let near = Vector3::from(near);
+    let length = vector.norm();
+    if length < 1e-9 {
+        // A whole turn keeps its axis.
+        return match near.try_normalize(1e-9) {
+            Some(axis) => (axis * 360.0 * (near.norm() / 360.0).round()).into(),
+            None => vector.into(),
+        };
+    }
+    let axis = vector / length;
+    let turns = ((near.dot(&axis) - length) / 360.0).round();
+    (axis * (length + 360.0 * turns)).into()
+}
+
+/// A tool orientation from a tool vector and the turn about it (°); `None` where the vector has no length.
+pub fn spun(vector: [f64; 3], spin_deg: f64) -> Option<UnitQuaternion<f64>> {
+    let z = -Vector3::from(vector).try_normalize(1e-9)?;
+    let along = if z.x.abs() < PARALLEL { Vector3::x() } else { Vector3::y() };
+    let x = (along - z * z.dot(&along)).normalize();
+    let base = rotation_from_matrix(&Matrix3::from_columns(&[x, z.cross(&x), z]));
+    Some(base * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), spin_deg.to_radians()))
+}
+
+/// Beyond this share of x in a tool's axis its turn is counted from y.
+const PARALLEL: f64 = 0.999;
+
+/// Tool vector and turn about it (°, the nearest to `near_deg`) of an orientation.
+pub fn vector_and_spin(rotation: &UnitQuaternion<f64>, near_deg: f64) -> ([f64; 3], f64) {
+    let vector: [f64; 3] = (-(rotation * Vector3::z())).into();
+    let spin = match spun(vector, 0.0) {
+        Some(base) => {
+            let turn = base.inverse() * rotation;
+            2.0 * turn.k.atan2(turn.w).to_degrees()
+        }
+        None => 0.0,
+    };
+    (vector, spin + 360.0 * ((near_deg - spin) / 360.0).round())
+}

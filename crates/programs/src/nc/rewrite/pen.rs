@@ -1,0 +1,201 @@
+//! Writing the words of one block: numbers in place, words that were left out at their place in the order.
+
+use super::slots::{ORDER, Slots, spaced};
+use crate::edit::Edits;
+use crate::nc::dialect::Dialect;
+use crate::nc::expression::literal;
+use crate::nc::syntax::{Belongs, NcTree, Word};
+use crate::nc::task::Written;
+use crate::nc::token::Token;
+use crate::rapid::number;
+use crate::rewrite::Outcome;
+
+/// Changes smaller than this are numerical noise, whatever the decimals of the source.
+const NOISE: f64 = 1e-9;
+
+/// Writes words of one block.
+pub(super) struct Pen<'p, 's> {
+    pub(super) tree: &'p NcTree<'s>,
+    pub(super) dialect: Dialect,
+    pub(super) edits: &'p mut Edits,
+    /// The words of the block in the order in which controls list them.
+    pub(super) order: [Option<Word<'p>>; ORDER],
+    /// After which token new words go where the block has none of these.
+    pub(super) end: u32,
+    /// The words of a block that does not exist yet.
+    pub(super) added: Vec<u8>,
+    pub(super) replaced: Outcome,
+    /// Whether white space stands between words here.
+    pub(super) spaced: bool,
+    /// The token before which L must come where a positioning block of Heidenhain gets words.
+    pub(super) lead: Option<u32>,
+}
+
+impl<'p, 's: 'p> Pen<'p, 's> {
+    /// A pen for a block that there is.
+    pub(super) fn new(
+        tree: &'p NcTree<'s>,
+        dialect: Dialect,
+        edits: &'p mut Edits,
+        slots: &Slots<'s>,
+        written: &Written,
+    ) -> Self {
+        Pen {
+            tree,
+            dialect,
+            edits,
+            order: slots.order(),
+            end: slots.end,
+            added: Vec::new(),
+            replaced: Outcome::Unchanged,
+            spaced: spaced(tree, slots.last),
+            lead: slots.first.filter(|_| written.paraxial).map(|word| word.first),
+        }
+    }
+
+    /// What has become of the block.
+    pub(super) fn finish(mut self) -> Outcome {
+        if let Some(token) = self.lead.take()
+            && self.replaced != Outcome::Unchanged
+        {
+            self.edits.insert(self.tree.start(token), b"L ");
+        }
+        self.replaced
+    }
+}
+
+impl Pen<'_, '_> {
+    /// Puts a word in at its place among the others: before the next of them, else after the last.
+    fn insert(&mut self, place: usize, mut text: Vec<u8>) {
+        if self.end == 0 {
+            self.added.push(b' ');
+            self.added.extend_from_slice(&text);
+            return;
+        }
+        if self.replaced == Outcome::Unchanged {
+            self.replaced = Outcome::InPlace;
+        }
+        match self.order[place + 1..].iter().flatten().next() {
+            Some(next) => {
+                if self.spaced {
+                    text.push(b' ');
+                }
+                if self.lead == Some(next.first) {
+                    self.lead = None;
+                    text.splice(0..0, *b"L ");
+                }
+                self.edits.insert(self.tree.start(next.first), &text);
+            }
+            None => {
+                let last = self.order[..place].iter().flatten().next_back().map_or(self.end, |word| word.end);
+                if self.spaced {
+                    text.insert(0, b' ');
+                }
+                // After the last byte of the word: white space belongs to what follows.
+                let at = self.tree.start(last - 1) + self.tree.text(last - 1).len();
+                self.edits.insert(at, &text);
+            }
+        }
+    }
+
+    /// How many decimals a word can have: a Fanuc takes eight digits.
+    fn fitting(&self, value: f64, decimals: u8) -> u8 {
+        const DIGITS: u8 = 8;
+        if self.dialect != Dialect::Fanuc {
+            return decimals;
+        }
+        let whole = value.abs().max(1.0).log10() as u8 + 1;
+        decimals.min(DIGITS.saturating_sub(whole))
+    }
+
+    /// Gives a word a value, or puts it in where it is left out and what holds without it (`keep`) is another. An
+    /// expression that is worth that value already (`was`) stays. Answers the value that the control reads.
+    pub(super) fn put(
+        &mut self,
+        place: usize,
+        name: &[u8],
+        value: f64,
+        keep: f64,
+        was: f64,
+        least: u8,
+    ) -> f64 {
+        if !value.is_finite() {
+            return keep;
+        }
+        let least = self.fitting(value, least);
+        let Some(word) = self.order[place] else {
+            if !differs(keep, value, least) {
+                return keep;
+            }
+            let mut text = name.to_vec();
+            if name.len() > 1 && self.dialect == Dialect::Siemens {
+                text.push(b'=');
+            }
+            if self.dialect == Dialect::Heidenhain && number::rounded(value, least) >= 0.0 {
+                text.push(b'+');
+            }
+            number::write(&mut text, value, least);
+            self.insert(place, text);
+            return number::rounded(value, least);
+        };
+        match word.belongs {
+            Belongs::Literal { sign, number: token } => {
+                let text = self.tree.text(token);
+                let minus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Minus));
+                let old = literal(text).map_or(f64::NAN, |old| if minus { -old } else { old });
+                let decimals = self.fitting(value, decimals(text).max(least));
+                if !differs(old, value, decimals) {
+                    return old;
+                }
+                let first = sign.unwrap_or(token);
+                let plus = sign.is_some_and(|sign| self.tree.kind(sign) == Some(Token::Plus))
+                    || self.dialect == Dialect::Heidenhain;
+                let rounded = number::rounded(value, decimals);
+                self.edits.replace_with(self.tree.range(first, token + 1), |out| {
+                    if plus && rounded >= 0.0 {
+                        out.push(b'+');
+                    }
+                    number::write(out, value, decimals);
+                });
+                if self.replaced == Outcome::Unchanged {
+                    self.replaced = Outcome::InPlace;
+                }
+                rounded
+            }
+            Belongs::Expression { .. } if !differs(was, value, least) => was,
+            Belongs::Expression { first, end } => {
+                // AC( … ) and IC( … ) keep their name.
+                let called =
+                    self.dialect == Dialect::Siemens && self.tree.kind(first) == Some(Token::Name) && {
+                        let name = self.tree.text(first).to_ascii_uppercase();
+                        matches!(&*name, b"AC" | b"IC" | b"DC" | b"ACP" | b"ACN")
+                    };
+                let open = (first..end).find(|&token| self.tree.kind(token) == Some(Token::ParenOpen));
+                let range = match open {
+                    Some(open) if called => self.tree.start(open + 1)..self.tree.start(end - 1),
+                    _ => self.tree.range(first, end),
+                };
+                let rounded = number::rounded(value, least);
+                self.edits.replace_with(range, |out| number::write(out, value, least));
+                self.replaced = Outcome::Inlined;
+                rounded
+            }
+            Belongs::Nothing | Belongs::Arguments { .. } => keep,
+        }
+    }
+}
+
+/// Half a unit of the last decimal, and never less than noise. What is not known differs from everything.
+pub(super) fn differs(old: f64, new: f64, decimals: u8) -> bool {
+    let half = 0.5 * 10_f64.powi(-i32::from(decimals));
+    !((new - old).abs() <= half.max(NOISE))
+}
+
+fn decimals(text: &[u8]) -> u8 {
+    // 1.5EX1 of Siemens is written anew without its exponent.
+    if text.iter().any(|byte| byte.eq_ignore_ascii_case(&b'E')) {
+        return 0;
+    }
+    let point = text.iter().position(|byte| matches!(byte, b'.' | b','));
+    point.map_or(0, |point| (text.len() - point - 1).min(usize::from(number::MOST_DECIMALS)) as u8)
+}

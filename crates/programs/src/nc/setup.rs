@@ -1,0 +1,132 @@
+//! What an NC file does not say itself: how A, B and C turn the tool, where work offsets lie, what tools are.
+//!
+//! A cell or robot file may say it, or comment lines of the program, which the control passes over:
+//!
+//! ```text
+//! ; truegrind angles wpr
+//! ; truegrind tool T1 tGrind [[0,0,150],[1,0,0,0]]
+//! ; truegrind frame G54 wPart [[500,0,300],[1,0,0,0]]
+//! ```
+
+use super::dialect::Dialect;
+use super::orientation::Angles;
+use crate::motion::{FARTHEST_MM, Frame, ToolValue};
+
+/// What is known beside the program. What is given here goes before what the program's comments say.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Setup {
+    /// The dialect; found by its signs where left out.
+    pub dialect: Option<Dialect>,
+    /// What A, B and C mean.
+    pub angles: Option<Angles>,
+    /// Tools by name (`T1`).
+    pub tools: Vec<(String, Frame)>,
+    /// Work offsets by name (`G54`).
+    pub frames: Vec<(String, Frame)>,
+}
+
+impl Setup {
+    /// The tool frame of a name, in any case.
+    pub fn tool(&self, name: &str) -> Option<Frame> {
+        find(&self.tools, name)
+    }
+
+    /// The work offset of a name, in any case.
+    pub fn frame(&self, name: &str) -> Option<Frame> {
+        find(&self.frames, name)
+    }
+}
+
+/// The last frame of a name: in any case, T08 is T8, `G54.1 P1` is G54.1P1.
+fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
+    let name = plain(name);
+    list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
+}
+
+/// Whether two names are one: in any case, T08 is T8.
+pub fn same(one: &str, other: &str) -> bool {
+    plain(one) == plain(other)
+}
+
+/// A name in upper case without blanks, and its number without leading zeros.
+pub(super) fn plain(name: &str) -> String {
+    let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
+    match name.strip_prefix('T') {
+        Some(digits) if !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()) => {
+            let number = digits.trim_start_matches('0');
+            format!("T{}", if number.is_empty() { "0" } else { number })
+        }
+        _ => name,
+    }
+}
+
+/// A tool on the flange of which only the frame is known.
+pub(super) fn held(frame: Frame) -> ToolValue {
+    ToolValue { robhold: true, frame, mass_kg: 0.0, centre_of_gravity_mm: [0.0; 3] }
+}
+
+/// A statement in a comment.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Statement {
+    /// `angles wpr`
+    Angles(Angles),
+    /// `tool T1 name [[…],[…]]`
+    Tool(Stated),
+    /// `frame G54 name [[…],[…]]`
+    Frame(Stated),
+}
+
+/// A tool or work offset that a comment states.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stated {
+    /// As blocks call it: `T1`, `G54`.
+    pub(super) number: String,
+    /// As people call it, and a cell file may.
+    pub(super) name: String,
+    pub(super) frame: Frame,
+}
+
+/// Reads a comment as a statement of a frame, tool or convention; an error where it begins as one and cannot be read.
+pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, ()> {
+    // Nearly every comment is turned away here.
+    let text = comment.trim_ascii();
+    let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"(")).unwrap_or(text).trim_ascii();
+    if text.len() < 12 || !text[..10].eq_ignore_ascii_case(b"truegrind ") {
+        return Ok(None);
+    }
+    let text = String::from_utf8_lossy(text);
+    let text = text.strip_suffix(')').unwrap_or(&text);
+    // `frame G54.1 P1 name [[` has a name of two words.
+    let (head, tail) = text.split_at(text.find("[[").unwrap_or(text.len()));
+    let words: Vec<&str> = head.split_ascii_whitespace().skip(1).collect();
+    let Some(what) = words.first().map(|what| what.to_ascii_lowercase()) else { return Ok(None) };
+    if what == "angles" {
+        let [_, angles] = words[..] else { return Err(()) };
+        return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or(());
+    }
+    if !matches!(&*what, "tool" | "frame") {
+        return Ok(None);
+    }
+    let (number, name) = match words[1..] {
+        [number, name] => (number.to_owned(), name),
+        [first, second, name] => (format!("{first} {second}"), name),
+        _ => return Err(()),
+    };
+    let stated = Stated { number, name: name.to_owned(), frame: frame(tail).ok_or(())? };
+    Ok(Some(if what == "tool" { Statement::Tool(stated) } else { Statement::Frame(stated) }))
+}
+
+/// `[[x,y,z],[q1,q2,q3,q4]]`
+fn frame(text: &str) -> Option<Frame> {
+    let mut numbers = [0.0_f64; 7];
+    let mut found = 0;
+    for part in text.split(['[', ']', ',', ' ']).filter(|part| !part.is_empty()) {
+        *numbers.get_mut(found)? = part.parse().ok()?;
+        found += 1;
+    }
+    let [x, y, z, w, i, j, k] = numbers;
+    let square = w * w + i * i + j * j + k * k;
+    let near = [x, y, z].iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM);
+    (found == 7 && near && (square - 1.0).abs() < 1e-3)
+        .then_some(Frame { position_mm: [x, y, z], quaternion: [w, i, j, k] })
+}

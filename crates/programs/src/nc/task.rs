@@ -1,0 +1,686 @@
+//! From a file to the listing: every block that moves, with what holds in it.
+//!
+//! Blocks are followed in the order of the text. Where they can be reached from elsewhere (labels, loops, the begin of a
+//! subprogram), what went before holds no more, but for groups that the whole file sets to one thing only. A block that
+//! may be skipped leaves known only what it does not change.
+
+mod codes;
+mod doubt;
+mod flow;
+mod frames;
+mod heidenhain;
+mod known;
+mod m_words;
+mod motion;
+mod names;
+mod survey;
+mod words;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::sync::Arc as Shared;
+
+use super::arc::Arc;
+use super::dialect::Dialect;
+use super::expression::{Variable, literal};
+use super::machine::{Group, Meaning, Mode, State, Turn};
+use super::mark;
+use super::orientation::Angles;
+use super::parser::parse;
+use super::setup::{self, Setup, Stated, Statement, held, statement};
+use super::syntax::{Belongs, NcTree, Word};
+use super::token::Token;
+use crate::motion::{Frame, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool};
+
+/// NC files, read together: each runs on its own, the setup holds for all.
+#[derive(Debug)]
+pub struct Task<'s> {
+    /// The names of the files, as given.
+    pub names: Vec<String>,
+    /// The files, as trees.
+    pub trees: Vec<NcTree<'s>>,
+    /// Their dialects.
+    pub dialects: Vec<Dialect>,
+    /// What A, B and C mean in each.
+    pub angles: Vec<Option<Angles>>,
+    /// What they tell the machine to do.
+    pub listing: Listing,
+    /// What happens to the position, in the order of files and lines.
+    pub(super) events: Vec<Event>,
+    /// How each motion is written; by motion.
+    pub(super) written: Vec<Written>,
+}
+
+/// What a rewrite must know of the order of blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Event {
+    /// A file begins.
+    Start,
+    /// A motion of the listing.
+    Motion(u32),
+    /// These axes are not known from here on: bits 0 to 2 X Y Z, 3 to 5 A B C.
+    Lost(u8),
+    /// Position and orientation are not known from here on.
+    Unknown,
+    /// The place where the tool stands gets these values (G92); of the axes that are named some may not be known.
+    Shift {
+        /// The values (mm), where value and place are known.
+        stated: [Option<f64>; 3],
+        /// The axes that are named.
+        named: [bool; 3],
+    },
+    /// The shift of these axes ends, or is said whole: wherever the tool stands.
+    Placed([bool; 3]),
+    /// The same in a block that may be skipped.
+    MaybePlaced([bool; 3]),
+    /// A shift that was kept holds again (G92.3).
+    Restored,
+    /// As [`Event::Unknown`], at a place that can be reached from elsewhere, or from which another place can.
+    Join,
+    /// Another place of the file can be reached from here.
+    Jump,
+    /// Something that stays counts from where the tool stands in these axes (bits as for [`Event::Lost`]): an origin is set by a
+    /// word that is not followed, or a position is read.
+    Held {
+        /// The axes.
+        axes: u8,
+        /// Whether a position is read, and no origin set.
+        read: bool,
+    },
+}
+
+/// How a motion is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Written {
+    /// Its block.
+    pub(super) node: u32,
+    pub(super) absolute: bool,
+    pub(super) unit_mm: f64,
+    /// Where it starts (mm, shifts included), as far as known.
+    pub(super) start: [Option<f64>; 3],
+    /// A, B, C (or A2, B2, C2) before it.
+    pub(super) start_angles: [Option<f64>; 3],
+    /// The same after it.
+    pub(super) angles: [Option<f64>; 3],
+    /// The tool vector and the turn about it before it.
+    pub(super) start_vector: Option<([f64; 3], f64)>,
+    /// The same after it.
+    pub(super) vector: Option<([f64; 3], f64)>,
+    pub(super) shift: [Option<f64>; 3],
+    pub(super) turn: Turn,
+    pub(super) vector_words: bool,
+    /// The arc, with whether it turns positively and whether its centre is absolute.
+    pub(super) arc: Option<(Arc, bool, bool)>,
+    /// Whether a block may stand before it.
+    pub(super) insertable: bool,
+    /// Whether words that it leaves out can be said again though it stays.
+    pub(super) restates: bool,
+    /// Whether a word of it may say nothing, because its variable may never have been set (Fanuc).
+    pub(super) may_lack: bool,
+    /// Whether it is a positioning block of Heidenhain without L.
+    pub(super) paraxial: bool,
+    /// What its way hangs on where it stays as it is.
+    pub(super) needs: Needs,
+}
+
+/// What the way of a motion that stays hangs on, beside its own words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Needs {
+    /// Nothing: a straight one only begins elsewhere.
+    Nothing,
+    /// Where it starts.
+    Start,
+    /// Where it starts, and in which direction the motion before comes there.
+    Tangent,
+}
+
+impl Task<'_> {
+    /// What the way of a motion hangs on, where it stays or does not.
+    pub(super) fn needs(&self, motion: usize, stays: bool) -> Needs {
+        let needs = self.written[motion].needs;
+        match self.listing.motions[motion].kind {
+            _ if !stays => Needs::Nothing,
+            MotionKind::Circular => needs.max(Needs::Start),
+            _ => needs,
+        }
+    }
+}
+
+impl<'s> Task<'s> {
+    /// Reads files, given by name and bytes. Never fails: what cannot be read is listed.
+    pub fn read(files: &[(&str, &'s [u8])], setup: &Setup) -> Task<'s> {
+        let dialects: Vec<Dialect> = files
+            .iter()
+            .map(|(name, bytes)| setup.dialect.unwrap_or_else(|| Dialect::of_named(name, bytes)))
+            .collect();
+        let trees: Vec<_> = files.iter().zip(&dialects).map(|((_, bytes), &d)| parse(bytes, d)).collect();
+        let mut task = Task {
+            names: files.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            trees,
+            dialects,
+            angles: Vec::new(),
+            listing: Listing::default(),
+            events: Vec::new(),
+            written: Vec::new(),
+        };
+        for file in 0..files.len() {
+            let mut lister = Lister::new(&task.trees[file], file as u32, task.dialects[file], setup);
+            // Siemens: a subprogram by the ending of its name.
+            lister.called = task.names[file].to_ascii_lowercase().ends_with(".spf");
+            lister.listing = std::mem::take(&mut task.listing);
+            lister.events = std::mem::take(&mut task.events);
+            lister.written = std::mem::take(&mut task.written);
+            lister.file();
+            task.angles.push(lister.angles);
+            let Lister { listing, events, written, .. } = lister;
+            (task.listing, task.events, task.written) = (listing, events, written);
+        }
+        task.spare_arcs();
+        task
+    }
+}
+
+pub(super) struct Lister<'t, 's> {
+    tree: &'t NcTree<'s>,
+    file: u32,
+    dialect: Dialect,
+    setup: &'t Setup,
+    angles: Option<Angles>,
+    /// Tools and work offsets as setup and comments state them, by name.
+    tools: HashMap<String, Frame>,
+    frames: HashMap<String, Frame>,
+    /// Variables that the file sets before here.
+    ever_set: HashSet<Variable>,
+    state: State,
+    /// What the file sets; found while it is followed.
+    found: doubt::Found,
+    /// What the whole file sets, where it has been followed before.
+    whole: Option<doubt::Found>,
+    /// Groups that are set before the way can first part.
+    settled: u32,
+    /// Whether the way has parted: jumps, calls, labels.
+    branched: bool,
+    /// Whether the block that is being followed may be skipped.
+    skipping: bool,
+    /// Whether the program has ended (M30): what comes next belongs to another.
+    ended: bool,
+    /// Whether synchronised actions may set variables.
+    actions: bool,
+    /// What numbers and words meant before the block that is being followed.
+    meaning: Meaning,
+    /// What held before the subprogram that is being passed.
+    passed: Option<State>,
+    /// Whether tools come in with M6.
+    changes_tools: bool,
+    /// Whether a cycle that is called may be a program (cycle 12 of Heidenhain).
+    calls_program: bool,
+    /// Whether a block has words of NC and no others.
+    speaks: bool,
+    /// Whether the program begins again at its end.
+    repeats: bool,
+    /// Whether the file is a subprogram and no more: what holds at its begin is its caller's.
+    called: bool,
+    /// Whether the file is of a control of which no reader here knows the words (DIN/ISO of Heidenhain).
+    foreign: bool,
+    /// Contours that cycles of lathes read, from block to block.
+    contours: HashMap<u64, u64>,
+    /// The block that ends the contour which is being read.
+    contour: Option<u64>,
+    /// Names that the file declares (Siemens).
+    declared: BTreeSet<Vec<u8>>,
+    /// Those of them that hold whole numbers only.
+    whole_numbers: BTreeSet<Vec<u8>>,
+    /// The programs and subprograms that stand in the file, by their O.
+    programs: BTreeSet<Variable>,
+    /// Blocks that jumps go to.
+    targets: BTreeSet<u64>,
+    /// Whether a jump goes to a computed block.
+    anywhere: bool,
+    listing: Listing,
+    events: Vec<Event>,
+    written: Vec<Written>,
+    instructions: BTreeMap<String, Shared<str>>,
+    speeds: BTreeMap<u64, u32>,
+    tool_index: HashMap<String, u32>,
+    frame_index: Option<(String, Option<truegrind_math::se3::Pose>, u32)>,
+}
+
+/// How long the lists were before a file.
+struct Lengths([usize; 7]);
+
+/// What a block says, word by word.
+#[derive(Default)]
+struct Said<'s> {
+    node: u32,
+    words: Vec<Word<'s>>,
+    axes: [Option<usize>; 3],
+    abc: [Option<usize>; 3],
+    rpy: [Option<usize>; 3],
+    vector: [Option<usize>; 3],
+    centre: [Option<usize>; 3],
+    spin: Option<usize>,
+    radius: Option<usize>,
+    g: Vec<u32>,
+    m: Vec<u32>,
+    p: Option<usize>,
+    l: Option<usize>,
+    q: Option<usize>,
+    feed: Option<usize>,
+    h: Option<usize>,
+    d: Option<usize>,
+    /// U, V, W, E: axes that are not followed.
+    others: bool,
+    /// R0 (false), RL, RR, R+ and R- of Heidenhain.
+    compensates: Option<bool>,
+    /// R+ and R-: the axes of the block go by the tool's radius farther or less far.
+    lengthens: bool,
+    /// NX, NY, NZ: the surface normal.
+    normal: bool,
+    /// Why the block is left though it moves as its words say: measuring, poles, angles of a contour.
+    aside: Option<Reason>,
+    /// A word that is not known: what it is, and why.
+    unknown: Option<(String, Reason)>,
+    /// A positioning block without L.
+    paraxial: bool,
+    opaque: bool,
+    /// The opaque part may hold more than axes.
+    obscure: bool,
+    skippable: bool,
+    /// G53, SUPA, M91.
+    machine: bool,
+    /// FMAX.
+    rapid: bool,
+    turns: bool,
+    /// Corners that are rounded or cut: `,R5`, `,C2`, RND=, CHF=, CHR=.
+    corner: bool,
+}
+
+impl Said<'_> {
+    fn moves(&self) -> bool {
+        let any = |list: &[Option<usize>]| list.iter().any(Option::is_some);
+        any(&self.axes) || any(&self.abc) || any(&self.rpy) || any(&self.vector) || self.spin.is_some()
+    }
+}
+
+impl<'t, 's> Lister<'t, 's> {
+    fn new(tree: &'t NcTree<'s>, file: u32, dialect: Dialect, setup: &'t Setup) -> Self {
+        let state = State::start(if dialect == Dialect::Siemens { "G500" } else { "G54" }, "T0");
+        Lister {
+            tree,
+            file,
+            dialect,
+            setup,
+            angles: setup.angles,
+            tools: HashMap::new(),
+            frames: HashMap::new(),
+            ever_set: HashSet::new(),
+            state,
+            found: doubt::Found::default(),
+            whole: None,
+            settled: 0,
+            branched: false,
+            skipping: false,
+            ended: false,
+            actions: false,
+            meaning: Meaning::default(),
+            passed: None,
+            changes_tools: false,
+            calls_program: false,
+            speaks: false,
+            repeats: false,
+            called: false,
+            foreign: false,
+            contours: HashMap::new(),
+            contour: None,
+            declared: BTreeSet::new(),
+            whole_numbers: BTreeSet::new(),
+            programs: BTreeSet::new(),
+            targets: BTreeSet::new(),
+            anywhere: false,
+            listing: Listing::default(),
+            events: Vec::new(),
+            written: Vec::new(),
+            instructions: BTreeMap::new(),
+            speeds: BTreeMap::new(),
+            tool_index: HashMap::new(),
+            frame_index: None,
+        }
+    }
+
+    fn place(&self, token: u32) -> Place {
+        let (line, column) = self.tree.line_column(self.tree.start(token));
+        Place { file: self.file, line, column }
+    }
+
+    fn file(&mut self) {
+        self.listing.marks.push(mark::find(self.tree));
+        for opaque in &self.tree.opaque {
+            self.listing.opaque.push(OpaqueRegion {
+                place: self.place(opaque.at.min(self.tree.len() as u32)),
+                span: self.tree.span(opaque.first, opaque.end),
+                reason: opaque.reason,
+            });
+        }
+        self.comments();
+        self.survey();
+        let lengths = self.lengths();
+        let start = self.state.clone();
+        self.follow();
+        if self.branched {
+            // Now it is known what the whole file sets, which tells what still holds where ways meet.
+            self.back_to(&lengths);
+            self.state = start;
+            self.whole = Some(std::mem::take(&mut self.found));
+            (self.settled, self.branched, self.ended, self.actions) = (0, false, false, false);
+            (self.passed, self.contour) = (None, None);
+            self.follow();
+        }
+        // A text of which not one block is NC is no program: nothing in it moves.
+        let unread = |motion: &Motion| matches!(motion.left, Some(Reason::Unread | Reason::UnknownWord));
+        if !self.speaks && self.listing.motions[lengths.0[0]..].iter().all(unread) {
+            self.back_to(&lengths);
+            self.events.push(Event::Start);
+        }
+    }
+
+    fn follow(&mut self) {
+        self.events.push(Event::Start);
+        if self.called {
+            self.enter();
+        } else if self.repeats() {
+            self.forget();
+        }
+        let mut said = Said::default();
+        let blocks: Vec<u32> = self.tree.child_nodes(0).collect();
+        for block in blocks {
+            self.block(block, &mut said);
+        }
+    }
+
+    fn lengths(&self) -> Lengths {
+        let listing = &self.listing;
+        Lengths([
+            listing.motions.len(),
+            listing.speeds.len(),
+            listing.zones.len(),
+            listing.tools.len(),
+            listing.work_objects.len(),
+            self.events.len(),
+            self.written.len(),
+        ])
+    }
+
+    fn back_to(&mut self, &Lengths([motions, speeds, zones, tools, objects, events, written]): &Lengths) {
+        self.listing.motions.truncate(motions);
+        self.listing.outside.retain(|call| (*call as usize) < motions);
+        self.listing.speeds.truncate(speeds);
+        self.listing.zones.truncate(zones);
+        self.listing.tools.truncate(tools);
+        self.listing.work_objects.truncate(objects);
+        self.events.truncate(events);
+        self.written.truncate(written);
+        self.speeds.clear();
+        self.tool_index.clear();
+        self.frame_index = None;
+    }
+
+    /// Frames, tools and conventions that comments state.
+    fn comments(&mut self) {
+        let (mut tools, mut frames) = (Vec::new(), Vec::new());
+        for token in 0..self.tree.len() as u32 {
+            if self.tree.kind(token) != Some(Token::Comment) {
+                continue;
+            }
+            match statement(self.tree.text(token)) {
+                Ok(Some(Statement::Angles(angles))) => self.angles = self.setup.angles.or(Some(angles)),
+                Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
+                Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
+                Ok(None) => {}
+                Err(()) => self.unread_comment(token),
+            }
+        }
+        let tool = |(name, frame): &(String, Frame)| {
+            let value = frame.within_reach().map(held);
+            Tool { name: name.clone(), value, place: None }
+        };
+        self.tools = self.stated(&tools);
+        self.frames = self.stated(&frames);
+        let told = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
+        let kept = told.filter(|(name, _)| {
+            self.tools.contains_key(&setup::plain(name)) && self.setup.tool(name).is_none()
+        });
+        let declared: Vec<Tool> =
+            self.setup.tools.iter().cloned().chain(kept).map(|one| tool(&one)).collect();
+        self.listing.declared_tools.extend(declared);
+        let labels = tools.into_iter().chain(frames).map(|(_, stated)| (stated.number, stated.name));
+        self.listing.labels.extend(labels);
+        // What is known beside the program goes before.
+        let beside = |list: &[(String, Frame)]| -> Vec<(String, Frame)> {
+            list.iter().map(|(name, frame)| (setup::plain(name), *frame)).collect()
+        };
+        self.tools.extend(beside(&self.setup.tools));
+        self.frames.extend(beside(&self.setup.frames));
+    }
+
+    /// Tools or work offsets that comments state, by plain name. One that is stated with two frames is not known.
+    fn stated(&mut self, all: &[(u32, Stated)]) -> HashMap<String, Frame> {
+        let mut found: HashMap<String, Frame> = HashMap::new();
+        let mut contradicted = Vec::new();
+        for (token, stated) in all {
+            let name = setup::plain(&stated.number);
+            match found.get(&name) {
+                Some(before) if *before != stated.frame => {
+                    self.unread_comment(*token);
+                    contradicted.push(name);
+                }
+                _ => drop(found.insert(name, stated.frame)),
+            }
+        }
+        for name in &contradicted {
+            found.remove(name);
+        }
+        found
+    }
+
+    /// A comment that was meant for this program and cannot be used is listed, not passed over.
+    fn unread_comment(&mut self, token: u32) {
+        self.listing.opaque.push(OpaqueRegion {
+            place: self.place(token),
+            span: self.tree.span(token, token + 1),
+            reason: OpaqueReason::Unexpected,
+        });
+    }
+
+    // ---- blocks ----
+
+    fn block(&mut self, node: u32, said: &mut Said<'s>) {
+        self.gather(node, said);
+        self.speaks |= !said.opaque && (!said.g.is_empty() || !said.m.is_empty() || said.moves());
+        if !said.skippable {
+            self.run(said);
+            return;
+        }
+        let before = self.state.clone();
+        self.skipping = true;
+        self.run(said);
+        self.skipping = false;
+        // What ends the program or goes elsewhere does so only where it is not skipped.
+        self.ended = false;
+        let after = std::mem::replace(&mut self.state, before);
+        self.state = after.joined(&self.state);
+        self.frame_index = None;
+        self.tool_index.clear();
+    }
+
+    /// What a block does.
+    fn run(&mut self, said: &Said<'s>) {
+        if std::mem::take(&mut self.ended) {
+            self.forget();
+        }
+        if self.is_reached_by_jumps(said) {
+            self.forget();
+            self.state.mode = Mode::Lost(Reason::UnknownFlow);
+        }
+        self.contour_of(said);
+        self.position_read(said);
+        let values = self.values(said);
+        let before = self.found.forgotten;
+        self.meaning = self.state.meaning();
+        self.effect(said);
+        self.assign(values, self.found.forgotten != before);
+    }
+
+    fn effect(&mut self, said: &Said<'s>) {
+        if let Some(on) = said.compensates {
+            self.state.radius = on;
+            self.set(Group::Radius, u64::from(on));
+        }
+        if self.dialect == Dialect::Heidenhain && self.heidenhain(said) {
+            return;
+        }
+        if self.is_action(said) {
+            // What it sets, it sets at any time from here on.
+            self.actions = true;
+            self.state.variables.lose(Reason::Variable);
+            self.forget();
+            return;
+        }
+        if self.foreign {
+            if !said.words.is_empty() {
+                self.deny(said, "?", Reason::UnknownWord);
+            }
+            return;
+        }
+        if self.control_flow(said) {
+            return;
+        }
+        if let Some((word, reason)) = self.not_known(said) {
+            self.deny(said, &word, reason);
+            self.ends(said);
+            return;
+        }
+        if said.opaque && said.obscure {
+            self.deny(said, "?", Reason::Unread);
+            self.ends(said);
+            return;
+        }
+        self.m_words(said);
+        self.tool_words(said);
+        let machine = said.machine
+            || said.g.contains(&530)
+            || self.dialect == Dialect::Siemens && said.g.contains(&1530)
+            || self.dialect == Dialect::Heidenhain && said.m.iter().any(|m| matches!(m, 91 | 92));
+        self.tools_of(said);
+        if self.named_commands(said) || self.modal_codes(said) || self.unmodal_codes(said) {
+            self.ends(said);
+            return;
+        }
+        if let Some(index) = said.feed {
+            let feed = self.worth(&said.words[index]).0;
+            // A feed has no decimals on any control.
+            let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
+            let feed = feed.and_then(|feed| match feed > 0.0 && feed < words::LARGEST {
+                true => Ok(feed),
+                // F0 and F-5 go nowhere, and what is too large is read as something else.
+                false => Err(Reason::NumberRange),
+            });
+            self.state.feed = feed.map(|feed| feed * self.state.unit_mm / 60.0);
+        }
+        self.motion(said, machine);
+        self.ends(said);
+    }
+
+    /// M2, M30, M99, M17 of Siemens: what comes after belongs to another program. M6 goes to change the tool.
+    fn ends(&mut self, said: &Said<'s>) {
+        let dialect = self.dialect;
+        let end = |m: &u32| match m {
+            2 | 30 => true,
+            17 => dialect == Dialect::Siemens,
+            99 => dialect != Dialect::Heidenhain,
+            _ => false,
+        };
+        // M99 P100 jumps, perhaps over what comes next, and so do M96 and M46 of Haas.
+        if said.m.iter().any(|m| matches!(m, 46 | 96 | 99)) {
+            self.parts();
+        }
+        if self.dialect == Dialect::Heidenhain && said.m.contains(&129) {
+            // It acts at the end of its block.
+            self.tip(false, false);
+        }
+        if said.m.iter().any(end) || said.words.iter().any(|word| word.is("RET")) {
+            self.ended = true;
+        } else if said.m.contains(&6) {
+            self.lose_all();
+        }
+    }
+
+    /// Tools: T, with M6 where the file changes them so.
+    fn tools_of(&mut self, said: &Said<'s>) {
+        for word in &said.words {
+            if word.address() != Some(b'T') {
+                continue;
+            }
+            let name = match (self.literal(word), word.belongs) {
+                (Some(number), _) => format!("T{}", number.round()),
+                (None, Belongs::Expression { first, .. }) if self.tree.kind(first) == Some(Token::String) => {
+                    let text = self.tree.text(first);
+                    String::from_utf8_lossy(text).trim_matches(['"', '\'']).to_owned()
+                }
+                _ => "T?".to_owned(),
+            };
+            self.state.next_tool = Some(name);
+        }
+        // LinuxCNC: M61 says which tool is in; T alone only makes one ready, whatever else the file has.
+        let linux = self.dialect == Dialect::LinuxCnc;
+        if linux && said.m.contains(&61) {
+            let number = said.q.and_then(|index| self.literal(&said.words[index]));
+            self.change_tool(number.map_or("T?".to_owned(), |number| format!("T{}", number.round())));
+        }
+        if (said.m.contains(&6) || !self.changes_tools && !linux)
+            && let Some(name) = self.state.next_tool.take()
+        {
+            self.change_tool(name);
+        }
+        if self.dialect == Dialect::Siemens
+            && let Some(index) = said.d
+        {
+            let edge = self.literal(&said.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
+            self.tool_is(|state| state.edge = edge);
+        }
+    }
+}
+
+/// Whether a letter is that of an axis or of what goes with one.
+fn is_axis(letter: u8) -> bool {
+    b"XYZABCIJKRUVWEF".contains(&letter.to_ascii_uppercase())
+}
+
+/// The axes that a block names, as bits.
+fn named_axes(said: &Said<'_>) -> u8 {
+    said.axes
+        .iter()
+        .chain(&said.abc)
+        .enumerate()
+        .fold(0, |all, (axis, word)| all | u8::from(word.is_some()) << axis)
+}
+
+/// The name of an axis, with or without the I of an increment.
+fn is_axis_name(name: &[u8]) -> bool {
+    match name {
+        [letter] | [b'I' | b'i', letter] => b"XYZABCUVW".contains(&letter.to_ascii_uppercase()),
+        _ => false,
+    }
+}
+
+/// All axes, for the same and for [`Event::Held`].
+const EVERYWHERE: u8 = POSITION | ORIENTATION;
+
+/// All of X, Y and Z, for [`Event::Lost`].
+const POSITION: u8 = 7;
+
+/// All of A, B and C, for the same.
+const ORIENTATION: u8 = 7 << 3;
+
+/// A G number in tenths: 540 for G54, 434 for G43.4.
+fn code(number: f64) -> u32 {
+    (number * 10.0).round().clamp(0.0, 1e6) as u32
+}

@@ -1,0 +1,423 @@
+//! Work offsets, frames within them, tools: what sets them, and each distinct one once in the listing.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::super::dialect::Dialect;
+use super::super::machine::{Group, State};
+use super::super::orientation::Angles;
+use super::super::setup::{self, held};
+use super::super::syntax::{Belongs, Word};
+use super::super::token::Token;
+use super::{Lister, Said};
+use crate::motion::{Frame, Reason, Tool, WorkObject, WorkObjectValue};
+use truegrind_math::se3::Pose;
+
+impl Lister<'_, '_> {
+    /// TRANS, ROT and those that add to them. True where the block is one.
+    pub(super) fn programmable_frame(&mut self, said: &Said<'_>) -> bool {
+        let Some(word) = said.words.iter().find(|word| {
+            [
+                "TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "ROTS", "AROTS",
+                "CROTS",
+            ]
+            .iter()
+            .any(|name| word.is(name))
+        }) else {
+            return false;
+        };
+        let name = word.name.to_ascii_uppercase();
+        let adds = name[0] == b'A';
+        let before = self.state.programmable;
+        let turned = |state: &State| state.turned & 1 << Group::Programmable as u32 != 0;
+        let was = turned(&self.state);
+        let unknown = self.state.doubt(1 << Group::Programmable as u32).is_some();
+        self.programmable_is_set();
+        if adds && unknown {
+            // To what it adds is not known.
+            self.state.turn_frame(Group::Programmable, true);
+        }
+        if !adds {
+            // Whatever is not added replaces all of the programmable frame, and nothing else.
+            self.state.programmable = None;
+            self.state.turn_frame(Group::Programmable, false);
+        }
+        self.lose_position();
+        let values: Result<Vec<Option<f64>>, Reason> = said
+            .axes
+            .iter()
+            .map(|word| word.map(|index| self.worth(&said.words[index]).0).transpose())
+            .collect();
+        let rpl = said.words.iter().find(|word| word.is("RPL"));
+        let stated = said.moves() || rpl.is_some();
+        // Shifts of rotary axes turn what A, B and C mean.
+        let rotary = said.abc.iter().any(Option::is_some) || said.others;
+        let pose = match (&*name, values) {
+            (_, Err(_)) => None,
+            _ if rotary => None,
+            (b"TRANS" | b"ATRANS", Ok(shift)) => {
+                let unit = self.state.unit_mm;
+                let shift = Vector3::from_iterator(shift.iter().map(|value| value.unwrap_or(0.0) * unit));
+                Some(Pose::from_parts(shift.into(), UnitQuaternion::identity()))
+            }
+            (b"ROT" | b"AROT", Ok(angles)) => {
+                let mut angles: Vec<f64> = angles.iter().map(|value| value.unwrap_or(0.0)).collect();
+                match rpl.map(|word| self.worth(word).0) {
+                    None => {}
+                    Some(Ok(turn)) => angles[self.state.plane.across] = turn,
+                    Some(Err(_)) => angles[0] = f64::NAN,
+                }
+                let [x, y, z] = [angles[0], angles[1], angles[2]];
+                let turn = Angles::Wpr.rotation([x, y, z]);
+                x.is_finite().then(|| Pose::from_parts(Vector3::zeros().into(), turn))
+            }
+            // Scaling and mirroring without values end; with values they are no rigid motion.
+            _ if !stated => Some(Pose::identity()),
+            _ => None,
+        };
+        match pose {
+            Some(_) if !stated => {}
+            Some(pose) => {
+                self.state.programmable = Some(self.state.programmable.unwrap_or_else(Pose::identity) * pose);
+            }
+            None => self.state.turn_frame(Group::Programmable, true),
+        }
+        let rotation = |pose: &Option<Pose>| pose.map_or(UnitQuaternion::identity(), |pose| pose.rotation);
+        let same = rotation(&before).angle_to(&rotation(&self.state.programmable)) < 1e-9;
+        if !same || was || turned(&self.state) {
+            self.lose_all();
+        }
+        true
+    }
+
+    /// The programmable frame is set: where ways meet it is known no more.
+    pub(super) fn programmable_is_set(&mut self) {
+        self.set_any(Group::Programmable);
+        self.frame_index = None;
+    }
+
+    /// G58 and G59 of Siemens: shifts within the work offset, no motion.
+    pub(super) fn axial_shift(&mut self, said: &Said<'_>, absolute: bool) {
+        let alone = self.state.programmable.is_none()
+            && self.state.doubt(1 << Group::Programmable as u32).is_none()
+            && absolute
+            && said.abc.iter().all(Option::is_none);
+        self.programmable_is_set();
+        self.lose_position();
+        let mut shift = Vector3::zeros();
+        for axis in 0..3 {
+            let Some(index) = said.axes[axis] else { continue };
+            match self.worth(&said.words[index]).0 {
+                Ok(value) if alone => shift[axis] = value * self.state.unit_mm,
+                _ => return self.turn(Group::Programmable, true),
+            }
+        }
+        if !alone {
+            return self.turn(Group::Programmable, true);
+        }
+        self.state.programmable = Some(Pose::translation(shift.x, shift.y, shift.z));
+    }
+
+    /// `$P_UIFR[1]=CTRANS(X,1,Y,2):CROT(Z,90)` and `$TC_DP3[1,1]=120`.
+    pub(super) fn system_variable(&mut self, word: &Word<'_>) {
+        let index = |at: usize| -> Option<u32> {
+            let (first, end) = word.index?;
+            let numbers: Vec<u32> = (first..end)
+                .filter(|&token| self.tree.kind(token) == Some(Token::Number))
+                .filter_map(|token| std::str::from_utf8(self.tree.text(token)).ok()?.parse().ok())
+                .collect();
+            numbers.get(at).copied()
+        };
+        let name = word.name.to_ascii_uppercase();
+        let starts = |list: &[&str]| list.iter().any(|begin| name.starts_with(begin.as_bytes()));
+        if word.is("$P_UIFR") {
+            let frame = match index(0) {
+                Some(0) => "G500".to_owned(),
+                Some(number @ 1..=4) => format!("G{}", 53 + number),
+                Some(number @ 5..=99) => format!("G{}", 500 + number),
+                _ => return self.frames_assigned(),
+            };
+            let pose = self.frame_expression(word).filter(|_| self.is_index_alone(word));
+            // The offset that holds goes on as it was until it is called again.
+            self.state.stale |= frame == self.state.frame;
+            self.assign_frame(&frame, pose.map(|pose| Frame::from_pose(&pose)));
+        } else if word.is("$P_PFRAME") {
+            self.programmable_is_set();
+            self.state.programmable = self.frame_expression(word);
+            self.state.turn_frame(Group::Programmable, self.state.programmable.is_none());
+            self.lose_all();
+        } else if word.is("$TC_DP3") || word.is("$TC_DP4") || word.is("$TC_DP5") {
+            let (Some(number), Some(1)) = (index(0), index(1)) else { return self.tools_assigned() };
+            let tool = format!("T{number}");
+            let axis = match word.name[6] {
+                b'3' => 2,
+                b'4' => 1,
+                _ => 0,
+            };
+            // Under G70 the data of the control stay in its own unit, under G700 they do not.
+            let value = self.worth(word).0.ok().filter(|_| self.counts_in_mm());
+            let frame = value.map(|value| {
+                let mut frame = self.tool_value(&tool).unwrap_or(Frame::IDENTITY);
+                frame.position_mm[axis] = value;
+                frame
+            });
+            self.state.tools.set(&tool, frame);
+            self.found.assigns.1 = true;
+            self.tool_index.clear();
+            if self.state.tool == tool {
+                self.lose_position();
+            }
+        } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
+            || starts(&["$A_", "$AC_TIMER", "$AC_MARKER", "$AC_PARAM", "$AC_FIFO", "$TC_MPP", "$TC_TP"])
+        {
+            // Kinds and radii of tools, signals, timers: neither frames nor lengths.
+        } else if starts(&["$TC_"]) {
+            self.tools_assigned();
+        } else if starts(&["$P_"]) {
+            self.frames_assigned();
+        } else {
+            self.state.lose_everything(Reason::UnknownWord);
+            self.found.add_all();
+            self.events.push(super::Event::Unknown);
+        }
+    }
+
+    /// Whether lengths are certainly mm here.
+    fn counts_in_mm(&self) -> bool {
+        self.state.unit_mm == 1.0 && self.state.doubt(1 << Group::Unit as u32).is_none()
+    }
+
+    /// Whether a word has one index and no more: `$P_UIFR[1,X,TR]` sets one component.
+    fn is_index_alone(&self, word: &Word<'_>) -> bool {
+        word.index.is_some_and(|(first, end)| (first..end).all(|at| self.tree.kind(at) != Some(Token::Comma)))
+    }
+
+    /// The program gives a work offset a value, or one that is not known.
+    pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
+        self.state.frames.set(name, frame);
+        self.found.assigns.0 = true;
+        self.frame_index = None;
+    }
+
+    /// A chain of CTRANS and CROT with plain numbers.
+    fn frame_expression(&self, word: &Word<'_>) -> Option<Pose> {
+        let Belongs::Expression { first, end } = word.belongs else { return None };
+        if !self.counts_in_mm() {
+            return None;
+        }
+        let mut pose = Pose::identity();
+        let (mut kind, mut values, mut axis, mut negative) = (None, [0.0; 3], None, false);
+        for token in first..end {
+            let text = self.tree.text(token);
+            match self.tree.kind(token)? {
+                Token::Name => {
+                    kind = match &*text.to_ascii_uppercase() {
+                        b"CTRANS" => Some(false),
+                        b"CROT" => Some(true),
+                        _ => return None,
+                    };
+                    values = [0.0; 3];
+                }
+                Token::Address => {
+                    axis = match text[0].to_ascii_uppercase() {
+                        letter @ b'X'..=b'Z' => Some(usize::from(letter - b'X')),
+                        _ => return None,
+                    };
+                }
+                Token::Minus => negative = !negative,
+                Token::Plus | Token::Comma | Token::ParenOpen | Token::Space | Token::Colon => {}
+                Token::Number => {
+                    let value = super::literal(text)?;
+                    values[axis.take()?] = if negative { -value } else { value };
+                    negative = false;
+                }
+                Token::ParenClose => {
+                    let [x, y, z] = values;
+                    pose *= match kind.take()? {
+                        false => Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::identity()),
+                        true => Pose::from_parts(Vector3::zeros().into(), Angles::Wpr.rotation([x, y, z])),
+                    };
+                }
+                _ => return None,
+            }
+        }
+        Some(pose)
+    }
+
+    /// A number that is written or can be worked out; whole numbers need no point.
+    pub(super) fn number(&self, word: &Word<'_>) -> Option<f64> {
+        self.literal(word).or_else(|| match word.belongs {
+            Belongs::Expression { first, end } => self.evaluated((first, end)).ok(),
+            _ => None,
+        })
+    }
+
+    /// G10: L2 P1 X sets a work offset, L20 one from where the tool stands, others tools and parameters.
+    pub(super) fn set_offset(&mut self, said: &Said<'_>) {
+        let number = |at: Option<usize>| at.and_then(|index| self.number(&said.words[index]));
+        let linux = self.dialect == Dialect::LinuxCnc;
+        let p = number(said.p);
+        let named = |p: f64| match p as u32 {
+            p @ 1..=6 => Some(format!("G{}", 53 + p)),
+            p @ 7..=9 if linux => Some(format!("G59.{}", p - 6)),
+            _ => None,
+        };
+        match number(said.l) {
+            Some(2.0) => {
+                let name = match p {
+                    Some(0.0) if linux => Some(self.state.frame.clone()),
+                    Some(p) => named(p),
+                    None => None,
+                };
+                // The external offset of a Fanuc is added to all.
+                let Some(name) = name else { return self.frames_assigned() };
+                self.state_offset(said, &name);
+            }
+            Some(20.0) => {
+                self.held_here(super::named_axes(said));
+                match p.and_then(named).filter(|_| linux) {
+                    Some(name) => self.offset_is(&name, None),
+                    None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
+                    None => self.frames_assigned(),
+                }
+            }
+            Some(number @ (1.0 | 3.0 | 10.0 | 11.0 | 12.0 | 13.0 | 14.0)) => {
+                if linux && (number == 10.0 || number == 11.0) {
+                    // A length with which the tool would stand there.
+                    self.held_here(super::named_axes(said));
+                }
+                self.tools_assigned();
+            }
+            None if said.p.is_some() && said.l.is_none() => self.tools_assigned(),
+            // Parameters of the control, or what is not known.
+            _ => self.deny(said, "G10", Reason::UnknownWord),
+        }
+    }
+
+    fn state_offset(&mut self, said: &Said<'_>, name: &str) {
+        let known = self.frame_value(name).ok();
+        let mut frame = known.unwrap_or(Frame::IDENTITY);
+        // What is not said stays: on LinuxCNC, for which a plain file may be, an offset has a turn as well.
+        let turns = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Iso);
+        let whole = said.axes.iter().all(Option::is_some) && (said.radius.is_some() || !turns);
+        let mut good = whole || known.is_some();
+        // LinuxCNC takes the values as they are in G91 too, Fanuc and Haas add them; which of them a plain file is for is
+        // not known.
+        let absolute = self.state.absolute || self.dialect == Dialect::LinuxCnc;
+        good &= absolute || self.dialect != Dialect::Iso;
+        for (axis, word) in said.axes.iter().enumerate() {
+            let Some(index) = word else { continue };
+            match self.worth(&said.words[*index]) {
+                (Ok(value), _) if absolute => frame.position_mm[axis] = value * self.state.unit_mm,
+                (Ok(value), _) => frame.position_mm[axis] += value * self.state.unit_mm,
+                (Err(_), _) => good = false,
+            }
+        }
+        // Offsets of rotary axes turn what A, B and C mean.
+        good &= said.abc.iter().flatten().all(|&index| self.number(&said.words[index]) == Some(0.0));
+        let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { 1 << Group::Distance as u32 };
+        good &= self.state.doubt(distance | 1 << Group::Unit as u32).is_none();
+        match said.radius.map(|index| self.number(&said.words[index])) {
+            // The turn of the work frame about z (LinuxCNC).
+            Some(Some(turn)) => {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
+                frame.quaternion = [turn.w, turn.i, turn.j, turn.k];
+            }
+            Some(None) => good = false,
+            None => {}
+        }
+        self.offset_is(name, good.then_some(frame));
+    }
+
+    /// A work offset gets a value; where it is the one that holds, the tool stands elsewhere in it now.
+    pub(super) fn offset_is(&mut self, name: &str, frame: Option<Frame>) {
+        let before = self.frame_value(name).ok();
+        self.assign_frame(name, frame);
+        let holds = name.eq_ignore_ascii_case(&self.state.frame);
+        if !holds && self.state.doubt(1 << Group::Frame as u32).is_none() {
+            return;
+        }
+        self.lose_position();
+        let alike = matches!((before, frame), (Some(a), Some(b))
+            if a.pose().rotation.angle_to(&b.pose().rotation) < 1e-9);
+        if !alike {
+            self.lose_all();
+        }
+    }
+
+    /// The tool of a name, as the program, the setup or a comment states it.
+    pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
+        match self.state.tools.of(name) {
+            Some(Some(frame)) => Ok(frame),
+            Some(None) => Err(Reason::Assigned),
+            None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
+        }
+    }
+
+    /// The work offset of a name, as the program, the setup or a comment states it.
+    pub(super) fn frame_value(&self, name: &str) -> Result<Frame, Reason> {
+        match self.state.frames.of(name) {
+            Some(Some(frame)) => Ok(frame),
+            Some(None) => Err(Reason::Assigned),
+            // Without a settable offset Siemens counts from the base.
+            None => self
+                .frames
+                .get(&setup::plain(name))
+                .copied()
+                .or_else(|| (name == "G500").then_some(Frame::IDENTITY))
+                .ok_or(Reason::WorkObjectUnknown),
+        }
+    }
+
+    /// The tool that is in.
+    pub(super) fn tool(&mut self) -> u32 {
+        let name = self.state.tool_name(self.dialect);
+        if let Some(&index) = self.tool_index.get(&name) {
+            return index;
+        }
+        let tool = Tool {
+            name: name.clone(),
+            value: self.tool_value(&name).and_then(Frame::within_reach).map(held),
+            place: None,
+        };
+        let index = intern(&mut self.listing.tools, tool);
+        self.tool_index.insert(name, index);
+        index
+    }
+
+    /// The work frame that holds.
+    pub(super) fn work_object(&mut self) -> u32 {
+        if let Some((name, pose, index)) = &self.frame_index
+            && *name == self.state.frame
+            && *pose == self.state.programmable
+        {
+            return *index;
+        }
+        let name = self.state.frame.clone();
+        let stated = if self.state.stale { Err(Reason::Assigned) } else { self.frame_value(&name) };
+        let within = self.state.programmable.as_ref().map_or(Frame::IDENTITY, Frame::from_pose);
+        let near = stated.and_then(Frame::within_reach).and_then(|user| Ok((user, within.within_reach()?)));
+        let value = near.map(|(user_frame, within)| WorkObjectValue {
+            robhold: false,
+            fixed: true,
+            mechanical_unit: String::new(),
+            user_frame,
+            object_frame: within,
+        });
+        let displacement = self.state.programmable.as_ref().map(Frame::from_pose);
+        let work_object = WorkObject { name: name.clone(), value, place: None, displacement };
+        let index = intern(&mut self.listing.work_objects, work_object);
+        self.frame_index = Some((name, self.state.programmable, index));
+        index
+    }
+}
+
+/// The index of an equal item, else of the new one.
+fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    match list.iter().rev().take(256).position(|other| *other == item) {
+        Some(back) => (list.len() - 1 - back) as u32,
+        None => {
+            list.push(item);
+            list.len() as u32 - 1
+        }
+    }
+}

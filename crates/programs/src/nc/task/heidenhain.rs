@@ -1,0 +1,457 @@
+//! Heidenhain conversational: blocks that are no words of an address each.
+
+use super::super::arc::Plane;
+use super::super::dialect::Dialect;
+use super::super::expression::{Worth, literal, numbered};
+use super::super::machine::{Group, Mode};
+use super::super::syntax::{Belongs, Word};
+use super::super::token::Token;
+use super::{Lister, Needs, Said};
+use crate::motion::Reason;
+use truegrind_math::se3::Pose;
+
+impl<'s> Lister<'_, 's> {
+    /// What the first word of a block says. True where the block does nothing else.
+    pub(super) fn heidenhain(&mut self, said: &Said<'s>) -> bool {
+        debug_assert_eq!(self.dialect, Dialect::Heidenhain);
+        let Some(first) = said.words.first() else { return false };
+        let name = first.name.to_ascii_uppercase();
+        match &*name {
+            b"L" | b"LN" => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            // Positioning blocks without L.
+            [b'X' | b'Y' | b'Z' | b'A' | b'B' | b'U' | b'V' | b'W']
+            | [b'I', b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W'] => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            b"C" if first.belongs != Belongs::Nothing => {
+                self.state.mode = Mode::Linear;
+                false
+            }
+            b"F" | b"R" => false,
+            b"C" | b"CR" => {
+                let direction = said.words.iter().find(|word| word.is("DR"));
+                let negative = direction.is_some_and(|word| {
+                    (word.first..word.end).any(|token| self.tree.kind(token) == Some(Token::Minus))
+                });
+                self.state.mode = match direction {
+                    Some(_) => Mode::Circular(!negative),
+                    None => Mode::Other(Reason::NotFollowed),
+                };
+                self.state.tangent = false;
+                false
+            }
+            b"CT" => {
+                self.state.mode = Mode::Other(Reason::NotFollowed);
+                self.state.tangent = true;
+                false
+            }
+            b"CC" => {
+                let whole =
+                    |axis: usize| said.axes[axis].is_some_and(|index| said.words[index].name.len() == 1);
+                if said.axes.iter().all(Option::is_none)
+                    || !(0..2).all(|axis| whole(axis) || said.axes[axis].is_none())
+                {
+                    // The pole is where the tool stands, or counts from there.
+                    self.held_here(super::POSITION);
+                }
+                for axis in 0..2 {
+                    self.state.pole[axis] = match said.axes[axis] {
+                        None => self.state.position[axis],
+                        Some(index) => {
+                            let (value, increment) = self.worth(&said.words[index]);
+                            if increment == Some(true) {
+                                self.state.position[axis].and_then(|at| value.map(|value| at + value))
+                            } else {
+                                value
+                            }
+                        }
+                    };
+                }
+                true
+            }
+            b"M" => {
+                // No motion: axis words are values of the M word.
+                match self.not_known(said) {
+                    Some((word, reason)) => self.deny(said, &word, reason),
+                    None => {
+                        self.m_words(said);
+                        self.calls_cycle(said);
+                    }
+                }
+                self.ends(said);
+                true
+            }
+            _ => {
+                self.other_block(said, first, &name);
+                true
+            }
+        }
+    }
+
+    /// Blocks that are not looked into word by word.
+    fn other_block(&mut self, said: &Said<'_>, first: &Word<'_>, name: &[u8]) {
+        let text = self.tree.source()[self.tree.range(first.first, first.end)].to_ascii_uppercase();
+        let words: Vec<&[u8]> =
+            text.split(|byte| byte.is_ascii_whitespace()).filter(|part| !part.is_empty()).collect();
+        let second = words.get(1).copied().unwrap_or_default();
+        match name {
+            b"TOOL" if second == b"CALL" => {
+                self.tool_call(&text);
+            }
+            // A length that the program states.
+            b"TOOL" if second == b"DEF" && words.iter().skip(3).any(|word| word.starts_with(b"L")) => {
+                self.tools_assigned();
+            }
+            b"TOOL" if second == b"DEF" => {}
+            b"CYCL" if second == b"CALL" => {
+                self.cycle_call(said, "CYCL CALL");
+            }
+            b"CYCL" => {
+                let number: Vec<u8> = words
+                    .get(2)
+                    .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
+                    .unwrap_or_default();
+                self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
+            }
+            b"PLANE" => {
+                // TURN moves the rotary axes to the plane, MOVE the others as well.
+                let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
+                if moves {
+                    self.left(said, "PLANE", Reason::Cycle);
+                }
+                self.turn(Group::Swivel, second != b"RESET");
+                if moves {
+                    self.lose_all();
+                }
+            }
+            b"FUNCTION" if second == b"TCPM" => {
+                self.tip(true, false);
+            }
+            b"FUNCTION" if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
+            // What a mill does anyway; the name of a kinematic may follow, which is not known.
+            b"FUNCTION" if words[1..] == [b"MODE", b"MILL"] => {}
+            b"FUNCTION" if matches!(second, b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
+            b"TRANS" if second == b"DATUM" => {
+                match words.get(2).copied() {
+                    Some(b"RESET") => {
+                        self.datum_is([Some(0.0); 3]);
+                        self.turn(Group::Rotary, false);
+                    }
+                    Some(b"AXIS") => self.datum_shift(&words[3..]),
+                    _ => self.datum_is([None; 3]),
+                }
+                self.lose_position();
+            }
+            b"TRANS" => {
+                let on = words.get(2) != Some(&&b"RESET"[..]);
+                match second {
+                    b"MIRROR" => self.turn(Group::Mirror, on),
+                    b"ROTATION" => self.turn(Group::Rotation, on),
+                    b"SCALE" => self.turn(Group::Scale, on),
+                    _ => self.deny(said, "TRANS", Reason::UnknownWord),
+                }
+            }
+            b"LBL" if second != b"0" => {
+                self.forget();
+                self.state.mode = Mode::Lost(Reason::UnknownFlow);
+            }
+            b"LBL" => self.parts(),
+            b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
+                self.subprogram(said, "CALL");
+            }
+            b"RND" | b"CHF" => {
+                // They round or cut the corner that their neighbours make; the next block counts from the corner.
+                let previous = self.state.previous;
+                let text = String::from_utf8_lossy(name).into_owned();
+                self.left_path(said, &text, Needs::Nothing);
+                self.state.previous = previous;
+            }
+            b"APPR" | b"DEP" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT" | b"FPOL"
+            | b"SPL" => {
+                let text = String::from_utf8_lossy(name).into_owned();
+                let needs = match name {
+                    b"FPOL" => Needs::Nothing,
+                    b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
+                    _ => Needs::Tangent,
+                };
+                self.left_path(said, &text, needs);
+                self.lose_position();
+            }
+            b"TCH" => {
+                self.left(said, "TCH PROBE", Reason::Probe);
+                self.lose_position();
+            }
+            b"FN" | b"Q" | b"QL" | b"QR" => {
+                // FN 25 sets a datum, FN 17 any data of the control.
+                match number_of_function(&text) {
+                    Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
+                    Some(25) => {
+                        self.held_here(super::EVERYWHERE);
+                        return self.frames_assigned();
+                    }
+                    Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
+                        self.events.push(super::Event::Held { axes: super::EVERYWHERE, read: true });
+                    }
+                    _ => {}
+                }
+                // FN 9 to FN 12 jump: what is set from here on may be passed over.
+                if words.contains(&&b"GOTO"[..]) {
+                    self.parts();
+                }
+                self.parameter(first);
+            }
+            b"BEGIN" | b"END" => {
+                if words.contains(&&b"INCH"[..]) {
+                    self.state.unit_mm = 25.4;
+                }
+            }
+            // Blanks, stops, texts, tables, declarations: nothing that moves.
+            b"BLK" | b"STOP" | b"QS" | b"DECLARE" | b"OPEN" | b"CLOSE" | b"SECTION" | b"SEL" | b"TABDATA"
+            | b"PATTERN" | b"POS" => {}
+            // The rest of a cycle's definition in lines of its own.
+            _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
+            _ => {
+                let text = String::from_utf8_lossy(name).into_owned();
+                self.deny(said, &text, Reason::UnknownWord);
+            }
+        }
+    }
+
+    /// `TOOL CALL 1 Z S1000 DL+0.5`, `TOOL CALL "MILL" Z`, `TOOL CALL Z S500`.
+    fn tool_call(&mut self, text: &[u8]) {
+        let text = String::from_utf8_lossy(text);
+        let rest = text.split_once("CALL").map_or("", |(_, rest)| rest).trim();
+        let (tool, after) = match rest.strip_prefix('"') {
+            Some(quoted) => {
+                let (name, after) = quoted.split_once('"').unwrap_or((quoted, ""));
+                (Some(name.to_owned()), after)
+            }
+            None => {
+                let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+                match word.bytes().next() {
+                    Some(b'0'..=b'9') => {
+                        let whole = word.bytes().all(|byte| byte.is_ascii_digit());
+                        let number = word.trim_start_matches('0');
+                        let zero = if number.is_empty() { "0" } else { number };
+                        (Some(if whole { format!("T{zero}") } else { format!("T{word}") }), after)
+                    }
+                    // Only speed or axis: the tool stays.
+                    Some(b'X' | b'Y' | b'Z' | b'S' | b'F' | b'D') => (None, rest),
+                    None => (Some(self.state.tool.clone()), rest),
+                    _ => (Some(format!("T {word}")), after),
+                }
+            }
+        };
+        // The working plane goes with the axis of the tool.
+        match after.split_whitespace().next() {
+            Some("X") => self.plane_is(Plane::YZ, 190),
+            Some("Y") => self.plane_is(Plane::ZX, 180),
+            Some("Z") => self.plane_is(Plane::XY, 170),
+            _ => {}
+        }
+        // A tool that is longer than its table says.
+        let longer = |word: &&str| {
+            let delta = word.strip_prefix("DL").map(|delta| delta.trim_start_matches(['+', '-']));
+            delta.is_some_and(|delta| literal(delta.as_bytes()) != Some(0.0))
+        };
+        let longer: String = after.split_whitespace().filter(longer).map(|word| format!(" {word}")).collect();
+        match tool {
+            Some(tool) => {
+                self.change_tool(tool + &longer);
+                self.lose_all();
+            }
+            // Which tool that is may not be known.
+            None if !longer.is_empty() => self.change_tool(format!("T?{longer}")),
+            None => {}
+        }
+    }
+
+    /// `CYCL DEF 8.1 X`: the number with what stands after the point, and the words from it on.
+    fn cycle_definition(&mut self, said: &Said<'_>, first: &Word<'_>, number: &[u8], words: &[&[u8]]) {
+        let title = words.first().is_some_and(|word| word.ends_with(b".0"));
+        let values = words.get(1..).unwrap_or_default();
+        let zero = |word: &&[u8], letters: usize| {
+            let digits = word.get(letters..).unwrap_or_default();
+            let digits = digits.strip_prefix(b"+").or(digits.strip_prefix(b"-")).unwrap_or(digits);
+            literal(digits)
+        };
+        match number {
+            b"7" => {
+                self.datum_shift(values);
+                self.lose_position();
+            }
+            // A title begins the definition; what it sets stands in the lines after it.
+            b"8" => self.turn(Group::Mirror, title || !values.is_empty()),
+            b"10" => {
+                let ends = values.len() == 1
+                    && values.iter().all(|word| word.starts_with(b"ROT") && zero(word, 3) == Some(0.0));
+                self.turn(Group::Rotation, title || !ends);
+            }
+            b"11" => {
+                let value = match values {
+                    [word] => zero(word, 3),
+                    [_, word] => zero(word, 0),
+                    _ => None,
+                };
+                self.turn(Group::Scale, title || value != Some(1.0));
+            }
+            b"19" => {
+                let ends = values.iter().all(|word| zero(word, 1) == Some(0.0));
+                self.turn(Group::Swivel, title || !ends);
+            }
+            b"26" => {
+                let ends = !values.is_empty() && values.iter().all(|word| zero(word, 1) == Some(1.0));
+                self.turn(Group::AxisScale, title || !ends);
+            }
+            b"247" => {
+                self.frame_is(self.preset(first));
+                self.shift_may_end();
+            }
+            b"220" | b"221" => {
+                self.left(said, "CYCL DEF", Reason::Cycle);
+                self.lose_all();
+            }
+            // A program takes the place of the cycle.
+            b"12" => self.calls_program = true,
+            // Definitions that CYCL CALL, M89 and M99 carry out, and settings.
+            b"1"
+            | b"2"
+            | b"3"
+            | b"4"
+            | b"5"
+            | b"6"
+            | b"9"
+            | b"13"
+            | b"14"
+            | b"15"
+            | b"16"
+            | b"17"
+            | b"18"
+            | b"20"
+            | b"21"
+            | b"22"
+            | b"23"
+            | b"24"
+            | b"25"
+            | b"27"
+            | b"28"
+            | b"29"
+            | b"30"
+            | b"32"
+            | b"39"
+            | [b'2', b'0', b'0'..=b'9']
+            | [b'2', b'3' | b'4' | b'5' | b'6' | b'7', b'0'..=b'9'] => {}
+            _ => self.deny(said, "CYCL DEF", Reason::UnknownWord),
+        }
+    }
+
+    /// A preset ends the shift within the one before on some controls, and not on others.
+    fn shift_may_end(&mut self) {
+        if self.state.datum != [Some(0.0); 3] {
+            self.state.programmable = None;
+            self.frame_index = None;
+            self.state.datum = [None; 3];
+            self.doubt(Group::Datum, Reason::Displacement);
+        }
+    }
+
+    /// `CYCL DEF 7.1 X+10` and `TRANS DATUM AXIS X+10 Y-5`: a shift within the preset. Axes that are not named keep theirs,
+    /// known or not: it may be told in several lines. A row of the datum table is not known here.
+    fn datum_shift(&mut self, words: &[&[u8]]) {
+        if words.first().is_none_or(|word| word.len() > 3 && word.iter().all(u8::is_ascii_alphabetic)) {
+            // The title: what it sets stands in the lines after it.
+            return;
+        }
+        let doubts = 1 << Group::Datum as u32 | 1 << Group::Programmable as u32;
+        let mut shift = match self.state.doubt(doubts) {
+            Some(_) => [None; 3],
+            None => self.state.datum,
+        };
+        for word in words {
+            let (name, increment) = match word {
+                [b'I', axis @ b'A'..=b'Z', ..] => (*axis, true),
+                [axis @ b'A'..=b'Z', ..] => (*axis, false),
+                _ => {
+                    shift = [None; 3];
+                    break;
+                }
+            };
+            let value = match &word[1 + usize::from(increment)..] {
+                [b'-', digits @ ..] => literal(digits).map(|value| -value),
+                [b'+', digits @ ..] | digits => literal(digits),
+            };
+            let value = value.map(|value| value * self.state.unit_mm);
+            match name {
+                b'X'..=b'Z' => {
+                    let entry = &mut shift[usize::from(name - b'X')];
+                    let old = if increment { *entry } else { Some(0.0) };
+                    *entry = old.zip(value).map(|(old, value)| old + value);
+                }
+                // A, B and C are counted from elsewhere, until the whole shift ends.
+                b'A'..=b'C' if value != Some(0.0) => self.turn(Group::Rotary, true),
+                b'A'..=b'C' | b'U'..=b'W' => {}
+                _ => {
+                    shift = [None; 3];
+                    break;
+                }
+            }
+        }
+        self.datum_is(shift);
+    }
+
+    /// The datum shift is this, as far as it is known.
+    fn datum_is(&mut self, shift: [Option<f64>; 3]) {
+        self.programmable_is_set();
+        self.state.datum = shift;
+        self.state.programmable = match shift {
+            [Some(x), Some(y), Some(z)] if shift != [Some(0.0); 3] => Some(Pose::translation(x, y, z)),
+            _ => None,
+        };
+        self.turn(Group::Datum, shift.iter().any(Option::is_none));
+    }
+
+    /// The name of the preset that `CYCL DEF 247 … Q339=n` takes: `PRESET1`; the number may stand in the next line.
+    fn preset(&self, first: &Word<'_>) -> String {
+        const NEAR: usize = 200;
+        let start = self.tree.start(first.first);
+        let source = &self.tree.source()[start..];
+        let text = source[..source.len().min(NEAR)].to_ascii_uppercase();
+        let at = text.windows(5).position(|five| five == b"Q339=").map(|at| at + 5);
+        let digits: String = at
+            .into_iter()
+            .flat_map(|at| &text[at..])
+            .map(|&byte| char::from(byte))
+            .skip_while(|c| matches!(c, ' ' | '+'))
+            .take_while(char::is_ascii_digit)
+            .collect();
+        format!("PRESET{digits}")
+    }
+
+    /// `Q1 = +5`, `FN 0: Q1 = +5`.
+    fn parameter(&mut self, word: &Word<'_>) {
+        let equal = (word.first..word.end).find(|&token| self.tree.kind(token) == Some(Token::Equal));
+        let Some(equal) = equal else { return };
+        let at = (word.first..equal).rev().find(|&token| self.tree.kind(token) == Some(Token::Number));
+        let number = at.and_then(|token| literal(self.tree.text(token)));
+        let (Some(at), Some(number)) = (at, number) else { return };
+        // Q, QL and QR are three sets.
+        let set = self.tree.text(at.saturating_sub(1)).to_ascii_uppercase();
+        let value: Worth = self.evaluated((equal + 1, word.end));
+        if matches!(&*set, b"Q" | b"QL" | b"QR") {
+            self.set_variable(numbered(&set, number), value);
+        } else {
+            self.state.variables.lose(Reason::Variable);
+        }
+    }
+}
+
+/// The number of a function: `FN 17: SYSWRITE`, `FN17:`.
+fn number_of_function(text: &[u8]) -> Option<u32> {
+    let digits = text.strip_prefix(b"FN")?.trim_ascii_start();
+    let end = digits.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(digits.len());
+    std::str::from_utf8(&digits[..end]).ok()?.parse().ok()
+}

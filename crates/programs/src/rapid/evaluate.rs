@@ -1,0 +1,743 @@
+//! What an expression is worth, as far as the text tells it.
+//!
+//! Method: constants are folded in double precision; data that nothing in the given files changes has its initial
+//! value; data that is assigned has what the flow of straight-line statements gave it ([`Known`]), else its initial
+//! value without the components that anything assigns. Target functions
+//! follow the RAPID reference: `Offs` adds in the object frame and keeps the orientation; `RelTool` moves along the
+//! axes of the target's tool frame and then turns about its x, the new y and the new z. A function of the program that does
+//! nothing but return an expression is worth that expression. Everything else is [`Value::Unknown`] with its reason.
+//!
+//! Stops: what a declaration is worth is worked out once; chains of declarations and of functions have a greatest
+//! length, values that refer to each other a greatest size.
+//!
+//! Departure: a controller computes `num` in single precision.
+
+mod functions;
+mod types;
+
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+use self::functions::{Options, call};
+use super::literal;
+use super::number;
+use super::symbol::{Symbol, Symbols, What};
+use super::syntax::{
+    Data, RapidTree, Syntax, arguments, expressions, node_kind, parts, text_of, token_kind, tokens_of,
+};
+use super::token::{Token, fold, folded, same_name};
+use super::value::{Value, built_in, cartesian_target, joint_target};
+use crate::motion::{Reason, Span, TargetValue};
+use crate::shared::Map;
+use crate::tree::Child;
+
+/// What the statements so far gave to data that the program assigns.
+pub type Known = Map<u32, Value>;
+
+/// How deeply constants may refer to constants.
+const REFERENCE_DEPTH: u32 = 32;
+
+/// How many numbers and texts data that refers to other data may hold.
+const REFERENCE_SIZE: usize = 1 << 16;
+
+/// How many functions of the program one expression may lead through.
+const FUNCTIONS: u32 = 256;
+
+/// Where an expression stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Context<'k> {
+    /// The file.
+    pub file: u32,
+    /// The scope.
+    pub scope: u32,
+    /// What is known of assigned data.
+    pub known: &'k Known,
+    depth: u32,
+}
+
+impl<'k> Context<'k> {
+    /// An expression in a file and scope.
+    pub fn new(file: u32, scope: u32, known: &'k Known) -> Self {
+        Context { file, scope, known, depth: 0 }
+    }
+}
+
+/// Where a target's numbers come from, before declarations have their place in the listing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The literal in the instruction.
+    Inline,
+    /// A declared name.
+    Symbol(u32),
+    /// One element of a declared array.
+    Element(u32, Span),
+    /// Computed from the text.
+    Computed,
+    /// Not known.
+    Unknown,
+}
+
+/// The place of an element by its index, from 1: the controller counts in single precision.
+pub(super) fn index_of(position: f64) -> Option<usize> {
+    let index = f64::from(position as f32).round();
+    (index >= 1.0).then(|| index as usize - 1)
+}
+
+/// Evaluates expressions of one task.
+#[derive(Debug)]
+pub struct Evaluator<'a, 's> {
+    /// The files.
+    pub trees: &'a [RapidTree<'s>],
+    /// Their names.
+    pub symbols: &'a Symbols,
+    elements: RefCell<HashMap<(u32, u32), Vec<Child>>>,
+    /// What declarations are worth that refer to others.
+    initial: RefCell<HashMap<u32, Value>>,
+    /// How many functions of the program the expression has led through.
+    functions: Cell<u32>,
+    /// Whether a function of the program was given what is not known: it may fail where the function never asks for it.
+    doubtful: Cell<bool>,
+    /// What is known where a declaration stands.
+    nothing: Known,
+}
+
+impl<'a, 's> Evaluator<'a, 's> {
+    /// For the files of one task.
+    pub fn new(trees: &'a [RapidTree<'s>], symbols: &'a Symbols) -> Self {
+        Evaluator {
+            trees,
+            symbols,
+            elements: RefCell::default(),
+            initial: RefCell::default(),
+            functions: Cell::new(0),
+            doubtful: Cell::new(false),
+            nothing: Known::new(),
+        }
+    }
+
+    fn tree(&self, file: u32) -> &'a RapidTree<'s> {
+        &self.trees[file as usize]
+    }
+
+    /// Whether the target that was asked for last is worth what it is only as long as nothing fails: a function of the program
+    /// was given what is not known, and did not look at it.
+    pub fn was_doubtful(&self) -> bool {
+        self.doubtful.get()
+    }
+
+    /// A target argument: its value and where its numbers stand.
+    pub fn target(
+        &self,
+        context: Context<'_>,
+        argument: Child,
+        joints: bool,
+    ) -> (Result<TargetValue, Reason>, Source) {
+        let tree = self.tree(context.file);
+        self.doubtful.set(false);
+        match argument {
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Aggregate => {
+                if let Some(value) = literal_target(tree.node_text(node), joints) {
+                    let source = if value.is_ok() { Source::Inline } else { Source::Unknown };
+                    return (value, source);
+                }
+            }
+            Child::Token(token) => match tree.kind(token) {
+                Some(Token::Ident) => return self.named_target(context, tree.text(token), joints),
+                Some(Token::Placeholder | Token::Star) => {
+                    return (Err(Reason::Placeholder), Source::Unknown);
+                }
+                _ => {}
+            },
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Place => {
+                if let Some(found) = self.element_target(context, node, joints) {
+                    return found;
+                }
+            }
+            Child::Node(_) => {}
+        }
+        let value = self.value(context, argument).target(joints);
+        let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+        (value, source)
+    }
+
+    fn named_target(
+        &self,
+        context: Context<'_>,
+        name: &[u8],
+        joints: bool,
+    ) -> (Result<TargetValue, Reason>, Source) {
+        let unknown = |reason| (Err(reason), Source::Unknown);
+        let Some(id) = self.symbols.find(context.scope, name) else {
+            return unknown(Reason::Undeclared);
+        };
+        let symbol = &self.symbols.symbols[id as usize];
+        let data = match &symbol.what {
+            What::Data(data) => data,
+            What::Parameter if context.known.contains_key(&id) => {
+                let value = self.symbol_value(context, id).target(joints);
+                let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+                return (value, source);
+            }
+            What::Parameter => return unknown(Reason::Parameter),
+            _ => return unknown(Reason::WrongShape),
+        };
+        let wanted: &[u8] = if joints { b"jointtarget" } else { b"robtarget" };
+        if self.symbols.resolved_type(symbol.scope, &symbol.type_name) != wanted || data.dimensions.is_some()
+        {
+            return unknown(Reason::WrongShape);
+        }
+        if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
+            return unknown(Reason::Ambiguous);
+        }
+        if symbol.assigned || context.known.contains_key(&id) {
+            let value = self.symbol_value(context, id).target(joints);
+            let source = if value.is_ok() { Source::Computed } else { Source::Unknown };
+            return (value, source);
+        }
+        let Some(initial) = data.value else { return unknown(Reason::Uninitialised) };
+        let value = match literal_target(text_of(self.tree(symbol.file), initial), joints) {
+            Some(value) => value,
+            None => self.symbol_value(context, id).target(joints),
+        };
+        let source = if value.is_ok() { Source::Symbol(id) } else { Source::Unknown };
+        (value, source)
+    }
+
+    /// `name{i, …}` of an array that nothing assigns.
+    fn element_target(
+        &self,
+        context: Context<'_>,
+        node: u32,
+        joints: bool,
+    ) -> Option<(Result<TargetValue, Reason>, Source)> {
+        let tree = self.tree(context.file);
+        let mut parts = parts(tree, node);
+        let root = self.symbols.root(tree, context.scope, parts.next()?)?;
+        let index = parts.next().filter(|&part| node_kind(tree, part) == Some(Syntax::Index))?;
+        if parts.next().is_some() {
+            return None;
+        }
+        let symbol = &self.symbols.symbols[root as usize];
+        if symbol.assigned || symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
+            return None;
+        }
+        let Child::Node(index) = index else { return None };
+        let (file, element) = match self.element(context, root, index) {
+            Ok(found) => found,
+            Err(reason) => return Some((Err(reason), Source::Unknown)),
+        };
+        let text = text_of(self.tree(file), element);
+        let (first, end) = tokens_of(self.tree(file), element);
+        let value = match literal_target(text, joints) {
+            Some(value) => value,
+            None => self.value(self.at(context, symbol.scope, file), element).target(joints),
+        };
+        let source = match value {
+            Ok(_) => Source::Element(root, self.tree(file).span(first, end)),
+            Err(_) => Source::Unknown,
+        };
+        Some((value, source))
+    }
+
+    /// The expression of an array element.
+    fn element(&self, context: Context<'_>, root: u32, index: u32) -> Result<(u32, Child), Reason> {
+        let symbol = &self.symbols.symbols[root as usize];
+        let What::Data(data) = &symbol.what else { return Err(Reason::WrongShape) };
+        let mut at = data.value.ok_or(Reason::Uninitialised)?;
+        let tree = self.tree(symbol.file);
+        for position in expressions(self.tree(context.file), index) {
+            let Ok(position) = self.value(context, position).number() else {
+                return Err(Reason::RunTimeIndex);
+            };
+            let Child::Node(list) = at else { return Err(Reason::WrongShape) };
+            if tree.nodes[list as usize].kind != Syntax::Aggregate {
+                return Err(Reason::WrongShape);
+            }
+            let mut cache = self.elements.borrow_mut();
+            let items = cache.entry((symbol.file, list)).or_insert_with(|| expressions(tree, list).collect());
+            at = *index_of(position).and_then(|at| items.get(at)).ok_or(Reason::IndexOutOfRange)?;
+        }
+        Ok((symbol.file, at))
+    }
+
+    /// The same context at a declaration elsewhere: nothing assigned is known there.
+    fn at(&self, context: Context<'_>, scope: u32, file: u32) -> Context<'_> {
+        Context { file, scope, known: &self.nothing, depth: context.depth + 1 }
+    }
+
+    /// What data or a parameter is worth.
+    pub fn symbol_value(&self, context: Context<'_>, id: u32) -> Value {
+        if let Some(value) = context.known.get(&id) {
+            return value.clone();
+        }
+        let symbol = &self.symbols.symbols[id as usize];
+        match &symbol.what {
+            What::Data(_) if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) => {
+                Value::Unknown(Reason::Ambiguous)
+            }
+            What::Data(_) if symbol.assigned && symbol.whole => Value::Unknown(symbol.unknown),
+            What::Data(data) => match data.value {
+                Some(initial) if context.depth < REFERENCE_DEPTH => {
+                    let mut value = self.declared(context, id, initial);
+                    for part in &symbol.parts {
+                        self.hide(&mut value, (symbol.scope, &symbol.type_name), part, symbol.unknown);
+                    }
+                    value
+                }
+                Some(_) => Value::Unknown(Reason::WrongShape),
+                None if symbol.assigned => Value::Unknown(symbol.unknown),
+                None if self.is_zero(symbol, data) => Value::Number(0.0),
+                None => Value::Unknown(Reason::Uninitialised),
+            },
+            What::Loop => Value::Unknown(Reason::Assigned),
+            What::Parameter => Value::Unknown(Reason::Parameter),
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    /// Whether data begin as zero, and nothing outside the files given can change them: a number of a routine.
+    fn is_zero(&self, symbol: &Symbol, data: &Data) -> bool {
+        let of_routine = self.symbols.module_scope(symbol.scope) != symbol.scope;
+        let number = matches!(&*symbol.type_name, b"num" | b"dnum") && data.dimensions.is_none();
+        of_routine && number && data.storage == Token::Var
+    }
+
+    /// Makes the component at a path of names unknown.
+    fn hide(&self, value: &mut Value, (scope, type_name): (u32, &[u8]), path: &[u8], reason: Reason) {
+        let mut names = path.splitn(2, |&byte| byte == b'.');
+        let (Some(name), rest) = (names.next(), names.next()) else { return };
+        let found = self.component(scope, type_name, name);
+        match (found, &mut *value) {
+            (Some((index, type_name)), Value::List(list)) if index < list.len() => match rest {
+                Some(rest) => self.hide(&mut list[index], (scope, &type_name), rest, reason),
+                None => list[index] = Value::Unknown(reason),
+            },
+            (_, Value::Unknown(_)) => {}
+            _ => *value = Value::Unknown(reason),
+        }
+    }
+
+    /// The value of the initial expression of data, whatever becomes of it later.
+    pub fn initial_value(&self, context: Context<'_>, id: u32) -> Option<Value> {
+        let symbol = &self.symbols.symbols[id as usize];
+        match &symbol.what {
+            What::Data(data) => data.value.map(|value| self.declared(context, id, value)),
+            _ => None,
+        }
+    }
+
+    /// The value of the initial expression of data; worked out once where it refers to other data.
+    fn declared(&self, context: Context<'_>, id: u32, initial: Child) -> Value {
+        let symbol = &self.symbols.symbols[id as usize];
+        let tree = self.tree(symbol.file);
+        let there = self.at(context, symbol.scope, symbol.file);
+        let (first, end) = tokens_of(tree, initial);
+        if !tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
+            return self.value(there, initial);
+        }
+        if let Some(value) = self.initial.borrow().get(&id) {
+            return value.clone();
+        }
+        let value = self.value(there, initial);
+        self.initial.borrow_mut().insert(id, value.clone());
+        value
+    }
+
+    /// The value of an expression.
+    pub fn value(&self, context: Context<'_>, expression: Child) -> Value {
+        let tree = self.tree(context.file);
+        match expression {
+            Child::Token(token) => self.operand(context, tree, token),
+            Child::Node(node) => match tree.nodes[node as usize].kind {
+                Syntax::Aggregate => self.aggregate(context, tree, node),
+                Syntax::Paren => match expressions(tree, node).next() {
+                    Some(inner) => self.value(context, inner),
+                    None => Value::Unknown(Reason::WrongShape),
+                },
+                Syntax::Unary => self.unary(context, tree, node),
+                Syntax::Binary => self.binary(context, tree, node),
+                Syntax::Function => self.function(context, tree, node),
+                Syntax::Place => self.place(context, tree, node),
+                _ => Value::Unknown(Reason::WrongShape),
+            },
+        }
+    }
+
+    fn aggregate(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut size = 0;
+        let mut list = Vec::new();
+        for part in expressions(tree, node) {
+            let value = self.value(context, part);
+            let (first, end) = tokens_of(tree, part);
+            // Numbers that stand here are no more than the text is long.
+            if tree.kinds()[first as usize..end as usize].contains(&Token::Ident) {
+                size += value.size(REFERENCE_SIZE);
+            }
+            if size > REFERENCE_SIZE {
+                return Value::Unknown(Reason::WrongShape);
+            }
+            list.push(value);
+        }
+        Value::List(list)
+    }
+
+    fn operand(&self, context: Context<'_>, tree: &RapidTree<'s>, token: u32) -> Value {
+        let text = tree.text(token);
+        match tree.kind(token) {
+            Some(Token::Number) => {
+                number::value(text).map_or(Value::Unknown(Reason::WrongShape), Value::Number)
+            }
+            Some(Token::True) => Value::Bool(true),
+            Some(Token::False) => Value::Bool(false),
+            Some(Token::String) => Value::Text(unquoted(text)),
+            Some(Token::Ident) => match self.symbols.find(context.scope, text) {
+                Some(id) => self.symbol_value(context, id),
+                None => built_in(&folded(text)).unwrap_or(Value::Unknown(Reason::Undeclared)),
+            },
+            Some(Token::Placeholder | Token::Star) => Value::Unknown(Reason::Placeholder),
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    fn unary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut parts = parts(tree, node);
+        let operator = parts.next().and_then(|part| token_kind(tree, part));
+        let Some(operand) = parts.next() else { return Value::Unknown(Reason::WrongShape) };
+        match (operator, self.value(context, operand)) {
+            (_, unknown @ Value::Unknown(_)) => unknown,
+            (Some(Token::Minus), Value::Number(value)) => Value::Number(-value),
+            (Some(Token::Plus), Value::Number(value)) => Value::Number(value),
+            (Some(Token::Not), Value::Bool(value)) => Value::Bool(!value),
+            (Some(Token::Minus), list @ Value::List(_)) => match list.numbers::<3>() {
+                Ok(vector) => Value::from_numbers(&vector.map(|value| -value)),
+                Err(reason) => Value::Unknown(reason),
+            },
+            _ => Value::Unknown(Reason::WrongShape),
+        }
+    }
+
+    fn binary(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let mut left: Option<Value> = None;
+        let mut operator = None;
+        // Operands and operators alternate (`*` could be either by itself).
+        for (index, part) in parts(tree, node).enumerate() {
+            if index % 2 == 1 {
+                operator = token_kind(tree, part);
+                continue;
+            }
+            let right = self.value(context, part);
+            left = Some(match (left, operator) {
+                (Some(left), Some(operator)) => combined(&left, operator, &right),
+                _ => right,
+            });
+        }
+        left.unwrap_or(Value::Unknown(Reason::WrongShape))
+    }
+
+    fn place(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let Some(root) = parts(tree, node).next() else { return Value::Unknown(Reason::WrongShape) };
+        let (mut value, mut type_name, mut rest) = match self.symbols.root(tree, context.scope, root) {
+            Some(id) => {
+                let symbol = &self.symbols.symbols[id as usize];
+                let type_name = symbol.type_name.clone();
+                // An element of an array that nothing assigns, without building the array.
+                let index = parts(tree, node).nth(1);
+                match index {
+                    Some(Child::Node(index))
+                        if !symbol.assigned && matches!(symbol.what, What::Data(_)) && !symbol.ambiguous =>
+                    {
+                        match self.element(context, id, index) {
+                            Ok((file, element)) => {
+                                let at = self.at(context, symbol.scope, file);
+                                (self.value(at, element), type_name, parts(tree, node).skip(2))
+                            }
+                            Err(reason) => return Value::Unknown(reason),
+                        }
+                    }
+                    _ => (self.symbol_value(context, id), type_name, parts(tree, node).skip(1)),
+                }
+            }
+            None => {
+                let name = match root {
+                    Child::Token(token) => folded(tree.text(token)),
+                    Child::Node(_) => Vec::new(),
+                };
+                let type_name: &[u8] = match &*name {
+                    b"tool0" => b"tooldata",
+                    b"wobj0" => b"wobjdata",
+                    [b'v', ..] => b"speeddata",
+                    _ => b"zonedata",
+                };
+                (self.value(context, root), type_name.to_vec(), parts(tree, node).skip(1))
+            }
+        };
+        for part in rest.by_ref() {
+            match part {
+                Child::Node(index) if tree.nodes[index as usize].kind == Syntax::Index => {
+                    for position in expressions(tree, index) {
+                        let Ok(position) = self.value(context, position).number() else {
+                            return Value::Unknown(Reason::RunTimeIndex);
+                        };
+                        value = match value {
+                            Value::List(mut list) => match index_of(position) {
+                                Some(at) if at < list.len() => list.swap_remove(at),
+                                _ => return Value::Unknown(Reason::IndexOutOfRange),
+                            },
+                            unknown @ Value::Unknown(_) => return unknown,
+                            _ => return Value::Unknown(Reason::WrongShape),
+                        };
+                    }
+                }
+                Child::Token(token) if tree.kind(token) == Some(Token::Ident) => {
+                    let Some((index, component_type)) =
+                        self.component(context.scope, &type_name, tree.text(token))
+                    else {
+                        return Value::Unknown(Reason::WrongShape);
+                    };
+                    value = match value {
+                        Value::List(mut list) if index < list.len() => list.swap_remove(index),
+                        unknown @ Value::Unknown(_) => return unknown,
+                        _ => return Value::Unknown(Reason::WrongShape),
+                    };
+                    type_name = component_type;
+                }
+                _ => {}
+            }
+        }
+        value
+    }
+
+    fn function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Value {
+        let name = folded(tree.text(tree.nodes[node as usize].first));
+        if let Some(id) = self.symbols.find(context.scope, &name) {
+            let symbol = &self.symbols.symbols[id as usize];
+            return match symbol.what {
+                What::Routine(routine) if !symbol.ambiguous => {
+                    self.own_function(context, tree, node, routine)
+                }
+                _ => Value::Unknown(Reason::RunTimeFunction),
+            };
+        }
+        if name == b"dim" {
+            return self.dimension(context, tree, node).unwrap_or(Value::Unknown(Reason::RunTimeFunction));
+        }
+        let mut required = Vec::new();
+        let mut options = Options::default();
+        for argument in arguments(tree, node) {
+            match (argument.name, argument.value) {
+                (None, None) => {}
+                (None, Some(value)) => {
+                    // reg1 to reg5: variables of the USER module that every controller has.
+                    let own =
+                        matches!(text_of(tree, value), [b'r' | b'R', b'e' | b'E', b'g' | b'G', b'1'..=b'5']);
+                    required.push(match self.value(context, value) {
+                        Value::Unknown(Reason::Undeclared) if own => Value::Unknown(Reason::RunTimeOffset),
+                        value => value,
+                    });
+                }
+                (Some(option), value) => {
+                    let option: Vec<u8> = tree.text(option).iter().map(|&byte| fold(byte)).collect();
+                    let value = value.map(|value| self.value(context, value));
+                    match (&*option, value) {
+                        (b"rx", Some(value)) => options.turns[0] = Some(value),
+                        (b"ry", Some(value)) => options.turns[1] = Some(value),
+                        (b"rz", Some(value)) => options.turns[2] = Some(value),
+                        (b"wobj", Some(value)) if name == b"mirpos" => options.work_object = Some(value),
+                        (b"miry", None) => options.mirrors_y = true,
+                        (b"origin", Some(value)) if name == b"defframe" => options.origin = Some(value),
+                        (b"dec", Some(value)) if name == b"round" || name == b"trunc" => {
+                            options.decimals = Some(value);
+                        }
+                        ([letter @ b'x'..=b'z'], None) if name == b"eulerzyx" => {
+                            options.axis = Some(usize::from(letter - b'x'));
+                        }
+                        _ => return Value::Unknown(Reason::RunTimeFunction),
+                    }
+                }
+            }
+        }
+        match call(&name, &required, &options) {
+            Ok(value) => value,
+            Err(reason) => Value::Unknown(reason),
+        }
+    }
+
+    /// A function of the program: what it returns, where that is all that it does.
+    fn own_function(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32, routine: u32) -> Value {
+        let unknown = Value::Unknown(Reason::RunTimeFunction);
+        self.functions.set(if context.depth == 0 { 0 } else { self.functions.get() + 1 });
+        if context.depth >= REFERENCE_DEPTH || self.functions.get() >= FUNCTIONS {
+            return unknown;
+        }
+        let found = &self.symbols.routines[routine as usize];
+        let home = self.tree(found.file);
+        let Some(returned) = only_returns(home, found.head.node) else { return unknown };
+        let parameters = &found.head.parameters;
+        if parameters.iter().any(|parameter| parameter.by_reference || parameter.array) {
+            return unknown;
+        }
+        let mut known = context.known.clone();
+        self.symbols.declared_in(found.scope).for_each(|id| known.remove(&id));
+        let mut required = parameters.iter().filter(|parameter| !parameter.optional);
+        for argument in arguments(tree, node) {
+            let parameter = match argument.name {
+                None => required.next(),
+                Some(name) => {
+                    parameters.iter().find(|parameter| same_name(home.text(parameter.name), tree.text(name)))
+                }
+            };
+            let (Some(parameter), Some(value)) = (parameter, argument.value) else { return unknown };
+            let Some(id) = self.symbols.find(found.scope, home.text(parameter.name)) else { return unknown };
+            let given = self.value(Context { depth: context.depth + 1, ..context }, value);
+            self.doubtful.set(self.doubtful.get() || !given.is_known() && !is_plain_place(tree, value));
+            known.insert(id, given);
+        }
+        let depth = context.depth + 1;
+        match self.value(Context { file: found.file, scope: found.scope, known: &known, depth }, returned) {
+            // Not a parameter of the routine in which the call stands.
+            Value::Unknown(Reason::Parameter) => unknown,
+            value => value,
+        }
+    }
+
+    /// `Dim(array, number)`, where the declaration states the dimensions.
+    fn dimension(&self, context: Context<'_>, tree: &RapidTree<'s>, node: u32) -> Option<Value> {
+        let mut given = arguments(tree, node);
+        let (array, number) = (given.next()?.value?, given.next()?.value?);
+        let Child::Token(_) = array else { return None };
+        let symbol = &self.symbols.symbols[self.symbols.root(tree, context.scope, array)? as usize];
+        let What::Data(data) = &symbol.what else { return None };
+        if symbol.ambiguous && symbol.scope != self.symbols.module_scope(context.scope) {
+            return None;
+        }
+        let number = self.value(context, number).number().ok()?.round();
+        let at = if number >= 1.0 { number as usize - 1 } else { return None };
+        let size = expressions(self.tree(symbol.file), data.dimensions?).nth(at)?;
+        let size = self.value(self.at(context, symbol.scope, symbol.file), size).number().ok()?;
+        Some(Value::Number(size))
+    }
+}
+
+/// Whether an expression is a name or a component of one: it is read and cannot fail.
+fn is_plain_place(tree: &RapidTree<'_>, expression: Child) -> bool {
+    match expression {
+        Child::Token(_) => true,
+        Child::Node(node) => {
+            tree.nodes[node as usize].kind == Syntax::Place
+                && parts(tree, node).all(|part| matches!(part, Child::Token(_)))
+        }
+    }
+}
+
+/// The expression that a function returns, where that is its only statement and it declares nothing.
+fn only_returns(tree: &RapidTree<'_>, function: u32) -> Option<Child> {
+    let mut inside =
+        tree.child_nodes(function).filter(|&node| tree.nodes[node as usize].kind != Syntax::Parameters);
+    let (mut only, None) = (inside.next()?, inside.next()) else { return None };
+    if tree.nodes[only as usize].kind == Syntax::Body {
+        let mut statements = tree.child_nodes(only);
+        let (Some(first), None) = (statements.next(), statements.next()) else { return None };
+        only = first;
+    }
+    (tree.nodes[only as usize].kind == Syntax::Return).then(|| expressions(tree, only).next()).flatten()
+}
+
+/// The target that a literal of plain numbers is; `None` where it is no such literal.
+fn literal_target(text: &[u8], joints: bool) -> Option<Result<TargetValue, Reason>> {
+    if joints {
+        let found = literal::numbers(text, literal::JOINTTARGET)?;
+        let [robot @ .., _, _, _, _, _] = found.values;
+        let (mut angles, mut axes) = ([0.0; 6], [0.0; 6]);
+        angles.copy_from_slice(&robot[..6]);
+        axes.copy_from_slice(&found.values[6..12]);
+        return Some(joint_target(angles, axes));
+    }
+    let values = literal::numbers(text, literal::ROBTARGET)?.values;
+    let [x, y, z, q1, q2, q3, q4, c1, c2, c3, c4, e1, e2, e3, e4, e5, e6] = values;
+    Some(cartesian_target([x, y, z], [q1, q2, q3, q4], [c1, c2, c3, c4], [e1, e2, e3, e4, e5, e6]))
+}
+
+/// The content of a string token.
+fn unquoted(text: &[u8]) -> Vec<u8> {
+    let inner = text.get(1..text.len().saturating_sub(1)).unwrap_or_default();
+    let mut out = Vec::with_capacity(inner.len());
+    let mut rest = inner;
+    while let Some((&byte, after)) = rest.split_first() {
+        rest = after;
+        match (byte, after) {
+            (b'"', [b'"', after @ ..]) | (b'\\', [b'\\', after @ ..]) => {
+                out.push(byte);
+                rest = after;
+            }
+            (b'\\', [high, low, after @ ..]) if high.is_ascii_hexdigit() && low.is_ascii_hexdigit() => {
+                let digit = |byte: u8| char::from(byte).to_digit(16).unwrap_or(0) as u8;
+                out.push(digit(*high) * 16 + digit(*low));
+                rest = after;
+            }
+            _ => out.push(byte),
+        }
+    }
+    out
+}
+
+fn combined(left: &Value, operator: Token, right: &Value) -> Value {
+    match (left, right) {
+        (Value::Unknown(reason), _) | (_, Value::Unknown(reason)) => Value::Unknown(*reason),
+        (&Value::Number(a), &Value::Number(b)) => match operator {
+            Token::Plus => Value::Number(a + b),
+            Token::Minus => Value::Number(a - b),
+            Token::Star => Value::Number(a * b),
+            Token::Slash if b != 0.0 => Value::Number(a / b),
+            Token::Div if b.round() != 0.0 => Value::Number((a.round() / b.round()).trunc()),
+            Token::Mod if b.round() != 0.0 => Value::Number(a.round().rem_euclid(b.round().abs())),
+            Token::Equal => Value::Bool(a == b),
+            Token::NotEqual => Value::Bool(a != b),
+            Token::Less => Value::Bool(a < b),
+            Token::LessEqual => Value::Bool(a <= b),
+            Token::Greater => Value::Bool(a > b),
+            Token::GreaterEqual => Value::Bool(a >= b),
+            _ => Value::Unknown(Reason::WrongShape),
+        },
+        (&Value::Bool(a), &Value::Bool(b)) => match operator {
+            Token::And => Value::Bool(a && b),
+            Token::Or => Value::Bool(a || b),
+            Token::Xor | Token::NotEqual => Value::Bool(a != b),
+            Token::Equal => Value::Bool(a == b),
+            _ => Value::Unknown(Reason::WrongShape),
+        },
+        (Value::Text(a), Value::Text(b)) if operator == Token::Plus => Value::Text([&**a, &**b].concat()),
+        (Value::List(_), Value::List(_)) => match (left.numbers::<3>(), right.numbers::<3>(), operator) {
+            (Ok(a), Ok(b), Token::Plus) => Value::from_numbers(&[a[0] + b[0], a[1] + b[1], a[2] + b[2]]),
+            (Ok(a), Ok(b), Token::Minus) => Value::from_numbers(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]),
+            (Ok(a), Ok(b), Token::Star) => {
+                let cross = Vector3::from(a).cross(&Vector3::from(b));
+                Value::from_numbers(&[cross.x, cross.y, cross.z])
+            }
+            _ => match (left.numbers::<4>(), right.numbers::<4>(), operator) {
+                (Ok(a), Ok(b), Token::Star) => {
+                    let turn = |q: [f64; 4]| nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]);
+                    let product = turn(a) * turn(b);
+                    Value::from_numbers(&[product.w, product.i, product.j, product.k])
+                }
+                (Err(reason), _, _) | (_, Err(reason), _) if reason != Reason::WrongShape => {
+                    Value::Unknown(reason)
+                }
+                _ => Value::Unknown(Reason::WrongShape),
+            },
+        },
+        (Value::List(_), &Value::Number(factor)) | (&Value::Number(factor), Value::List(_)) => {
+            let list = if matches!(left, Value::List(_)) { left } else { right };
+            match (list.numbers::<3>(), operator) {
+                (Ok(vector), Token::Star) => Value::from_numbers(&vector.map(|value| value * factor)),
+                (Ok(vector), Token::Slash) if matches!(left, Value::List(_)) && factor != 0.0 => {
+                    Value::from_numbers(&vector.map(|value| value / factor))
+                }
+                (Err(reason), _) => Value::Unknown(reason),
+                _ => Value::Unknown(Reason::WrongShape),
+            }
+        }
+        _ => Value::Unknown(Reason::WrongShape),
+    }
+}

@@ -1,0 +1,301 @@
+//! The motion instructions of RAPID and what their arguments are.
+//!
+//! Source: RAPID instructions reference (RobotWare 6) and, for process packages, their application manuals; argument
+//! orders of arc, force control, paint, spot and dispense instructions are confirmed by public programs.
+
+use super::token::fold;
+use crate::motion::MotionKind;
+
+/// What a required argument is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slot {
+    /// The end point.
+    To,
+    /// The circle point.
+    Via,
+    /// A point that the instruction writes.
+    Output,
+    /// Speed.
+    Speed,
+    /// Zone.
+    Zone,
+    /// Tool.
+    Tool,
+    /// Anything else.
+    Other,
+}
+
+/// What may be put between the start of a motion and its end so that the process goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// A plain MoveL or MoveJ.
+    Plain,
+    /// The same instruction with another target.
+    Same,
+    /// Another instruction of the same process, with the same arguments.
+    Other(&'static str),
+    /// Nothing.
+    Nothing,
+}
+
+/// What a motion instruction does besides moving.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Also {
+    /// Nothing.
+    Nothing,
+    /// Writes the values of its options whose names begin with Ret.
+    Returns,
+    /// Calls the procedure that its last required argument names, between any two statements that follow.
+    Calls,
+    /// Ends where it touches something, before its target.
+    Stops,
+    /// Ends the soft servo.
+    Stiffens,
+    /// Does things at distances from its start or end, or at either: what is put before it would shift them.
+    Triggers,
+}
+
+/// A motion instruction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instruction {
+    /// Its name in the manual's spelling.
+    pub name: &'static str,
+    /// How the robot goes.
+    pub kind: MotionKind,
+    /// Required arguments: `T` end, `C` circle point, `J` joint target, `O` output, `S` speed, `Z` zone, `t` tool,
+    /// `.` another, `*` any number of others.
+    pattern: &'static str,
+    /// What may be put between.
+    pub between: Between,
+    /// The instruction that does the same with a joint target.
+    pub joint_form: Option<&'static str>,
+    /// Whether a sensor moves the path.
+    pub sensor_guided: bool,
+    /// What it does besides.
+    pub also: Also,
+}
+
+impl Instruction {
+    /// Whether the end is a joint target.
+    pub fn takes_joints(&self) -> bool {
+        self.pattern.contains('J')
+    }
+
+    /// What the required argument at `index` of `count` is; `None` where the count does not fit.
+    pub fn slot(&self, index: usize, count: usize) -> Option<Slot> {
+        let pattern = self.pattern.as_bytes();
+        let letter = match self.pattern.find('*') {
+            None => *pattern.get(index)?,
+            Some(star) => {
+                let tail = pattern.len() - star - 1;
+                if count < star + tail {
+                    *pattern.get(index).filter(|_| index < star)?
+                } else if index < star {
+                    pattern[index]
+                } else if index + tail >= count {
+                    pattern[pattern.len() - (count - index)]
+                } else {
+                    b'.'
+                }
+            }
+        };
+        Some(match letter {
+            b'T' | b'J' => Slot::To,
+            b'C' => Slot::Via,
+            b'O' => Slot::Output,
+            b'S' => Slot::Speed,
+            b'Z' => Slot::Zone,
+            b't' => Slot::Tool,
+            _ => Slot::Other,
+        })
+    }
+
+    /// For a motion on a circle, the one that does the same on a line: the last C of its name is an L, the circle point
+    /// goes, the other arguments stay.
+    pub fn line_form(&self) -> Option<&'static Instruction> {
+        let rest = self.pattern.strip_prefix('C')?;
+        let at = self.name.rfind('C')?;
+        let line = |name: &str| {
+            name.len() == self.name.len()
+                && name[..at] == self.name[..at]
+                && name[at..].starts_with('L')
+                && name[at + 1..] == self.name[at + 1..]
+        };
+        INSTRUCTIONS.iter().find(|other| other.pattern == rest && line(other.name))
+    }
+
+    /// Whether it ends where a signal comes.
+    pub fn searches(&self) -> bool {
+        self.pattern.contains('O')
+    }
+
+    /// Whether it ends elsewhere than at its target: where a signal comes, or where it touches something.
+    pub fn ends_early(&self) -> bool {
+        self.also == Also::Stops || self.searches()
+    }
+
+    /// Whether it does nothing but move: nearly every statement of a long program is such a one.
+    pub fn only_moves(&self) -> bool {
+        matches!(self.also, Also::Nothing | Also::Triggers) && !self.searches()
+    }
+
+    /// How many required arguments there are at least.
+    pub fn least(&self) -> usize {
+        self.pattern.bytes().filter(|&letter| letter != b'*').count()
+    }
+}
+
+const fn plain(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    let (between, joint_form, also) = (Between::Plain, None, Also::Nothing);
+    Instruction { name, kind, pattern, between, joint_form, sensor_guided: false, also }
+}
+
+const fn same(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { between: Between::Same, ..plain(name, kind, pattern) }
+}
+
+const fn rigid(name: &'static str, kind: MotionKind, pattern: &'static str) -> Instruction {
+    Instruction { between: Between::Nothing, ..plain(name, kind, pattern) }
+}
+
+const fn within(
+    name: &'static str,
+    between: &'static str,
+    kind: MotionKind,
+    pattern: &'static str,
+) -> Instruction {
+    Instruction { between: Between::Other(between), ..plain(name, kind, pattern) }
+}
+
+const fn with_joints(instruction: Instruction, joint_form: &'static str) -> Instruction {
+    Instruction { joint_form: Some(joint_form), ..instruction }
+}
+
+const fn guided(instruction: Instruction) -> Instruction {
+    Instruction { sensor_guided: true, between: Between::Nothing, ..instruction }
+}
+
+const fn besides(instruction: Instruction, also: Also) -> Instruction {
+    Instruction { also, ..instruction }
+}
+
+use MotionKind::{AbsoluteJoint, Circular, External, Joint, Linear};
+
+/// The instructions, the most frequent first.
+pub const INSTRUCTIONS: &[Instruction] = &[
+    with_joints(plain("MoveL", Linear, "TSZt"), "MoveAbsJ"),
+    with_joints(plain("MoveJ", Joint, "TSZt"), "MoveAbsJ"),
+    plain("MoveAbsJ", AbsoluteJoint, "JSZt"),
+    rigid("MoveC", Circular, "CTSZt"),
+    rigid("MoveExtJ", External, "JSZ"),
+    plain("MoveLDO", Linear, "TSZt.."),
+    plain("MoveJDO", Joint, "TSZt.."),
+    rigid("MoveCDO", Circular, "CTSZt.."),
+    plain("MoveAbsJDO", AbsoluteJoint, "JSZt.."),
+    plain("MoveLAO", Linear, "TSZt.."),
+    plain("MoveJAO", Joint, "TSZt.."),
+    rigid("MoveCAO", Circular, "CTSZt.."),
+    plain("MoveAbsJAO", AbsoluteJoint, "JSZt.."),
+    plain("MoveLGO", Linear, "TSZt."),
+    plain("MoveJGO", Joint, "TSZt."),
+    rigid("MoveCGO", Circular, "CTSZt."),
+    plain("MoveAbsJGO", AbsoluteJoint, "JSZt."),
+    besides(plain("MoveLSync", Linear, "TSZt."), Also::Calls),
+    besides(plain("MoveJSync", Joint, "TSZt."), Also::Calls),
+    besides(rigid("MoveCSync", Circular, "CTSZt."), Also::Calls),
+    besides(plain("TriggL", Linear, "TS.Zt"), Also::Triggers),
+    besides(plain("TriggJ", Joint, "TS.Zt"), Also::Triggers),
+    rigid("TriggC", Circular, "CTS.Zt"),
+    besides(plain("TriggAbsJ", AbsoluteJoint, "JS.Zt"), Also::Triggers),
+    besides(plain("TriggLIOs", Linear, "TSZt"), Also::Triggers),
+    besides(plain("TriggJIOs", Joint, "TSZt"), Also::Triggers),
+    rigid("SearchL", Linear, ".OTSt"),
+    rigid("SearchC", Circular, ".OCTSt"),
+    rigid("SearchExtJ", External, ".OJS"),
+    plain("ArcLStart", Linear, "TS*Zt"),
+    same("ArcL", Linear, "TS*Zt"),
+    within("ArcLEnd", "ArcL", Linear, "TS*Zt"),
+    rigid("ArcCStart", Circular, "CTS*Zt"),
+    rigid("ArcC", Circular, "CTS*Zt"),
+    rigid("ArcCEnd", Circular, "CTS*Zt"),
+    plain("ArcL1Start", Linear, "TS*Zt"),
+    same("ArcL1", Linear, "TS*Zt"),
+    within("ArcL1End", "ArcL1", Linear, "TS*Zt"),
+    rigid("ArcC1Start", Circular, "CTS*Zt"),
+    rigid("ArcC1", Circular, "CTS*Zt"),
+    rigid("ArcC1End", Circular, "CTS*Zt"),
+    plain("ArcL2Start", Linear, "TS*Zt"),
+    same("ArcL2", Linear, "TS*Zt"),
+    within("ArcL2End", "ArcL2", Linear, "TS*Zt"),
+    rigid("ArcC2Start", Circular, "CTS*Zt"),
+    rigid("ArcC2", Circular, "CTS*Zt"),
+    rigid("ArcC2End", Circular, "CTS*Zt"),
+    guided(rigid("ArcAdaptLStart", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptL", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptLEnd", Linear, "TS*Zt")),
+    guided(rigid("ArcAdaptC", Circular, "CTS*Zt")),
+    guided(rigid("ArcAdaptCEnd", Circular, "CTS*Zt")),
+    guided(rigid("ArcCalcLStart", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcL", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcLEnd", Linear, "TS*Zt")),
+    guided(rigid("ArcCalcC", Circular, "CTS*Zt")),
+    guided(rigid("ArcCalcCEnd", Circular, "CTS*Zt")),
+    rigid("ArcMoveExtJ", External, "JSZ"),
+    plain("ArcMoveL", Linear, "TSZt"),
+    plain("ArcMoveJ", Joint, "TSZt"),
+    rigid("ArcMoveC", Circular, "CTSZt"),
+    plain("ArcMoveAbsJ", AbsoluteJoint, "JSZt"),
+    plain("FCPress1LStart", Linear, "TS*Zt"),
+    same("FCPressL", Linear, "TS.Zt"),
+    rigid("FCPressC", Circular, "CTS.Zt"),
+    rigid("FCPressEnd", Linear, "TSt"),
+    same("PaintL", Linear, "TS*Zt"),
+    rigid("PaintC", Circular, "CTS*Zt"),
+    plain("SpotL", Linear, "TS*t"),
+    plain("SpotJ", Joint, "TS*t"),
+    plain("SpotML", Linear, "TS*t"),
+    plain("SpotMJ", Joint, "TS*t"),
+    plain("NutL", Linear, "TS*t"),
+    plain("NutJ", Joint, "TS*t"),
+    same("DispL", Linear, "TS.Zt"),
+    rigid("DispC", Circular, "CTS.Zt"),
+    plain("LaserLStart", Linear, "TS*Zt"),
+    same("LaserL", Linear, "TS*Zt"),
+    within("LaserLEnd", "LaserL", Linear, "TS*Zt"),
+    rigid("LaserCStart", Circular, "CTS*Zt"),
+    rigid("LaserC", Circular, "CTS*Zt"),
+    rigid("LaserCEnd", Circular, "CTS*Zt"),
+    besides(same("CapL", Linear, "TS*Zt"), Also::Triggers),
+    rigid("CapC", Circular, "CTS*Zt"),
+    besides(rigid("ContactL", Linear, "TSt"), Also::Stops),
+    besides(rigid("CSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
+    besides(rigid("SCSSDeactMoveL", Linear, "TSt"), Also::Stiffens),
+    with_joints(plain("SMoveL", Linear, "TSZt"), "MoveAbsJ"),
+    with_joints(plain("SMoveJ", Joint, "TSZt"), "MoveAbsJ"),
+    plain("SMoveLDO", Linear, "TSZt.."),
+    plain("SMoveJDO", Joint, "TSZt.."),
+    plain("SMoveLGO", Linear, "TSZt."),
+    plain("SMoveJGO", Joint, "TSZt."),
+    besides(plain("SMoveLSync", Linear, "TSZt."), Also::Calls),
+    besides(plain("SMoveJSync", Joint, "TSZt."), Also::Calls),
+    besides(plain("STriggL", Linear, "TS.Zt"), Also::Triggers),
+    besides(plain("STriggJ", Joint, "TS.Zt"), Also::Triggers),
+    rigid("SSearchL", Linear, ".OTSt"),
+    besides(rigid("CalibL", Linear, "TS*t"), Also::Returns),
+    besides(rigid("CalibJ", Joint, "TS*t"), Also::Returns),
+    besides(rigid("MeasureWearL", Linear, "TS*t"), Also::Returns),
+    guided(rigid("EGMMoveL", Linear, ".TSZt")),
+    guided(rigid("EGMMoveC", Circular, ".CTSZt")),
+];
+
+/// The instruction of this name in any case, by its index in [`INSTRUCTIONS`].
+pub fn find(name: &[u8]) -> Option<usize> {
+    // Every name begins with one of these letters; nearly all others are turned away here.
+    if !matches!(
+        name.first().map(|&byte| fold(byte)),
+        Some(b'm' | b't' | b's' | b'a' | b'f' | b'p' | b'n' | b'd' | b'l' | b'c' | b'e')
+    ) {
+        return None;
+    }
+    INSTRUCTIONS.iter().position(|instruction| instruction.name.as_bytes().eq_ignore_ascii_case(name))
+}

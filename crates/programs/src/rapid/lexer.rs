@@ -1,0 +1,270 @@
+//! Bytes to tokens, on `nom` (RAPID kernel reference, chapter 2).
+//!
+//! Every byte ends up in exactly one token, whatever the file holds. The lexer works on bytes and never transcodes:
+//! controllers write Latin-1, people write UTF-8 and GBK into comments, and none of these can hide a `"`, `!`, `;` or
+//! line end in the second byte of a character. There is no `\"` escape in RAPID strings.
+
+use nom::branch::alt;
+use nom::bytes::complete::{tag, tag_no_case, take, take_while, take_while1};
+use nom::character::complete::digit1;
+use nom::combinator::recognize;
+use nom::{IResult, Parser};
+use rayon::prelude::*;
+
+use super::syntax::Syntax;
+use super::token::{Token, keyword};
+use crate::tree::Tree;
+
+type Bytes<'s> = &'s [u8];
+type Lexed<'s, O = Bytes<'s>> = IResult<Bytes<'s>, O, ()>;
+
+/// The placeholders that the editor leaves for what is not written yet; programs that hold them are legal.
+const PLACEHOLDERS: [&str; 13] =
+    ["TDN", "DDN", "RDN", "PAR", "ALT", "DIM", "SMT", "VAR", "EIT", "CSE", "EXP", "ARG", "ID"];
+
+/// How far the second `%%%` of a header may be from the first.
+const HEADER_LIMIT: usize = 1024;
+
+/// Files from here on are split into tokens on all threads (bytes).
+const LARGE: usize = 1 << 20;
+
+/// Splits a file into tokens.
+///
+/// A large file is cut where a line begins with something other than white space: no token but white space and the
+/// header goes over the end of a line, so the parts are the same as of the whole.
+pub fn lex(source: &[u8]) -> Tree<'_, Token, Syntax> {
+    if source.len() >= u32::MAX as usize || is_binary(source) {
+        let mut tree = Tree::new(source, 1);
+        tree.push(Token::Unknown, 0);
+        return tree;
+    }
+    let mut tree = Tree::new(source, source.len() / 2);
+    let cuts = cuts(source);
+    let Some(&first) = cuts.first() else {
+        tokens(source, 0..source.len(), &mut tree);
+        return tree;
+    };
+    let ends = cuts[1..].iter().copied().chain([source.len()]);
+    let later: Vec<std::ops::Range<usize>> = cuts.iter().zip(ends).map(|(&from, to)| from..to).collect();
+    let ((), later) = rayon::join(
+        || tokens(source, 0..first, &mut tree),
+        || -> Vec<_> {
+            let part = |range: &std::ops::Range<usize>| {
+                let mut part = Tree::part(source, range.len() / 2);
+                tokens(source, range.clone(), &mut part);
+                part
+            };
+            later.par_iter().map(part).collect()
+        },
+    );
+    tree.append(&later);
+    tree
+}
+
+/// Where to cut a large file, one part for each thread.
+fn cuts(source: &[u8]) -> Vec<usize> {
+    let parts =
+        if source.len() < LARGE { 1 } else { rayon::current_num_threads().min(source.len() / LARGE + 1) };
+    let mut cuts: Vec<usize> = Vec::new();
+    for part in 1..parts {
+        let mut at = part * (source.len() / parts);
+        let cut = loop {
+            let Some(line) = source[at..].iter().position(|&byte| byte == b'\n') else { break source.len() };
+            let begin = source[at + line..].iter().position(|&byte| !is_space(byte));
+            let Some(begin) = begin.map(|begin| at + line + begin) else { break source.len() };
+            // Not within what may be a header.
+            let near = &source[begin.saturating_sub(HEADER_LIMIT + 8)..begin];
+            if !near.windows(3).any(|three| three == b"%%%") {
+                break begin;
+            }
+            at = begin;
+        };
+        if cut < source.len() && cuts.last().is_none_or(|&last| last < cut) {
+            cuts.push(cut);
+        }
+    }
+    cuts
+}
+
+fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\n' | b'\r' | 0x0B | 0x0C | 0x1A | 0xA0)
+}
+
+/// The tokens of a part of a file that begins and ends between tokens.
+fn tokens(source: &[u8], range: std::ops::Range<usize>, tree: &mut Tree<'_, Token, Syntax>) {
+    let mut rest = &source[range.clone()];
+    while !rest.is_empty() {
+        let at = range.end - rest.len();
+        let (after, kind) = if is_space(rest[0]) {
+            (space(rest, at, tree), Token::Space)
+        } else {
+            token(rest).unwrap_or((&rest[1..], Token::Unknown))
+        };
+        if kind == Token::Header {
+            let header = &rest[..rest.len() - after.len()];
+            for (index, _) in header.iter().enumerate().filter(|&(_, &byte)| byte == b'\n') {
+                tree.line_starts(at + index + 1);
+            }
+        }
+        tree.push(kind, at);
+        rest = after;
+    }
+}
+
+/// White space; notes the beginnings of lines.
+#[inline]
+fn space<'s>(input: Bytes<'s>, at: usize, tree: &mut Tree<'_, Token, Syntax>) -> Bytes<'s> {
+    let mut index = 0;
+    while let Some(&byte) = input.get(index) {
+        match byte {
+            b'\n' => tree.line_starts(at + index + 1),
+            byte if is_space(byte) => {}
+            _ => break,
+        }
+        index += 1;
+    }
+    &input[index..]
+}
+
+/// One token that is not plain white space.
+#[inline]
+fn token(input: Bytes<'_>) -> Lexed<'_, Token> {
+    let one = |kind| Ok((&input[1..], kind));
+    let two = |second: u8, both, single| match input.get(1) {
+        Some(&byte) if byte == second => Ok((&input[2..], both)),
+        _ => Ok((&input[1..], single)),
+    };
+    match input[0] {
+        b'0'..=b'9' => number(input).map(|(rest, _)| (rest, Token::Number)),
+        b',' => one(Token::Comma),
+        b'[' => one(Token::BracketOpen),
+        b']' => one(Token::BracketClose),
+        b'-' => one(Token::Minus),
+        b'a'..=b'z' | b'A'..=b'Z' | b'_' | 0xC0.. => word(input),
+        b'.' if input.get(1).is_some_and(u8::is_ascii_digit) => {
+            number(input).map(|(rest, _)| (rest, Token::Number))
+        }
+        b'.' => one(Token::Dot),
+        b';' => one(Token::Semicolon),
+        b'\\' => one(Token::Backslash),
+        b':' => two(b'=', Token::Assign, Token::Colon),
+        b'!' => {
+            take_while(|byte| byte != b'\n' && byte != b'\r').parse(input).map(|(r, _)| (r, Token::Comment))
+        }
+        b'"' => string(input),
+        b'(' => one(Token::ParenOpen),
+        b')' => one(Token::ParenClose),
+        b'{' => one(Token::BraceOpen),
+        b'}' => one(Token::BraceClose),
+        b'+' => one(Token::Plus),
+        b'*' => one(Token::Star),
+        b'/' => one(Token::Slash),
+        b'=' => one(Token::Equal),
+        b'>' => two(b'=', Token::GreaterEqual, Token::Greater),
+        b'<' => match placeholder(input) {
+            Ok(found) => Ok(found),
+            Err(_) => match input.get(1) {
+                Some(b'>') => Ok((&input[2..], Token::NotEqual)),
+                Some(b'=') => Ok((&input[2..], Token::LessEqual)),
+                _ => one(Token::Less),
+            },
+        },
+        b'%' => header(input).or_else(|_| one(Token::Percent)),
+        b'?' => one(Token::Question),
+        b'|' => one(Token::Pipe),
+        _ => one(Token::Unknown),
+    }
+}
+
+/// A number: decimal with optional fraction and exponent, or binary, octal, decimal, hexadecimal with its prefix.
+/// The sign is no part of it.
+#[inline]
+pub fn number(input: Bytes<'_>) -> Lexed<'_> {
+    if input.first() == Some(&b'0') && input.get(1).is_some_and(u8::is_ascii_alphabetic) {
+        let prefixed = alt((
+            recognize((tag_no_case("0x"), take_while1(|byte: u8| byte.is_ascii_hexdigit()))),
+            recognize((tag_no_case("0b"), take_while1(|byte| matches!(byte, b'0' | b'1')))),
+            recognize((tag_no_case("0o"), take_while1(|byte| matches!(byte, b'0'..=b'7')))),
+            recognize((tag_no_case("0d"), digit1)),
+        ))
+        .parse(input);
+        if prefixed.is_ok() {
+            return prefixed;
+        }
+    }
+    let digits = |mut at: usize| {
+        while input.get(at).is_some_and(u8::is_ascii_digit) {
+            at += 1;
+        }
+        at
+    };
+    let whole = digits(0);
+    let mut end = whole;
+    if input.get(end) == Some(&b'.') {
+        end = digits(end + 1);
+    }
+    if end - usize::from(end > whole) == 0 {
+        return Err(nom::Err::Error(()));
+    }
+    if matches!(input.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(input.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    take(end).parse(input)
+}
+
+/// An identifier or reserved word. Bytes from 0x80 belong to it: Latin-1 letters, and the pieces of letters of other
+/// encodings.
+#[inline]
+fn word(input: Bytes<'_>) -> Lexed<'_, Token> {
+    // Blanks of UTF-8: byte order mark, ideographic space, no-break space.
+    match input {
+        [0xEF, 0xBB, 0xBF, rest @ ..] | [0xE3, 0x80, 0x80, rest @ ..] | [0xC2, 0xA0, rest @ ..] => {
+            return Ok((rest, Token::Space));
+        }
+        _ => {}
+    }
+    let (rest, text) =
+        take_while(|byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80).parse(input)?;
+    Ok((rest, keyword(text).unwrap_or(Token::Ident)))
+}
+
+/// A string to its closing quote; `""` is a quote in it. Without a closing quote it ends with the line.
+fn string(input: Bytes<'_>) -> Lexed<'_, Token> {
+    let mut rest = &input[1..];
+    loop {
+        (rest, _) = take_while(|byte| !matches!(byte, b'"' | b'\n' | b'\r')).parse(rest)?;
+        match rest {
+            [b'"', b'"', after @ ..] => rest = after,
+            [b'"', after @ ..] => return Ok((after, Token::String)),
+            _ => return Ok((rest, Token::OpenString)),
+        }
+    }
+}
+
+fn placeholder(input: Bytes<'_>) -> Lexed<'_, Token> {
+    let inner = &input[1..];
+    let name = PLACEHOLDERS
+        .iter()
+        .find(|name| inner.starts_with(name.as_bytes()) && inner.get(name.len()) == Some(&b'>'))
+        .ok_or(nom::Err::Error(()))?;
+    Ok((&inner[name.len() + 1..], Token::Placeholder))
+}
+
+/// `%%%` VERSION and LANGUAGE lines `%%%`.
+fn header(input: Bytes<'_>) -> Lexed<'_, Token> {
+    let (rest, _) = tag("%%%").parse(input)?;
+    let within = &rest[..rest.len().min(HEADER_LIMIT)];
+    let close = within.windows(3).position(|three| three == b"%%%").ok_or(nom::Err::Error(()))?;
+    Ok((&rest[close + 3..], Token::Header))
+}
+
+/// Whether the bytes are no text: an encoded module, or not a program at all.
+fn is_binary(source: &[u8]) -> bool {
+    let sample = &source[..source.len().min(4096)];
+    let control = sample.iter().filter(|&&byte| byte < 9 || (14..32).contains(&byte) && byte != 0x1A).count();
+    control * 50 > sample.len()
+}

@@ -1,0 +1,95 @@
+//! The comment line that says that a file was compensated.
+//!
+//! `! truegrind 0.1.0 model 3f9a…`, and `partial` behind it where cuts may be corrected in part, on a line of its own after the head of each MODULE in which something changed: a
+//! controller keeps the modules of a file apart.
+
+use std::ops::Range;
+
+use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
+use super::token::Token;
+use crate::motion::Mark;
+
+/// The mark of a file, where it has one: the first comment of this form.
+pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
+    read(tree.text(token(tree)?))
+}
+
+/// The token of the mark.
+pub fn token(tree: &RapidTree<'_>) -> Option<u32> {
+    token_in(tree, 0..tree.len() as u32)
+}
+
+/// The token of the mark among some tokens.
+pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
+    // Long stretches hold no comment: that is told without looking at each token by itself.
+    const STRETCH: usize = 128;
+    let is_comment = |kind: &Token| *kind == Token::Comment;
+    let holds_comment = |kinds: &[Token]| kinds.iter().fold(false, |any, kind| any | is_comment(kind));
+    let first = tokens.start as usize;
+    let stretches = tree.kinds()[first..tokens.end as usize].chunks(STRETCH);
+    let mut stretches = (first..).step_by(STRETCH).zip(stretches);
+    stretches.find_map(|(first, kinds)| {
+        if !holds_comment(kinds) {
+            return None;
+        }
+        let comments = (first..).zip(kinds).filter(|(_, kind)| is_comment(kind));
+        let mut comments = comments.map(|(token, _)| token as u32);
+        comments.find(|&token| read(tree.text(token)).is_some())
+    })
+}
+
+/// Reads a comment as a mark.
+pub fn read(comment: &[u8]) -> Option<Mark> {
+    // Nearly no comment is one.
+    let begins = comment.iter().position(|byte| *byte != b'!' && !byte.is_ascii_whitespace())?;
+    if !comment[begins..].starts_with(b"truegrind") {
+        return None;
+    }
+    let text = std::str::from_utf8(comment).ok()?.trim_start_matches('!');
+    let mut words = text.split_ascii_whitespace();
+    if words.next() != Some("truegrind") {
+        return None;
+    }
+    let version = words.next()?.to_owned();
+    if words.next() != Some("model") {
+        return None;
+    }
+    Some(Mark { version, model: words.next()?.to_owned(), partial: words.next() == Some("partial") })
+}
+
+/// The comment of a mark.
+pub fn text(mark: &Mark) -> String {
+    format!("! truegrind {} model {}{}", mark.version, mark.model, if mark.partial { " partial" } else { "" })
+}
+
+/// The modules of a file; a fragment has none.
+pub fn modules(tree: &RapidTree<'_>) -> Vec<u32> {
+    tree.child_nodes(0).filter(|&node| tree.nodes[node as usize].kind == Syntax::Module).collect()
+}
+
+/// Where the mark of a module goes, and whether a line begins there: after the line on which its head ends, or, where it
+/// has no other line, behind its head.
+pub fn place(tree: &RapidTree<'_>, module: u32) -> (usize, bool) {
+    let node = tree.nodes[module as usize];
+    let mut head = node.first + 1;
+    for part in parts(tree, module).skip(1) {
+        match (node_kind(tree, part), token_kind(tree, part)) {
+            (Some(Syntax::Attributes), _) | (_, Some(Token::Ident)) => head = tokens_of(tree, part).1,
+            _ => break,
+        }
+    }
+    let span = tree.range(node.first, node.end);
+    let behind = tree.range(node.first, head).end;
+    match tree.source()[behind..span.end].iter().position(|&byte| byte == b'\n') {
+        Some(line) => (behind + line + 1, true),
+        None => (behind, false),
+    }
+}
+
+/// The line end that a file uses.
+pub fn line_end(source: &[u8]) -> &'static [u8] {
+    match source.iter().position(|&byte| byte == b'\n') {
+        Some(at) if at > 0 && source[at - 1] == b'\r' => b"\r\n",
+        _ => b"\n",
+    }
+}

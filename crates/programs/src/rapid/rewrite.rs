@@ -1,0 +1,586 @@
+//! New values to edits of RAPID text.
+//!
+//! Where a target's numbers stand decides how it changes: a literal in the instruction in place; a declaration in
+//! place where every use agrees on the new value and nothing else reads it, else a clone beside it under a new name;
+//! an array element in place or as a literal in the instruction; a computed target as a literal in the instruction.
+
+mod extra;
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use rayon::prelude::*;
+
+use super::instruction::{self, Between, INSTRUCTIONS, Instruction};
+use super::mark;
+use super::print::{self, Fresh};
+use super::syntax::RapidTree;
+use super::task::Task;
+use super::token::{Token, folded, keyword, same_name};
+use crate::edit::{EditError, Edits};
+use crate::motion::{Motion, MotionKind, Origin, Reason, Role, Span, TargetValue};
+use crate::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+
+/// Changes that one thread takes at a time.
+const PORTION: usize = 1024;
+
+/// Names of data have at most so many characters.
+const NAME_LENGTH: usize = 32;
+
+impl Task<'_> {
+    /// The edits that make the changes. Per file they are sorted and disjoint; [`Edits::apply`] makes the new bytes.
+    ///
+    /// A change of a motion that must be left ([`Motion::reason`]) is refused with that reason; two changes of one
+    /// motion would overlap and are an error.
+    pub fn rewrite(&self, changes: &[Change], options: &RewriteOptions) -> Result<Rewritten, EditError> {
+        let mut rewriter = Rewriter::new(self, options);
+        let outcomes = rewriter.all(changes);
+        let mut files = Vec::with_capacity(self.trees.len());
+        for (edits, tree) in rewriter.edits.into_iter().zip(&self.trees) {
+            let mut file = FileEdits { edits, unmarked: false };
+            if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
+                // Before the others, so that the list stays in order.
+                let mut marked = marks(tree, &file.edits, mark::text(mark).as_bytes());
+                file.unmarked = marked.is_empty();
+                marked.append(std::mem::take(&mut file.edits));
+                file.edits = marked;
+            }
+            file.edits.sort()?;
+            files.push(file);
+        }
+        Ok(Rewritten { files, outcomes })
+    }
+}
+
+/// The marks of the modules in which something changed.
+fn marks(tree: &RapidTree<'_>, edits: &Edits, comment: &[u8]) -> Edits {
+    let modules = mark::modules(tree);
+    let mut changed = vec![modules.len() == 1; modules.len()];
+    if modules.len() > 1 {
+        let spans: Vec<_> = modules.iter().map(|&module| tree.node_span(module).range()).collect();
+        for (range, _) in edits.iter() {
+            let at = spans.partition_point(|span| span.start <= range.start);
+            if at > 0 && range.start < spans[at - 1].end {
+                changed[at - 1] = true;
+            }
+        }
+    }
+    let mut marks = Edits::new();
+    let replace = |marks: &mut Edits, old: u32| marks.replace(tree.range(old, old + 1), comment);
+    for (&module, _) in modules.iter().zip(&changed).filter(|&(_, &changed)| changed) {
+        let node = tree.nodes[module as usize];
+        let tokens = if modules.len() == 1 { 0..tree.len() as u32 } else { node.first..node.end };
+        let (place, begins_line) = mark::place(tree, module);
+        let end = mark::line_end(tree.source());
+        match mark::token_in(tree, tokens) {
+            Some(old) => replace(&mut marks, old),
+            None if begins_line => marks.insert(place, &[comment, end].concat()),
+            None => marks.insert(place, &[end, comment, end].concat()),
+        }
+    }
+    if marks.is_empty()
+        && let Some(old) = mark::token(tree)
+    {
+        replace(&mut marks, old);
+    }
+    marks
+}
+
+/// One wish for a declared target: which change, which motion and target, which value.
+#[derive(Clone, Copy)]
+struct Wish {
+    change: usize,
+    motion: u32,
+    target: u32,
+    fresh: Fresh,
+}
+
+/// Wishes by declaration and first byte of the literal.
+type WishesOf = BTreeMap<(u32, u32), Vec<Wish>>;
+
+/// Who uses which declared target.
+struct Users {
+    /// The motions of each declaration, array elements apart by the first byte of their literal.
+    own: HashMap<(u32, u32), Vec<(u32, u32)>>,
+    /// Declarations that something reads which will not be written out as a literal.
+    read_elsewhere: HashSet<u32>,
+}
+
+impl Users {
+    fn of(task: &Task<'_>, replaced: &HashSet<(u32, u32)>) -> Users {
+        let mut users = Users { own: HashMap::new(), read_elsewhere: HashSet::new() };
+        for (index, declaration) in (0_u32..).zip(&task.listing.declarations) {
+            for &user in &declaration.uses {
+                let target = &task.listing.motions[user.0 as usize].targets[user.1 as usize];
+                let start = match target.origin {
+                    Origin::Element { literal, .. } => literal.start,
+                    _ => 0,
+                };
+                users.own.entry((index, start)).or_default().push(user);
+            }
+            let mut others = declaration.other_uses.iter();
+            if others.any(|other| other.motion.is_none_or(|user| !replaced.contains(&user))) {
+                users.read_elsewhere.insert(index);
+            }
+        }
+        users
+    }
+}
+
+/// The name of an argument, `Name :=`, right before its value.
+fn named_before(source: &[u8], value: usize) -> Option<std::ops::Range<usize>> {
+    let assign = source[..value].trim_ascii_end().strip_suffix(b":=")?.trim_ascii_end();
+    let letters =
+        assign.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
+    (letters > 0).then_some(assign.len() - letters..assign.len())
+}
+
+struct Rewriter<'r, 's> {
+    task: &'r Task<'s>,
+    options: &'r RewriteOptions,
+    edits: Vec<Edits>,
+    /// Every name in use, lower case, once a new one is needed.
+    names: Option<HashSet<Vec<u8>>>,
+    /// Declarations (with the first byte of the literal) that were edited in place.
+    moved_bases: HashSet<u32>,
+}
+
+impl<'r, 's> Rewriter<'r, 's> {
+    fn new(task: &'r Task<'s>, options: &'r RewriteOptions) -> Self {
+        let edits = vec![Edits::new(); task.trees.len()];
+        Rewriter { task, options, edits, names: None, moved_bases: HashSet::new() }
+    }
+
+    fn all(&mut self, changes: &[Change]) -> Vec<Outcome> {
+        let task = self.task;
+        let (mut outcomes, wishes, computed) = self.in_place(changes);
+        let replaced: HashSet<(u32, u32)> = computed.iter().map(|wish| (wish.motion, wish.target)).collect();
+        if !wishes.is_empty() {
+            let users = Users::of(task, &replaced);
+            for ((declaration, literal), wishes) in wishes {
+                self.declared((declaration, literal), &wishes, &users, &mut outcomes);
+            }
+        }
+        self.computed(&computed, &mut outcomes);
+        for (change, outcome) in changes.iter().zip(&mut outcomes) {
+            if !change.before.is_empty() && !matches!(outcome, Outcome::Refused(_)) {
+                self.extras(change);
+                if *outcome == Outcome::Unchanged {
+                    *outcome = Outcome::InPlace;
+                }
+            }
+        }
+        outcomes
+    }
+
+    /// What stands in the instructions themselves, in portions on all threads: an edit of one instruction depends on
+    /// no other. Wishes for declared and computed targets are collected, in the order of the changes.
+    fn in_place(&mut self, changes: &[Change]) -> (Vec<Outcome>, WishesOf, Vec<Wish>) {
+        let (task, options) = (self.task, self.options);
+        let portions: Vec<_> = changes
+            .par_chunks(PORTION)
+            .enumerate()
+            .map(|(portion, changes)| {
+                let mut part = Rewriter::new(task, options);
+                if let [edits] = &mut part.edits[..] {
+                    // About eight numbers of a target change, each by a few digits.
+                    *edits = Edits::with_capacity(8 * changes.len(), 64 * changes.len());
+                }
+                let (mut wishes, mut computed) = (WishesOf::new(), Vec::new());
+                let outcomes: Vec<Outcome> = (portion * PORTION..)
+                    .zip(changes)
+                    .map(|(index, change)| match task.listing.motions.get(change.motion as usize) {
+                        None => Outcome::Refused(Reason::MissingArgument),
+                        Some(motion) => match part.refusal(motion, change) {
+                            Some(reason) => Outcome::Refused(reason),
+                            None => part.one(index, motion, change, &mut wishes, &mut computed),
+                        },
+                    })
+                    .collect();
+                (part.edits, outcomes, wishes, computed)
+            })
+            .collect();
+        let (mut outcomes, mut wishes, mut computed) =
+            (Vec::with_capacity(changes.len()), WishesOf::new(), Vec::new());
+        for (edits, mut some, wished, mut left) in portions {
+            self.edits.iter_mut().zip(edits).for_each(|(all, some)| all.append(some));
+            outcomes.append(&mut some);
+            for (place, mut more) in wished {
+                wishes.entry(place).or_default().append(&mut more);
+            }
+            computed.append(&mut left);
+        }
+        (outcomes, wishes, computed)
+    }
+
+    /// Why a change cannot be made.
+    fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {
+        if let Some(reason) = motion.reason() {
+            return Some(reason);
+        }
+        if !change.is_held() {
+            return Some(Reason::NumberRange);
+        }
+        let instruction = self.instruction(motion);
+        for (target, new) in motion.targets.iter().zip(&change.targets) {
+            let Ok(value) = &target.value else { continue };
+            match (new, value) {
+                (NewTarget::Cartesian { .. }, TargetValue::Joint(_)) => return Some(Reason::WrongKind),
+                (NewTarget::Joint { .. }, TargetValue::Cartesian(_))
+                    if instruction.is_none_or(|instruction| instruction.joint_form.is_none()) =>
+                {
+                    return Some(Reason::NoJointForm);
+                }
+                _ => {}
+            }
+        }
+        if change.straightens() && !motion.straightens {
+            return Some(Reason::NoInsertion);
+        }
+        if change.before.is_empty() {
+            return None;
+        }
+        let guarded = self.task.statements[change.motion as usize].guarded;
+        let written = instruction.and_then(|instruction| written_as(instruction, change));
+        let between = written.map_or(Between::Nothing, |instruction| instruction.between);
+        if guarded || motion.timed || between == Between::Nothing {
+            return Some(Reason::NoInsertion);
+        }
+        for extra in &change.before {
+            match (extra.kind, &extra.target) {
+                (MotionKind::Linear | MotionKind::Joint, NewTarget::Cartesian { .. }) => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) if between == Between::Plain => {}
+                (MotionKind::AbsoluteJoint, NewTarget::Joint { .. }) => return Some(Reason::NoJointForm),
+                _ => return Some(Reason::WrongKind),
+            }
+        }
+        None
+    }
+
+    /// The instruction of a motion as the source has it.
+    fn instruction(&self, motion: &Motion) -> Option<&'static Instruction> {
+        instruction::find(motion.instruction.as_bytes()).map(|index| &INSTRUCTIONS[index])
+    }
+
+    /// The targets of one motion: what stands in the instruction at once, the rest for later.
+    fn one(
+        &mut self,
+        index: usize,
+        motion: &Motion,
+        change: &Change,
+        wishes: &mut WishesOf,
+        computed: &mut Vec<Wish>,
+    ) -> Outcome {
+        let mut outcome = Outcome::Unchanged;
+        if change.straightens() {
+            self.straighten(motion);
+            outcome = Outcome::InPlace;
+        }
+        for (position, (target, new)) in motion.targets.iter().zip(&change.targets).enumerate() {
+            let Some(fresh) = fresh(new) else { continue };
+            let Ok(old) = target.value else { continue };
+            let (motion_index, position) = (change.motion, position as u32);
+            let wish = Wish { change: index, motion: motion_index, target: position, fresh };
+            if matches!((&fresh, &old), (Fresh::Joint { .. }, TargetValue::Cartesian(_))) {
+                self.take_joint_form(motion, target.argument, &old, &fresh);
+                outcome = worse(outcome, Outcome::Inlined);
+                continue;
+            }
+            match target.origin {
+                Origin::Inline => {
+                    if self.literal(motion.place.file, target.argument, (&old, true), &fresh) {
+                        outcome = worse(outcome, Outcome::InPlace);
+                    }
+                }
+                Origin::Declared(declaration) => {
+                    wishes.entry((declaration, 0)).or_default().push(wish);
+                }
+                Origin::Element { declaration, literal } => {
+                    wishes.entry((declaration, literal.start)).or_default().push(wish);
+                }
+                Origin::Computed => computed.push(wish),
+                Origin::Unknown => {}
+            }
+        }
+        outcome
+    }
+
+    /// Numbers of a literal in place, or the whole literal where it is not made of plain numbers. `plain`: it is.
+    fn literal(&mut self, file: u32, span: Span, (old, plain): (&TargetValue, bool), fresh: &Fresh) -> bool {
+        let text = &self.task.trees[file as usize].source()[span.range()];
+        let edits = &mut self.edits[file as usize];
+        let known = Some(old).filter(|_| plain);
+        match print::replace_numbers(text, span.start as usize, known, fresh, self.options, edits) {
+            Some(changed) => changed,
+            None if print::changes(old, fresh, self.options) => {
+                let value = print::merged(old, fresh);
+                edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn inline(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+        let value = print::merged(old, fresh);
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace_with(span.range(), |out| print::literal(out, &value, self.options));
+    }
+
+    /// The instruction becomes the one on a line, and its circle point goes with the comma behind it; a comment between
+    /// them stays.
+    fn straighten(&mut self, motion: &Motion) {
+        let Some(line) = self.instruction(motion).and_then(Instruction::line_form) else { return };
+        let start = motion.statement.start as usize;
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace(start..start + motion.instruction.len(), line.name.as_bytes());
+        let source = self.task.trees[motion.place.file as usize].source();
+        for range in circle_point(source, motion).into_iter().flatten() {
+            edits.replace(range, b"");
+        }
+    }
+
+    /// The instruction becomes the one that takes joints.
+    fn take_joint_form(&mut self, motion: &Motion, span: Span, old: &TargetValue, fresh: &Fresh) {
+        let Some(name) = self.instruction(motion).and_then(|instruction| instruction.joint_form) else {
+            return;
+        };
+        let start = motion.statement.start as usize;
+        let source = self.task.trees[motion.place.file as usize].source();
+        let edits = &mut self.edits[motion.place.file as usize];
+        edits.replace(start..start + motion.instruction.len(), name.as_bytes());
+        if let Some(argument) = named_before(source, span.start as usize) {
+            edits.replace(argument, b"ToJointPos");
+        }
+        self.inline(motion, span, old, fresh);
+    }
+
+    // ---- declarations ----
+
+    /// The wishes for one declared target or array element.
+    fn declared(
+        &mut self,
+        (index, start): (u32, u32),
+        wishes: &[Wish],
+        users: &Users,
+        outcomes: &mut [Outcome],
+    ) {
+        let task = self.task;
+        let declaration = &task.listing.declarations[index as usize];
+        let target = |wish: &Wish| &task.listing.motions[wish.motion as usize].targets[wish.target as usize];
+        let Some(first) = wishes.first() else { return };
+        let Ok(old) = target(first).value else { return };
+        let literal = match target(first).origin {
+            Origin::Element { literal, .. } => literal,
+            _ => declaration.literal.unwrap_or_default(),
+        };
+        // Wishes that come to the same text.
+        let mut groups: Vec<(Vec<u8>, Vec<&Wish>)> = Vec::new();
+        let mut group_of: HashMap<Vec<u8>, usize> = HashMap::new();
+        let source = task.trees[declaration.place.file as usize].source();
+        let original = source[literal.range()].to_vec();
+        for wish in wishes {
+            let text = self.written(&original, &old, &wish.fresh);
+            let group = *group_of.entry(text.clone()).or_insert_with(|| {
+                groups.push((text, Vec::new()));
+                groups.len() - 1
+            });
+            groups[group].1.push(wish);
+        }
+        // Whoever else needs the old value.
+        let wished: HashSet<(u32, u32)> = wishes.iter().map(|wish| (wish.motion, wish.target)).collect();
+        let own = users.own.get(&(index, start)).map_or(&[][..], Vec::as_slice);
+        let others_hold = users.read_elsewhere.contains(&index)
+            || own.iter().any(|user| !wished.contains(user))
+            || groups.iter().any(|(text, _)| *text == original);
+        let mut free = !others_hold;
+        for (text, group) in groups {
+            if text == original {
+                continue;
+            }
+            let outcome = if free {
+                free = false;
+                self.literal(declaration.place.file, literal, (&old, false), &group[0].fresh);
+                self.moved_bases.insert(index);
+                Outcome::InPlace
+            } else if declaration.array {
+                for wish in &group {
+                    let motion = &task.listing.motions[wish.motion as usize];
+                    self.inline(motion, target(wish).argument, &old, &wish.fresh);
+                }
+                Outcome::Inlined
+            } else {
+                let name = self.clone_of(index, &text);
+                for wish in &group {
+                    let motion = &task.listing.motions[wish.motion as usize];
+                    let edits = &mut self.edits[motion.place.file as usize];
+                    edits.replace(target(wish).argument.range(), name.as_bytes());
+                }
+                Outcome::Split(name)
+            };
+            for wish in group {
+                let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
+                outcomes[wish.change] = worse(was, outcome.clone());
+            }
+        }
+    }
+
+    /// The text of a literal with new values.
+    fn written(&self, text: &[u8], old: &TargetValue, fresh: &Fresh) -> Vec<u8> {
+        let mut edits = Edits::new();
+        match print::replace_numbers(text, 0, None, fresh, self.options, &mut edits) {
+            Some(_) => edits.apply(text).unwrap_or_else(|_| text.to_vec()),
+            None if print::changes(old, fresh, self.options) => {
+                let mut out = Vec::new();
+                print::literal(&mut out, &print::merged(old, fresh), self.options);
+                out
+            }
+            None => text.to_vec(),
+        }
+    }
+
+    /// Declares a constant with this value beside a declaration; answers its name.
+    fn clone_of(&mut self, index: u32, literal: &[u8]) -> String {
+        let declaration = &self.task.listing.declarations[index as usize];
+        let file = declaration.place.file as usize;
+        let tree = &self.task.trees[file];
+        let source = tree.source();
+        let name = self.new_name(&declaration.name);
+        let statement = &source[declaration.statement.range()];
+        let local = statement.len() >= 5 && same_name(&statement[..5], b"LOCAL");
+        let joints = super::literal::numbers(literal, super::literal::ROBTARGET).is_none();
+        // After the declaration, and after a comment that stands behind it on its line.
+        let end = declaration.statement.end as usize;
+        let line = source[end..].iter().position(|&byte| byte == b'\n').map_or(source.len(), |at| end + at);
+        let rest = source[end..line].trim_ascii();
+        let at = if rest.is_empty() || rest[0] == b'!' {
+            end + source[end..line].trim_ascii_end().len()
+        } else {
+            end
+        };
+        let mut text = mark::line_end(source).to_vec();
+        text.extend_from_slice(indent(source, declaration.statement.start as usize));
+        text.extend_from_slice(if local { b"LOCAL CONST " } else { b"CONST " });
+        text.extend_from_slice(if joints { b"jointtarget " } else { b"robtarget " });
+        text.extend_from_slice(name.as_bytes());
+        text.extend_from_slice(b":=");
+        text.extend_from_slice(literal);
+        text.push(b';');
+        self.edits[file].insert(at, &text);
+        name
+    }
+
+    /// `p10` to `p10_2`, `p10_3`, …: of at most 32 characters, and like no other name of the task.
+    fn new_name(&mut self, like: &str) -> String {
+        let task = self.task;
+        let names = self.names.get_or_insert_with(|| {
+            let mut names: HashSet<Vec<u8>> = task.symbols.names().map(<[u8]>::to_vec).collect();
+            for tree in &task.trees {
+                for token in 0..tree.len() as u32 {
+                    if tree.kind(token) == Some(Token::Ident) {
+                        names.insert(folded(tree.text(token)));
+                    }
+                }
+            }
+            names
+        });
+        // New text is ASCII, whatever encoding the file has.
+        let stem: String = like.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let stem =
+            if stem.starts_with(|c: char| c.is_ascii_alphabetic()) { stem } else { format!("p{stem}") };
+        let mut number = 2_u64;
+        loop {
+            let tail = format!("_{number}");
+            let head = &stem[..stem.len().min(NAME_LENGTH - tail.len())];
+            let name = format!("{head}{tail}");
+            if keyword(name.as_bytes()).is_none() && names.insert(folded(name.as_bytes())) {
+                return name;
+            }
+            number += 1;
+        }
+    }
+
+    // ---- computed targets ----
+
+    fn computed(&mut self, wishes: &[Wish], outcomes: &mut [Outcome]) {
+        let task = self.task;
+        // A target computed from a declaration that has moved must be written out even where it itself stays.
+        let mut forced: HashSet<(u32, u32)> = HashSet::new();
+        for (index, declaration) in task.listing.declarations.iter().enumerate() {
+            if self.moved_bases.contains(&(index as u32)) {
+                forced.extend(declaration.other_uses.iter().filter_map(|other| other.motion));
+            }
+        }
+        for wish in wishes {
+            let motion = &task.listing.motions[wish.motion as usize];
+            let target = &motion.targets[wish.target as usize];
+            let Ok(old) = target.value else { continue };
+            if !print::changes(&old, &wish.fresh, self.options)
+                && !forced.contains(&(wish.motion, wish.target))
+            {
+                continue;
+            }
+            self.inline(motion, target.argument, &old, &wish.fresh);
+            let was = std::mem::replace(&mut outcomes[wish.change], Outcome::Unchanged);
+            outcomes[wish.change] = worse(was, Outcome::Inlined);
+        }
+    }
+}
+
+/// The instruction that a change leaves.
+fn written_as(instruction: &'static Instruction, change: &Change) -> Option<&'static Instruction> {
+    if change.straightens() { instruction.line_form() } else { Some(instruction) }
+}
+
+/// The bytes of a circle point, and those of the comma behind it with the blanks before the next argument.
+fn circle_point(source: &[u8], motion: &Motion) -> Option<[std::ops::Range<usize>; 2]> {
+    let via = motion.targets.iter().find(|target| target.role == Role::Via)?;
+    let mut argument = via.argument.range();
+    // `CirPoint := p20` goes with its name.
+    if let Some(before) = source[..argument.start].trim_ascii_end().strip_suffix(b":=") {
+        let name = before.trim_ascii_end();
+        let long =
+            name.iter().rev().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
+        argument.start = name.len() - long;
+    }
+    let mut at = argument.end;
+    while let Some(&byte) = source.get(at).filter(|_| at < motion.statement.end as usize) {
+        match byte {
+            b',' => {
+                let blanks = source[at + 1..].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+                return Some([argument, at..at + 1 + blanks]);
+            }
+            b'!' => at += source[at..].iter().take_while(|&&byte| byte != b'\n').count(),
+            _ => at += 1,
+        }
+    }
+    None
+}
+
+fn fresh(new: &NewTarget) -> Option<Fresh> {
+    match *new {
+        NewTarget::Keep | NewTarget::Drop => None,
+        NewTarget::Cartesian { position_mm, quaternion, conf } => {
+            Some(Fresh::Cartesian { position_mm, quaternion, conf })
+        }
+        NewTarget::Joint { robot_deg } => Some(Fresh::Joint { robot_deg }),
+    }
+}
+
+/// The outcome that says more.
+fn worse(a: Outcome, b: Outcome) -> Outcome {
+    let rank = |outcome: &Outcome| match outcome {
+        Outcome::Unchanged => 0,
+        Outcome::InPlace => 1,
+        Outcome::Split(_) => 2,
+        Outcome::Inlined => 3,
+        Outcome::Refused(_) => 4,
+    };
+    if rank(&b) > rank(&a) { b } else { a }
+}
+
+/// The white space before a statement on its line.
+fn indent(source: &[u8], statement: usize) -> &[u8] {
+    let line = source[..statement].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+    let blank = source[line..statement].iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+    &source[line..line + blank]
+}

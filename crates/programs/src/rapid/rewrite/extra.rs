@@ -1,0 +1,172 @@
+//! Motions that are put in before another: they take its speed, tool, work object and process.
+
+use super::{Rewriter, circle_point, fresh, indent, written_as};
+use crate::edit::Edits;
+use crate::motion::{Motion, MotionKind, Role, Span, TargetValue};
+use crate::rapid::instruction::{Between, Instruction, Slot};
+use crate::rapid::mark;
+use crate::rapid::print;
+use crate::rapid::syntax::{RapidTree, arguments, tokens_of};
+use crate::rapid::token::{Token, same_name};
+use crate::rewrite::{Change, Extra};
+use crate::tree::Child;
+
+impl Rewriter<'_, '_> {
+    /// Puts in what a change asks for.
+    pub(super) fn extras(&mut self, change: &Change) {
+        let motion = &self.task.listing.motions[change.motion as usize];
+        let Some(instruction) = self.instruction(motion) else { return };
+        let tree = &self.task.trees[motion.place.file as usize];
+        let source = tree.source();
+        let start = motion.statement.start as usize;
+        let parts = Parts::of(tree, self.task.statements[change.motion as usize].node, instruction);
+        let mut text = Vec::new();
+        for extra in &change.before {
+            let Some(written) = written_as(instruction, change) else { return };
+            self.extra(&mut text, motion, written, tree, &parts, extra);
+            text.extend_from_slice(mark::line_end(source));
+            text.extend_from_slice(indent(source, start));
+        }
+        self.edits[motion.place.file as usize].insert(start, &text);
+    }
+
+    fn extra(
+        &self,
+        out: &mut Vec<u8>,
+        motion: &Motion,
+        instruction: &Instruction,
+        tree: &RapidTree<'_>,
+        parts: &Parts,
+        extra: &Extra,
+    ) {
+        let (Some(fresh), Some(Ok(old))) = (fresh(&extra.target), motion.to().map(|target| target.value))
+        else {
+            return;
+        };
+        let mut value = print::merged(&old, &fresh);
+        if let Some(external) = extra.external {
+            match &mut value {
+                TargetValue::Cartesian(target) => target.external = external,
+                TargetValue::Joint(target) => target.external = external,
+            }
+        }
+        let source = tree.source();
+        let mut target = Vec::new();
+        print::literal(&mut target, &value, self.options);
+        let same = match instruction.between {
+            Between::Same => Some(instruction.name),
+            Between::Other(name) => Some(name),
+            Between::Plain | Between::Nothing => None,
+        };
+        let Some(name) = same else {
+            let name: &[u8] = match extra.kind {
+                MotionKind::Joint => b"MoveJ",
+                MotionKind::AbsoluteJoint => b"MoveAbsJ",
+                _ => b"MoveL",
+            };
+            out.extend_from_slice(name);
+            out.push(b' ');
+            out.extend_from_slice(&target);
+            out.push(b',');
+            for (index, part) in [&parts.speed, &parts.zone, &parts.tool].into_iter().enumerate() {
+                if index == 1 {
+                    out.extend_from_slice(self.options.extra_zone.as_bytes());
+                    out.push(b',');
+                } else if let Some(span) = part {
+                    out.extend_from_slice(&source[span.range()]);
+                    if index == 0 {
+                        for option in &parts.speed_options {
+                            out.extend_from_slice(&source[option.range()]);
+                        }
+                        out.push(b',');
+                    }
+                }
+            }
+            for option in &parts.tool_options {
+                out.extend_from_slice(&source[option.range()]);
+            }
+            out.push(b';');
+            return;
+        };
+        // The same instruction, with another target and a fly-by zone.
+        let statement = &source[motion.statement.range()];
+        let base = motion.statement.start as usize;
+        let mut edits = Edits::new();
+        edits.replace(0..motion.instruction.len(), name.as_bytes());
+        for range in circle_point(source, motion).into_iter().flatten() {
+            edits.replace(range.start - base..range.end - base, b"");
+        }
+        if let Some(to) = motion.targets.iter().find(|target| target.role == Role::To) {
+            let range = to.argument.range();
+            edits.replace(range.start - base..range.end - base, &target);
+        }
+        if let Some(zone) = parts.zone {
+            let range = zone.range();
+            edits.replace(range.start - base..range.end - base, self.options.extra_zone.as_bytes());
+        }
+        for option in &parts.stop_options {
+            let range = option.range();
+            edits.replace(range.start - base..range.end - base, b"");
+        }
+        if let Ok(copy) = edits.apply(statement) {
+            out.extend_from_slice(&copy);
+        }
+    }
+}
+
+/// The arguments of an instruction that extra motions take over.
+#[derive(Default)]
+struct Parts {
+    speed: Option<Span>,
+    zone: Option<Span>,
+    tool: Option<Span>,
+    /// `\V`.
+    speed_options: Vec<Span>,
+    /// `\WObj`, `\TLoad`.
+    tool_options: Vec<Span>,
+    /// `\Inpos`, `\Z`: belong to the stop at the end.
+    stop_options: Vec<Span>,
+}
+
+impl Parts {
+    fn of(tree: &RapidTree<'_>, node: u32, instruction: &Instruction) -> Parts {
+        let mut parts = Parts::default();
+        let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+        let span = |child: Child| {
+            let (first, end) = tokens_of(tree, child);
+            tree.span(first, end)
+        };
+        let mut index = 0;
+        for argument in arguments(tree, node) {
+            if argument.optional {
+                let Some(name) = argument.name else { continue };
+                let end = argument.value.map_or(name + 1, |value| tokens_of(tree, value).1);
+                // From the backslash before the name.
+                let mut first = name;
+                while first > 0 && tree.kind(first) != Some(Token::Backslash) {
+                    first -= 1;
+                }
+                let option = tree.span(first, end);
+                let is = |wanted: &[u8]| same_name(tree.text(name), wanted);
+                if is(b"V") {
+                    parts.speed_options.push(option);
+                } else if is(b"WObj") || is(b"TLoad") {
+                    parts.tool_options.push(option);
+                } else if is(b"Inpos") || is(b"Z") {
+                    parts.stop_options.push(option);
+                }
+                continue;
+            }
+            let slot = instruction.slot(index, count);
+            index += 1;
+            let Some(value) = argument.value else { continue };
+            match slot {
+                Some(Slot::Speed) => parts.speed = Some(span(value)),
+                Some(Slot::Zone) => parts.zone = Some(span(value)),
+                Some(Slot::Tool) => parts.tool = Some(span(value)),
+                _ => {}
+            }
+        }
+        parts
+    }
+}

@@ -1,0 +1,494 @@
+//! Names: what each stands for, from where it is seen, and whether the program changes it.
+//!
+//! Look-up goes from the routine to its module to the task (all files given together). LOCAL declarations and those
+//! of routines hide others. What a file assigns, or hands to something that may assign it, is marked: its initial
+//! value then says nothing about its value at a motion, or only about the components that nothing assigns.
+
+mod acts;
+mod change;
+mod named;
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+pub use self::change::{Change, Ends, How, Reach};
+pub(super) use self::change::{places, resumes};
+use super::instruction;
+use super::modal::States;
+use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};
+use super::token::{Token, display, fold, folded, same_name};
+use crate::motion::Reason;
+use crate::tree::Child;
+
+/// What a name stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// Data.
+    Data(Data),
+    /// A parameter of a routine.
+    Parameter,
+    /// The variable of a FOR loop.
+    Loop,
+    /// A routine: index into [`Symbols::routines`].
+    Routine(u32),
+    /// A record type: names and types of its components.
+    Record(Vec<(Vec<u8>, Vec<u8>)>),
+    /// Another name of a type.
+    Alias,
+}
+
+/// A declared name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Symbol {
+    /// The file in which it is declared.
+    pub file: u32,
+    /// The scope in which it is declared.
+    pub scope: u32,
+    /// The token of its name.
+    pub name: u32,
+    /// What it stands for.
+    pub what: What,
+    /// Its type in lower case (the aliased type for an alias).
+    pub type_name: Vec<u8>,
+    /// Whether anything may change it while the program runs.
+    pub assigned: bool,
+    /// Whether it is changed otherwise than by assignments to components that `parts` names.
+    pub whole: bool,
+    /// The components that are assigned, each as its path of lower-case names with a point between.
+    pub parts: Vec<Vec<u8>>,
+    /// Why its value is not known where no statement before tells it.
+    pub unknown: Reason,
+    /// Whether it may change between any two statements: in a trap routine or an error handler.
+    pub volatile: bool,
+    /// Whether another module declares the same global name.
+    pub ambiguous: bool,
+}
+
+impl Symbol {
+    /// A name that nothing changes.
+    fn new((file, scope): (u32, u32), name: u32, what: What, type_name: Vec<u8>) -> Symbol {
+        Symbol {
+            file,
+            scope,
+            name,
+            what,
+            type_name,
+            assigned: false,
+            whole: false,
+            parts: Vec::new(),
+            unknown: Reason::Assigned,
+            volatile: false,
+            ambiguous: false,
+        }
+    }
+
+    /// One that always has another value: a parameter, the variable of a loop.
+    fn varying(self) -> Symbol {
+        Symbol { assigned: true, whole: true, ..self }
+    }
+
+    /// Whether it is declared as a constant.
+    pub fn is_constant(&self) -> bool {
+        matches!(&self.what, What::Data(data) if data.storage == Token::Const)
+    }
+}
+
+/// A scope: the task, a module, or a routine.
+#[derive(Debug, Default)]
+pub struct Scope {
+    /// The scope around it.
+    pub parent: Option<u32>,
+    names: HashMap<Vec<u8>, u32>,
+}
+
+/// A routine.
+#[derive(Debug)]
+pub struct RoutineScope {
+    /// Its file.
+    pub file: u32,
+    /// Its head.
+    pub head: RoutineHead,
+    /// Its scope.
+    pub scope: u32,
+    /// The name of its module.
+    pub module: String,
+    /// Why what is handed to each parameter may come back changed; `None` where it does not.
+    pub written: Vec<Option<Reason>>,
+    /// What a call of it may change.
+    pub reach: Reach,
+    /// Index into [`Symbols::units`].
+    pub unit: u32,
+}
+
+/// Statements that run together: a routine, or the statements of a fragment outside routines.
+#[derive(Debug, Clone, Copy)]
+pub struct Unit {
+    /// Its file.
+    pub file: u32,
+    /// Its node.
+    pub node: u32,
+    /// Its scope.
+    pub scope: u32,
+    /// Index into [`Symbols::routines`].
+    pub routine: Option<u32>,
+}
+
+/// All names of a task.
+#[derive(Debug, Default)]
+pub struct Symbols {
+    /// The names.
+    pub symbols: Vec<Symbol>,
+    /// The scopes; 0 is the task.
+    pub scopes: Vec<Scope>,
+    /// The routines.
+    pub routines: Vec<RoutineScope>,
+    /// Everything that runs, in the order of files and lines.
+    pub units: Vec<Unit>,
+    /// Whether a routine has the name of a motion instruction.
+    pub hides_instruction: bool,
+    /// What the statements of each unit may change by themselves, in order.
+    pub changed: Vec<Vec<u32>>,
+    /// The units in such an order that what a routine calls stands before it, as far as none calls itself.
+    pub callees_first: Vec<u32>,
+    /// How each unit leaves the switches.
+    pub ends: Vec<Ends>,
+    /// The calls and functions of each unit that set a switch or call a routine of the program, in order.
+    pub switches: Vec<Vec<u32>>,
+    /// The routines that each unit may call by a computed name, in order.
+    pub late: Vec<Arc<[u32]>>,
+    /// What they set.
+    pub late_sets: Vec<States>,
+    /// Whether each routine may run between any two statements: a trap routine, or called while the robot moves.
+    pub interrupts: Vec<bool>,
+    /// Those that may.
+    pub interrupting: Vec<u32>,
+    /// Whether one of those leads the robot away.
+    led_away: bool,
+    /// What any statement sets.
+    pub everything: States,
+    /// Whether the next cycle may begin in the middle of this one.
+    pub cycles: bool,
+    /// The routines of names that several modules declare for all, in lower case.
+    namesakes: HashMap<Vec<u8>, Vec<u32>>,
+    /// Names of records that are declared more than once, in lower case.
+    pub(super) records_twice: HashSet<Vec<u8>>,
+    /// File, scope and name of the variables of loops, until they are settled.
+    loop_names: Vec<(u32, u32, u32)>,
+}
+
+impl Symbols {
+    /// Gathers the names of files that belong to one task.
+    pub fn gather(trees: &[RapidTree<'_>]) -> Symbols {
+        let mut symbols = Symbols { scopes: vec![Scope::default()], ..Symbols::default() };
+        for (file, tree) in trees.iter().enumerate() {
+            symbols.file(tree, file as u32);
+        }
+        symbols.loops(trees);
+        symbols.settle_namesakes(trees);
+        symbols.settle(trees);
+        symbols
+    }
+
+    /// The symbol that a name stands for in a scope.
+    pub fn find(&self, scope: u32, name: &[u8]) -> Option<u32> {
+        let mut buffer = [0_u8; 64];
+        let long;
+        let key = if name.len() <= buffer.len() {
+            for (to, &byte) in buffer.iter_mut().zip(name) {
+                *to = fold(byte);
+            }
+            &buffer[..name.len()]
+        } else {
+            long = folded(name);
+            &long
+        };
+        let mut at = Some(scope);
+        while let Some(scope) = at {
+            let scope = &self.scopes[scope as usize];
+            if let Some(&found) = scope.names.get(key) {
+                return Some(found);
+            }
+            at = scope.parent;
+        }
+        None
+    }
+
+    /// The routine that a name calls.
+    pub fn routine(&self, scope: u32, name: &[u8]) -> Option<u32> {
+        match self.symbols[self.find(scope, name)? as usize].what {
+            What::Routine(routine) => Some(routine),
+            _ => None,
+        }
+    }
+
+    /// The routines that a name may call: several where modules beside this one declare it, of which the controller has one.
+    pub fn called(&self, scope: u32, name: &[u8]) -> &[u32] {
+        let Some(symbol) = self.find(scope, name).map(|symbol| &self.symbols[symbol as usize]) else {
+            return &[];
+        };
+        let What::Routine(routine) = &symbol.what else { return &[] };
+        if symbol.ambiguous && symbol.scope != self.module_scope(scope) {
+            let name = folded(name);
+            return self.namesakes.get(&name).map_or(std::slice::from_ref(routine), Vec::as_slice);
+        }
+        std::slice::from_ref(routine)
+    }
+
+    /// Whether a routine is the one with which a program begins.
+    pub fn is_main(&self, trees: &[RapidTree<'_>], routine: u32) -> bool {
+        let routine = &self.routines[routine as usize];
+        same_name(trees[routine.file as usize].text(routine.head.name), b"main")
+    }
+
+    /// The scope of the module around a scope.
+    pub(super) fn module_scope(&self, scope: u32) -> u32 {
+        let mut scope = scope;
+        while let Some(parent) = self.scopes[scope as usize].parent.filter(|&parent| parent != 0) {
+            scope = parent;
+        }
+        scope
+    }
+
+    /// What the statements of a unit may change by themselves, in order.
+    pub fn changed_in(&self, unit: Unit) -> &[u32] {
+        self.place_of(unit).and_then(|at| self.changed.get(at)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The calls among some nodes of a unit that set a switch or call a routine of the program.
+    pub fn switches_in(&self, unit: Unit, nodes: std::ops::Range<u32>) -> &[u32] {
+        let all = self.place_of(unit).and_then(|at| self.switches.get(at)).map_or(&[][..], Vec::as_slice);
+        let first = all.partition_point(|&node| node < nodes.start);
+        let end = all.partition_point(|&node| node < nodes.end);
+        &all[first..end]
+    }
+
+    /// The routines that a unit may call by a computed name.
+    pub fn late_of(&self, unit: Unit) -> &[u32] {
+        self.place_of(unit).and_then(|at| self.late.get(at)).map_or(&[], |late| late)
+    }
+
+    /// What the routines set that a unit may call by a computed name.
+    pub fn late_sets_of(&self, unit: Unit) -> States {
+        self.place_of(unit).map_or(States::NONE, |at| self.late_sets[at])
+    }
+
+    fn place_of(&self, unit: Unit) -> Option<usize> {
+        match unit.routine {
+            Some(routine) => Some(self.routines[routine as usize].unit as usize),
+            None => self.units.iter().position(|other| (other.file, other.node) == (unit.file, unit.node)),
+        }
+    }
+
+    /// Every declared name, in lower case.
+    pub fn names(&self) -> impl Iterator<Item = &[u8]> {
+        self.scopes.iter().flat_map(|scope| scope.names.keys().map(Vec::as_slice))
+    }
+
+    /// What is declared in a scope.
+    pub fn declared_in(&self, scope: u32) -> impl Iterator<Item = u32> {
+        self.scopes[scope as usize].names.values().copied()
+    }
+
+    /// A type name with aliases resolved.
+    pub fn resolved_type<'a>(&'a self, scope: u32, type_name: &'a [u8]) -> &'a [u8] {
+        let mut name = type_name;
+        for _ in 0..16 {
+            match self.find(scope, name).map(|symbol| &self.symbols[symbol as usize]) {
+                Some(Symbol { what: What::Alias, type_name, .. }) => name = type_name,
+                _ => break,
+            }
+        }
+        name
+    }
+
+    /// The scope of a file's module, for names that stand outside routines.
+    fn new_scope(&mut self, parent: u32) -> u32 {
+        self.scopes.push(Scope { parent: Some(parent), names: HashMap::new() });
+        self.scopes.len() as u32 - 1
+    }
+
+    fn declare(&mut self, text: &[u8], symbol: Symbol, global: bool) {
+        let name = folded(text);
+        let (scope, id) = (symbol.scope, self.symbols.len() as u32);
+        self.symbols.push(symbol);
+        self.scopes[scope as usize].names.entry(name.clone()).or_insert(id);
+        if global {
+            match self.scopes[0].names.get(&name) {
+                Some(&other) => {
+                    self.symbols[id as usize].ambiguous = true;
+                    self.symbols[other as usize].ambiguous = true;
+                }
+                None => {
+                    self.scopes[0].names.insert(name, id);
+                }
+            }
+        }
+    }
+
+    fn file(&mut self, tree: &RapidTree<'_>, file: u32) {
+        let outside = self.new_scope(0);
+        let mut loose = false;
+        for node in tree.child_nodes(0) {
+            if tree.nodes[node as usize].kind == Syntax::Module {
+                let scope = self.new_scope(0);
+                let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident));
+                let name = name.map(|part| display(text_of(tree, part))).unwrap_or_default();
+                let mut inside = false;
+                for item in tree.child_nodes(node) {
+                    inside |= !self.item(tree, file, scope, item, &name);
+                }
+                if inside {
+                    self.loose_loops(tree, file, scope, node);
+                    self.units.push(Unit { file, node, scope, routine: None });
+                }
+            } else {
+                loose |= !self.item(tree, file, outside, node, "");
+            }
+        }
+        if loose {
+            self.loose_loops(tree, file, outside, 0);
+            self.units.push(Unit { file, node: 0, scope: outside, routine: None });
+        }
+    }
+
+    /// A declaration or routine; false for a statement.
+    fn item(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) -> bool {
+        let kind = tree.nodes[node as usize].kind;
+        match kind {
+            Syntax::Data => self.data(tree, file, scope, node, true),
+            Syntax::Record | Syntax::Alias => self.type_(tree, file, scope, node),
+            Syntax::Proc | Syntax::Func | Syntax::Trap => self.routine_item(tree, file, scope, node, module),
+            Syntax::Attributes | Syntax::Opaque | Syntax::Unwritten => {}
+            _ => return false,
+        }
+        true
+    }
+
+    fn data(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module_level: bool) {
+        let Some(data) = data(tree, node) else { return };
+        let type_name = folded(tree.text(data.type_name));
+        let symbol = Symbol::new((file, scope), data.name, What::Data(data), type_name);
+        self.declare(tree.text(data.name), symbol, module_level && !data.local);
+    }
+
+    fn type_(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
+        let names = |node: u32| -> Vec<u32> {
+            parts(tree, node)
+                .filter_map(|part| match part {
+                    Child::Token(token) if tree.kind(token) == Some(Token::Ident) => Some(token),
+                    _ => None,
+                })
+                .collect()
+        };
+        let own = names(node);
+        let (name, type_name, what) = if tree.nodes[node as usize].kind == Syntax::Alias {
+            let [type_name, name] = own[..] else { return };
+            (name, folded(tree.text(type_name)), What::Alias)
+        } else {
+            let [name] = own[..] else { return };
+            let components = tree.child_nodes(node).filter_map(|component| match names(component)[..] {
+                [type_name, name] => Some((folded(tree.text(name)), folded(tree.text(type_name)))),
+                _ => None,
+            });
+            (name, Vec::new(), What::Record(components.collect()))
+        };
+        let symbol = Symbol::new((file, scope), name, what, type_name);
+        self.declare(tree.text(name), symbol, true);
+    }
+
+    fn routine_item(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32, module: &str) {
+        let Some(head) = routine_head(tree, node) else { return };
+        let inner = self.new_scope(scope);
+        let index = self.routines.len() as u32;
+        let text = tree.text(head.name);
+        self.hides_instruction |= instruction::find(text).is_some();
+        let symbol = Symbol::new((file, scope), head.name, What::Routine(index), Vec::new());
+        self.declare(text, symbol, !head.local);
+        for parameter in &head.parameters {
+            let type_name = folded(tree.text(parameter.type_name));
+            let symbol = Symbol::new((file, inner), parameter.name, What::Parameter, type_name);
+            self.declare(tree.text(parameter.name), symbol.varying(), false);
+        }
+        for inside in node + 1..node + tree.nodes[node as usize].size {
+            match tree.nodes[inside as usize].kind {
+                Syntax::Data => self.data(tree, file, inner, inside, false),
+                Syntax::For => {
+                    self.loop_names.extend(loop_name(tree, inside).map(|name| (file, inner, name)))
+                }
+                _ => {}
+            }
+        }
+        let written = vec![None; head.parameters.len()];
+        let module = module.to_owned();
+        let reach = Reach::default();
+        let unit = self.units.len() as u32;
+        self.routines.push(RoutineScope { file, head, scope: inner, module, written, reach, unit });
+        self.units.push(Unit { file, node, scope: inner, routine: Some(index) });
+    }
+
+    /// The variables of the loops of a fragment, outside routines.
+    fn loose_loops(&mut self, tree: &RapidTree<'_>, file: u32, scope: u32, node: u32) {
+        let (mut at, end) = (node + 1, node + tree.nodes[node as usize].size);
+        while at < end {
+            let kind = tree.nodes[at as usize].kind;
+            if kind.is_routine() || kind == Syntax::Module {
+                at += tree.nodes[at as usize].size;
+                continue;
+            }
+            if kind == Syntax::For {
+                self.loop_names.extend(loop_name(tree, at).map(|name| (file, scope, name)));
+            }
+            at += 1;
+        }
+    }
+
+    /// Gathers the routines that have their name together with others.
+    fn settle_namesakes(&mut self, trees: &[RapidTree<'_>]) {
+        for symbol in self.symbols.iter().filter(|symbol| symbol.ambiguous) {
+            if let What::Routine(routine) = symbol.what {
+                let name = folded(trees[symbol.file as usize].text(symbol.name));
+                self.namesakes.entry(name).or_default().push(routine);
+            }
+        }
+    }
+
+    /// The variables of loops: names of their routines where nothing else has the name. One that hides other data within its
+    /// loop stands for that data, which the loop is then taken to change; one that hides what never changes stands
+    /// for it in the whole routine.
+    fn loops(&mut self, trees: &[RapidTree<'_>]) {
+        for (file, inner, name) in std::mem::take(&mut self.loop_names) {
+            let text = trees[file as usize].text(name);
+            let hides = self.find(inner, text).is_some_and(|found| {
+                let found = &self.symbols[found as usize];
+                matches!(found.what, What::Data(_) | What::Parameter | What::Loop) && !found.is_constant()
+            });
+            if !hides {
+                let symbol = Symbol::new((file, inner), name, What::Loop, b"num".to_vec()).varying();
+                let id = self.symbols.len() as u32;
+                self.symbols.push(symbol);
+                self.scopes[inner as usize].names.insert(folded(text), id);
+            }
+        }
+    }
+
+    /// The symbol that a name or place begins with.
+    pub fn root(&self, tree: &RapidTree<'_>, scope: u32, place: Child) -> Option<u32> {
+        let token = match place {
+            Child::Token(token) => token,
+            Child::Node(node) if tree.nodes[node as usize].kind == Syntax::Place => {
+                tree.nodes[node as usize].first
+            }
+            Child::Node(_) => return None,
+        };
+        if tree.kind(token) != Some(Token::Ident) {
+            return None;
+        }
+        self.find(scope, tree.text(token))
+    }
+}
+
+/// The token that names the variable of a loop.
+fn loop_name(tree: &RapidTree<'_>, node: u32) -> Option<u32> {
+    let name = parts(tree, node).find(|&part| token_kind(tree, part) == Some(Token::Ident))?;
+    if let Child::Token(name) = name { Some(name) } else { None }
+}

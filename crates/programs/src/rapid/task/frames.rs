@@ -1,0 +1,163 @@
+//! Speed, zone, tool and work object of a motion: each distinct one once in the listing.
+
+use super::super::flow::{DISPLACEMENT, State};
+use super::Lister;
+use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
+use crate::rapid::evaluate::{Context, Known};
+use crate::rapid::symbol::{Unit, What};
+use crate::rapid::syntax::{text_of, tokens_of};
+use crate::rapid::token::{Token, display};
+use crate::rapid::value::{LARGEST, Value, built_in};
+use crate::tree::Child;
+
+impl<'s> Lister<'_, 's> {
+    /// Whether a name or expression may have another value at another motion.
+    pub(super) fn varies(&self, unit: Unit, value: Child) -> bool {
+        let tree = &self.trees[unit.file as usize];
+        let (first, end) = tokens_of(tree, value);
+        (first..end).any(|token| {
+            tree.kind(token) == Some(Token::Ident)
+                && self
+                    .symbols
+                    .find(unit.scope, tree.text(token))
+                    .is_some_and(|symbol| self.symbols.symbols[symbol as usize].assigned)
+        })
+    }
+
+    pub(super) fn evaluated(&self, unit: Unit, state: &State, value: Child) -> Value {
+        self.evaluator.value(Context::new(unit.file, unit.scope, &state.known), value)
+    }
+
+    pub(super) fn speed(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.speeds.get(unit.scope, text) {
+            return index;
+        }
+        let speed = Speed { text: display(text), value: self.evaluated(unit, state, value).speed() };
+        let index = intern(&mut self.listing.speeds, speed);
+        if !self.varies(unit, value) {
+            self.speeds.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    /// The speed of a motion with the velocity of the TCP that its option states in place of it.
+    pub(super) fn overridden(&mut self, speed: u32, unit: Unit, state: &State, velocity: Child) -> u32 {
+        let mut speed = self.listing.speeds[speed as usize].clone();
+        match (&mut speed.value, self.evaluated(unit, state, velocity).number()) {
+            (speed @ Ok(_), Ok(velocity)) if !(velocity > 0.0 && velocity <= LARGEST) => {
+                *speed = Err(Reason::NumberRange);
+            }
+            (Ok(value), Ok(velocity)) => value.tcp_mm_s = velocity,
+            (value, Err(reason)) => *value = Err(reason),
+            (Err(_), Ok(_)) => {}
+        }
+        intern(&mut self.listing.speeds, speed)
+    }
+
+    pub(super) fn zone(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.zones.get(unit.scope, text) {
+            return index;
+        }
+        let zone = Zone { text: display(text), value: self.evaluated(unit, state, value).zone() };
+        let index = intern(&mut self.listing.zones, zone);
+        if !self.varies(unit, value) {
+            self.zones.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    pub(super) fn declared_at(&self, unit: Unit, value: Child) -> Option<Place> {
+        let tree = &self.trees[unit.file as usize];
+        let symbol = &self.symbols.symbols[self.symbols.root(tree, unit.scope, value)? as usize];
+        Some(self.place(symbol.file, symbol.name))
+    }
+
+    pub(super) fn tool(&mut self, unit: Unit, state: &State, value: Child) -> u32 {
+        let text = text_of(&self.trees[unit.file as usize], value);
+        if let Some(index) = self.tools.get(unit.scope, text) {
+            return index;
+        }
+        let tool = Tool {
+            name: display(text),
+            value: self.evaluated(unit, state, value).tool(),
+            place: self.declared_at(unit, value),
+        };
+        let index = intern(&mut self.listing.tools, tool);
+        if !self.varies(unit, value) {
+            self.tools.put(unit.scope, text, index);
+        }
+        index
+    }
+
+    /// The tools that the files declare, whether motions use them or not.
+    pub(super) fn declared_tools(&mut self) {
+        let known = Known::default();
+        for (id, symbol) in (0..).zip(&self.symbols.symbols) {
+            let What::Data(data) = &symbol.what else { continue };
+            if *symbol.type_name != *b"tooldata" || data.dimensions.is_some() {
+                continue;
+            }
+            let context = Context::new(symbol.file, symbol.scope, &known);
+            let tree = &self.trees[symbol.file as usize];
+            let tool = Tool {
+                name: display(tree.text(symbol.name)),
+                value: self.evaluator.symbol_value(context, id).tool(),
+                place: Some(self.place(symbol.file, symbol.name)),
+            };
+            self.listing.declared_tools.push(tool);
+        }
+    }
+
+    /// The work object of a motion, with the displacement in it that the text tells.
+    pub(super) fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
+        let displacement = displacement(state).and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
+        let text: &'s [u8] = match value {
+            Some(value) => text_of(&self.trees[unit.file as usize], value),
+            None => b"wobj0",
+        };
+        // Without an argument it is wobj0 in every scope, whatever a scope calls by that name.
+        let scope = if value.is_some() { unit.scope } else { u32::MAX };
+        if displacement.is_none()
+            && let Some(index) = self.work_objects.get(scope, text)
+        {
+            return index;
+        }
+        let mut found = match value {
+            Some(value) => self.evaluated(unit, state, value).work_object(),
+            None => built_in(text).ok_or(Reason::Undeclared).and_then(|v| v.work_object()),
+        };
+        if let (Ok(found), Some(displacement)) = (&mut found, &displacement) {
+            found.object_frame = Frame::from_pose(&(found.object_frame.pose() * displacement.pose()));
+        }
+        let work_object = WorkObject {
+            name: display(text),
+            value: found,
+            place: value.and_then(|value| self.declared_at(unit, value)),
+            displacement,
+        };
+        let index = intern(&mut self.listing.work_objects, work_object);
+        if displacement.is_none() && value.is_none_or(|value| !self.varies(unit, value)) {
+            self.work_objects.put(scope, text, index);
+        }
+        index
+    }
+}
+
+/// The program displacement before a statement: `None` as at the entry of the routine, an error where it is not known.
+pub(super) fn displacement(state: &State) -> Option<Result<Frame, Reason>> {
+    state.known.get(&DISPLACEMENT).map(|value| value.frame())
+}
+
+/// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost
+/// their square.
+fn intern<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    match list.iter().rev().take(256).position(|other| *other == item) {
+        Some(back) => (list.len() - 1 - back) as u32,
+        None => {
+            list.push(item);
+            list.len() as u32 - 1
+        }
+    }
+}

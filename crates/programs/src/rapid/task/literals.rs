@@ -1,0 +1,96 @@
+//! Targets that stand in motion instructions as numbers. No statement changes their values, so they are read on other
+//! threads while the statements are followed.
+
+use rayon::prelude::*;
+
+use super::super::evaluate::{Context, Evaluator, Known, Source};
+use super::super::instruction::{self, INSTRUCTIONS};
+use super::super::symbol::Symbols;
+use super::super::syntax::{RapidTree, Syntax, arguments};
+use super::super::token::Token;
+use crate::motion::{Origin, Reason, TargetValue};
+use crate::tree::Child;
+
+/// Nodes that one thread looks at at a time.
+const PORTION: u32 = 1 << 14;
+
+/// The values, by file and by the portion in which the call stands, in the order of nodes.
+pub(super) struct Literals(Vec<Vec<Vec<Read>>>);
+
+#[derive(Debug, Clone, Copy)]
+struct Read {
+    node: u32,
+    joints: bool,
+    found: Found,
+}
+
+/// What a literal says, and where its numbers stand.
+pub(super) type Found = (Result<TargetValue, Reason>, Origin);
+
+impl Literals {
+    /// Reads the literals in motion instructions.
+    pub(super) fn of(trees: &[RapidTree<'_>], symbols: &Symbols) -> Self {
+        let files = trees.par_iter().enumerate().map(|(file, tree)| {
+            let portions = 0..(tree.nodes.len() as u32).div_ceil(PORTION);
+            portions.into_par_iter().map(|portion| read(trees, symbols, file as u32, portion)).collect()
+        });
+        Literals(files.collect())
+    }
+
+    /// What the literal at `node` in the call at `call` says; `None` where it was not read.
+    pub(super) fn get(&self, file: u32, call: u32, node: u32, joints: bool) -> Option<Found> {
+        let portion = self.0.get(file as usize)?.get((call / PORTION) as usize)?;
+        let at = portion.binary_search_by_key(&node, |read| read.node).ok()?;
+        Some(portion[at]).filter(|read| read.joints == joints).map(|read| read.found)
+    }
+}
+
+fn read(trees: &[RapidTree<'_>], symbols: &Symbols, file: u32, portion: u32) -> Vec<Read> {
+    let tree = &trees[file as usize];
+    let evaluator = Evaluator::new(trees, symbols);
+    let first = portion * PORTION;
+    let end = (first + PORTION).min(tree.nodes.len() as u32);
+    let mut out = Vec::new();
+    for call in first..end {
+        let found = tree.nodes[call as usize];
+        if found.kind != Syntax::Call {
+            continue;
+        }
+        let Some(known) = instruction::find(tree.text(found.first)) else { continue };
+        let joints = INSTRUCTIONS[known].takes_joints();
+        for argument in arguments(tree, call).filter(|argument| !argument.optional) {
+            if let Some(node) = argument.value.and_then(|value| plain(tree, value)) {
+                out.push(Read { node, joints, found: value(&evaluator, file, node, joints) });
+            }
+        }
+    }
+    out
+}
+
+/// What an aggregate of numbers says as a target.
+pub(super) fn value(evaluator: &Evaluator<'_, '_>, file: u32, node: u32, joints: bool) -> Found {
+    let nothing = Known::new();
+    // No name stands in it: any scope will do.
+    let (value, source) = evaluator.target(Context::new(file, 0, &nothing), Child::Node(node), joints);
+    let origin = match source {
+        Source::Inline => Origin::Inline,
+        Source::Computed => Origin::Computed,
+        _ => Origin::Unknown,
+    };
+    (value, origin)
+}
+
+/// The node of an argument that is an aggregate of nothing but numbers.
+pub(super) fn plain(tree: &RapidTree<'_>, argument: Child) -> Option<u32> {
+    let Child::Node(node) = argument else { return None };
+    let found = tree.nodes[node as usize];
+    let number = |kind: &Token| {
+        kind.is_trivia()
+            || matches!(
+                kind,
+                Token::Number | Token::Comma | Token::BracketOpen | Token::BracketClose | Token::Minus
+            )
+    };
+    let tokens = &tree.kinds()[found.first as usize..found.end as usize];
+    (found.kind == Syntax::Aggregate && tokens.iter().all(number)).then_some(node)
+}

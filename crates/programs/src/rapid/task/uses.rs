@@ -1,0 +1,152 @@
+//! Who uses a declared target: motions, and everything else that an edit of the declaration would reach.
+
+use super::Lister;
+use crate::motion::{MotionKind, Origin, OtherUse};
+use crate::rapid::symbol::{Unit, What};
+use crate::rapid::syntax::{RapidTree, Syntax, arguments, token_kind, tokens_of};
+use crate::rapid::token::{Token, fold, same_name};
+
+impl<'s> Lister<'_, 's> {
+    /// Finds every use of the declared targets in the listing that is no motion's own target argument.
+    pub(super) fn other_uses(&mut self) {
+        for (index, motion) in self.listing.motions.iter().enumerate() {
+            for (target_index, target) in motion.targets.iter().enumerate() {
+                if let Origin::Declared(declaration) | Origin::Element { declaration, .. } = target.origin {
+                    let uses = &mut self.listing.declarations[declaration as usize].uses;
+                    uses.push((index as u32, target_index as u32));
+                }
+            }
+        }
+        if self.declarations.is_empty() {
+            return;
+        }
+        // Names seldom begin and end as a target's does: most are turned away by one look.
+        let mut likely = vec![false; 1 << 16];
+        let hash = |text: &[u8]| {
+            let ends = [text[0], text[text.len() - 1]].map(|byte| usize::from(fold(byte)));
+            (ends[0] << 8 | ends[1]) ^ text.len() << 4 & 0xFFFF
+        };
+        for &symbol in self.declarations.keys().collect::<std::collections::BTreeSet<_>>() {
+            let symbol = &self.symbols.symbols[symbol as usize];
+            likely[hash(self.trees[symbol.file as usize].text(symbol.name))] = true;
+        }
+        // Own uses by the first byte of the argument; whatever else lies within a motion's argument is a base.
+        for (unit_index, unit) in self.symbols.units.iter().enumerate() {
+            let tree = &self.trees[unit.file as usize];
+            // Motions are listed unit by unit.
+            let first = self.units.partition_point(|&unit| unit < unit_index as u32) as u32;
+            let end = self.units.partition_point(|&unit| unit <= unit_index as u32) as u32;
+            let motions: Vec<u32> = (first..end).collect();
+            self.uses_in(*unit, tree, &motions, &likely, &hash);
+        }
+        self.uses_in_declarations(&likely, &hash);
+        self.uses_by_name();
+    }
+
+    /// GetDataVal with a name that the text does not tell may read any of them.
+    fn uses_by_name(&mut self) {
+        for (file, tree) in (0..).zip(self.trees) {
+            let reads = |node: &u32| {
+                let node = tree.nodes[*node as usize];
+                node.kind == Syntax::Call && same_name(tree.text(node.first), b"GetDataVal")
+            };
+            let computed = |node: &u32| {
+                let name = arguments(tree, *node).find(|argument| !argument.optional);
+                name.and_then(|name| name.value).and_then(|name| token_kind(tree, name))
+                    != Some(Token::String)
+            };
+            // One in a file says it for all.
+            if let Some(node) = (0..tree.nodes.len() as u32).filter(reads).find(computed) {
+                let place = self.place(file, tree.nodes[node as usize].first);
+                for declaration in &mut self.listing.declarations {
+                    declaration.other_uses.push(OtherUse { motion: None, place });
+                }
+            }
+        }
+    }
+
+    pub(super) fn uses_in(
+        &mut self,
+        unit: Unit,
+        tree: &RapidTree<'s>,
+        motions: &[u32],
+        likely: &[bool],
+        hash: &dyn Fn(&[u8]) -> usize,
+    ) {
+        let node = tree.nodes[unit.node as usize];
+        let mut next = 0;
+        for token in node.first..node.end {
+            // A text may be the name with which GetDataVal reads it.
+            let name = match (tree.kind(token), tree.text(token)) {
+                (Some(Token::Ident), name) => name,
+                (Some(Token::String), [_, name @ .., _]) if !name.is_empty() => name,
+                _ => continue,
+            };
+            if !likely[hash(name)] {
+                continue;
+            }
+            let Some(symbol) = self.symbols.find(unit.scope, name) else { continue };
+            let Some(&declaration) = self.declarations.get(&symbol) else { continue };
+            let found = &self.symbols.symbols[symbol as usize];
+            if found.file == unit.file && found.name == token {
+                continue;
+            }
+            let start = tree.start(token) as u32;
+            while motions
+                .get(next)
+                .is_some_and(|&motion| self.listing.motions[motion as usize].statement.end <= start)
+            {
+                next += 1;
+            }
+            let user = motions.get(next).and_then(|&index| {
+                let motion = &self.listing.motions[index as usize];
+                motion
+                    .targets
+                    .iter()
+                    .position(|target| (target.argument.start..target.argument.end).contains(&start))
+                    .map(|target| (index, target as u32))
+            });
+            let own = user.is_some_and(|(motion, target)| {
+                let target = &self.listing.motions[motion as usize].targets[target as usize];
+                matches!(target.origin, Origin::Declared(_) | Origin::Element { .. })
+                    && target.argument.start == start
+            });
+            if !own {
+                let computed = user.filter(|&(motion, target)| {
+                    let motion = &self.listing.motions[motion as usize];
+                    motion.kind != MotionKind::Unknown
+                        && motion.targets[target as usize].origin == Origin::Computed
+                });
+                let place = self.place(unit.file, token);
+                let uses = &mut self.listing.declarations[declaration as usize].other_uses;
+                uses.push(OtherUse { motion: computed, place });
+            }
+        }
+    }
+
+    /// Uses in the initial values of other declarations at module level.
+    pub(super) fn uses_in_declarations(&mut self, likely: &[bool], hash: &dyn Fn(&[u8]) -> usize) {
+        for symbol in &self.symbols.symbols {
+            let What::Data(data) = &symbol.what else { continue };
+            let tree = &self.trees[symbol.file as usize];
+            let Some(value) = data.value else { continue };
+            let (first, end) = tokens_of(tree, value);
+            if end - first > 1
+                && tree.kinds()[first as usize..end as usize].iter().all(|&kind| kind != Token::Ident)
+            {
+                continue;
+            }
+            for token in first..end {
+                if tree.kind(token) != Some(Token::Ident) || !likely[hash(tree.text(token))] {
+                    continue;
+                }
+                let Some(used) = self.symbols.find(symbol.scope, tree.text(token)) else { continue };
+                if let Some(&declaration) = self.declarations.get(&used) {
+                    let place = self.place(symbol.file, token);
+                    let uses = &mut self.listing.declarations[declaration as usize].other_uses;
+                    uses.push(OtherUse { motion: None, place });
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! A lossless syntax tree over bytes, in flat arrays.
+//!
+//! Tokens tile the file: the end of one is the start of the next, white space and comments included, so that the
+//! tokens in order are the file, whatever bytes it holds. Nodes stand in the order in which they begin (preorder);
+//! each knows how many nodes its subtree has and which tokens it covers, so that walking costs no pointer and
+//! building no allocation. The tree knows no language: a dialect brings its kinds of token (`T`) and node (`N`) and
+//! gives the nodes their meaning in typed views.
+//!
+//! Offsets are 32 bits. A file of 4 GiB or more becomes one single token (the dialect marks it as opaque).
+
+use std::ops::Range;
+
+use crate::motion::{OpaqueReason, Span};
+
+/// A node: what it is, how many nodes it and its descendants are, which tokens they cover.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Node<N> {
+    /// What it is.
+    pub kind: N,
+    /// How many nodes the subtree has, itself included.
+    pub size: u32,
+    /// Its first token.
+    pub first: u32,
+    /// One past its last token.
+    pub end: u32,
+}
+
+/// A region that the parser could not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Opaque {
+    /// Its first token.
+    pub first: u32,
+    /// One past its last token.
+    pub end: u32,
+    /// Why.
+    pub reason: OpaqueReason,
+    /// The token at which reading failed.
+    pub at: u32,
+}
+
+/// The tree of one file.
+#[derive(Debug, Clone)]
+pub struct Tree<'s, T, N> {
+    source: &'s [u8],
+    kinds: Vec<T>,
+    starts: Vec<u32>,
+    lines: Vec<u32>,
+    /// The nodes in preorder.
+    pub nodes: Vec<Node<N>>,
+    /// What could not be read, in the order of the file.
+    pub opaque: Vec<Opaque>,
+}
+
+/// A child of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Child {
+    /// A token that belongs to no child node, by index.
+    Token(u32),
+    /// A child node, by index.
+    Node(u32),
+}
+
+impl<'s, T: Copy, N: Copy> Tree<'s, T, N> {
+    /// A tree of tokens alone. `estimate` is how many tokens to expect.
+    pub fn new(source: &'s [u8], estimate: usize) -> Self {
+        Tree {
+            source,
+            kinds: Vec::with_capacity(estimate),
+            starts: Vec::with_capacity(estimate + 1),
+            lines: vec![0],
+            nodes: Vec::new(),
+            opaque: Vec::new(),
+        }
+    }
+
+    /// The tokens of a later part of the file, for [`Tree::append`].
+    pub fn part(source: &'s [u8], estimate: usize) -> Self {
+        Tree { lines: Vec::new(), ..Tree::new(source, estimate) }
+    }
+
+    /// Appends the tokens of the next parts of the same file.
+    pub fn append(&mut self, parts: &[Self])
+    where
+        T: Send + Sync,
+        N: Sync,
+    {
+        let Tree { kinds, starts, lines, .. } = self;
+        rayon::join(
+            || parts.iter().for_each(|part| starts.extend_from_slice(&part.starts)),
+            || {
+                parts.iter().for_each(|part| kinds.extend_from_slice(&part.kinds));
+                parts.iter().for_each(|part| lines.extend_from_slice(&part.lines));
+            },
+        );
+    }
+
+    /// Appends the token that begins at `start`; it ends where the next begins.
+    #[inline]
+    pub fn push(&mut self, kind: T, start: usize) {
+        self.kinds.push(kind);
+        self.starts.push(start as u32);
+    }
+
+    /// Notes that a line begins at `start`.
+    #[inline]
+    pub fn line_starts(&mut self, start: usize) {
+        self.lines.push(start as u32);
+    }
+
+    /// The bytes of the file.
+    pub fn source(&self) -> &'s [u8] {
+        self.source
+    }
+
+    /// How many tokens there are.
+    pub fn len(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// Whether the file has no token, which is to say no byte.
+    pub fn is_empty(&self) -> bool {
+        self.kinds.is_empty()
+    }
+
+    /// The kind of a token; `None` past the end.
+    #[inline]
+    pub fn kind(&self, token: u32) -> Option<T> {
+        self.kinds.get(token as usize).copied()
+    }
+
+    /// Kinds of all tokens.
+    pub fn kinds(&self) -> &[T] {
+        &self.kinds
+    }
+
+    /// Where a token begins; the length of the file past the end.
+    #[inline]
+    pub fn start(&self, token: u32) -> usize {
+        self.starts.get(token as usize).map_or(self.source.len(), |&start| start as usize)
+    }
+
+    /// The bytes of a token.
+    #[inline]
+    pub fn text(&self, token: u32) -> &'s [u8] {
+        &self.source[self.start(token)..self.start(token + 1)]
+    }
+
+    /// The byte range of tokens `first..end`.
+    pub fn range(&self, first: u32, end: u32) -> Range<usize> {
+        self.start(first)..self.start(end)
+    }
+
+    /// The same as a [`Span`].
+    pub fn span(&self, first: u32, end: u32) -> Span {
+        Span { start: self.start(first) as u32, end: self.start(end) as u32 }
+    }
+
+    /// The bytes of a node.
+    pub fn node_text(&self, node: u32) -> &'s [u8] {
+        let node = self.nodes[node as usize];
+        &self.source[self.range(node.first, node.end)]
+    }
+
+    /// The span of a node.
+    pub fn node_span(&self, node: u32) -> Span {
+        let node = self.nodes[node as usize];
+        self.span(node.first, node.end)
+    }
+
+    /// Line and column, from 1, of a byte; the column counts bytes.
+    pub fn line_column(&self, byte: usize) -> (u32, u32) {
+        let line = self.lines.partition_point(|&start| start as usize <= byte);
+        (line as u32, (byte - self.lines[line - 1] as usize) as u32 + 1)
+    }
+
+    /// The children of a node, tokens and nodes in order.
+    pub fn children(&self, node: u32) -> Children<'_, 's, T, N> {
+        let Node { size, first, end, .. } = self.nodes[node as usize];
+        Children { tree: self, token: first, end, node: node + 1, end_node: node + size }
+    }
+
+    /// The child nodes of a node.
+    pub fn child_nodes(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let end = node + self.nodes[node as usize].size;
+        let mut next = node + 1;
+        std::iter::from_fn(move || {
+            (next < end).then(|| {
+                let this = next;
+                next += self.nodes[this as usize].size;
+                this
+            })
+        })
+    }
+
+    /// The tokens put together: the file.
+    pub fn print(&self) -> Vec<u8> {
+        (0..self.len() as u32).flat_map(|token| self.text(token).iter().copied()).collect()
+    }
+}
+
+/// Iterator of [`Tree::children`].
+#[derive(Debug)]
+pub struct Children<'t, 's, T, N> {
+    tree: &'t Tree<'s, T, N>,
+    token: u32,
+    end: u32,
+    node: u32,
+    end_node: u32,
+}
+
+impl<T: Copy, N: Copy> Iterator for Children<'_, '_, T, N> {
+    type Item = Child;
+
+    fn next(&mut self) -> Option<Child> {
+        if self.node < self.end_node {
+            let node = self.tree.nodes[self.node as usize];
+            if node.first <= self.token {
+                let child = Child::Node(self.node);
+                self.node += node.size;
+                self.token = node.end;
+                return Some(child);
+            }
+        }
+        (self.token < self.end).then(|| {
+            self.token += 1;
+            Child::Token(self.token - 1)
+        })
+    }
+}

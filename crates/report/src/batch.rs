@@ -1,0 +1,274 @@
+//! Many programs in one run: one row per program, the sum, and the programs that could not be done.
+
+use serde_json::{Value, json};
+
+use super::document::{Document, KeyFigure, Verdict};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_compensation::deviation::Status as Fate;
+use truegrind_compensation::rewrite::Plan;
+use truegrind_compensation::undeclared::undeclared;
+use truegrind_programs::motion::Listing;
+
+/// What became of one program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// Rewritten (or would be, in a dry run).
+    Changed,
+    /// Nothing in it changes.
+    Unchanged,
+    /// It carries the mark of this model.
+    Already,
+    /// It could not be done; the reason says why.
+    Failed,
+}
+
+impl Ended {
+    /// The word for a table.
+    pub fn text(self) -> &'static str {
+        match self {
+            Ended::Changed => "changed",
+            Ended::Unchanged => "unchanged",
+            Ended::Already => "already compensated",
+            Ended::Failed => "failed",
+        }
+    }
+}
+
+/// One program of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its files.
+    pub file: String,
+    /// Where it went.
+    pub output: Option<String>,
+    /// What became of it.
+    pub ended: Ended,
+    /// Motions: all, changed, flagged, refused, left.
+    pub motions: [usize; 5],
+    /// Regions that could not be read.
+    pub opaque: usize,
+    /// Largest deviation before (mm).
+    pub before_mm: Option<f64>,
+    /// Largest predicted remainder of the rewritten motions (mm).
+    pub after_mm: Option<f64>,
+    /// Why it failed, or what to know about it.
+    pub note: Option<String>,
+}
+
+impl Row {
+    /// The row of a program that was planned.
+    pub fn of(file: String, output: Option<String>, ended: Ended, plan: &Plan, listing: &Listing) -> Row {
+        let count = |fate: Fate| plan.outcomes.iter().filter(|outcome| outcome.status == fate).count();
+        let written = |fate: Fate| matches!(fate, Fate::Changed | Fate::Flagged);
+        let before = plan.outcomes.iter().filter_map(|outcome| outcome.before_mm);
+        let after = plan.outcomes.iter().filter(|o| written(o.status)).filter_map(|o| o.after_mm);
+        Row {
+            file,
+            output,
+            ended,
+            motions: [
+                plan.outcomes.len(),
+                count(Fate::Changed),
+                count(Fate::Flagged),
+                count(Fate::Refused),
+                count(Fate::Left),
+            ],
+            opaque: listing.opaque.len(),
+            before_mm: before.reduce(f64::max),
+            after_mm: after.reduce(f64::max),
+            note: undeclared_note(listing),
+        }
+    }
+
+    /// The row of a program that nothing was worked out for.
+    pub fn without(file: String, ended: Ended, note: Option<String>) -> Row {
+        Row { file, output: None, ended, motions: [0; 5], opaque: 0, before_mm: None, after_mm: None, note }
+    }
+
+    /// Nothing rewritten must not look like done.
+    fn judged(&self) -> Status {
+        match self.ended {
+            Ended::Changed => Status::Good,
+            Ended::Unchanged if self.motions[0] == 0 => Status::NotEvaluated,
+            Ended::Unchanged | Ended::Already => Status::Warning,
+            Ended::Failed => Status::Bad,
+        }
+    }
+
+    /// Share of its motions that is rewritten (%).
+    pub fn covered_percent(&self) -> Option<f64> {
+        let [all, changed, flagged, ..] = self.motions;
+        (all > 0).then(|| 100.0 * (changed + flagged) as f64 / all as f64)
+    }
+}
+
+/// What is declared nowhere, in a few words.
+fn undeclared_note(listing: &Listing) -> Option<String> {
+    /// How many names a row has room for.
+    const NAMED: usize = 4;
+    let all = undeclared(listing);
+    let names: Vec<&str> = all.iter().take(NAMED).map(|one| one.name.as_str()).collect();
+    let more = if all.len() > NAMED { " and more" } else { "" };
+    (!names.is_empty()).then(|| format!("declared in no file: {}{more}", names.join(", ")))
+}
+
+/// One row per program.
+pub fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new(
+        "Programs",
+        vec![
+            Column::text("file", "Program"),
+            Column::text("status", "Status"),
+            Column::count("motions", "Motions"),
+            Column::count("changed", "Changed"),
+            Column::count("flagged", "Flagged"),
+            Column::count("refused", "Refused"),
+            Column::count("left", "Left"),
+            Column::number("covered_percent", "Covered", "%", 1),
+            Column::number("before_mm", "largest before", "mm", 3),
+            Column::number("after_mm", "largest remainder", "mm", 4),
+            Column::count("opaque", "Not read"),
+            Column::text("output", "Written to"),
+            Column::text("note", "Note"),
+        ],
+    );
+    for row in rows {
+        let mut cells: Vec<Cell> =
+            vec![row.file.as_str().into(), Cell::Judged(row.judged(), row.ended.text().to_owned())];
+        cells.extend(row.motions.map(Cell::from));
+        cells.extend([
+            row.covered_percent().into(),
+            row.before_mm.into(),
+            row.after_mm.into(),
+            row.opaque.into(),
+            row.output.clone().into(),
+            row.note.clone().into(),
+        ]);
+        table.push(cells);
+    }
+    table
+}
+
+/// The sum of all rows in one sentence.
+pub fn sum(rows: &[Row]) -> String {
+    let with = |ended: Ended| rows.iter().filter(|row| row.ended == ended).count();
+    let motions: [usize; 5] = std::array::from_fn(|k| rows.iter().map(|row| row.motions[k]).sum());
+    let [all, changed, flagged, refused, left] = motions;
+    let share = if all > 0 { 100.0 * (changed + flagged) as f64 / all as f64 } else { 0.0 };
+    format!(
+        "{} programs: {} changed, {} unchanged, {} already compensated, {} failed; {all} motions: {changed} changed, \
+         {flagged} flagged, {refused} refused, {left} left ({share:.1} % rewritten)",
+        rows.len(),
+        with(Ended::Changed),
+        with(Ended::Unchanged),
+        with(Ended::Already),
+        with(Ended::Failed),
+    )
+}
+
+/// What fits a terminal: the sum, and the table.
+pub fn summary(rows: &[Row]) -> Document {
+    let mut page = Document::new(title(rows));
+    page.push(verdict(rows));
+    let mut table = table(rows);
+    // In a terminal only columns in which something stands.
+    for column in (0..table.columns.len()).rev() {
+        if table.rows.iter().all(|row| row[column] == Cell::Missing) {
+            table.columns.remove(column);
+            table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+        }
+    }
+    page.push(table.excerpt(ROWS));
+    page
+}
+
+/// Rows of the table in a terminal and on a page; all of them are in the CSV file.
+const ROWS: usize = 200;
+
+/// The page.
+pub fn document(rows: &[Row]) -> Document {
+    let mut page = Document::new(title(rows));
+    page.push(verdict(rows));
+    let largest = |value: fn(&Row) -> Option<f64>| rows.iter().filter_map(value).reduce(f64::max);
+    let motions: usize = rows.iter().map(|row| row.motions[0]).sum();
+    page.push(vec![
+        KeyFigure::new("Programs", rows.len(), 0, ""),
+        KeyFigure::new("Motions", motions, 0, ""),
+        KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm"),
+        KeyFigure::new("Predicted remainder", largest(|row| row.after_mm), 4, "mm")
+            .note("largest of the rewritten motions"),
+    ]);
+    page.push(table(rows).excerpt(ROWS));
+    page
+}
+
+fn title(rows: &[Row]) -> String {
+    match rows.len() {
+        1 => "Compensation of 1 program".to_owned(),
+        count => format!("Compensation of {count} programs"),
+    }
+}
+
+fn verdict(rows: &[Row]) -> Verdict {
+    let failed = rows.iter().filter(|row| row.ended == Ended::Failed).count();
+    let doubtful: usize = rows.iter().map(|row| row.motions[2] + row.motions[3]).sum();
+    let rewritten: usize = rows.iter().map(|row| row.motions[1] + row.motions[2]).sum();
+    let (status, headline) = match (failed, doubtful) {
+        (0, _) if rewritten == 0 => (Status::NotEvaluated, "Nothing was rewritten"),
+        (0, 0) => (Status::Good, "Every program was done"),
+        (0, _) => (Status::Warning, "Every program was done; look at what was refused or flagged"),
+        _ => (Status::Bad, "Some programs could not be done"),
+    };
+    let mut reasons = vec![sum(rows)];
+    reasons.extend(
+        rows.iter()
+            .filter(|row| row.ended == Ended::Failed)
+            .take(20)
+            .map(|row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"))),
+    );
+    // What would be needed is said in full: a table cuts it where a terminal is narrow.
+    let missing: Vec<&Row> =
+        rows.iter().filter(|row| row.ended == Ended::Unchanged && row.note.is_some()).collect();
+    reasons.extend(missing.iter().take(MISSING_NAMED).filter_map(|row| {
+        let note = row.note.as_ref()?;
+        Some(format!(
+            "{}: {note}; give the file that declares them, or a cell file (--cell) that says where they are",
+            row.file
+        ))
+    }));
+    if missing.len() > MISSING_NAMED {
+        reasons.push(format!(
+            "and {} more programs of which nothing is rewritten for want of them",
+            missing.len() - MISSING_NAMED
+        ));
+    }
+    Verdict::new(status, headline, reasons)
+}
+
+/// Programs that are named for what is missing.
+const MISSING_NAMED: usize = 5;
+
+/// The contract `truegrind.compensation/1` of all programs together, with what failed. `programs` are the entries of
+/// each program's own contract.
+pub fn json(rows: &[Row], programs: Vec<Value>) -> Value {
+    let failed: Vec<Value> = rows
+        .iter()
+        .filter(|row| row.ended == Ended::Failed)
+        .map(|row| json!({ "file": row.file, "error": row.note }))
+        .collect();
+    let totals: [usize; 5] = std::array::from_fn(|k| rows.iter().map(|row| row.motions[k]).sum());
+    json!({
+        "schema": "truegrind.compensation/1",
+        "programs": programs,
+        "failed": failed,
+        "totals": {
+            "programs": rows.len(),
+            "motions": totals[0],
+            "changed": totals[1],
+            "flagged": totals[2],
+            "refused": totals[3],
+            "left": totals[4],
+        },
+    })
+}

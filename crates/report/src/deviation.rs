@@ -1,0 +1,597 @@
+//! How far each point of a path is off, before and after, and the summary block of ltlm-2024 Table 8.
+//!
+//! "After" under the model that made the correction is a *predicted remainder* (rounding, interpolation, inverse
+//! kinematics); it is labelled so everywhere and stands beside the predicted 1σ and the model's held-out error, which say
+//! how far the real arm will be off. Only a simulated actual arm or a measurement is called *achieved*.
+
+mod pictures;
+mod summary;
+
+use nalgebra::Point3;
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Verdict};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_arm::region::Outside;
+use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status as Fate};
+
+pub use summary::{block_table, registered_table};
+
+/// Rows of a point table on a page; the whole table belongs in the CSV file.
+const ROWS_ON_PAGE: usize = 150;
+
+/// Models with a key figure of their own.
+const MODELS_IN_FIGURES: usize = 7;
+
+/// Which side of the correction.
+type Side = fn(&PathPoint) -> Option<Deviation>;
+const BEFORE: Side = |point| point.before;
+const AFTER: Side = |point| point.after;
+
+/// One row per path point of one program under one model, all columns. Positions and vectors in the work object.
+pub fn table(report: &PathReport) -> Table {
+    let (word, key) = words(report.after);
+    let columns = point_columns((word, key), decimals(report.after));
+    let mut table = Table::new(format!("Deviation of {} under {}", report.program, named(report)), columns);
+    report.points.iter().for_each(|point| table.push(point_cells(point)));
+    table.notes = notes(report);
+    table
+}
+
+/// The same for several programs and models under each other, for a file: each row names its program and model, what
+/// "after" is, and the model's held-out error.
+pub fn whole_table(reports: &[PathReport]) -> Table {
+    let mut columns = vec![
+        Column::text("program", "Program"),
+        Column::text("model", "Model"),
+        Column::text("after_is", "After is"),
+        Column::number("model_held_out_rmse_mm", "Held-out error", "mm", 3),
+    ];
+    columns.extend(point_columns(("after", "after"), 4));
+    let mut table = Table::new("Deviation of path points", columns);
+    for report in reports {
+        for point in &report.points {
+            let mut row: Vec<Cell> = vec![
+                report.program.as_str().into(),
+                report.model.as_str().into(),
+                if point.after.is_some() { meaning(report.after).into() } else { Cell::Missing },
+                report.held_out_mm.into(),
+            ];
+            row.extend(point_cells(point));
+            table.push(row);
+        }
+    }
+    if let Some(first) = reports.first() {
+        table.notes = notes(first);
+    }
+    table
+}
+
+fn point_columns((word, key): (&str, &str), decimals: usize) -> Vec<Column> {
+    let mut columns = vec![
+        Column::count("index", "Point"),
+        Column::count("line", "Line"),
+        Column::text("instruction", "Instruction"),
+        Column::number("x_mm", "x", "mm", 3),
+        Column::number("y_mm", "y", "mm", 3),
+        Column::number("z_mm", "z", "mm", 3),
+    ];
+    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals)] {
+        for (part, name) in [("dx", "dx"), ("dy", "dy"), ("dz", "dz"), ("norm", "|d|"), ("normal", "normal")]
+        {
+            columns.push(Column::number(
+                format!("{key}_{part}_mm"),
+                format!("{side} {name}"),
+                "mm",
+                decimals,
+            ));
+        }
+    }
+    columns.extend([
+        Column::number("sigma_mm", "predicted 1σ", "mm", 3),
+        Column::text("status", "Status"),
+        Column::text("reason", "Reason"),
+    ]);
+    columns
+}
+
+fn point_cells(point: &PathPoint) -> Vec<Cell> {
+    let mut row = place(point);
+    for side in [point.before, point.after] {
+        row.extend(match side {
+            Some(d) => [
+                d.vector_mm.x.into(),
+                d.vector_mm.y.into(),
+                d.vector_mm.z.into(),
+                d.norm_mm().into(),
+                d.normal_mm.into(),
+            ],
+            None => [const { Cell::Missing }; 5],
+        });
+    }
+    row.extend(outcome(point));
+    row
+}
+
+/// What fits a page: position, sizes before and after, 1σ and what became of the point.
+pub fn short_table(report: &PathReport) -> Table {
+    let (word, key) = words(report.after);
+    let normals = report.points.iter().any(|point| point.normal.is_some());
+    let mut columns = vec![
+        Column::count("index", "Point"),
+        Column::count("line", "Line"),
+        Column::text("instruction", "Instruction"),
+        Column::number("x_mm", "x", "mm", 2),
+        Column::number("y_mm", "y", "mm", 2),
+        Column::number("z_mm", "z", "mm", 2),
+    ];
+    for (side, key, decimals) in [("before", "before", 3), (word, key, decimals(report.after))] {
+        columns.push(Column::number(format!("{key}_norm_mm"), format!("{side} |d|"), "mm", decimals));
+        if normals {
+            columns.push(Column::number(
+                format!("{key}_normal_mm"),
+                format!("{side} normal"),
+                "mm",
+                decimals,
+            ));
+        }
+    }
+    columns.push(Column::number("sigma_mm", "1σ", "mm", 3));
+    columns.push(Column::text("status", "Status"));
+    columns.push(Column::text("reason", "Reason"));
+    let mut table = Table::new(format!("Points of {} under {}", report.program, named(report)), columns);
+    for point in &report.points {
+        let mut row = place(point);
+        for side in [point.before, point.after] {
+            row.push(side.map(|d| d.norm_mm()).into());
+            if normals {
+                row.push(side.and_then(|d| d.normal_mm).into());
+            }
+        }
+        row.extend(outcome(point));
+        table.push(row);
+    }
+    table.notes = notes(report);
+    table
+}
+
+/// Points that were refused, flagged or left, in the order of the path. Neighbours with the same fate and the same kind
+/// of reason share a row, which gives the reason of the first.
+pub fn flag_table(report: &PathReport) -> Table {
+    let mut table = Table::new(
+        "Points to look at",
+        vec![
+            Column::text("lines", "Lines"),
+            Column::text("points", "Points"),
+            Column::count("count", "Count"),
+            Column::text("status", "Status"),
+            Column::text("reason", "Reason"),
+        ],
+    );
+    let kind = |point: &PathPoint| (point.status, point.kind_of_reason());
+    for run in report.points.chunk_by(|a, b| kind(a) == kind(b)) {
+        let [first, ..] = run else { continue };
+        if first.status == Fate::Changed {
+            continue;
+        }
+        let reason = first.reason.as_ref().map(|reason| {
+            let same = run.iter().all(|point| point.reason.as_ref() == Some(reason));
+            if same { reason.clone() } else { format!("{reason} (the first)") }
+        });
+        let lines = run.iter().map(|point| point.line as usize).filter(|line| *line > 0);
+        table.push([
+            range(lines).into(),
+            range(run.iter().map(|point| point.index)).into(),
+            run.len().into(),
+            fate(first.status),
+            reason.into(),
+        ]);
+    }
+    table
+}
+
+/// First and last of rising numbers; `None` of none.
+fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
+    let (low, high) = numbers.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
+    match low.cmp(&high) {
+        std::cmp::Ordering::Less => Some(format!("{low}–{high}")),
+        std::cmp::Ordering::Equal => Some(low.to_string()),
+        std::cmp::Ordering::Greater => None,
+    }
+}
+
+/// The page: one section per program. Reports of one program with several models stand together.
+pub fn document(reports: &[PathReport]) -> Document {
+    let programs = by_program(reports);
+    let mut page = match programs.as_slice() {
+        [(program, _)] => Document::new(format!("Deviation of {program}")),
+        _ => Document::new("Deviation of grinding paths"),
+    };
+    let mut models: Vec<&str> = Vec::new();
+    for report in reports.iter().filter(|report| !report.model.is_empty()) {
+        if !models.contains(&report.model.as_str()) {
+            models.push(&report.model);
+        }
+    }
+    page.subtitle = match models.as_slice() {
+        [] => String::new(),
+        [model] => format!("model {model}"),
+        _ => format!("models {}", models.join(", ")),
+    };
+    if reports.is_empty() {
+        page.paragraph("No program has a path whose deviation could be told.");
+    }
+    if programs.len() > 1 {
+        page.push(block_table(reports));
+    }
+    for (program, reports) in &programs {
+        if programs.len() > 1 {
+            page.heading(2, *program);
+        }
+        page.blocks.extend(sections(reports, if programs.len() > 1 { 3 } else { 2 }));
+    }
+    page
+}
+
+/// The blocks of one program, headings at `level`: what a page on its compensation takes in too.
+pub(super) fn sections(reports: &[&PathReport], level: u8) -> Vec<Block> {
+    let mut page = Document::default();
+    let Some(first) = reports.first() else { return page.blocks };
+    page.push(verdict(reports));
+    page.push(key_figures(reports));
+    page.push(summary::block(reports, false));
+    page.push(summary::registered(reports, false));
+    page.heading(level, "Along the path");
+    for figure in pictures::all(reports) {
+        page.push(figure);
+    }
+    page.heading(level, "Points to look at");
+    let alike = reports.iter().all(|report| same_fates(first, report));
+    for report in reports.iter().take(if alike { 1 } else { reports.len() }) {
+        let flags = flag_table(report);
+        let name = if reports.len() == 1 || alike { String::new() } else { report.model.clone() };
+        if flags.rows.is_empty() {
+            let of = if name.is_empty() { name } else { format!("{name}: ") };
+            page.paragraph(format!("{of}Every point was rewritten without a flag."));
+        } else {
+            page.push(Table { title: name, ..flags.excerpt(60) });
+        }
+    }
+    page.heading(level, "All points");
+    for report in reports {
+        let count = report.points.len();
+        page.push(Block::Details {
+            summary: format!("{count} points under {}", report.model),
+            blocks: vec![short_table(report).excerpt(ROWS_ON_PAGE).into()],
+        });
+    }
+    page.blocks
+}
+
+/// Everything; schema `truegrind.deviation/1`.
+pub fn json(reports: &[PathReport]) -> Value {
+    let programs: Vec<Value> = by_program(reports)
+        .into_iter()
+        .map(|(program, reports)| {
+            let models: Vec<Value> = reports.iter().map(|report| model_json(report)).collect();
+            json!({ "program": program, "models": models })
+        })
+        .collect();
+    json!({ "schema": "truegrind.deviation/1", "programs": programs })
+}
+
+fn model_json(report: &PathReport) -> Value {
+    let points: Vec<Value> = report
+        .points
+        .iter()
+        .map(|point| {
+            let at = intended(point);
+            json!({
+                "index": point.index,
+                "line": (point.line > 0).then_some(point.line),
+                "instruction": point.instruction,
+                "cutting": point.cutting,
+                "intended_mm": [at.x, at.y, at.z],
+                "before": point.before.map(deviation_json),
+                "after": point.after.map(deviation_json),
+                "sigma_mm": point.sigma_mm,
+                "outside": point.outside.map(|outside| match outside {
+                    Outside::Joint { joint, by_deg } => json!({ "joint": joint + 1, "by_deg": by_deg }),
+                    Outside::Coverage { ratio } => json!({ "coverage_ratio": ratio }),
+                }),
+                "status": point.status,
+                "reason": point.reason,
+            })
+        })
+        .collect();
+    let block = |side: Side| {
+        report.block(side).map(|block| {
+            json!({
+                "five_mm": block.five_mm,
+                "mean_mm": block.all.mean,
+                "mean_absolute_mm": block.all.mean_absolute,
+                "standard_deviation_mm": block.all.standard_deviation,
+                "rmse_mm": block.all.rmse,
+                "max_mm": block.all.max,
+                "points": block.all.count,
+                "registered_rms_mm": report.registered_rms_mm(side),
+            })
+        })
+    };
+    json!({
+        "model": report.model,
+        "after_is": report.after,
+        "model_held_out_rmse_mm": report.held_out_mm,
+        "summary": { "before": block(BEFORE), "after": block(AFTER) },
+        "points": points,
+    })
+}
+
+fn deviation_json(deviation: Deviation) -> Value {
+    let [dx, dy, dz] = deviation.vector_mm.into();
+    json!({
+        "dx_mm": dx,
+        "dy_mm": dy,
+        "dz_mm": dz,
+        "norm_mm": deviation.norm_mm(),
+        "normal_mm": deviation.normal_mm,
+        "turn_deg": deviation.angle_rad.to_degrees(),
+    })
+}
+
+/// Reports by program, in the order in which programs first appear.
+fn by_program(reports: &[PathReport]) -> Vec<(&str, Vec<&PathReport>)> {
+    let mut out: Vec<(&str, Vec<&PathReport>)> = Vec::new();
+    for report in reports {
+        match out.iter_mut().find(|(program, _)| *program == report.program) {
+            Some((_, group)) => group.push(report),
+            None => out.push((&report.program, vec![report])),
+        }
+    }
+    out
+}
+
+/// Where the TCP shall be, in the work object.
+fn intended(point: &PathPoint) -> Point3<f64> {
+    point.base_from_object.inverse_transform_point(&Point3::from(point.intended.translation.vector))
+}
+
+/// The points that a summary is made of: the cut, or all where nothing cuts.
+fn cut(report: &PathReport) -> impl Iterator<Item = &PathPoint> {
+    let any = report.points.iter().any(|point| point.cutting);
+    report.points.iter().filter(move |point| point.cutting || !any)
+}
+
+fn has(report: &PathReport, side: Side) -> bool {
+    report.points.iter().any(|point| side(point).is_some())
+}
+
+/// Whether two reports say the same of every point.
+fn same_fates(a: &PathReport, b: &PathReport) -> bool {
+    let fates = |r: &PathReport| r.points.iter().map(|p| (p.status, p.reason.clone())).collect::<Vec<_>>();
+    fates(a) == fates(b)
+}
+
+/// Root mean square of the predicted 1σ over the cut (mm); `None` where no point has one.
+fn sigma_rms(report: &PathReport) -> Option<f64> {
+    let squares: Vec<f64> = cut(report).filter_map(|point| point.sigma_mm.map(|s| s * s)).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// Short heading and key of the columns after the correction.
+fn words(after: After) -> (&'static str, &'static str) {
+    match after {
+        After::PredictedRemainder => ("remainder", "predicted_remainder"),
+        After::Achieved => ("achieved", "achieved"),
+    }
+}
+
+/// What the figures after the correction are.
+fn meaning(after: After) -> &'static str {
+    match after {
+        After::PredictedRemainder => "predicted remainder",
+        After::Achieved => "achieved",
+    }
+}
+
+/// A remainder is far smaller than a deviation.
+fn decimals(after: After) -> usize {
+    match after {
+        After::PredictedRemainder => 4,
+        After::Achieved => 3,
+    }
+}
+
+/// Model with its held-out error.
+fn named(report: &PathReport) -> String {
+    match report.held_out_mm {
+        Some(mm) => format!("{} (held-out error {mm:.3} mm RMSE)", report.model),
+        None => format!("{} (held-out error not known)", report.model),
+    }
+}
+
+const REMAINDER: &str = "A predicted remainder is what rounding, interpolation and inverse kinematics leave under the \
+    very model that made the correction. It does not say how far the real arm will be off: the predicted 1σ and the \
+    model's held-out error do.";
+
+fn notes(report: &PathReport) -> Vec<String> {
+    let mut notes = vec![
+        "Positions and vectors in the axes of the work object; d is reached minus intended.".to_owned(),
+        if report.points.iter().any(|point| point.normal.is_some()) {
+            "\"normal\" is signed along the outward surface normal: positive stands off the surface, negative digs in."
+                .to_owned()
+        } else {
+            "No surface is known, so nothing is stated along a normal.".to_owned()
+        },
+    ];
+    if report.after == After::PredictedRemainder && has(report, AFTER) {
+        notes.push(REMAINDER.to_owned());
+    }
+    notes
+}
+
+fn line(point: &PathPoint) -> Cell {
+    if point.line > 0 { Cell::Count(u64::from(point.line)) } else { Cell::Missing }
+}
+
+fn place(point: &PathPoint) -> Vec<Cell> {
+    let at = intended(point);
+    vec![
+        point.index.into(),
+        line(point),
+        point.instruction.as_str().into(),
+        at.x.into(),
+        at.y.into(),
+        at.z.into(),
+    ]
+}
+
+fn outcome(point: &PathPoint) -> [Cell; 3] {
+    [point.sigma_mm.into(), fate(point.status), point.reason.clone().into()]
+}
+
+/// What became of a point, with its sign.
+pub(super) fn fate(fate: Fate) -> Cell {
+    let status = match fate {
+        Fate::Changed => Status::Good,
+        Fate::Left => Status::NotEvaluated,
+        Fate::Refused => Status::Bad,
+        Fate::Flagged => Status::Warning,
+    };
+    Cell::Judged(status, fate_word(fate).to_owned())
+}
+
+/// The contract's word.
+pub(super) fn fate_word(fate: Fate) -> &'static str {
+    match fate {
+        Fate::Changed => "changed",
+        Fate::Left => "left",
+        Fate::Refused => "refused",
+        Fate::Flagged => "flagged",
+    }
+}
+
+fn verdict(reports: &[&PathReport]) -> Verdict {
+    let count = |fate: Fate| {
+        reports.iter().map(|r| r.points.iter().filter(|p| p.status == fate).count()).max().unwrap_or(0)
+    };
+    let mut reasons = Vec::new();
+    let mut status = Status::Good;
+    for (fate, text) in [
+        (Fate::Refused, "refused: not rewritten, because that would be wrong or dangerous"),
+        (Fate::Flagged, "flagged: rewritten with a warning"),
+    ] {
+        let points = count(fate);
+        if points > 0 {
+            status = Status::Warning;
+            reasons.push(format!("{points} {} {text}", if points == 1 { "point" } else { "points" }));
+        }
+    }
+    let size = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
+    let known = |value: Option<f64>| value.map_or("not known".to_owned(), |mm| format!("{mm:.3} mm"));
+    let judged: Vec<(&PathReport, f64, f64)> = reports
+        .iter()
+        .filter_map(|report| Some((*report, size(report, BEFORE)?, size(report, AFTER)?)))
+        .collect();
+    for (report, before, after) in &judged {
+        if after > before {
+            status = if judged.iter().all(|(_, before, after)| after > before) {
+                Status::Bad
+            } else {
+                Status::Warning
+            };
+            reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
+        }
+        if let (Some(sigma), Some(rms)) = (sigma_rms(report), before_rms(report))
+            && sigma > rms
+        {
+            if status == Status::Good {
+                status = Status::Warning;
+            }
+            reasons.push(format!(
+                "under {} the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the \
+                 model does not know enough here to say that the correction helps",
+                report.model
+            ));
+        }
+    }
+    let headline = match judged.as_slice() {
+        [] => {
+            if status == Status::Good {
+                status = Status::NotEvaluated;
+            }
+            let worst = reports.iter().filter_map(|report| size(report, BEFORE)).reduce(f64::max);
+            format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
+        }
+        [(report, before, after)] => format!(
+            "The largest deviation goes from {before:.3} mm to {after:.*} mm ({}); predicted 1σ {}, held-out error of the \
+             model {}",
+            decimals(report.after),
+            meaning(report.after),
+            known(sigma_rms(report)),
+            known(report.held_out_mm),
+        ),
+        [(first, ..), ..] => {
+            let spread = |values: Vec<f64>, decimals: usize| {
+                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let (low, high) = (format!("{low:.decimals$}"), format!("{high:.decimals$}"));
+                if low == high { format!("{low} mm") } else { format!("{low}–{high} mm") }
+            };
+            format!(
+                "The largest deviation goes from {} to {} ({}), depending on the model",
+                spread(judged.iter().map(|j| j.1).collect(), 3),
+                spread(judged.iter().map(|j| j.2).collect(), decimals(first.after)),
+                meaning(first.after),
+            )
+        }
+    };
+    Verdict::new(status, headline, reasons)
+}
+
+/// Root mean square of the sizes of the deviations of the cut as programmed (mm).
+fn before_rms(report: &PathReport) -> Option<f64> {
+    let squares: Vec<f64> =
+        cut(report).filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
+    let mut figures = Vec::new();
+    let note = |report: &PathReport, side: Side, what: &str| match report.block(side) {
+        Some(block) => {
+            let decimals = if what == meaning(After::PredictedRemainder) { 4 } else { 3 };
+            format!("{what}, mean |d| {:.decimals$} mm", block.all.mean_absolute)
+        }
+        None => what.to_owned(),
+    };
+    let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
+    if let Some(first) = reports.first() {
+        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(
+            first,
+            BEFORE,
+            "as programmed",
+        )));
+    }
+    for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
+        let label = if reports.len() > 1 {
+            format!("Largest after, {}", report.model)
+        } else {
+            "Largest after".into()
+        };
+        figures.push(KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm").note(note(
+            report,
+            AFTER,
+            meaning(report.after),
+        )));
+    }
+    if let [report] = reports {
+        figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));
+        figures.push(
+            KeyFigure::new("Held-out error of the model", report.held_out_mm, 3, "mm")
+                .note("RMSE on rows it never saw"),
+        );
+    }
+    figures
+}

@@ -1,0 +1,263 @@
+//! Pictures of a path: its deviation along the way, how often each size occurs, and where on the part.
+
+use super::{AFTER, BEFORE, Side, cut, has, intended, meaning};
+use crate::document::Figure;
+use crate::plot::{
+    Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
+};
+use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
+
+/// More points than a picture can show make a page heavy; of each group the largest is kept.
+const POINTS: usize = 2000;
+
+/// Models beyond these would hide each other.
+const MODELS: usize = 5;
+
+/// All pictures of one program.
+pub(super) fn all(reports: &[&PathReport]) -> Vec<Figure> {
+    let mut out = vec![along(reports)];
+    out.push(frequency(reports));
+    if reports.len() > 1 {
+        out.push(strips(reports));
+    }
+    out.extend(plan(reports));
+    out
+}
+
+/// One side of one report.
+struct Shown<'a> {
+    name: String,
+    report: &'a PathReport,
+    side: Side,
+    after: bool,
+    ink: Option<Ink>,
+}
+
+/// Everything that is drawn: before (of the first report, or of each where they differ), then after.
+fn shown<'a>(reports: &[&'a PathReport]) -> Vec<Shown<'a>> {
+    let mut out = Vec::new();
+    let Some(first) = reports.first() else { return out };
+    let several = reports.len() > 1;
+    let differ = reports.iter().any(|report| report.signed_mm(BEFORE) != first.signed_mm(BEFORE));
+    for (index, report) in reports.iter().take(if differ { MODELS } else { 1 }).enumerate() {
+        if has(report, BEFORE) {
+            let name = if differ { format!("before, under {}", report.model) } else { "before".to_owned() };
+            let ink = (index == 0).then_some(Ink::Vermilion);
+            out.push(Shown { name, report, side: BEFORE, after: false, ink });
+        }
+    }
+    for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS) {
+        let word = meaning(report.after);
+        let name = if several { format!("{}, {word}", report.model) } else { format!("after ({word})") };
+        out.push(Shown { name, report, side: AFTER, after: true, ink: (!several).then_some(Ink::Blue) });
+    }
+    out
+}
+
+const SIGNED: &str = "deviation along the normal";
+
+fn quantity(reports: &[&PathReport]) -> &'static str {
+    let signed = reports.iter().flat_map(|report| cut(report)).all(|point| point.normal.is_some());
+    if signed { SIGNED } else { "size of the deviation" }
+}
+
+fn along(reports: &[&PathReport]) -> Figure {
+    let single = reports.len() == 1;
+    let mut band = false;
+    let series: Vec<Series> = shown(reports)
+        .into_iter()
+        .map(|Shown { name, report, side, after, ink }| {
+            let kept = thinned(report, side);
+            let points: Vec<[f64; 2]> = kept
+                .iter()
+                .map(|point| [point.index as f64, side(point).map_or(f64::NAN, |d| d.signed_mm())])
+                .collect();
+            let mut series = Series { ink, ..Series::line(name, points) };
+            // The band belongs to the path that will be run: after, or before where nothing was rewritten.
+            if single && (after || !has(report, AFTER)) && kept.iter().any(|p| p.sigma_mm.is_some()) {
+                let sigmas: Vec<f64> = kept.iter().map(|p| p.sigma_mm.unwrap_or(0.0)).collect();
+                series = series.plus_minus(&sigmas);
+                if quantity(reports) != SIGNED {
+                    // A size is never negative.
+                    series.bounds.iter_mut().for_each(|bounds| bounds[0] = bounds[0].max(0.0));
+                }
+                band = true;
+            }
+            series
+        })
+        .collect();
+    let covered = covered(&series);
+    let graph = Graph {
+        title: "Deviation along the path".to_owned(),
+        x: Axis::new("path point", ""),
+        y: Axis::new(quantity(reports), "mm"),
+        series,
+        spans: reports.first().map_or(Vec::new(), |report| spans(report)),
+        ..Graph::default()
+    };
+    let mut caption = String::from("Deviation at each point of the path, approaches and links included.");
+    if band {
+        caption
+            .push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
+    }
+    for (under, over) in covered {
+        caption.push_str(&format!(
+            " The curve \u{201c}{under}\u{201d} lies under \u{201c}{over}\u{201d}: the two agree."
+        ));
+    }
+    if !graph.spans.is_empty() {
+        caption.push_str(" Shaded: points that were refused, flagged or left.");
+    }
+    if reports.iter().any(|report| report.points.len() > POINTS) {
+        caption.push_str(" Of neighbouring points the one with the largest deviation is drawn.");
+    }
+    Figure::new(graph.svg(), caption)
+}
+
+/// Curves that nobody sees because a later one runs over them: nowhere apart by more than a line's width.
+fn covered(series: &[Series]) -> Vec<(String, String)> {
+    let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
+    let (low, high) =
+        heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
+    let line = 0.005 * (high - low);
+    let agree = |a: &Series, b: &Series| {
+        a.points.len() == b.points.len()
+            && a.points.iter().zip(&b.points).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= line)
+    };
+    let pairs = series.iter().enumerate().filter_map(|(k, under)| {
+        let over = series[k + 1..].iter().find(|over| agree(under, over))?;
+        Some((under.name.clone(), over.name.clone()))
+    });
+    pairs.collect()
+}
+
+fn frequency(reports: &[&PathReport]) -> Figure {
+    // More than two would only hide each other.
+    let one = &reports[..reports.len().min(1)];
+    let samples = shown(one)
+        .into_iter()
+        .map(|s| Sample { ink: s.ink, ..Sample::new(s.name, s.report.signed_mm(s.side)) })
+        .collect();
+    let histogram = Histogram {
+        title: "How often each deviation occurs".to_owned(),
+        x: Axis::new(quantity(one), "mm"),
+        samples,
+        bins: None,
+    };
+    let mut caption = "Deviations of the points of the cut, before and after".to_owned();
+    if let ([report], true) = (one, reports.len() > 1) {
+        caption.push_str(&format!(" with {}", report.model));
+    }
+    Figure::new(histogram.svg(), caption + ".")
+}
+
+fn strips(reports: &[&PathReport]) -> Figure {
+    let signed = quantity(reports) == SIGNED;
+    let strips = shown(reports)
+        .into_iter()
+        .map(|Shown { name, report, side, .. }| Strip { name, values: report.signed_mm(side) })
+        .collect();
+    let strip = HeatStrip {
+        title: "Model by model".to_owned(),
+        x: Axis::new("point of the cut", ""),
+        value: Axis::new(quantity(reports), "mm"),
+        colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
+        strips,
+    };
+    Figure::new(
+        strip.svg(),
+        "Deviation along the cut, one strip per model on a common scale: strips that look alike are alike.",
+    )
+}
+
+fn plan(reports: &[&PathReport]) -> Option<Figure> {
+    let first = reports.first()?;
+    let axes = widest(first)?;
+    let signed = quantity(reports) == SIGNED;
+    let names = ["x", "y", "z"];
+    let cuts = first.points.iter().any(|point| point.cutting);
+    let paths: Vec<PlanPath> = shown(reports)
+        .into_iter()
+        .map(|Shown { name, report, side, .. }| {
+            let kept = thinned(report, side);
+            let points = kept.iter().map(|point| axes.map(|axis| intended(point)[axis])).collect();
+            let value = |point: &&PathPoint| match side(point) {
+                Some(d) if point.cutting || !cuts => {
+                    if signed {
+                        d.signed_mm()
+                    } else {
+                        d.norm_mm()
+                    }
+                }
+                _ => f64::NAN,
+            };
+            PlanPath { name, points, values: kept.iter().map(value).collect() }
+        })
+        .collect();
+    let view = PlanView {
+        title: "Where on the part".to_owned(),
+        x: Axis::new(names[axes[0]], "mm"),
+        y: Axis::new(names[axes[1]], "mm"),
+        value: Axis::new(quantity(reports), "mm"),
+        colors: if signed { ColorMap::CoolWarm } else { ColorMap::Viridis },
+        paths,
+    };
+    let after = reports.iter().find(|report| has(report, AFTER)).map_or("", |report| meaning(report.after));
+    Some(Figure::new(
+        view.svg(),
+        format!(
+            "The path in the work object, seen along {}, in colours of its deviation; all panels share one scale{}. \
+             Approaches and links are grey.",
+            names[3 - axes[0] - axes[1]],
+            if after.is_empty() { String::new() } else { format!(" (after is {after})") }
+        ),
+    ))
+}
+
+/// The two axes of the work object along which the path is longest, in their order.
+fn widest(report: &PathReport) -> Option<[usize; 2]> {
+    let extent = |axis: usize| {
+        let ends = cut(report)
+            .map(|point| intended(point)[axis])
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |ends, v| (ends.0.min(v), ends.1.max(v)));
+        ends.1 - ends.0
+    };
+    if report.points.is_empty() {
+        return None;
+    }
+    let shortest = (0..3).rev().min_by(|&a, &b| extent(a).total_cmp(&extent(b)))?;
+    let mut axes = (0..3).filter(|axis| *axis != shortest);
+    Some([axes.next()?, axes.next()?])
+}
+
+/// Points for a picture: all, or of each group the one with the largest deviation.
+fn thinned(report: &PathReport, side: Side) -> Vec<&PathPoint> {
+    let size = |point: &&PathPoint| side(point).map_or(-1.0, |d| d.norm_mm());
+    report
+        .points
+        .chunks(report.points.len().div_ceil(POINTS).max(1))
+        .filter_map(|group| group.iter().max_by(|a, b| size(a).total_cmp(&size(b))))
+        .collect()
+}
+
+/// Stretches of points that were not simply rewritten; none where that would be all of them.
+fn spans(report: &PathReport) -> Vec<Span> {
+    if report.points.iter().all(|point| point.status != Status::Changed) {
+        return Vec::new();
+    }
+    let mut out: Vec<Span> = Vec::new();
+    for point in &report.points {
+        let name = match point.status {
+            Status::Changed => continue,
+            Status::Refused => "refused",
+            Status::Flagged => "flagged",
+            Status::Left => "left",
+        };
+        let (from, to) = (point.index as f64 - 0.5, point.index as f64 + 0.5);
+        match out.last_mut() {
+            Some(last) if last.name == name && last.range[1] == from => last.range[1] = to,
+            _ => out.push(Span { range: [from, to], name: name.to_owned() }),
+        }
+    }
+    out
+}

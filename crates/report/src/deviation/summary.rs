@@ -1,0 +1,157 @@
+//! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
+
+use super::{AFTER, BEFORE, REMAINDER, Side, by_program, cut, has, meaning, sigma_rms};
+use crate::table::{Cell, Column, Table};
+use truegrind_compensation::deviation::{After, Block, PathReport};
+
+/// The block of ltlm-2024 Table 8: before compensation, then one row per model. Where the models disagree about the
+/// path as it was, each has a row of its own before.
+pub fn block_table(reports: &[PathReport]) -> Table {
+    let all: Vec<&PathReport> = reports.iter().collect();
+    block(&all, by_program(reports).len() > 1)
+}
+
+/// RMS deviation as it stands and after the rigid motion that fits the path best, for a base that was not measured in the
+/// work object.
+pub fn registered_table(reports: &[PathReport]) -> Table {
+    let all: Vec<&PathReport> = reports.iter().collect();
+    registered(&all, by_program(reports).len() > 1)
+}
+
+/// [`block_table`], with a column for the program where there are several.
+pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
+    // The unit stands in the title, so that the figures and what they must be seen beside fit one line.
+    let number = |key: &str, heading: &str| Column::number(key, heading, "", 3);
+    let mut columns = first_columns(programs);
+    columns.extend((1..=5).map(|point| number(&format!("p{point}_mm"), &format!("P{point}"))));
+    columns.extend([
+        number("mean_mm", "mean"),
+        number("mean_absolute_mm", "mean |d|"),
+        number("standard_deviation_mm", "SD"),
+        number("max_mm", "max"),
+        number("sigma_mm", "1σ"),
+        number("model_held_out_rmse_mm", "held-out"),
+    ]);
+    let mut table = Table::new("Deviation of path points before and after compensation [mm]", columns);
+    for row in rows(reports, |report, side| report.block(side)) {
+        let Block { five_mm, all } = row.value;
+        let mut cells = row.first_cells(programs);
+        cells.extend(five_mm.map(Cell::from));
+        cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
+        // What a program does on an actual arm before anything is corrected is no model's prediction.
+        let model = (!row.before || row.report.after != After::Achieved).then_some(row.report);
+        cells.extend([model.and_then(sigma_rms).into(), model.and_then(|m| m.held_out_mm).into()]);
+        table.push(cells);
+    }
+    let (mut with, mut without) = (0, 0);
+    for point in reports.iter().flat_map(|report| cut(report)) {
+        match point.normal {
+            Some(_) => with += 1,
+            None => without += 1,
+        }
+    }
+    table.notes.push(
+        match (with, without) {
+            (_, 0) => "Signed along the outward surface normal: positive stands off the surface, negative digs in.",
+            (0, _) => {
+                "No surface is known: sizes of the deviation, which have no sign, so mean and mean |d| are the same."
+            }
+            _ => "Signed along the outward surface normal where the surface is known; sizes elsewhere.",
+        }
+        .to_owned(),
+    );
+    table.notes.push(
+        "P1 to P5 lie in the middles of five equal sections of the cut; the other figures are over the whole cut. The \
+         mean is signed, as in ltlm-2024 Table 8, and SD has n − 1; compare by mean |d| and max. 1σ is predicted from \
+         the covariance (RMS over the cut), held-out is the model's RMSE on rows it never saw."
+            .to_owned(),
+    );
+    if reports.iter().any(|report| report.after == After::PredictedRemainder && has(report, AFTER)) {
+        table.notes.push(REMAINDER.to_owned());
+    }
+    table
+}
+
+/// [`registered_table`], with a column for the program where there are several.
+pub(super) fn registered(reports: &[&PathReport], programs: bool) -> Table {
+    let mut columns = first_columns(programs);
+    columns.push(Column::number("rms_mm", "RMS as it stands", "mm", 4));
+    columns.push(Column::number("registered_rms_mm", "RMS after rigid registration", "mm", 4));
+    let mut table = Table::new("Absolute, and the shape of the path alone", columns);
+    let both = |report: &PathReport, side: Side| {
+        let squares: Vec<f64> =
+            report.points.iter().filter_map(|p| side(p).map(|d| d.vector_mm.norm_squared())).collect();
+        let rms = (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
+        rms.map(|rms| (rms, report.registered_rms_mm(side)))
+    };
+    for row in rows(reports, both) {
+        let mut cells = row.first_cells(programs);
+        cells.extend([row.value.0.into(), row.value.1.into()]);
+        table.push(cells);
+    }
+    table.notes.push(
+        "Sizes over all points of the path. Registration takes away the rigid motion that fits best: what is left is the \
+         shape of the path, which counts where the base was not measured in the work object."
+            .to_owned(),
+    );
+    table
+}
+
+/// One row of a summary.
+struct Row<'a, T> {
+    report: &'a PathReport,
+    before: bool,
+    path: String,
+    value: T,
+}
+
+impl<T> Row<'_, T> {
+    fn first_cells(&self, programs: bool) -> Vec<Cell> {
+        let mut cells = vec![self.path.as_str().into()];
+        if programs {
+            cells.insert(0, self.report.program.as_str().into());
+        }
+        cells
+    }
+}
+
+fn first_columns(programs: bool) -> Vec<Column> {
+    let mut columns = vec![Column::text("path", "Path")];
+    if programs {
+        columns.insert(0, Column::text("program", "Program"));
+    }
+    columns
+}
+
+/// Rows of each program: before compensation, once where all models agree about it, then each model after.
+fn rows<'a, T: PartialEq>(
+    reports: &[&'a PathReport],
+    value: impl Fn(&'a PathReport, Side) -> Option<T>,
+) -> Vec<Row<'a, T>> {
+    let mut programs: Vec<&str> = Vec::new();
+    for report in reports {
+        if !programs.contains(&report.program.as_str()) {
+            programs.push(&report.program);
+        }
+    }
+    let mut out = Vec::new();
+    for program in programs {
+        let of: Vec<&'a PathReport> =
+            reports.iter().copied().filter(|report| report.program == program).collect();
+        let before: Vec<(&'a PathReport, T)> =
+            of.iter().filter_map(|report| Some((*report, value(report, BEFORE)?))).collect();
+        let agreed = before.windows(2).all(|pair| pair[0].1 == pair[1].1);
+        let shown = if agreed { 1 } else { before.len() };
+        for (report, value) in before.into_iter().take(shown) {
+            let path = if agreed { "before".to_owned() } else { format!("before, under {}", report.model) };
+            out.push(Row { report, before: true, path, value });
+        }
+        for report in of.into_iter().filter(|report| has(report, AFTER)) {
+            if let Some(value) = value(report, AFTER) {
+                let path = format!("{}, {}", report.model, meaning(report.after));
+                out.push(Row { report, before: false, path, value });
+            }
+        }
+    }
+    out
+}

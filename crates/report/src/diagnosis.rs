@@ -1,0 +1,455 @@
+//! What the model of an arm gets wrong: one sentence of cause for each finding, the picture that shows it, the gain on
+//! held-out rows, what to do, and what could not be told.
+
+use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::number::Precision;
+use super::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, Span};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_calibration::diagnosis::diagnose::Diagnosed;
+use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis, Finding, FoundParameter};
+use truegrind_calibration::diagnosis::picture::Picture;
+use truegrind_calibration::measurement::dataset::Dataset;
+
+/// The whole page.
+pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
+    let diagnosis = &found.diagnosis;
+    let mut page = summary(found);
+    page.figure(
+        steps(diagnosis),
+        "Held-out error (five random folds, everything refitted in each) from the data sheet to the extended model. The \
+         gain of fitting frames is not shown: every bar has them fitted. Numbers count causes in the order in which \
+         they came in.",
+    );
+    page.push(step_table(diagnosis));
+    for (k, finding) in diagnosis.findings.iter().enumerate() {
+        page.heading(2, format!("{}. {}", k + 1, title(finding)));
+        page.paragraph(format!("{}. ({}.)", sentence(&finding.cause), sentence(word(finding.confidence))));
+        page.push(Block::List(reasons(finding)));
+        if let Some(picture) = found.pictures.get(k) {
+            page.figure(drawn(picture), caption(picture));
+        }
+        if !finding.parameters.is_empty() {
+            page.push(parameters(finding));
+        }
+        if !finding.alternatives.is_empty() {
+            page.push(rivals(finding));
+        }
+        page.paragraph(format!("What to do: {}.", finding.remedy));
+    }
+    page.heading(2, "What these rows cannot tell");
+    if diagnosis.not_testable.is_empty() {
+        page.paragraph("Every effect of the catalogue would have shown at a size met in practice.");
+    } else {
+        page.push(not_testable_table(diagnosis));
+    }
+    page.heading(2, "What is left");
+    page.paragraph(left(diagnosis));
+    if let Some(noise) = &diagnosis.noise_model {
+        page.paragraph(format!(
+            "The noise grows with range: {:.3} mm and {:.3} mm for every metre (p = {:.0e}).",
+            noise.sigma_mm, noise.per_metre_mm, noise.p_value
+        ));
+    }
+    if !diagnosis.measure_again.is_empty() {
+        page.paragraph(format!("Rows to measure again: {}.", listed(&diagnosis.measure_again)));
+    }
+    let notes: Vec<String> = diagnosis.notes.iter().chain(&dataset.notes).cloned().collect();
+    if !notes.is_empty() {
+        page.push(Block::List(notes));
+    }
+    page.heading(2, "Where this came from");
+    let from = &found.estimated.provenance;
+    page.push(Provenance {
+        version: format!("truegrind {}", from.version),
+        command: None,
+        method: Some("diagnose".to_owned()),
+        seed: Some(from.seed),
+        sources: vec![Source {
+            name: from.file.clone(),
+            role: "Measurements".to_owned(),
+            sha256: Some(from.sha256.clone()).filter(|hash| !hash.is_empty()),
+            rows: Some(diagnosis.dataset.rows),
+        }],
+        remarks: vec![
+            ("Robot".to_owned(), diagnosis.dataset.robot.clone()),
+            ("Sensor".to_owned(), diagnosis.dataset.sensor.clone()),
+        ],
+    });
+    page
+}
+
+/// What fits a terminal.
+pub fn summary(found: &Diagnosed) -> Document {
+    let diagnosis = &found.diagnosis;
+    let mut page = Document::new(format!("Diagnosis of {}", diagnosis.dataset.robot));
+    page.subtitle = format!(
+        "{}, {} rows, sensor {}, {} set aside",
+        diagnosis.dataset.file, diagnosis.dataset.rows, diagnosis.dataset.sensor, diagnosis.dataset.set_aside
+    );
+    page.push(super::identification::judged(&found.estimated));
+    let fits = &diagnosis.fits;
+    let causes: Vec<String> = diagnosis
+        .findings
+        .iter()
+        .map(|f| match f.confidence {
+            Confidence::Identified => sentence(&f.cause),
+            Confidence::Ambiguous => format!("{} (ambiguous: {})", sentence(&f.cause), others(f)),
+        })
+        .collect();
+    let found_there = match diagnosis.findings.len() {
+        0 => "Nothing but geometry was found".to_owned(),
+        1 => "One cause beyond geometry was found".to_owned(),
+        n => format!("{n} causes beyond geometry were found"),
+    };
+    // A fit of so few rows follows them whatever is wrong: that it found nothing is no good news.
+    let (status, headline) = match diagnosis.poses_needed {
+        Some(needed) => (
+            Status::NotEvaluated,
+            format!(
+                "{} rows are too few to look for causes, at least {needed} different poses are needed; geometry, held by its \
+                 priors",
+                diagnosis.dataset.rows
+            ),
+        ),
+        None if diagnosis.findings.is_empty() => (Status::Good, found_there),
+        None => (Status::Warning, found_there),
+    };
+    page.push(Verdict::new(
+        status,
+        format!(
+            "{headline}: held-out error {:.3} mm, geometry alone {:.3}, data sheet {:.3}",
+            fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
+        ),
+        causes,
+    ));
+    page.push(vec![
+        KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm")
+            .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_rmse_mm)),
+        KeyFigure::new("On contiguous blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
+            .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_blocks_rmse_mm)),
+        KeyFigure::new("Noise floor", diagnosis.noise_floor_mm, 3, "mm")
+            .note(diagnosis.noise_floor_source.clone()),
+        KeyFigure::new("Findings", diagnosis.findings.len(), 0, "").note(format!(
+            "{} identified",
+            diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count()
+        )),
+    ]);
+    page.push(stage_table(diagnosis));
+    if !diagnosis.findings.is_empty() {
+        page.push(finding_table(diagnosis));
+    }
+    if !diagnosis.transfers.is_empty() {
+        page.push(transfer_table(diagnosis));
+    }
+    page
+}
+
+/// The models on other series of the same arm.
+pub fn transfer_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "On other series of this arm, only the frames refitted: RMSE",
+        vec![
+            Column::text("file", "file"),
+            Column::count("rows", "rows"),
+            Column::number("nominal_rmse_mm", "data sheet", "mm", 3),
+            Column::number("geometric_rmse_mm", "geometry", "mm", 3),
+            Column::number("extended_rmse_mm", "extended", "mm", 3),
+        ],
+    );
+    for other in &diagnosis.transfers {
+        table.push([
+            Cell::from(other.file.as_str()),
+            other.rows.into(),
+            other.nominal_rmse_mm.into(),
+            other.geometric_rmse_mm.into(),
+            other.extended_rmse_mm.into(),
+        ]);
+    }
+    table
+}
+
+/// Errors of the three stages.
+pub fn stage_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "Errors by stage",
+        vec![
+            Column::text("stage", "stage"),
+            Column::number("rmse_mm", "RMSE", "mm", 3),
+            Column::number("mean_mm", "mean", "mm", 3),
+            Column::number("max_mm", "max", "mm", 3),
+            Column::number("cv_rmse_mm", "held out, random", "mm", 3),
+            Column::number("cv_blocks_rmse_mm", "held out, blocks", "mm", 3),
+        ],
+    );
+    let fits = &diagnosis.fits;
+    for (name, stage) in [
+        ("nominal: frames fitted", &fits.nominal),
+        ("geometric: links too", &fits.geometric),
+        ("extended: findings too", &fits.extended),
+    ] {
+        table.push([
+            Cell::from(name),
+            stage.rmse_mm.into(),
+            stage.mean_mm.into(),
+            stage.max_mm.into(),
+            stage.cv_rmse_mm.into(),
+            stage.cv_blocks_rmse_mm.into(),
+        ]);
+    }
+    table.notes.push(
+        "RMSE, mean and max on the rows of the fit. Held out: five random folds, and contiguous blocks, which show what \
+         drifts or jumps along the rows."
+            .to_owned(),
+    );
+    table
+}
+
+/// One row for each finding.
+pub fn finding_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "Findings",
+        vec![
+            Column::text("effect", "effect"),
+            Column::text("where", "where"),
+            Column::text("confidence", "confidence"),
+            Column::significant("p_value", "p", "", 2),
+            Column::number("cv_rmse_before_mm", "held out without", "mm", 4),
+            Column::number("cv_rmse_after_mm", "held out with", "mm", 4),
+        ],
+    );
+    for finding in &diagnosis.findings {
+        table.push([
+            Cell::from(finding.effect.as_str()),
+            place(finding).into(),
+            word(finding.confidence).into(),
+            p_value(finding.p_value),
+            finding.gain.cv_rmse_before_mm.into(),
+            finding.gain.cv_rmse_after_mm.into(),
+        ]);
+    }
+    table
+}
+
+/// A p-value; those that no number can hold are told as bounds.
+fn p_value(p: f64) -> Cell {
+    if p < 1e-300 { "< 1e-300".into() } else { p.into() }
+}
+
+fn word(confidence: Confidence) -> &'static str {
+    match confidence {
+        Confidence::Identified => "identified",
+        Confidence::Ambiguous => "ambiguous",
+    }
+}
+
+fn place(finding: &Finding) -> String {
+    if let Some([from, to]) = finding.rows {
+        return format!("rows {from} to {to}");
+    }
+    if let Some(list) = &finding.row_list {
+        return format!("rows {}", listed(list));
+    }
+    match &finding.joints {
+        Some(joints) => format!("joint {}", listed(joints)),
+        None => "all rows".to_owned(),
+    }
+}
+
+/// Numbers in a sentence, not too many.
+fn listed(numbers: &[usize]) -> String {
+    let shown: Vec<String> = numbers.iter().take(20).map(usize::to_string).collect();
+    let rest = numbers.len().saturating_sub(20);
+    if rest > 0 { format!("{} and {rest} more", shown.join(", ")) } else { shown.join(", ") }
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn title(finding: &Finding) -> String {
+    format!("{}, {}", sentence(&finding.effect.replace('-', " ")), place(finding))
+}
+
+fn others(finding: &Finding) -> String {
+    let names: Vec<&str> = finding.alternatives.iter().map(|a| a.effect.as_str()).collect();
+    if names.is_empty() { "its rivals were not beaten".to_owned() } else { names.join(", ") }
+}
+
+fn reasons(finding: &Finding) -> Vec<String> {
+    let mut out = vec![finding.evidence.clone()];
+    let gain = &finding.gain;
+    if gain.cv_rmse_before_mm > gain.cv_rmse_after_mm {
+        out.push(format!(
+            "without it the held-out error is {:.4} mm, with it {:.4} mm",
+            gain.cv_rmse_before_mm, gain.cv_rmse_after_mm
+        ));
+    }
+    if let Some(lambda) = finding.non_centrality {
+        out.push(format!(
+            "non-centrality {lambda:.0} against everything else that was free; from 40 an effect can be counted on to show"
+        ));
+    }
+    out.push(match finding.confidence {
+        Confidence::Identified if finding.alternatives.is_empty() => "no other cause comes near".to_owned(),
+        Confidence::Identified => "the alternatives below were fitted in its place and beaten".to_owned(),
+        Confidence::Ambiguous => {
+            "an alternative below explains nearly as much: the name is not sure".to_owned()
+        }
+    });
+    out
+}
+
+fn parameters(finding: &Finding) -> Table {
+    let mut table = Table::new(
+        "Numbers",
+        vec![
+            Column::text("name", "parameter"),
+            Column::significant("value", "value ± 1σ", "", 4),
+            Column::text("unit", "unit"),
+        ],
+    );
+    // A map is a picture, not a table.
+    let shown: Vec<&FoundParameter> = finding.parameters.iter().filter(|p| p.name != "knot").collect();
+    for parameter in shown {
+        let (scale, unit) = super::number::handy(&parameter.unit);
+        table.push([
+            Cell::from(parameter.name.as_str()),
+            Cell::with_sigma(parameter.value * scale, parameter.sigma.map(|s| s * scale)),
+            unit.into(),
+        ]);
+    }
+    table
+}
+
+fn rivals(finding: &Finding) -> Table {
+    let mut table = Table::new(
+        "What else was fitted in its place",
+        vec![
+            Column::text("effect", "effect"),
+            Column::text("where", "where"),
+            Column::number("cv_rmse_mm", "held out", "mm", 4),
+            Column::number("beaten_by", "beaten by", "2 ln Bayes factor", 1),
+        ],
+    );
+    for rival in &finding.alternatives {
+        let at = match (&rival.joints, rival.rows) {
+            (_, Some([from, to])) => format!("rows {from} to {to}"),
+            (Some(joints), _) => format!("joint {}", listed(joints)),
+            _ => "all rows".to_owned(),
+        };
+        table.push([
+            Cell::from(rival.effect.as_str()),
+            at.into(),
+            rival.cv_rmse_mm.into(),
+            rival.beaten_by.into(),
+        ]);
+    }
+    table
+}
+
+/// What could not be told.
+pub fn not_testable_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "Not testable",
+        vec![
+            Column::text("effect", "effect"),
+            Column::text("reason", "why"),
+            Column::text("remedy", "what would decide"),
+        ],
+    );
+    for item in &diagnosis.not_testable {
+        let name = match &item.joints {
+            Some(joints) => format!("{}, joint {}", item.effect, listed(joints)),
+            None => item.effect.clone(),
+        };
+        table.push([Cell::from(name), item.reason.as_str().into(), item.remedy.as_str().into()]);
+    }
+    table
+}
+
+fn left(diagnosis: &Diagnosis) -> String {
+    let rmse = diagnosis.fits.extended.rmse_mm;
+    match (&diagnosis.remaining, diagnosis.noise_floor_mm) {
+        (Some(text), _) => format!("{}.", sentence(text)),
+        (None, Some(floor)) => format!(
+            "Explained: {rmse:.3} mm RMS is left, and the noise floor is {floor:.3} mm ({}).",
+            diagnosis.noise_floor_source
+        ),
+        (None, None) => format!(
+            "{rmse:.3} mm RMS is left, without a pattern; {}, so a floor to hold it against is not known.",
+            diagnosis.noise_floor_source
+        ),
+    }
+}
+
+/// Name of a bar: the two first stages, then causes by number.
+fn step_name(index: usize) -> String {
+    match index {
+        0 => "data sheet".to_owned(),
+        1 => "geometry".to_owned(),
+        n => format!("+ {}", n - 1),
+    }
+}
+
+/// What each step added.
+pub fn step_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new(
+        "Steps",
+        vec![
+            Column::text("step", "step"),
+            Column::text("added", "added"),
+            Column::number("cv_rmse_mm", "held out", "mm", 4),
+        ],
+    );
+    for (index, step) in diagnosis.steps.iter().enumerate() {
+        table.push([step_name(index).into(), step.added.as_str().into(), step.cv_rmse_mm.into()]);
+    }
+    table
+}
+
+fn steps(diagnosis: &Diagnosis) -> String {
+    Bars {
+        title: "Held-out error after each step".to_owned(),
+        y: Axis::new("held-out RMSE", "mm"),
+        names: (0..diagnosis.steps.len()).map(step_name).collect(),
+        groups: vec![BarGroup::new("", diagnosis.steps.iter().map(|step| Some(step.cv_rmse_mm)))],
+        labels: Some(Precision::Decimals(3)),
+    }
+    .svg()
+}
+
+/// Points shown in one picture; more would only make the page heavy.
+const POINTS: usize = 3000;
+
+fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    points.iter().step_by(points.len().div_ceil(POINTS).max(1)).copied().collect()
+}
+
+fn drawn(picture: &Picture) -> String {
+    Graph {
+        title: String::new(),
+        x: Axis::new(picture.x.0.clone(), picture.x.1),
+        y: Axis::new(picture.y.0.clone(), picture.y.1),
+        series: vec![
+            Series::points("without this cause", thinned(&picture.before)).ink(Ink::Vermilion),
+            Series::points("with it", thinned(&picture.after)).ink(Ink::Blue),
+        ],
+        references: vec![Reference::Horizontal(0.0, String::new())],
+        spans: picture
+            .rows
+            .map(|[from, to]| Span { range: [from as f64, to as f64], name: "rows of the cause".to_owned() })
+            .into_iter()
+            .collect(),
+    }
+    .svg()
+}
+
+fn caption(picture: &Picture) -> String {
+    format!(
+        "{} against {}: everything else fitted, without this cause and with it.",
+        sentence(&picture.y.0),
+        picture.x.0
+    )
+}

@@ -1,0 +1,82 @@
+//! CSV after RFC 4180: comma, CRLF, quotes where needed, one header row of column keys.
+//!
+//! Every digit of a number, so that a reader gets the same bits back. A column whose cells carry a σ becomes two. An
+//! absent cell is empty. Titles and notes are left out: RFC 4180 has no comments.
+//!
+//! Words may come from files of others. Characters that act without showing are spelled out ([`visible`]), and a word that a
+//! spreadsheet would take for a formula (one that begins with `=`, `+`, `-`, `@`, a tab or a carriage return and is no number)
+//! gets an apostrophe before it, the spreadsheets' own sign for text.
+
+use super::visible;
+use crate::number::exact;
+use crate::table::{Cell, Table};
+
+/// The table as CSV.
+pub fn table(table: &Table) -> String {
+    let fields = table.fields();
+    let header: Vec<String> = fields
+        .iter()
+        .flat_map(|field| std::iter::once(&field.key).chain(&field.sigma_key))
+        .map(|key| words(key))
+        .collect();
+    let mut text = line(&header);
+    for row in 0..table.rows.len() {
+        let mut cells = Vec::with_capacity(header.len());
+        for (column, field) in fields.iter().enumerate() {
+            let cell = table.cell(row, column);
+            cells.push(value(cell));
+            if field.sigma_key.is_some() {
+                cells.push(match cell {
+                    Cell::WithSigma { sigma, .. } => number(*sigma),
+                    _ => String::new(),
+                });
+            }
+        }
+        text.push_str(&line(&cells));
+    }
+    text
+}
+
+fn value(cell: &Cell) -> String {
+    match cell {
+        Cell::Text(text) => words(text),
+        Cell::Number(value) | Cell::WithSigma { value, .. } => number(*value),
+        Cell::Count(count) => count.to_string(),
+        Cell::Judged(status, text) if text.is_empty() => status.word().to_owned(),
+        Cell::Judged(_, text) => words(text),
+        Cell::Missing => String::new(),
+    }
+}
+
+fn words(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r'])
+        && text.chars().nth(1).is_some()
+        && text.parse::<f64>().is_err();
+    let mark = if formula { "'" } else { "" };
+    // Ends of lines stay: quotes hold them.
+    let shown: Vec<_> = text.split('\r').map(visible::text).collect();
+    mark.to_owned() + &shown.join("\r")
+}
+
+fn number(value: f64) -> String {
+    if value.is_nan() { String::new() } else { exact(value) }
+}
+
+fn line<S: AsRef<str>>(cells: &[S]) -> String {
+    // A lone empty cell would be an empty line, which readers skip.
+    if let [cell] = cells
+        && cell.as_ref().is_empty()
+    {
+        return "\"\"\r\n".to_owned();
+    }
+    let quoted: Vec<String> = cells.iter().map(|cell| quote(cell.as_ref())).collect();
+    quoted.join(",") + "\r\n"
+}
+
+fn quote(cell: &str) -> String {
+    if cell.contains([',', '"', '\r', '\n']) || cell.starts_with(' ') || cell.ends_with(' ') {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_owned()
+    }
+}

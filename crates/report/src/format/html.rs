@@ -1,0 +1,261 @@
+//! HTML: one page that needs nothing beside itself. It loads nothing and runs no script, and a content security policy
+//! inside the page holds it to that.
+
+use std::collections::BTreeSet;
+
+use super::visible;
+use crate::document::{Block, Document, Figure, KeyFigure, Verdict};
+use crate::status::Status;
+use crate::table::{Alignment, Cell, Table};
+
+/// Style sheet of a page: light and dark after the reader's setting, and paper.
+const STYLE: &str = include_str!("page.css");
+
+/// Sections from which a page gets a table of contents.
+const SECTIONS_FOR_CONTENTS: usize = 4;
+
+/// Rows from which a table scrolls inside the page.
+const ROWS_TO_SCROLL: usize = 24;
+
+/// The document as a whole page.
+pub fn document(document: &Document) -> String {
+    let mut page = Page::default();
+    page.blocks(&document.blocks);
+    let title = escape(&document.title);
+    let subtitle = match document.subtitle.as_str() {
+        "" => String::new(),
+        subtitle => format!("<p class=\"subtitle\">{}</p>\n", escape(subtitle)),
+    };
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <header>\n<h1>{title}</h1>\n{subtitle}</header>\n{contents}<main>\n{body}</main>\n</body>\n</html>\n",
+        contents = page.contents(),
+        body = page.body,
+    )
+}
+
+/// The table alone, as an HTML fragment.
+pub fn table(table: &Table) -> String {
+    let mut html = String::from(if table.rows.len() > ROWS_TO_SCROLL {
+        "<div class=\"table long\" tabindex=\"0\">\n<table>\n"
+    } else {
+        "<div class=\"table\">\n<table>\n"
+    });
+    if !table.title.is_empty() {
+        html.push_str(&format!("<caption>{}</caption>\n", escape(&table.title)));
+    }
+    html.push_str("<thead><tr>");
+    for column in &table.columns {
+        let unit = column.unit.as_ref().map(|unit| format!(" <span class=\"unit\">{}</span>", escape(unit)));
+        html.push_str(&format!(
+            "<th scope=\"col\"{}>{}{}</th>",
+            side(column.alignment),
+            escape(&column.heading),
+            unit.unwrap_or_default()
+        ));
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for row in 0..table.rows.len() {
+        html.push_str("<tr>");
+        for (index, column) in table.columns.iter().enumerate() {
+            let shown = match table.cell(row, index) {
+                Cell::Judged(status, text) => {
+                    judged(*status, if text.is_empty() { status.word() } else { text })
+                }
+                _ => escape(&table.shown(row, index)),
+            };
+            html.push_str(&format!("<td{}>{shown}</td>", side(column.alignment)));
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</tbody>\n</table>\n</div>\n");
+    for note in &table.notes {
+        html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(note)));
+    }
+    html
+}
+
+/// Text with what HTML reads as markup made harmless, in content and in quoted attributes; control characters, which are
+/// errors in HTML and forbidden in XML, and others that act without showing are spelled out.
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in visible::text(text).chars() {
+        match character {
+            '\r' => {}
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+fn side(alignment: Alignment) -> &'static str {
+    match alignment {
+        Alignment::Left => "",
+        Alignment::Right => " class=\"number\"",
+    }
+}
+
+fn judged(status: Status, text: &str) -> String {
+    format!(
+        "<span class=\"status {}\"><span aria-hidden=\"true\">{}</span> {}</span>",
+        status.class(),
+        status.sign(),
+        escape(text)
+    )
+}
+
+/// What has been written, and what a table of contents needs to know of it.
+#[derive(Default)]
+struct Page {
+    body: String,
+    sections: Vec<(String, String)>,
+    anchors: BTreeSet<String>,
+    figures: usize,
+}
+
+impl Page {
+    fn blocks(&mut self, blocks: &[Block]) {
+        for block in blocks {
+            self.block(block);
+        }
+    }
+
+    fn block(&mut self, block: &Block) {
+        match block {
+            Block::Heading(level, text) => self.heading((*level).clamp(2, 6), text),
+            Block::Paragraph(text) => self.push(&format!("<p>{}</p>\n", escape(text))),
+            Block::List(points) => self.list(points),
+            Block::KeyFigures(figures) => self.key_figures(figures),
+            Block::Table(block) => self.push(&table(block)),
+            Block::Figure(figure) => self.figure(figure),
+            Block::Verdict(verdict) => self.verdict(verdict),
+            Block::Details { summary, blocks } => {
+                self.push(&format!("<details>\n<summary>{}</summary>\n", escape(summary)));
+                self.blocks(blocks);
+                self.push("</details>\n");
+            }
+            Block::Code(code) => self.push(&format!("<pre><code>{}</code></pre>\n", escape(code))),
+            Block::Provenance(provenance) => {
+                self.push("<dl class=\"provenance\">\n");
+                for (name, value) in provenance.entries() {
+                    self.push(&format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(&name), escape(&value)));
+                }
+                self.push("</dl>\n");
+            }
+        }
+    }
+
+    fn push(&mut self, html: &str) {
+        self.body.push_str(html);
+    }
+
+    fn heading(&mut self, level: u8, text: &str) {
+        let anchor = self.anchor(text);
+        self.push(&format!("<h{level} id=\"{anchor}\">{}</h{level}>\n", escape(text)));
+        if level == 2 {
+            self.sections.push((anchor, text.to_owned()));
+        }
+    }
+
+    /// A name made of the heading's letters and digits, unlike every earlier one.
+    fn anchor(&mut self, text: &str) -> String {
+        let mut name = String::new();
+        for character in text.chars() {
+            if character.is_ascii_alphanumeric() {
+                name.push(character.to_ascii_lowercase());
+            } else if !name.is_empty() && !name.ends_with('-') {
+                name.push('-');
+            }
+        }
+        let stem = match name.trim_end_matches('-') {
+            "" => "section",
+            stem => stem,
+        };
+        let mut anchor = stem.to_owned();
+        let mut number = 2;
+        while !self.anchors.insert(anchor.clone()) {
+            anchor = format!("{stem}-{number}");
+            number += 1;
+        }
+        anchor
+    }
+
+    fn contents(&self) -> String {
+        if self.sections.len() < SECTIONS_FOR_CONTENTS {
+            return String::new();
+        }
+        let mut html = String::from("<nav aria-label=\"Contents\">\n<ul>\n");
+        for (anchor, text) in &self.sections {
+            html.push_str(&format!("<li><a href=\"#{anchor}\">{}</a></li>\n", escape(text)));
+        }
+        html + "</ul>\n</nav>\n"
+    }
+
+    fn list(&mut self, points: &[String]) {
+        self.push("<ul>\n");
+        for point in points {
+            self.push(&format!("<li>{}</li>\n", escape(point)));
+        }
+        self.push("</ul>\n");
+    }
+
+    fn key_figures(&mut self, figures: &[KeyFigure]) {
+        self.push("<dl class=\"key-figures\">\n");
+        for figure in figures {
+            let (shown, unit) = figure.shown();
+            let unit = match unit {
+                "" => String::new(),
+                unit => format!(" <span class=\"unit\">{}</span>", escape(unit)),
+            };
+            self.push(&format!(
+                "<div class=\"{}\"><dt>{}</dt><dd class=\"value\">{}{unit}</dd>",
+                figure.status.map_or("plain", Status::class),
+                escape(&figure.label),
+                escape(&shown)
+            ));
+            if let Some(status) = figure.status {
+                self.push(&format!("<dd>{}</dd>", judged(status, status.word())));
+            }
+            if !figure.note.is_empty() {
+                self.push(&format!("<dd>{}</dd>", escape(&figure.note)));
+            }
+            self.push("</div>\n");
+        }
+        self.push("</dl>\n");
+    }
+
+    fn figure(&mut self, figure: &Figure) {
+        self.figures += 1;
+        // Inside HTML an SVG element needs no namespace.
+        let svg = figure.svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
+        self.push(&format!(
+            "<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",
+            svg.trim_end(),
+            self.figures,
+            escape(&figure.caption)
+        ));
+    }
+
+    fn verdict(&mut self, verdict: &Verdict) {
+        let status = verdict.status;
+        self.push(&format!(
+            "<section class=\"verdict {}\">\n<p><b>{}</b> {}</p>\n",
+            status.class(),
+            judged(status, status.word()),
+            escape(&verdict.headline)
+        ));
+        if !verdict.reasons.is_empty() {
+            self.list(&verdict.reasons);
+        }
+        self.push("</section>\n");
+    }
+}

@@ -1,0 +1,224 @@
+//! Plain text for a terminal: aligned columns within a given width, no colour codes.
+//!
+//! One character counts as one cell, which holds for everything truegrind itself writes. What would act on a terminal
+//! is spelled out ([`visible`]).
+
+use super::visible;
+use crate::document::{Block, Document};
+use crate::status::Status;
+use crate::table::{Alignment, Table};
+
+/// Columns of words are shortened to this before a table is cut into blocks.
+const NARROWEST_TEXT: usize = 12;
+const GAP: usize = 2;
+
+/// The table as lines of at most `width` characters. Where it is wider, columns of words are shortened with `…`; where
+/// that does not suffice, the table continues below with its first column repeated.
+pub fn table(table: &Table, width: usize) -> String {
+    let mut text = String::new();
+    if !table.title.is_empty() {
+        text.push_str(&wrapped(&table.title, width, ""));
+    }
+    let columns = 0..table.columns.len();
+    let heading: Vec<String> = table.columns.iter().map(|column| flat(&column.label())).collect();
+    let rows = (0..table.rows.len()).map(|row| columns.clone().map(|c| flat(&table.shown(row, c))).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(heading).chain(rows).collect();
+    let mut widths: Vec<usize> =
+        columns.map(|c| lines.iter().map(|line| length(&line[c])).max().unwrap_or(0)).collect();
+    shrink(table, &mut widths, width);
+    for block in blocks(&widths, width) {
+        if !text.is_empty() && block.first() == Some(&0) && block.get(1).is_some_and(|&second| second > 1) {
+            text.push('\n');
+        }
+        for (index, line) in lines.iter().enumerate() {
+            push_line(&mut text, block.iter().map(|&c| fit(&line[c], widths[c], table.columns[c].alignment)));
+            if index == 0 {
+                push_line(&mut text, block.iter().map(|&c| "─".repeat(widths[c])));
+            }
+        }
+    }
+    for note in &table.notes {
+        text.push_str(&wrapped(note, width, "  "));
+    }
+    text
+}
+
+/// The document as lines of at most `width` characters. Pictures and folded parts are left out, and so are headings
+/// that have nothing else below them.
+pub fn document(document: &Document, width: usize) -> String {
+    let mut text = wrapped(&document.title, width, "");
+    text.push_str(&format!("{}\n", "═".repeat(length(&visible::text(&document.title)).min(width))));
+    if !document.subtitle.is_empty() {
+        text.push_str(&wrapped(&document.subtitle, width, ""));
+    }
+    for (index, block) in document.blocks.iter().enumerate() {
+        if shows(block, &document.blocks[index + 1..]) {
+            text.push('\n');
+            push_block(&mut text, block, width);
+        }
+    }
+    text
+}
+
+/// Whether a block leaves anything on a terminal, knowing those after it.
+fn shows(block: &Block, after: &[Block]) -> bool {
+    match block {
+        Block::Figure(_) | Block::Details { .. } => false,
+        Block::Heading(level, _) => after
+            .iter()
+            .take_while(|block| !matches!(block, Block::Heading(next, _) if next <= level))
+            .any(|block| !matches!(block, Block::Figure(_) | Block::Details { .. } | Block::Heading(..))),
+        _ => true,
+    }
+}
+
+/// A judgement for a terminal, `[warning]`.
+pub fn badge(status: Status) -> String {
+    format!("[{}]", status.word())
+}
+
+fn push_block(text: &mut String, block: &Block, width: usize) {
+    match block {
+        Block::Heading(level, heading) => {
+            text.push_str(&wrapped(heading, width, ""));
+            if *level <= 2 {
+                text.push_str(&format!("{}\n", "─".repeat(length(&visible::text(heading)).min(width))));
+            }
+        }
+        Block::Paragraph(paragraph) => text.push_str(&wrapped(paragraph, width, "")),
+        Block::List(points) => {
+            for point in points {
+                text.push_str(&wrapped(&format!("- {point}"), width, "  "));
+            }
+        }
+        Block::KeyFigures(figures) => {
+            let label = figures.iter().map(|figure| length(&figure.label)).max().unwrap_or(0);
+            let value = figures.iter().map(|figure| length(&figure.shown().0)).max().unwrap_or(0);
+            let unit_width = figures.iter().map(|figure| length(figure.shown().1)).max().unwrap_or(0);
+            for figure in figures {
+                let (shown, unit) = figure.shown();
+                let name = visible::line(&figure.label);
+                let (shown, unit) = (visible::line(&shown), visible::line(unit));
+                let mut line = format!("{name:label$}  {shown:>value$} {unit:unit_width$}");
+                if let Some(status) = figure.status {
+                    line.push_str(&format!("  {}", badge(status)));
+                }
+                if !figure.note.is_empty() {
+                    line.push_str(&format!("  {}", visible::line(&figure.note)));
+                }
+                text.push_str(line.trim_end());
+                text.push('\n');
+            }
+        }
+        Block::Table(block) => text.push_str(&table(block, width)),
+        Block::Figure(_) | Block::Details { .. } => {}
+        Block::Verdict(verdict) => {
+            text.push_str(&wrapped(&format!("{} {}", badge(verdict.status), verdict.headline), width, "  "));
+            for reason in &verdict.reasons {
+                text.push_str(&wrapped(&format!("  - {reason}"), width, "    "));
+            }
+        }
+        Block::Code(code) => {
+            for line in visible::text(code).lines() {
+                text.push_str(&format!("    {line}\n"));
+            }
+        }
+        Block::Provenance(provenance) => {
+            for (name, value) in provenance.entries() {
+                text.push_str(&wrapped(&format!("{name}: {value}"), width, "  "));
+            }
+        }
+    }
+}
+
+/// Takes characters from the widest column of words until the table fits or no such column can give any.
+fn shrink(table: &Table, widths: &mut [usize], width: usize) {
+    while total(widths.iter().copied()) > width {
+        let widest = (0..widths.len())
+            .filter(|&c| table.columns[c].alignment == Alignment::Left && widths[c] > NARROWEST_TEXT)
+            .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
+        match widest {
+            Some(column) => widths[column] -= 1,
+            None => return,
+        }
+    }
+}
+
+/// Columns of each block; the first column leads every block. A block has at least one column beside it, even where
+/// that is too wide.
+fn blocks(widths: &[usize], width: usize) -> Vec<Vec<usize>> {
+    if widths.is_empty() {
+        return Vec::new();
+    }
+    let mut blocks = vec![vec![0]];
+    for column in 1..widths.len() {
+        let last = blocks.len() - 1;
+        let wide = total(blocks[last].iter().chain(&[column]).map(|&c| widths[c])) > width;
+        if wide && blocks[last].len() > 1 {
+            blocks.push(vec![0, column]);
+        } else {
+            blocks[last].push(column);
+        }
+    }
+    blocks
+}
+
+fn total(widths: impl Iterator<Item = usize>) -> usize {
+    widths.map(|width| width + GAP).sum::<usize>().saturating_sub(GAP)
+}
+
+/// A cell on one line.
+fn flat(cell: &str) -> String {
+    visible::line(cell).into_owned()
+}
+
+fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
+    let line = cells.collect::<Vec<_>>().join(&" ".repeat(GAP));
+    text.push_str(line.trim_end());
+    text.push('\n');
+}
+
+fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
+    let length = length(cell);
+    if length > width {
+        let mut short: String = cell.chars().take(width.saturating_sub(1)).collect();
+        short.push('…');
+        return short;
+    }
+    let blank = " ".repeat(width - length);
+    match alignment {
+        Alignment::Left => format!("{cell}{blank}"),
+        Alignment::Right => format!("{blank}{cell}"),
+    }
+}
+
+/// Words in lines of at most `width` characters, each with a newline; later lines start with `indent`. A single longer
+/// word, such as a file name, is not cut.
+fn wrapped(text: &str, width: usize, indent: &str) -> String {
+    let text = &*visible::text(text);
+    let mut lines = String::new();
+    let leading: String = text.chars().take_while(|c| *c == ' ').collect();
+    let mut line = leading;
+    let mut empty = true;
+    for word in text.split_whitespace() {
+        if !empty && length(&line) + 1 + length(word) > width {
+            lines.push_str(&line);
+            lines.push('\n');
+            line = indent.to_owned();
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        empty = false;
+    }
+    lines.push_str(&line);
+    lines.push('\n');
+    lines
+}
+
+/// Characters that take a cell; the selector after the warning sign takes none.
+fn length(text: &str) -> usize {
+    text.chars().filter(|c| *c != '\u{fe0e}').count()
+}

@@ -1,0 +1,353 @@
+//! What an identification found: verdict, errors by stage, parameters, what the data could tell, outliers.
+//!
+//! Inside truegrind angles are radians; people read degrees here, and the keys of tables and JSON say so.
+
+mod pictures;
+mod tables;
+mod words;
+
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::number::Precision;
+use super::status::Status;
+use super::table::Cell;
+use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_calibration::identification::identify::Identification;
+use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+
+pub use tables::{
+    frame_table, held_out_table, observability_table, outlier_table, parameter_table, stage_table,
+};
+
+/// The whole page. `dataset` is the one that was identified from.
+pub fn document(found: &Identification, dataset: &Dataset) -> Document {
+    let mut page = summary(found);
+    page.push(Block::List(words::remarks(found, dataset)));
+    page.figure(
+        pictures::frequency(found),
+        "Errors of the held-out rows, which no fit has seen: frames registered alone, and with geometry.",
+    );
+    page.figure(
+        pictures::by_row(found),
+        "The same errors by data row, in the order of the file. What runs in steps or drifts along the rows is not \
+         geometry; random splits hide it.",
+    );
+
+    page.heading(2, "Parameters of the arm");
+    page.figure(
+        pictures::parameters(found),
+        "Change from the data sheet with 1σ and 2σ, in units of the manufacturing tolerance that serves as prior, so that \
+         lengths and angles share an axis.",
+    );
+    page.push(parameter_table(found));
+
+    page.heading(2, "How the arm was measured");
+    page.push(frame_table(found));
+
+    page.heading(2, "What the data can tell");
+    match &found.identifiability {
+        Some(report) => {
+            page.push(words::identifiability(found, report));
+            page.figure(
+                pictures::singular_values(report),
+                "Singular values of the Jacobian, each parameter in units of its prior σ and each reading in units of \
+                 its own. Above 1 the data knows more than the prior, below 1 the prior holds; values at the lower end \
+                 belong to combinations that move no reading.",
+            );
+            page.push(observability_table(report));
+        }
+        None => page.paragraph("Nothing can be said: the Jacobian is not finite at the estimate."),
+    }
+
+    page.heading(2, "Rows");
+    page.push(words::sharpening(found));
+    page.push(words::outliers(found));
+    if !found.outliers.rows.is_empty() {
+        page.push(outlier_table(found, dataset));
+    }
+    page.push(Block::Details {
+        summary: format!("Errors of the {} held-out rows", found.held_out.len()),
+        blocks: vec![held_out_table(found).excerpt(300).into()],
+    });
+    page.push(Block::List(dataset.notes.clone()));
+    page.blocks.retain(|block| !matches!(block, Block::List(points) if points.is_empty()));
+
+    page.heading(2, "Convergence");
+    page.figure(pictures::convergence(found), words::convergence(found));
+
+    page.heading(2, "Where this came from");
+    page.push(provenance(found, dataset));
+    page
+}
+
+/// What fits a terminal: verdict, key figures, the table of stages.
+pub fn summary(found: &Identification) -> Document {
+    let estimated = &found.estimated;
+    let mut page = Document::new(format!("Identification of {}", estimated.robot));
+    page.subtitle = format!(
+        "{}, {} rows, sensor {}, method {}",
+        estimated.provenance.file,
+        estimated.provenance.rows,
+        estimated.provenance.sensor,
+        estimated.provenance.method
+    );
+    page.push(verdict(found));
+    page.push(key_figures(found));
+    page.push(stage_table(found));
+    page
+}
+
+/// Everything, with the error of each held-out row; schema `truegrind.identification/1`. Angles are degrees.
+pub fn json(found: &Identification, dataset: &Dataset) -> Value {
+    let estimated = &found.estimated;
+    let parameters = |of_arm: bool| -> Vec<Value> {
+        found.parameters.iter().filter(|p| is_of_arm(p) == of_arm).map(parameter_json).collect()
+    };
+    let held_out: Vec<Value> = found
+        .held_out
+        .iter()
+        .map(|(row, before, after)| json!({ "row": row, "registered_mm": before, "geometry_mm": after }))
+        .collect();
+    let identifiability = found.identifiability.as_ref().map(|report| {
+        let observability: serde_json::Map<String, Value> = report
+            .observability
+            .iter()
+            .enumerate()
+            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank > 0).then_some(value))))
+            .collect();
+        let combinations: Vec<Value> = report
+            .combinations
+            .iter()
+            .map(|terms| {
+                terms.iter().map(|(p, share)| json!({ "parameter": p.to_string(), "share": share })).collect()
+            })
+            .collect();
+        json!({
+            "parameters": report.parameters,
+            "rank": report.rank,
+            "condition": report.condition,
+            "determined_condition": report.determined_condition,
+            "singular_values": report.singular_values,
+            "observability": observability,
+            "held_by_priors": report.held_by_priors,
+            "combinations": combinations,
+            "sentences": words::combinations(found, report),
+        })
+    });
+    let rounds: Vec<Vec<f64>> = found
+        .geometry
+        .rounds
+        .iter()
+        .map(|trace| trace.iter().map(|iteration| iteration.cost).collect())
+        .collect();
+    json!({
+        "schema": "truegrind.identification/1",
+        "dataset": {
+            "file": estimated.provenance.file,
+            "sha256": estimated.provenance.sha256,
+            "rows": dataset.rows.len(),
+            "rows_used": estimated.provenance.rows,
+            "sensor": estimated.provenance.sensor,
+            "robot": estimated.robot,
+        },
+        "method": {
+            "name": estimated.provenance.method,
+            "seed": estimated.provenance.seed,
+            "held_out_share": estimated.provenance.held_out,
+            "version": estimated.provenance.version,
+            "termination": found.geometry.termination(),
+            "evaluations": found.geometry.evaluations,
+            "costs_by_round": rounds,
+        },
+        "verdict": estimated.verdict,
+        "benefit": found.benefit,
+        "noise_floor_mm": estimated.noise_floor_mm,
+        "sigma_mm": found.geometry.sigma_mm,
+        "stages": {
+            "raw": found.raw.map(|all| json!({ "all": all })),
+            "registered": estimated.registered,
+            "geometry": estimated.geometry,
+        },
+        "parameters": parameters(true),
+        "frames": parameters(false),
+        "identifiability": identifiability,
+        "sharpening": words::sharpening_json(found),
+        "outliers": {
+            "rows": found.outliers.rows.iter().map(|(index, size)| json!({
+                "row": row_number(dataset, *index), "robust_sigmas": size,
+            })).collect::<Vec<_>>(),
+            "too_many": found.outliers.too_many,
+        },
+        "region": estimated.region,
+        "condition": estimated.condition,
+        "held_out": held_out,
+    })
+}
+
+/// Whether a parameter belongs to the arm and not to how it was measured.
+fn is_of_arm(parameter: &EstimatedParameter) -> bool {
+    parameter.name.starts_with("link") || parameter.name.starts_with("effect")
+}
+
+/// A parameter with all its numbers times `factor`.
+fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
+    EstimatedParameter {
+        name: parameter.name.clone(),
+        unit: unit.to_owned(),
+        nominal: parameter.nominal * factor,
+        value: parameter.value * factor,
+        sigma: parameter.sigma * factor,
+        prior_sigma: parameter.prior_sigma.map(|sigma| sigma * factor),
+        determined: parameter.determined,
+    }
+}
+
+/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
+fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
+    let (factor, unit) = match parameter.unit.as_str() {
+        "1" => (1e6, "ppm"),
+        "1/K" => (1e6, "ppm/K"),
+        "rad/(N m)" => (1e6, "µrad/(N m)"),
+        unit => super::number::handy(unit),
+    };
+    in_unit(parameter, factor, unit)
+}
+
+fn parameter_json(parameter: &EstimatedParameter) -> Value {
+    let shown = match parameter.unit.as_str() {
+        "rad" => in_unit(parameter, 1f64.to_degrees(), "deg"),
+        unit => in_unit(parameter, 1.0, unit),
+    };
+    let of_arm = is_of_arm(parameter);
+    json!({
+        "name": shown.name,
+        "unit": shown.unit,
+        "nominal": of_arm.then_some(shown.nominal),
+        "value": shown.value,
+        "sigma": shown.sigma,
+        "deviation": of_arm.then_some(shown.value - shown.nominal),
+        "prior_sigma": shown.prior_sigma,
+        "determined": shown.determined,
+        "held_by_prior": held_by_prior(parameter),
+    })
+}
+
+/// Whether the prior knew more of a parameter than the data did.
+fn held_by_prior(parameter: &EstimatedParameter) -> bool {
+    !(parameter.determined >= 0.5)
+}
+
+/// Number of a data row as files count them; the index itself where the data set is not the one that was used.
+fn row_number(dataset: &Dataset, index: usize) -> usize {
+    dataset.rows.get(index).map_or(index, |row| row.number)
+}
+
+fn verdict(found: &Identification) -> Verdict {
+    judged(&found.estimated)
+}
+
+/// The verdict on an estimated arm as every report says it, whichever way the arm was found.
+pub fn judged(estimated: &Estimated) -> Verdict {
+    let (before, after) = (estimated.registered.held_out.rmse, estimated.geometry.held_out.rmse);
+    let errors =
+        format!("held-out error {after:.3} mm RMSE, where registered frames alone leave {before:.3} mm");
+    let (status, headline) = match estimated.verdict.status {
+        Judgement::Pass => (Status::Good, format!("The model meets the stated limits: {errors}")),
+        Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
+        Judgement::Doubtful => (
+            Status::Warning,
+            format!("The model is doubtful, it is not written or used without --allow-doubtful: {errors}"),
+        ),
+        Judgement::NotEvaluated => (
+            Status::NotEvaluated,
+            format!("Nothing speaks against the model, but no limits were stated: {errors}"),
+        ),
+    };
+    Verdict::new(status, headline, estimated.verdict.reasons.iter().cloned())
+}
+
+fn key_figures(found: &Identification) -> Vec<KeyFigure> {
+    let estimated = &found.estimated;
+    let (before, after) = (&estimated.registered.held_out, &estimated.geometry.held_out);
+    let gain = if before.rmse > 0.0 { 100.0 * (1.0 - after.rmse / before.rmse) } else { f64::NAN };
+    let floor = KeyFigure::new("Noise floor", estimated.noise_floor_mm, 3, "mm");
+    let used = estimated.provenance.rows;
+    let rank = found.identifiability.as_ref();
+    vec![
+        KeyFigure::new("Held-out RMSE", after.rmse, 3, "mm")
+            .note(format!("{}: {:.3} mm", "registered frames alone", before.rmse)),
+        KeyFigure::new("Gain of the model", gain, 0, "%").note("registered frames to geometry, held out"),
+        KeyFigure::new("Largest held-out error", after.max, 3, "mm")
+            .note(format!("registered: {:.3} mm", before.max)),
+        match estimated.noise_floor_mm {
+            Some(_) => floor.note("scatter of repeated poses, else what rounding leaves"),
+            None => floor.note("no pose repeated, nothing known to be rounded"),
+        },
+        KeyFigure::new("Rows used", used, 0, "").note(format!(
+            "{} fitted and {} held out to state errors; the model is fitted to all",
+            used - found.held_out.len().min(used),
+            found.held_out.len()
+        )),
+        KeyFigure::new("Set aside", estimated.provenance.set_aside.len(), 0, "").note("gross outliers"),
+        KeyFigure::new("Rank", rank.map(|r| format!("{} of {}", r.rank, r.parameters)), 0, "").note(
+            match rank {
+                Some(report) => format!("{} combinations known mostly from priors", report.held_by_priors),
+                None => String::new(),
+            },
+        ),
+    ]
+}
+
+fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
+    let from = &found.estimated.provenance;
+    let remark = |name: &str, value: String| (name.to_owned(), value);
+    let mut remarks = vec![
+        remark("Robot", found.estimated.robot.clone()),
+        remark("Sensor", from.sensor.clone()),
+        remark("Split", format!("{} % of the rows held out", (1e4 * from.held_out).round() / 100.0)),
+        remark("Sharpened", if from.sharpened { "yes, by the read-out" } else { "no" }.to_owned()),
+    ];
+    if let Some(sheet) = &dataset.sheet {
+        remarks.push(remark("Sheet", sheet.clone()));
+    }
+    if !from.set_aside.is_empty() {
+        let rows: Vec<String> = from.set_aside.iter().map(usize::to_string).collect();
+        remarks.push(remark("Set aside", format!("data rows {}", rows.join(", "))));
+    }
+    let condition = &found.estimated.condition;
+    for (name, value, unit) in [
+        ("Time", condition.time_h, "h"),
+        ("Temperature", condition.temperature_c, "°C"),
+        ("Payload", condition.payload_kg, "kg"),
+    ] {
+        if let Some(value) = value {
+            remarks
+                .push(remark(name, format!("{} {unit} (median)", Precision::Significant(4).format(value))));
+        }
+    }
+    Provenance {
+        version: format!("truegrind {}", from.version),
+        command: None,
+        method: Some(from.method.clone()),
+        seed: Some(from.seed),
+        sources: vec![Source {
+            name: from.file.clone(),
+            role: "Measurements".to_owned(),
+            sha256: Some(from.sha256.clone()).filter(|hash| !hash.is_empty()),
+            rows: Some(from.rows),
+        }],
+        remarks,
+    }
+}
+
+/// Whether a row has one error with a sign (a cable) or the length of a vector.
+fn signed(found: &Identification) -> bool {
+    found.estimated.provenance.sensor
+        == truegrind_calibration::identification::identify::sensor_name(Sensor::Cable)
+}
+
+/// A figure that has a meaning only for some sensors or counts.
+fn cell(value: f64, meaningful: bool) -> Cell {
+    if meaningful { value.into() } else { Cell::Missing }
+}

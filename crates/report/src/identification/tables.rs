@@ -1,0 +1,303 @@
+//! Tables of an identification.
+
+use super::{cell, handy, held_by_prior, is_of_arm, row_number, signed};
+use crate::status::Status;
+use crate::table::{Cell, Column, Table};
+use truegrind_arm::estimated::EstimatedParameter;
+use truegrind_calibration::identification::identifiability::Identifiability;
+use truegrind_calibration::identification::identify::Identification;
+use truegrind_calibration::identification::solver;
+use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_math::statistics::ErrorSummary;
+
+/// Errors of each stage, on the rows of the fit and on held-out rows.
+pub fn stage_table(found: &Identification) -> Table {
+    let mut table = Table::new(
+        "Errors by stage",
+        vec![
+            Column::text("stage", "Stage"),
+            Column::text("rows", "Rows"),
+            Column::count("count", "Count"),
+            Column::number("rmse_mm", "RMSE", "mm", 3),
+            Column::number("mean_absolute_mm", "mean |e|", "mm", 3),
+            Column::number("standard_deviation_mm", "SD", "mm", 3),
+            Column::number("max_mm", "max", "mm", 3),
+            Column::number("mean_mm", "signed mean", "mm", 3),
+        ],
+    );
+    let signed = signed(found);
+    let mut push = |stage: &str, rows: &str, errors: Option<&ErrorSummary>| {
+        let mut row: Vec<Cell> = vec![stage.into(), rows.into()];
+        row.extend(match errors.filter(|errors| errors.count > 0) {
+            Some(errors) => [
+                errors.count.into(),
+                errors.rmse.into(),
+                errors.mean_absolute.into(),
+                cell(errors.standard_deviation, errors.count > 1),
+                errors.max.into(),
+                cell(errors.mean, signed),
+            ],
+            None => [const { Cell::Missing }; 6],
+        });
+        table.push(row);
+    };
+    push("raw", "all", found.raw.as_ref());
+    let estimated = &found.estimated;
+    for (stage, errors) in [("frames registered", &estimated.registered), ("geometry", &estimated.geometry)] {
+        push(stage, "fitted", Some(&errors.fitted));
+        push(stage, "held out", Some(&errors.held_out));
+    }
+    if found.raw.is_none() {
+        table.notes.push(
+            "raw: no sensor frame was stated (--sensor-frame, or --outlet and --cable-zero), and an error against a fitted \
+             frame is no raw error."
+                .to_owned(),
+        );
+    }
+    table.notes.push(
+        "The gain of registering frames (raw to frames registered) says nothing about the arm and is kept apart from the \
+         gain of the model (frames registered to geometry)."
+            .to_owned(),
+    );
+    table.notes.push(if signed {
+        "mean |e| is what the papers print as \"STD\" or \"SD\" (ltlm-2024 eq. 20, Table 6); SD here is the standard \
+         deviation of the signed errors with n − 1."
+            .to_owned()
+    } else {
+        "Errors are lengths of vectors, so they have no signed mean, and SD is the scatter of the lengths. mean |e| is what \
+         the papers print as \"STD\" (ltlm-2024 eq. 20)."
+            .to_owned()
+    });
+    table
+}
+
+/// The arm's parameters: nominal, estimated ± σ, deviation; angles in degrees.
+pub fn parameter_table(found: &Identification) -> Table {
+    let mut table = Table::new(
+        "Estimated parameters",
+        vec![
+            Column::text("name", "Parameter"),
+            Column::significant("nominal", "Nominal", "", 6),
+            Column::significant("value", "Estimated ± σ", "", 2),
+            Column::number("deviation", "Deviation", "", 4),
+            Column::text("unit", "Unit"),
+            Column::significant("prior_sigma", "Tolerance", "", 2),
+            Column::number("determined_percent", "Determined", "%", 0),
+            Column::text("held", "Held by"),
+        ],
+    );
+    let literal = solver::by_name(&found.estimated.provenance.method).is_ok_and(|solver| solver.literal);
+    for parameter in found.parameters.iter().filter(|parameter| is_of_arm(parameter)) {
+        let shown = handy(parameter);
+        table.push([
+            shown.name.as_str().into(),
+            shown.nominal.into(),
+            Cell::with_sigma(shown.value, Some(shown.sigma)),
+            (shown.value - shown.nominal).into(),
+            shown.unit.as_str().into(),
+            shown.prior_sigma.into(),
+            (100.0 * shown.determined).into(),
+            held(parameter, literal),
+        ]);
+    }
+    table.notes.push(
+        "Tolerance is the standard deviation of the prior, what an arm leaves the factory with. Determined: the share that \
+         the data brought, 1 − (σ / tolerance)². A parameter below 50 % is known from its prior more than from the data; \
+         where it moved all the same, the data saw a combination, and the priors shared it out among its parts."
+            .to_owned(),
+    );
+    if literal {
+        table.notes.push(
+            "This method has no priors: what the data cannot determine moved freely. These numbers are no geometry.".to_owned(),
+        );
+    }
+    table
+}
+
+/// More than so many tolerances from the data sheet is worth a word.
+const FAR: f64 = 3.0;
+
+/// What holds a parameter where it is, and whether that is far from the data sheet.
+fn held(parameter: &EstimatedParameter, literal: bool) -> Cell {
+    let (status, mut text) = match (held_by_prior(parameter), literal) {
+        (false, _) => (None, "data".to_owned()),
+        (true, false) => (Some(Status::Warning), "held by prior".to_owned()),
+        (true, true) => (Some(Status::Bad), "not determined".to_owned()),
+    };
+    let off = parameter.prior_sigma.map_or(0.0, |prior| (parameter.value - parameter.nominal).abs() / prior);
+    if off > FAR {
+        text.push_str(&format!(", {off:.1} tolerances off"));
+    }
+    match status.or((off > FAR).then_some(Status::Warning)) {
+        Some(status) => Cell::Judged(status, text),
+        None => Cell::Text(text),
+    }
+}
+
+/// Sensor frame, outlets, zeros and the touched point.
+pub fn frame_table(found: &Identification) -> Table {
+    let mut table = Table::new(
+        "Sensor and touched point",
+        vec![
+            Column::text("name", "Parameter"),
+            Column::text("meaning", "What it is"),
+            Column::significant("value", "Estimated ± σ", "", 2),
+            Column::text("unit", "Unit"),
+        ],
+    );
+    for parameter in found.parameters.iter().filter(|parameter| !is_of_arm(parameter)) {
+        let shown = handy(parameter);
+        table.push([
+            shown.name.as_str().into(),
+            meaning(&shown.name).into(),
+            Cell::with_sigma(shown.value, Some(shown.sigma)),
+            shown.unit.as_str().into(),
+        ]);
+    }
+    if table.rows.is_empty() {
+        let frames = &found.geometry.frames;
+        let touched = frames.flange_from_target.translation.vector;
+        let fixed = [("tool.x", touched.x, "mm"), ("tool.y", touched.y, "mm"), ("tool.z", touched.z, "mm")];
+        for (name, value, unit) in fixed {
+            table.push([name.into(), meaning(name).into(), value.into(), unit.into()]);
+        }
+        for (anchor, (outlet, zero)) in frames.outlets_mm.iter().zip(&frames.zeros_mm).enumerate() {
+            let number = if anchor == 0 { String::new() } else { (anchor + 1).to_string() };
+            for (axis, value) in ["x", "y", "z"].iter().zip(outlet.iter()) {
+                let name = format!("outlet{number}.{axis}");
+                table.push([name.as_str().into(), meaning(&name).into(), (*value).into(), "mm".into()]);
+            }
+            let name = format!("zero{number}");
+            table.push([name.as_str().into(), meaning(&name).into(), (*zero).into(), "mm".into()]);
+        }
+        table.notes.push("Taken from the fit of the frames alone and not moved by this method.".to_owned());
+    }
+    table.notes.push(
+        "tool is the point on the flange that the sensor touches (hook, reflector, target). It is not the TCP, and no \
+         program is moved by it."
+            .to_owned(),
+    );
+    table
+}
+
+fn meaning(name: &str) -> &'static str {
+    match name.split(['.', '1', '2', '3', '4', '5', '6', '7', '8', '9', '0']).next() {
+        Some("tool") => "touched point on the flange, not the TCP",
+        Some("base") => "sensor frame in the base of the arm",
+        Some("outlet") => "outlet of the cable in the base of the arm",
+        Some("zero") => "reading of the cable at length zero",
+        _ => "",
+    }
+}
+
+/// Error of each held-out row, frames registered and geometry.
+pub fn held_out_table(found: &Identification) -> Table {
+    let mut table = Table::new(
+        "Held-out rows",
+        vec![
+            Column::count("row", "Data row"),
+            Column::number("registered_mm", "frames registered", "mm", 3),
+            Column::number("geometry_mm", "geometry", "mm", 3),
+        ],
+    );
+    for (row, before, after) in by_row(found) {
+        table.push([row.into(), before.into(), after.into()]);
+    }
+    table.notes.push("Data rows count from 0 at the first row below the header.".to_owned());
+    table
+}
+
+/// Held-out errors in the order of the file.
+pub(super) fn by_row(found: &Identification) -> Vec<(usize, f64, f64)> {
+    let mut rows = found.held_out.clone();
+    rows.sort_by_key(|(row, ..)| *row);
+    rows
+}
+
+/// Rows that were set aside, with their size in robust standard deviations.
+pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
+    let mut table = Table::new(
+        "Rows set aside",
+        vec![
+            Column::count("row", "Data row"),
+            Column::count("line", "Line of the file"),
+            Column::text("session", "Session"),
+            Column::number("robust_sigmas", "Size", "robust σ", 1),
+        ],
+    );
+    for (index, size) in &found.outliers.rows {
+        let row = dataset.rows.get(*index);
+        table.push([
+            row_number(dataset, *index).into(),
+            row.map(|row| row.line).into(),
+            row.and_then(|row| row.session.clone()).into(),
+            (*size).into(),
+        ]);
+    }
+    if table.rows.iter().all(|row| row[2] == Cell::Missing) {
+        table.columns.remove(2);
+        table.rows.iter_mut().for_each(|row| {
+            row.remove(2);
+        });
+    }
+    table.notes.push(
+        "Beyond six robust standard deviations of a robust fit of geometry. Data rows count from 0 at the first row below \
+         the header; lines as an editor or spreadsheet counts them."
+            .to_owned(),
+    );
+    table
+}
+
+/// Rank, condition number and observability indices.
+pub fn observability_table(report: &Identifiability) -> Table {
+    let mut table = Table::new(
+        "Identifiability",
+        vec![
+            Column::text("figure", "Figure"),
+            Column::significant("value", "Value", "", 4),
+            Column::text("meaning", "What it is"),
+        ],
+    );
+    table.push([
+        "rank".into(),
+        report.rank.into(),
+        format!("of {} parameters, data alone", report.parameters).into(),
+    ]);
+    table.push([
+        "condition".into(),
+        report.condition.into(),
+        "largest over smallest singular value, all parameters".into(),
+    ]);
+    let full = report.rank == report.parameters;
+    if !full {
+        table.push([
+            "condition, seen".into(),
+            report.determined_condition.into(),
+            "the same over the combinations that the data determine".into(),
+        ]);
+    }
+    let meanings = [
+        "geometric mean of the singular values over √poses",
+        "smallest over largest singular value",
+        "smallest singular value",
+        "O2 times O3",
+        "1 / Σ 1/σ",
+    ];
+    for (index, (value, meaning)) in report.observability.iter().zip(meanings).enumerate() {
+        table.push([format!("O{}", index + 1).into(), cell(*value, report.rank > 0), meaning.into()]);
+    }
+    table.push([
+        "below 1".into(),
+        report.held_by_priors.into(),
+        "singular values below 1: the prior knows more than the data".into(),
+    ]);
+    table.notes.push(format!(
+        "Parameters in units of their priors' σ. O1 to O5 after Joubair and Bonev 2013{}.",
+        if full {
+            ""
+        } else {
+            ", over the combinations that the data determine: over all parameters they would be 0"
+        }
+    ));
+    table
+}

@@ -1,0 +1,110 @@
+//! Numbers as people read them: fixed decimals, significant digits, value ± σ.
+
+/// What is printed where there is nothing to print.
+pub const MISSING: &str = "–";
+
+/// How many digits of a number are shown. Files for programs (CSV, JSON) always carry all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// So many digits after the point: columns whose points should stand under each other.
+    Decimals(usize),
+    /// So many significant digits, with an exponent where the number is very small or large. With a σ it is σ that
+    /// has so many, and the value ends at the same digit (GUM 7.2.6).
+    Significant(usize),
+}
+
+impl Precision {
+    /// The number as text. NaN is absence, `–`; infinities are `∞` and `-∞`; zero has no sign.
+    ///
+    /// ```
+    /// use crate::number::Precision::{Decimals, Significant};
+    /// assert_eq!(Decimals(3).format(-0.0001), "0.000");
+    /// assert_eq!(Significant(3).format(0.012345), "0.0123");
+    /// assert_eq!(Significant(2).format(1.27e-9), "1.3e-9");
+    /// assert_eq!(Decimals(2).format(f64::NAN), "–");
+    /// ```
+    pub fn format(self, value: f64) -> String {
+        if value.is_nan() {
+            return MISSING.to_owned();
+        }
+        if value.is_infinite() {
+            return if value > 0.0 { "∞".to_owned() } else { "-∞".to_owned() };
+        }
+        match self {
+            Precision::Decimals(decimals) => fixed(value, decimals),
+            Precision::Significant(digits) => significant(value, digits.max(1)),
+        }
+    }
+
+    /// Value and standard uncertainty as `1.270 ± 0.021`. A σ that is not known or not finite is shown as `–`.
+    ///
+    /// ```
+    /// use crate::number::Precision::{Decimals, Significant};
+    /// assert_eq!(Significant(2).format_with_sigma(1.27042, 0.0213), "1.270 ± 0.021");
+    /// assert_eq!(Significant(2).format_with_sigma(3.1e-9, 4.0e-10), "(3.10 ± 0.40)e-9");
+    /// assert_eq!(Decimals(1).format_with_sigma(5.04, f64::NAN), "5.0 ± –");
+    /// ```
+    pub fn format_with_sigma(self, value: f64, sigma: f64) -> String {
+        match self {
+            Precision::Significant(digits) if value.is_finite() && sigma.is_finite() && sigma > 0.0 => {
+                let digits = digits.max(1);
+                let exponent = exponent_of(value.abs().max(sigma), digits);
+                let scale = if (-4..7).contains(&exponent) { 0 } else { exponent };
+                // 10^-scale in two steps: 10^308 is the last power that exists.
+                let shift = |x: f64| x * 10f64.powi(-(scale / 2)) * 10f64.powi(-(scale - scale / 2));
+                let decimals = digits as i32 - 1 - exponent_of(shift(sigma), digits);
+                let decimals = usize::try_from(decimals).unwrap_or(0).min(15);
+                let pair = format!("{} ± {}", fixed(shift(value), decimals), fixed(shift(sigma), decimals));
+                if scale == 0 { pair } else { format!("({pair})e{scale}") }
+            }
+            Precision::Significant(digits) => {
+                let precision = Precision::Significant(digits + 2);
+                format!("{} ± {}", precision.format(value), Precision::Significant(digits).format(sigma))
+            }
+            Precision::Decimals(_) => format!("{} ± {}", self.format(value), self.format(sigma)),
+        }
+    }
+}
+
+/// Factor and unit in which people read a number that is held in `unit`: degrees for radians.
+pub fn handy(unit: &str) -> (f64, &str) {
+    match unit {
+        "rad" => (1f64.to_degrees(), "°"),
+        unit => (1.0, unit),
+    }
+}
+
+/// The shortest text that reads back as the same number; plain where that is short, with an exponent elsewhere.
+pub(super) fn exact(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-5..1e16).contains(&size) && value.is_finite() {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
+}
+
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(size) if size.bytes().all(|b| matches!(b, b'0' | b'.')) => size.to_owned(),
+        _ => text,
+    }
+}
+
+fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = exponent_of(value.abs(), digits);
+    if !(-4..7.max(digits as i32)).contains(&exponent) {
+        return format!("{value:.*e}", digits - 1);
+    }
+    fixed(value, usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0))
+}
+
+/// Decimal exponent of a positive number after rounding to so many digits: 9.99 with two digits has exponent 1.
+fn exponent_of(size: f64, digits: usize) -> i32 {
+    let text = format!("{size:.*e}", digits - 1);
+    text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0)
+}

@@ -1,0 +1,257 @@
+//! A measurement plan: the rows to measure, what they will tell, which effects they can decide.
+
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Verdict};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::measurement::dataset::Reading;
+use truegrind_planning::poses::drive::reading;
+use truegrind_planning::poses::power::Decidable;
+use truegrind_planning::poses::schedule::Purpose;
+use truegrind_planning::poses::{Plan, Wanted};
+
+/// Rows on a page; all are in the CSV file.
+const ROWS_ON_PAGE: usize = 60;
+
+/// One row per reading to take. As CSV it is the log to fill in: joint angles, sides of approach and time under the names
+/// that `identify` reads, and what the nominal arm would give beside it.
+pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
+    let mut columns =
+        vec![Column::count("row", "Row"), Column::count("pose", "Pose"), Column::text("purpose", "Purpose")];
+    columns.extend((1..=6).map(|j| Column::number(format!("q{j}"), format!("q{j}"), "°", 3)));
+    columns.extend((1..=6).map(|j| Column::number(format!("approach{j}"), format!("side {j}"), "", 0)));
+    columns.push(Column::number("t", "Time", "h", 3));
+    let expected: &[&str] = match plan_reading(plan, wanted) {
+        Some(Reading::Cable(_)) => &["expected_L"],
+        _ => &["expected_x", "expected_y", "expected_z"],
+    };
+    columns.extend(expected.iter().map(|key| {
+        Column::number(*key, format!("expected {}", key.trim_start_matches("expected_")), "mm", 1)
+    }));
+    let cables = plan.poses.iter().any(|pose| pose.anchor > 0);
+    if cables {
+        columns.push(Column::count("anchor", "Cable"));
+    }
+    columns.push(Column::text("note", "Note"));
+    let mut table = Table::new("Rows to measure", columns);
+    for (number, row) in plan.rows.iter().enumerate() {
+        let pose = &plan.poses[row.pose];
+        let mut cells: Vec<Cell> = vec![number.into(), (row.pose + 1).into(), row.purpose.word().into()];
+        cells.extend(pose.joints.iter().map(|q| Cell::from(q.to_degrees())));
+        cells.extend(row.approach.iter().map(|side| Cell::from(f64::from(*side))));
+        cells.push(row.time_h.into());
+        match reading(plan, wanted, row) {
+            Some(Reading::Cable(length)) => cells.push(length.into()),
+            Some(Reading::Position(p)) => cells.extend(p.iter().map(|v| Cell::from(*v))),
+            Some(Reading::Pose(p)) => cells.extend(p.translation.vector.iter().map(|v| Cell::from(*v))),
+            None => cells.extend(expected.iter().map(|_| Cell::Missing)),
+        }
+        if cables {
+            cells.push((pose.anchor).into());
+        }
+        cells.push(if row.rough_way { "unhook the cable on the way".into() } else { Cell::Missing });
+        table.push(cells);
+    }
+    table
+}
+
+fn plan_reading(plan: &Plan, wanted: &Wanted<'_>) -> Option<Reading> {
+    plan.rows.first().and_then(|row| reading(plan, wanted, row))
+}
+
+/// Every effect with the smallest size that the plan decides.
+pub fn effect_table(plan: &Plan) -> Table {
+    let mut table = Table::new(
+        "What the rows can decide",
+        vec![
+            Column::text("effect", "Effect"),
+            Column::text("which", "Which"),
+            Column::significant("smallest", "Smallest size", "", 2),
+            Column::text("unit", "Unit"),
+            Column::significant("shows", "Shows as", "", 2),
+            Column::text("shows_unit", "Unit"),
+            Column::significant("usual", "Usual size", "", 2),
+            Column::text("decided", "Decided"),
+        ],
+    );
+    for found in &plan.decidable {
+        table.push([
+            found.effect.into(),
+            found.which.as_str().into(),
+            found.smallest.into(),
+            found.unit.into(),
+            found.shows.into(),
+            found.shows_unit.into(),
+            found.usual.into(),
+            judged(found),
+        ]);
+    }
+    table.notes.push(
+        "Smallest size: the one whose non-centrality beside geometry and frames reaches the stated bound in its worst phase \
+         or direction. Shows as: what that does at the most, in a joint or at the sensor. Usual size: small for what is \
+         met in practice, in the same unit. Shifts are taken to happen in the middle of the run; a shift near its end \
+         needs to be larger."
+            .to_owned(),
+    );
+    table
+}
+
+fn judged(found: &Decidable) -> Cell {
+    if found.shows.is_none() {
+        Cell::Judged(Status::Bad, "at no size".to_owned())
+    } else if found.is_decided() {
+        Cell::Judged(Status::Good, "yes".to_owned())
+    } else {
+        Cell::Judged(Status::Warning, "only when larger than usual".to_owned())
+    }
+}
+
+/// Predicted standard deviation of every parameter.
+pub fn sigma_table(plan: &Plan) -> Table {
+    let mut table = Table::new(
+        "What the rows will tell of every parameter",
+        vec![
+            Column::text("parameter", "Parameter"),
+            Column::significant("sigma", "Predicted 1σ", "", 2),
+            Column::text("unit", "Unit"),
+        ],
+    );
+    for (parameter, sigma) in plan.parameters.iter().zip(&plan.sigmas) {
+        let angle = parameter.unit() == "rad";
+        let (value, unit) = if angle { (sigma.to_degrees(), "°") } else { (*sigma, "mm") };
+        table.push([parameter.to_string().into(), value.into(), unit.into()]);
+    }
+    table.notes.push(
+        "Tolerances of the arm and its frames are counted in. What no reading can see keeps its tolerance."
+            .to_owned(),
+    );
+    table
+}
+
+fn rows_of(plan: &Plan, purpose: Purpose) -> usize {
+    plan.rows.iter().filter(|row| row.purpose == purpose).count()
+}
+
+fn verdict(plan: &Plan) -> Verdict {
+    let mut reasons = vec![format!(
+        "{} rows at {} poses: {} from the other side, {} repeated, {} for warm-up",
+        plan.rows.len(),
+        plan.poses.len(),
+        rows_of(plan, Purpose::OtherSide),
+        rows_of(plan, Purpose::Repeat),
+        rows_of(plan, Purpose::WarmUp)
+    )];
+    let quality = &plan.quality;
+    reasons.push(format!(
+        "after one visit to each pose the model says what is read elsewhere to {:.3} mm (1σ); after as many random poses: \
+         {:.3} mm",
+        quality.reading_sigma_mm, quality.random_reading_sigma_mm
+    ));
+    let undecided: Vec<&Decidable> = plan.decidable.iter().filter(|d| !d.is_decided()).collect();
+    if !undecided.is_empty() {
+        let names: Vec<String> =
+            undecided.iter().take(6).map(|d| format!("{} ({})", d.effect, d.which)).collect();
+        let more = undecided.len().saturating_sub(names.len());
+        let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
+        reasons.push(format!("not decided at the usual size: {}{tail}", names.join(", ")));
+    }
+    let rough = plan.rows.iter().filter(|row| row.rough_way).count();
+    if rough > 0 {
+        reasons.push(format!("{rough} times the cable has to be unhooked on the way"));
+    }
+    let status = if rough == 0 { Status::Good } else { Status::Warning };
+    Verdict::new(status, "The plan stays within joint limits and clear of singularities", reasons)
+}
+
+/// What fits a terminal.
+pub fn summary(plan: &Plan, robot: &str) -> Document {
+    let mut page = Document::new(format!("What to measure on {robot}"));
+    page.push(verdict(plan));
+    page.push(effect_table(plan));
+    page
+}
+
+/// The page.
+pub fn document(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Document {
+    let mut page = Document::new(format!("What to measure on {robot}"));
+    page.push(verdict(plan));
+    page.push(vec![
+        KeyFigure::new("Rows", plan.rows.len(), 0, ""),
+        KeyFigure::new("Poses", plan.poses.len(), 0, ""),
+        KeyFigure::new("Reading elsewhere, predicted 1σ", plan.quality.reading_sigma_mm, 3, "mm"),
+        KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm"),
+    ]);
+    page.paragraph(
+        "No program can know what stands in the cell: collisions are not checked. Run the program slowly first, then take one \
+         reading at every stop, in the order of the rows.",
+    );
+    page.push(effect_table(plan));
+    page.heading(2, "Rows");
+    page.push(table(plan, wanted).excerpt(ROWS_ON_PAGE));
+    page.push(Block::Details { summary: "Parameters".to_owned(), blocks: vec![sigma_table(plan).into()] });
+    page
+}
+
+/// Everything; schema `truegrind.plan/1`.
+pub fn json(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Value {
+    let rows: Vec<Value> = plan
+        .rows
+        .iter()
+        .enumerate()
+        .map(|(number, row)| {
+            let pose = &plan.poses[row.pose];
+            json!({
+                "row": number,
+                "pose": row.pose,
+                "purpose": row.purpose.word(),
+                "joints_deg": pose.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>(),
+                "approach": row.approach,
+                "anchor": pose.anchor,
+                "t_h": row.time_h,
+                "expected": match reading(plan, wanted, row) {
+                    Some(Reading::Cable(length)) => json!(length),
+                    Some(Reading::Position(p)) => json!([p.x, p.y, p.z]),
+                    Some(Reading::Pose(p)) => {
+                        json!([p.translation.x, p.translation.y, p.translation.z])
+                    }
+                    None => Value::Null,
+                },
+                "singularity": pose.singularity,
+                "rough_way": row.rough_way,
+            })
+        })
+        .collect();
+    let effects: Vec<Value> = plan
+        .decidable
+        .iter()
+        .map(|found| {
+            json!({
+                "effect": found.effect,
+                "which": found.which,
+                "joint": found.joint.map(|j| j + 1),
+                "smallest": found.smallest,
+                "unit": found.unit,
+                "shows": found.shows,
+                "shows_unit": found.shows_unit,
+                "usual": found.usual,
+                "decided": found.is_decided(),
+            })
+        })
+        .collect();
+    let sigma = |(parameter, sigma): (&Parameter, &f64)| json!({ "name": parameter.to_string(), "sigma": sigma, "unit": parameter.unit() });
+    json!({
+        "schema": "truegrind.plan/1",
+        "robot": robot,
+        "quality": {
+            "log_det": plan.quality.log_det,
+            "random_log_det": plan.quality.random_log_det,
+            "reading_sigma_mm": plan.quality.reading_sigma_mm,
+            "random_reading_sigma_mm": plan.quality.random_reading_sigma_mm,
+        },
+        "parameters": plan.parameters.iter().zip(&plan.sigmas).map(sigma).collect::<Vec<_>>(),
+        "effects": effects,
+        "rows": rows,
+    })
+}

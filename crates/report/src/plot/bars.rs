@@ -1,0 +1,187 @@
+//! Bars: one figure per thing and group, with whiskers where a spread is known.
+
+use super::Axis;
+use super::canvas::{DrawingError, PIXEL};
+use super::frame::{Entry, Frame, Glyph, picture};
+use super::ink::Ink;
+use super::letters;
+use super::pen::{LABEL, Paint, Pen, THIN};
+use super::scale::{Ends, Scale};
+use crate::number::{MISSING, Precision};
+use plotters::style::text_anchor::{HPos, VPos};
+
+/// A bar chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bars {
+    /// Title inside the picture; may be empty.
+    pub title: String,
+    /// What the bars measure. On a logarithmic axis they start at its lower end.
+    pub y: Axis,
+    /// The things along the horizontal axis, such as methods.
+    pub names: Vec<String>,
+    /// What is shown of each, side by side.
+    pub groups: Vec<BarGroup>,
+    /// Digits of the number over each bar; none where absent.
+    pub labels: Option<Precision>,
+}
+
+/// One figure of every thing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BarGroup {
+    /// Name in the legend; may be empty.
+    pub name: String,
+    /// One value per thing, in the order of the names. What is absent is marked `–`.
+    pub values: Vec<Option<f64>>,
+    /// Standard deviations, drawn as whiskers; may be shorter than the values.
+    pub deviations: Vec<Option<f64>>,
+    /// Colour; by the order of the groups where absent.
+    pub ink: Option<Ink>,
+}
+
+impl BarGroup {
+    /// Values without whiskers.
+    pub fn new(name: impl Into<String>, values: impl IntoIterator<Item = Option<f64>>) -> Self {
+        Self { name: name.into(), values: values.into_iter().collect(), deviations: Vec::new(), ink: None }
+    }
+}
+
+impl Bars {
+    /// The picture, 900 × 380 pixels.
+    pub fn svg(&self) -> String {
+        let name = if self.title.is_empty() { self.y.text() } else { self.title.clone() };
+        picture((900, 380), &name, |pen| self.draw(pen))
+    }
+
+    fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
+        let ink = |index: usize| {
+            self.groups[index].ink.unwrap_or(Ink::nth(index + usize::from(self.groups.len() == 1)))
+        };
+        let values = self.groups.iter().flat_map(|group| {
+            (0..group.values.len()).flat_map(|index| {
+                let value = group.value(index);
+                let spread = group.deviation(index).unwrap_or(0.0);
+                // A number over a bar needs room.
+                let room = match (self.labels, value) {
+                    (Some(_), Some(value)) if self.y.log => Some((value + spread) * 1.5),
+                    (Some(_), Some(value)) => Some((value + spread.copysign(value)) * 1.06),
+                    _ => None,
+                };
+                [value, value.map(|value| value - spread), value.map(|value| value + spread), room]
+            })
+        });
+        let legend = self.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty());
+        let frame = Frame {
+            title: &self.title,
+            x: Scale::named(&shortened(&self.names)),
+            y: Scale::of(&self.y, values.flatten(), Ends::Zero, 6),
+            x_text: String::new(),
+            y_text: self.y.text(),
+            legend: legend
+                .map(|(index, group)| Entry {
+                    name: group.name.clone(),
+                    ink: ink(index),
+                    glyph: Glyph::Area { alpha: 1.0, outlined: false },
+                })
+                .collect(),
+            x_grid: false,
+            y_grid: true,
+            right: 0,
+        };
+        let inside = frame.draw(pen)?;
+        if !self.groups.iter().any(|group| (0..group.values.len()).any(|index| group.value(index).is_some()))
+        {
+            return inside.say_empty(pen);
+        }
+        let slot = f64::from(inside.x.end - inside.x.start) / self.names.len().max(1) as f64;
+        let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
+        for (index, group) in self.groups.iter().enumerate() {
+            let offset = (index as f64 - (self.groups.len() as f64 - 1.0) / 2.0) * breadth;
+            for place in 0..self.names.len() {
+                let Some(center) = inside.across(place as f64) else { continue };
+                let middle = center + offset.round() as i32;
+                let half = (breadth * 0.46).round() as i32;
+                let base = inside.base();
+                let Some((value, top)) =
+                    group.value(place).and_then(|value| Some((value, inside.down(value)?)))
+                else {
+                    pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom)?;
+                    continue;
+                };
+                let top = top.clamp(inside.y.start, inside.y.end);
+                pen.sheet.open_group(&format!(
+                    "{} {} {} {}",
+                    self.names[place],
+                    group.name,
+                    Precision::Significant(4).format(value),
+                    self.y.unit
+                ));
+                pen.rectangle(
+                    [(middle - half, top.min(base)), (middle + half, top.max(base))],
+                    Paint(ink(index).rgb(), 1.0),
+                )?;
+                let mut above = top.min(base);
+                if let Some(spread) = group.deviation(place) {
+                    let ends = [value - spread, value + spread].map(|end| {
+                        inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end)
+                    });
+                    let cap = half / 3;
+                    for path in [
+                        vec![(middle, ends[0]), (middle, ends[1])],
+                        vec![(middle - cap, ends[0]), (middle + cap, ends[0])],
+                        vec![(middle - cap, ends[1]), (middle + cap, ends[1])],
+                    ] {
+                        pen.line(path, Paint::text(0.85), THIN + 2, "")?;
+                    }
+                    above = above.min(ends[1]);
+                }
+                if let Some(precision) = self.labels {
+                    let label = precision.format(value);
+                    let size = LABEL * 0.9;
+                    // Numbers wider than their bars would run into each other.
+                    if letters::width(&label, size) <= breadth * 1.05 {
+                        let (at, side) = if value < 0.0 {
+                            (top.max(base) + 2 * PIXEL, VPos::Top)
+                        } else {
+                            (above - 2 * PIXEL, VPos::Bottom)
+                        };
+                        pen.text(&label, (middle, at), size, HPos::Center, side)?;
+                    }
+                }
+                pen.sheet.close_group();
+            }
+        }
+        // The line at zero lies over the feet of the bars.
+        pen.line(
+            vec![(inside.x.start, inside.base()), (inside.x.end, inside.base())],
+            Paint::text(0.5),
+            THIN,
+            "",
+        )
+    }
+}
+
+impl BarGroup {
+    fn value(&self, index: usize) -> Option<f64> {
+        self.values.get(index).copied().flatten().filter(|value| value.is_finite())
+    }
+
+    fn deviation(&self, index: usize) -> Option<f64> {
+        self.deviations.get(index).copied().flatten().filter(|spread| spread.is_finite() && *spread > 0.0)
+    }
+}
+
+/// Names that fit side by side over 800 pixels, cut with `…` where they do not.
+fn shortened(names: &[String]) -> Vec<String> {
+    let room = 800.0 * f64::from(PIXEL) / names.len().max(1) as f64 * 0.95;
+    names
+        .iter()
+        .map(|name| {
+            let mut short = name.clone();
+            while letters::width(&short, LABEL) > room && short.chars().count() > 2 {
+                let keep = short.chars().count() - 2;
+                short = short.chars().take(keep).collect::<String>() + "…";
+            }
+            short
+        })
+        .collect()
+}

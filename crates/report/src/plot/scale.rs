@@ -1,0 +1,291 @@
+//! Scales: the ends of an axis, its ticks and their labels.
+
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+
+use super::Axis;
+
+/// Canvas coordinates beyond this are cut off long before anyone sees them.
+const FAR: f64 = 1e6;
+
+/// Numbers smaller than this are drawn as zero: the powers of ten that would scale them do not exist.
+const SMALLEST: f64 = 1e-290;
+
+/// One axis of a frame, ready to be drawn.
+#[derive(Debug, Clone)]
+pub(super) struct Scale {
+    pub(super) low: f64,
+    pub(super) high: f64,
+    log: bool,
+    /// Places with their labels, from low to high.
+    pub(super) ticks: Vec<(f64, String)>,
+    /// Places between them that get a faint line.
+    minor: Vec<f64>,
+}
+
+/// How the ends of a scale follow from the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ends {
+    /// Exactly the data.
+    Tight,
+    /// The data and a little more.
+    Loose,
+    /// The data, a little more, and zero.
+    Zero,
+    /// From zero to the largest value exactly.
+    Nought,
+    /// The data and a little more on both sides, even where that crosses zero.
+    Around,
+}
+
+impl Scale {
+    /// Scale of an axis for the values on it, with at most about `ticks` ticks.
+    pub(super) fn of(axis: &Axis, values: impl Iterator<Item = f64>, ends: Ends, ticks: usize) -> Self {
+        let usable = |value: &f64| value.is_finite() && (!axis.log || *value > 0.0);
+        let [mut low, mut high] = values
+            .filter(usable)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+        if low > high {
+            [low, high] = if axis.log { [0.1, 10.0] } else { [0.0, 1.0] };
+        }
+        if axis.log {
+            let margin = if ends == Ends::Tight { 0.0 } else { 0.04 * (high / low).log10() };
+            let margin = if high / low > 1.0 + 1e-9 { margin } else { 0.5 };
+            low = (low * 10f64.powf(-margin)).max(f64::MIN_POSITIVE);
+            high = (high * 10f64.powf(margin)).min(f64::MAX);
+        } else {
+            // Halved, so that the span of the largest numbers is finite.
+            let span = 2.0 * (high / 2.0 - low / 2.0);
+            let size = low.abs().max(high.abs());
+            if span <= size * 1e-12 || size < SMALLEST {
+                // A constant: room on both sides, so that its line lies in the middle.
+                let room = if size < SMALLEST { 1.0 } else { size * 0.1 };
+                [low, high] = [low - room, high + room];
+            } else {
+                let margin = if matches!(ends, Ends::Tight | Ends::Nought) { 0.0 } else { 0.05 * span };
+                // What is never negative starts at zero rather than just below.
+                let floor = if low >= 0.0 && ends != Ends::Around { 0.0 } else { f64::MIN };
+                let ceiling = if high <= 0.0 && ends != Ends::Around { 0.0 } else { f64::MAX };
+                [low, high] = [(low - margin).max(floor), (high + margin).min(ceiling)];
+            }
+            if matches!(ends, Ends::Zero | Ends::Nought) {
+                [low, high] = [low.min(0.0), high.max(0.0)];
+            }
+        }
+        if let Some([first, last]) = axis.range
+            && first.is_finite()
+            && last > first
+            && last.abs().max(first.abs()) > SMALLEST
+            && last.is_finite()
+            && (!axis.log || first > 0.0)
+        {
+            [low, high] = [first, last];
+        }
+        Self::between(low, high, axis.log, ticks)
+    }
+
+    /// Scale with stated ends.
+    pub(super) fn between(low: f64, high: f64, log: bool, ticks: usize) -> Self {
+        if log {
+            let places = log_ticks(low, high, ticks);
+            let decade = (high / low).log10() / ticks.max(1) as f64;
+            let minor = if decade < 1.0 { minor_ticks(low, high, &places) } else { Vec::new() };
+            // One manner for all labels of an axis.
+            let plain = places.iter().all(|&place| (1e-3..1e5).contains(&place));
+            let label = |place: f64| if plain { format!("{place}") } else { power(place) };
+            Self { low, high, log, ticks: places.iter().map(|&place| (place, label(place))).collect(), minor }
+        } else {
+            let places = linear_ticks(low, high, ticks);
+            let labels = linear_labels(&places);
+            Self { low, high, log, ticks: places.into_iter().zip(labels).collect(), minor: Vec::new() }
+        }
+    }
+
+    /// Scale for things that have names: they stand at 0, 1, 2, …
+    pub(super) fn named(names: &[String]) -> Self {
+        let ticks = names.iter().enumerate().map(|(place, name)| (place as f64, name.clone())).collect();
+        Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, log: false, ticks, minor: Vec::new() }
+    }
+
+    /// Place of a value between the ends, 0 to 1; `None` where it has none.
+    pub(super) fn fraction(&self, value: f64) -> Option<f64> {
+        let fraction = if self.log {
+            (value / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value / 2.0 - self.low / 2.0) / (self.high / 2.0 - self.low / 2.0)
+        };
+        Some(fraction).filter(|fraction| fraction.is_finite() && value.is_finite())
+    }
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
+        let fraction = self.fraction(*value).unwrap_or(0.0);
+        (f64::from(from) + fraction * f64::from(to - from)).clamp(-FAR, FAR).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() {
+            self.minor.clone()
+        } else {
+            self.ticks.iter().map(|tick| tick.0).collect()
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format_ext(&self, value: &f64) -> String {
+        // The values asked for are the key points themselves.
+        self.ticks.iter().find(|tick| tick.0 == *value).map(|tick| tick.1.clone()).unwrap_or_default()
+    }
+}
+
+/// Round numbers between two ends, at steps of 1, 2 or 5 times a power of ten, at most about `wanted` of them.
+///
+/// ```
+/// use crate::plot::linear_ticks;
+/// assert_eq!(linear_ticks(-0.31, 0.62, 5), [-0.2, 0.0, 0.2, 0.4, 0.6]);
+/// ```
+pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
+    let span = 2.0 * (high / 2.0 - low / 2.0);
+    if !(span > 0.0 && span.is_finite()) {
+        return if low.is_finite() { vec![low] } else { Vec::new() };
+    }
+    let (factor, exponent) = step(span / wanted.max(1) as f64);
+    // A tick is a whole number times a power of ten, divided or multiplied exactly, so that 0.3 is 0.3.
+    let place = |count: f64| {
+        if exponent < 0 {
+            count * factor / 10f64.powi(-exponent)
+        } else {
+            count * factor * 10f64.powi(exponent)
+        }
+    };
+    let width = place(1.0);
+    let (first, last) = ((low / width - 1e-9).ceil(), (high / width + 1e-9).floor());
+    if width == 0.0 || first.abs().max(last.abs()) > 1e15 {
+        return vec![low, high];
+    }
+    if last < first {
+        // A step so wide that it passes over the whole range.
+        return linear_ticks(low, high, wanted + 1);
+    }
+    let count = (last - first) as usize;
+    (0..=count).map(|i| place(first + i as f64) + 0.0).collect()
+}
+
+/// Powers of ten between two positive ends, every second or further one where there are too many; with twos and fives
+/// where there are few, and round linear numbers where the ends are closer than that.
+///
+/// ```
+/// use crate::plot::log_ticks;
+/// assert_eq!(log_ticks(1e-9, 1e3, 5), [1e-9, 1e-6, 1e-3, 1.0, 1e3]);
+/// assert_eq!(log_ticks(0.4, 3.0, 6), [0.5, 1.0, 2.0]);
+/// ```
+pub fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
+    if !(low > 0.0 && high > low && high.is_finite()) {
+        return Vec::new();
+    }
+    let (bottom, top) = (low.log10(), high.log10());
+    let (first, last) = ((bottom - 1e-9).ceil() as i32, (top + 1e-9).floor() as i32);
+    let decades = last - first;
+    if decades >= 3 {
+        let stride = (decades as usize + 1).div_ceil(wanted.max(2)) as i32;
+        return (first..=last).filter(|power| power.rem_euclid(stride) == 0).map(ten).collect();
+    }
+    let inside =
+        |place: &f64| place.is_finite() && *place >= low * (1.0 - 1e-9) && *place <= high * (1.0 + 1e-9);
+    let places: Vec<f64> = (first - 1..=last)
+        .flat_map(|power| [1.0, 2.0, 5.0].map(|factor| factor * ten(power)))
+        .map(|place| format!("{place:.3e}").parse().unwrap_or(place))
+        .filter(inside)
+        .collect();
+    if places.len() >= 3 { places } else { linear_ticks(low, high, wanted) }
+}
+
+/// 10^power; negative powers by division, which is exact where it can be.
+fn ten(power: i32) -> f64 {
+    if power < 0 && power > -308 { 1.0 / 10f64.powi(-power) } else { 10f64.powi(power) }
+}
+
+/// Twos to nines of each decade that are no ticks.
+fn minor_ticks(low: f64, high: f64, ticks: &[f64]) -> Vec<f64> {
+    let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+    (first..last)
+        .flat_map(|power| (2..10).map(move |factor| f64::from(factor) * ten(power)))
+        .filter(|place| (low..=high).contains(place))
+        .filter(|place| ticks.iter().all(|tick| (tick / place - 1.0).abs() > 1e-6))
+        .collect()
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is at least `size`.
+fn step(size: f64) -> (f64, i32) {
+    let exponent = size.log10().floor() as i32;
+    let fraction = size / 10f64.powi(exponent);
+    for factor in [1.0, 2.0, 5.0] {
+        if fraction <= factor * (1.0 + 1e-9) {
+            return (factor, exponent);
+        }
+    }
+    (1.0, exponent + 1)
+}
+
+/// Labels with the digits that tell the ticks apart; with exponents where numbers are very small or large.
+fn linear_labels(places: &[f64]) -> Vec<String> {
+    let size = places.iter().fold(0.0f64, |size, place| size.max(place.abs()));
+    let width = match places {
+        [first, second, ..] => (second - first).abs(),
+        _ => size,
+    };
+    let exponent = |x: f64| if x > 0.0 { (x.log10() + 1e-9).floor() as i32 } else { 0 };
+    if size >= 1e6 || (size > 0.0 && size < 1e-3) {
+        let digits = usize::try_from(exponent(size) - exponent(width)).unwrap_or(0).min(15);
+        let power = exponent(size);
+        return places
+            .iter()
+            .map(|place| match *place {
+                0.0 => "0".to_owned(),
+                place => format!("{:.digits$}·10{}", place / 10f64.powi(power), raised(power)),
+            })
+            .collect();
+    }
+    let decimals = usize::try_from(-exponent(width)).unwrap_or(0).min(15);
+    places.iter().map(|place| format!("{place:.decimals$}")).collect()
+}
+
+/// `10⁻⁶`, `2·10⁻⁶`.
+fn power(place: f64) -> String {
+    let text = format!("{place:.0e}");
+    match text.split_once('e') {
+        Some(("1", exponent)) => format!("10{}", raised(exponent.parse().unwrap_or(0))),
+        Some((factor, exponent)) => format!("{factor}·10{}", raised(exponent.parse().unwrap_or(0))),
+        None => text,
+    }
+}
+
+fn raised(exponent: i32) -> String {
+    exponent
+        .to_string()
+        .chars()
+        .map(|digit| match digit {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            '4' => '⁴',
+            '5' => '⁵',
+            '6' => '⁶',
+            '7' => '⁷',
+            '8' => '⁸',
+            '9' => '⁹',
+            _ => '⁰',
+        })
+        .collect()
+}

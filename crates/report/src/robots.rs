@@ -1,0 +1,360 @@
+//! The catalogue of arms and the page of one arm: link table, ranges, masses, published poses, sources.
+
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Verdict};
+use super::number::MISSING;
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_arm::link::LinkModel;
+use truegrind_arm::robots::Robot;
+use truegrind_arm::robots::sheet::{Angles, Dialect, Orientation, Point};
+use truegrind_arm::robots::validation;
+
+/// Name, maker, designation, rated load, reach, repeatability and program language of each arm.
+pub fn catalogue_table(robots: &[Robot]) -> Table {
+    let mut table = Table::new(
+        "Robot arms",
+        vec![
+            Column::text("name", "Name"),
+            Column::text("maker", "Maker"),
+            Column::text("model", "Model"),
+            Column::significant("payload_kg", "Payload", "kg", 3),
+            Column::number("reach_mm", "Reach", "mm", 0),
+            Column::number("repeatability_mm", "Repeatability", "mm", 3),
+            Column::text("dialect", "Programs"),
+        ],
+    );
+    for robot in robots {
+        let sheet = &robot.sheet;
+        table.push([
+            sheet.name.as_str().into(),
+            words(&sheet.maker),
+            words(&sheet.model),
+            sheet.payload_kg.into(),
+            sheet.reach_mm.into(),
+            sheet.repeatability_mm.into(),
+            sheet.dialect.map(dialect).into(),
+        ]);
+    }
+    table
+}
+
+/// The links: which four numbers are free, and their nominal values in mm and degrees.
+pub fn link_table(robot: &Robot) -> Table {
+    let hayati = robot.sheet.link.iter().any(|link| link.model == LinkModel::Hayati);
+    let mut columns = vec![
+        Column::count("link", "Link"),
+        Column::text("model", "Model"),
+        Column::number("a_mm", "a", "mm", 3),
+        Column::number("d_mm", "d", "mm", 3),
+        Column::number("alpha_deg", "α", "°", 3),
+        Column::number("theta_deg", "θ offset", "°", 3),
+    ];
+    if hayati {
+        columns.push(Column::number("beta_deg", "β", "°", 3));
+    }
+    let mut table = Table::new("Links", columns);
+    for (index, link) in robot.sheet.link.iter().enumerate() {
+        let (model, beta) = match link.model {
+            LinkModel::Dh => ("DH", Cell::Missing),
+            LinkModel::Hayati => ("Hayati", link.beta_deg.into()),
+        };
+        table.push([
+            (index + 1).into(),
+            model.into(),
+            link.a_mm.into(),
+            link.d_mm.into(),
+            link.alpha_deg.into(),
+            link.theta_deg.into(),
+            beta,
+        ]);
+    }
+    table.notes.push(
+        "T = Rz(θ) Tz(d) Tx(a) Rx(α) from each frame to the next (ltlm-2024 eq. 2); θ is the joint's angle plus the \
+         offset."
+            .to_owned(),
+    );
+    if hayati {
+        table.notes.push(
+            "Hayati links end in Ry(β): the next axis is nominally parallel, d is a constant of theirs and not \
+             identified."
+                .to_owned(),
+        );
+    }
+    table
+}
+
+/// Ranges and speeds of the joints in the controller's angles.
+pub fn joint_table(robot: &Robot) -> Table {
+    let joints = &robot.sheet.joints;
+    let mut table = Table::new(
+        "Joints",
+        vec![
+            Column::count("joint", "Joint"),
+            Column::number("min_deg", "Lowest", "°", 1),
+            Column::number("max_deg", "Highest", "°", 1),
+            Column::number("speed_deg_s", "Speed", "°/s", 0),
+        ],
+    );
+    for joint in 0..6 {
+        let of = |values: Option<[f64; 6]>| Cell::from(values.map(|v| v[joint]));
+        table.push([(joint + 1).into(), of(joints.min_deg), of(joints.max_deg), of(joints.speed_deg_s)]);
+    }
+    match joints.angles {
+        Angles::Logged => {
+            table
+                .notes
+                .push("Angles as the controller shows and logs them, without the offsets θ.".to_owned());
+        }
+        Angles::Dh => {
+            table.notes.push("Logged angles are DH angles: the offsets θ are in them already.".to_owned())
+        }
+    }
+    for (joint, sum) in couplings(joints.map) {
+        table.notes.push(format!("The rotation of joint {joint} is {sum} of the controller's angles."));
+    }
+    table
+}
+
+/// Masses and centres of mass; `None` where none are published.
+pub fn mass_table(robot: &Robot) -> Option<Table> {
+    let masses = robot.sheet.masses.as_ref()?;
+    let mut columns = vec![Column::count("link", "Link"), Column::number("mass_kg", "Mass", "kg", 2)];
+    columns.extend(
+        ["x", "y", "z"]
+            .map(|axis| Column::number(format!("centre_{axis}_mm"), format!("centre {axis}"), "mm", 1)),
+    );
+    let mut table = Table::new("Masses", columns);
+    for (link, (mass, centre)) in masses.mass_kg.iter().zip(&masses.centre_mm).enumerate() {
+        table.push([(link + 1).into(), (*mass).into(), centre[0].into(), centre[1].into(), centre[2].into()]);
+    }
+    table.notes.push("Centres of mass in the frame at the end of each link.".to_owned());
+    Some(table)
+}
+
+/// Poses that were published, and how far the links miss them.
+pub fn published_table(robot: &Robot) -> Table {
+    let mut table = Table::new(
+        "Published poses",
+        vec![
+            Column::text("what", "Pose"),
+            Column::text("joints_deg", "Joints [°]"),
+            Column::text("point", "Point"),
+            Column::text("published_mm", "Published [mm]"),
+            Column::number("miss_mm", "Miss", "mm", 3),
+            Column::number("tolerance_mm", "Tolerance", "mm", 3),
+            Column::number("turn_deg", "Turned by", "°", 4),
+            Column::text("source", "Source"),
+        ],
+    );
+    for pose in &robot.sheet.published {
+        let (miss, turn) = validation::deviation(pose, &robot.model);
+        let stated = match (pose.position_mm, pose.radius_mm) {
+            (Some(position), _) => Cell::Text(list(&position)),
+            (None, Some(radius)) => Cell::Text(format!("{radius} from axis 1")),
+            (None, None) => Cell::Missing,
+        };
+        let point = match pose.point {
+            Point::Flange => "flange",
+            Point::WristCentre => "wrist centre",
+        };
+        table.push([
+            pose.what.as_str().into(),
+            list(&pose.joints_deg).into(),
+            point.into(),
+            stated,
+            miss.into(),
+            pose.tolerance_mm.into(),
+            turn.map(f64::to_degrees).into(),
+            pose.source.as_str().into(),
+        ]);
+    }
+    table.notes.push("The tolerance is what the rounding of the published numbers allows.".to_owned());
+    table
+}
+
+/// Which number comes from where.
+pub fn source_table(robot: &Robot) -> Table {
+    let sources = &robot.sheet.sources;
+    let mut table =
+        Table::new("Sources", vec![Column::text("numbers", "Numbers"), Column::text("source", "Source")]);
+    for (numbers, source) in [
+        ("links and joint map", &sources.links),
+        ("ranges and speeds", &sources.limits),
+        ("masses", &sources.masses),
+        ("payload, reach, repeatability", &sources.payload),
+    ] {
+        table.push([numbers.into(), words(source)]);
+    }
+    table
+}
+
+/// The page of one arm.
+pub fn document(robot: &Robot) -> Document {
+    let sheet = &robot.sheet;
+    let mut page = Document::new(sheet.name.clone());
+    page.subtitle = [sheet.maker.as_str(), sheet.model.as_str()]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ");
+    if !robot.warnings.is_empty() {
+        page.push(Verdict::new(
+            Status::Warning,
+            "The sheet can be used, with reservations",
+            robot.warnings.iter().cloned(),
+        ));
+    }
+    let figure =
+        |label: &str, value: Option<f64>, decimals, unit: &str| KeyFigure::new(label, value, decimals, unit);
+    let payload = KeyFigure {
+        precision: super::number::Precision::Significant(3),
+        ..figure("Payload", sheet.payload_kg, 0, "kg")
+    };
+    page.push(vec![
+        payload,
+        figure("Reach", sheet.reach_mm, 0, "mm"),
+        figure("Repeatability RP", sheet.repeatability_mm, 3, "mm").note("not the accuracy"),
+        KeyFigure::new("Programs", sheet.dialect.map(dialect), 0, "")
+            .note(sheet.orientation().map_or("", orientation)),
+    ]);
+    if sheet.compensates {
+        page.paragraph(
+            "The controller already computes with identified parameters, so a program for it is rewritten only when \
+             that is asked for.",
+        );
+    }
+    page.heading(2, "Links");
+    page.push(untitled(link_table(robot)));
+    if let Some(flange) = &sheet.flange {
+        page.paragraph(format!(
+            "The flange lies in the last link frame at ({}) mm, turned by the quaternion ({}), w first.",
+            list(&flange.position_mm),
+            list(&flange.quaternion_wxyz)
+        ));
+    }
+    page.heading(2, "Joints");
+    page.push(untitled(joint_table(robot)));
+    page.heading(2, "Mounting and masses");
+    page.paragraph(format!(
+        "Gravity points along ({}) in the base; the mounting face is at ({}) mm.",
+        list(&sheet.mounting.gravity),
+        list(&sheet.mounting.plate_mm)
+    ));
+    match mass_table(robot) {
+        Some(table) => page.push(untitled(table)),
+        None => page.paragraph("No masses are stated, so gravity bends this arm only through its payload."),
+    }
+    page.heading(2, "Published poses");
+    if sheet.published.is_empty() {
+        page.paragraph("None is stated, so nothing checks the links.");
+    } else {
+        // Words of any length stand better in a list.
+        let mut table = untitled(published_table(robot));
+        for key in ["source", "joints_deg", "point"] {
+            table.columns.iter().position(|column| column.key == key).into_iter().for_each(|place| {
+                table.columns.remove(place);
+                table.rows.iter_mut().for_each(|row| drop(row.remove(place)));
+            });
+        }
+        page.push(table);
+        page.push(Block::List(
+            robot
+                .sheet
+                .published
+                .iter()
+                .map(|pose| format!("{}: joints ({})°; {}", pose.what, list(&pose.joints_deg), pose.source))
+                .collect(),
+        ));
+    }
+    page.heading(2, "Sources");
+    page.push(untitled(source_table(robot)));
+    page
+}
+
+/// The data sheet with what its published poses say of it; schema `truegrind.robot/1`.
+pub fn json(robot: &Robot) -> Value {
+    let misses: Vec<Value> = robot
+        .sheet
+        .published
+        .iter()
+        .map(|pose| {
+            let (miss, turn) = validation::deviation(pose, &robot.model);
+            json!({ "what": pose.what, "miss_mm": miss, "turn_deg": turn.map(f64::to_degrees) })
+        })
+        .collect();
+    json!({
+        "schema": "truegrind.robot/1",
+        "sheet": robot.sheet,
+        "published_misses": misses,
+        "warnings": robot.warnings,
+    })
+}
+
+/// The catalogue for programs; schema `truegrind.robots/1`.
+pub fn catalogue_json(robots: &[Robot]) -> Value {
+    json!({ "schema": "truegrind.robots/1", "robots": super::format::json::Rows(&catalogue_table(robots)) })
+}
+
+/// A table right under a heading that says the same.
+fn untitled(table: Table) -> Table {
+    Table { title: String::new(), ..table }
+}
+
+fn words(text: &str) -> Cell {
+    if text.is_empty() { Cell::Missing } else { text.into() }
+}
+
+fn list(values: &[f64]) -> String {
+    // Rust would print −0.
+    let shown: Vec<String> = values.iter().map(|value| format!("{}", value + 0.0)).collect();
+    if shown.is_empty() { MISSING.to_owned() } else { shown.join(", ") }
+}
+
+fn dialect(dialect: Dialect) -> &'static str {
+    match dialect {
+        Dialect::Rapid => "RAPID",
+        Dialect::Krl => "KRL",
+        Dialect::Fanuc => "FANUC TP",
+        Dialect::Urscript => "URScript",
+        Dialect::Val3 => "VAL 3",
+        Dialect::Inform => "INFORM",
+        Dialect::Hsr => "HSR",
+    }
+}
+
+fn orientation(orientation: Orientation) -> &'static str {
+    match orientation {
+        Orientation::Quaternion => "orientation as quaternion",
+        Orientation::Abc => "orientation as A, B, C",
+        Orientation::Wpr => "orientation as W, P, R",
+        Orientation::RotationVector => "orientation as rotation vector",
+        Orientation::Rxyz => "orientation as Rx, Ry, Rz",
+    }
+}
+
+/// Joints whose rotation is not their own angle alone: number and sum, such as `q3 + q2`.
+fn couplings(map: Option<[[f64; 6]; 6]>) -> Vec<(usize, String)> {
+    let Some(map) = map else { return Vec::new() };
+    map.iter()
+        .enumerate()
+        .filter(|(joint, row)| (0..6).any(|k| row[k] != f64::from(u8::from(k == *joint))))
+        .map(|(joint, row)| {
+            let mut sum = String::new();
+            for (k, factor) in row.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
+                let sign = if *factor < 0.0 {
+                    "−"
+                } else if sum.is_empty() {
+                    ""
+                } else {
+                    "+"
+                };
+                let gap = if sum.is_empty() { "" } else { " " };
+                let size = if factor.abs() == 1.0 { String::new() } else { format!("{} · ", factor.abs()) };
+                sum.push_str(&format!("{gap}{sign}{gap}{size}q{}", k + 1));
+            }
+            (joint + 1, sum)
+        })
+        .collect()
+}

@@ -1,0 +1,137 @@
+//! A track: what was taken in, what moved, and how sure the arm is known now.
+
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::number::handy;
+use super::plot::{Axis, Graph, Reference, Series};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_calibration::tracking::state::Consumed;
+use truegrind_calibration::tracking::{Alarm, Tracker};
+
+/// What the terminal shows.
+pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
+    let mut page = Document::new("Track");
+    page.subtitle = format!("{}, {} readings", tracker.robot(), tracker.state().sensor);
+    head(&mut page, tracker, fresh, alarms, model);
+    page
+}
+
+/// Whether a file is what CSV makes of [`table`]: a result, and no measurement.
+pub fn is_table(csv: &[u8]) -> bool {
+    csv.starts_with(b"parameter,unit,")
+}
+
+/// The page.
+pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
+    let mut page = summary(tracker, fresh, alarms, model);
+    let earlier = tracker.state().alarms.len() - alarms.len().min(tracker.state().alarms.len());
+    if earlier > 0 {
+        page.heading(2, "Changes noticed before");
+        page.push(Block::List(tracker.state().alarms[..earlier].iter().map(ToString::to_string).collect()));
+    }
+    page.heading(2, "How surprising the poses are");
+    let history = &tracker.state().history;
+    let points: Vec<[f64; 2]> = history.iter().enumerate().map(|(i, s)| [i as f64 + 1.0, s.nis]).collect();
+    page.figure(
+        Graph {
+            title: "Normalised innovations squared of the latest poses".to_owned(),
+            x: Axis::new("pose of the history", ""),
+            y: Axis::new("NIS", ""),
+            series: vec![Series::points("", points)],
+            references: vec![Reference::Horizontal(rows_per_pose(tracker), "expected mean".to_owned())],
+            ..Graph::default()
+        }
+        .svg(),
+        "How surprising each pose was: near the line on average while arm, sensor and noise are what they are taken for.",
+    );
+    page.heading(2, "Where the arm stands");
+    page.push(table(tracker));
+    page.push(Provenance { sources: sources(tracker), ..Provenance::here() });
+    page
+}
+
+/// The files that were taken in.
+fn sources(tracker: &Tracker) -> Vec<Source> {
+    let of = |consumed: &Consumed| Source {
+        name: consumed.file.clone(),
+        role: "Measurements".to_owned(),
+        sha256: None,
+        rows: Some(consumed.rows),
+    };
+    tracker.state().consumed.iter().map(of).collect()
+}
+
+fn rows_per_pose(tracker: &Tracker) -> f64 {
+    match tracker.state().sensor.as_str() {
+        "cable" => 1.0,
+        "position" => 3.0,
+        _ => 6.0,
+    }
+}
+
+fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
+    let state = tracker.state();
+    let (status, headline) = match alarms.len() {
+        0 => (Status::Good, format!("{fresh} new poses taken in, no change noticed")),
+        1 => (Status::Warning, format!("{fresh} new poses taken in, one change noticed")),
+        n => (Status::Warning, format!("{fresh} new poses taken in, {n} changes noticed")),
+    };
+    page.push(Verdict::new(status, headline, alarms.iter().map(ToString::to_string)));
+    let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
+    let mean = (!nis.is_empty()).then(|| nis.iter().sum::<f64>() / nis.len() as f64);
+    page.push(vec![
+        KeyFigure::new("Poses in all", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
+        KeyFigure::new("Mean NIS of the latest", mean, 2, "")
+            .note(format!("{} expected", rows_per_pose(tracker))),
+        KeyFigure::new("Changes in all", state.alarms.len(), 0, ""),
+    ]);
+    page.paragraph(format!("Model written: {model}"));
+}
+
+/// Parameters as they stand now.
+pub fn table(tracker: &Tracker) -> Table {
+    let mut table = Table::new(
+        "Parameters, as deviations from the model that tracking began with",
+        vec![
+            Column::text("parameter", "Parameter"),
+            Column::text("unit", "Unit"),
+            Column::significant("value", "deviation", "", 2),
+        ],
+    );
+    let sigmas = tracker.sigmas();
+    for ((parameter, value), sigma) in tracker.parameters().iter().zip(tracker.deviations()).zip(sigmas) {
+        let (scale, unit) = handy(parameter.unit());
+        table.push([
+            parameter.to_string().into(),
+            unit.into(),
+            Cell::with_sigma(value * scale, Some(sigma * scale)),
+        ]);
+    }
+    table
+}
+
+/// Everything; schema `truegrind.track-report/1`.
+pub fn json(tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> Value {
+    let state = tracker.state();
+    let sigmas = tracker.sigmas();
+    let parameters: Vec<Value> = tracker
+        .parameters()
+        .iter()
+        .zip(tracker.deviations())
+        .zip(&sigmas)
+        .map(|((p, value), sigma)| {
+            json!({ "name": p.to_string(), "unit": p.unit(), "deviation": value, "sigma": sigma })
+        })
+        .collect();
+    json!({
+        "schema": "truegrind.track-report/1",
+        "new_poses": fresh,
+        "poses": state.poses,
+        "set_aside": state.accidents,
+        "new_alarms": alarms,
+        "alarms": state.alarms,
+        "parameters": parameters,
+    })
+}

@@ -1,0 +1,633 @@
+//! The surface file: surface, work object, tool and path in one TOML text.
+//!
+//! ```toml
+//! name = "blade"
+//!
+//! [surface]
+//! kind = "explicit"              # explicit | parametric | implicit | mesh
+//! z = "12 - x^2/300 - y^2/900"   # mm from mm; parametric: x, y, z of u, v; implicit: f of x, y, z; mesh: file
+//! x_mm = [-50, 50]
+//! y_mm = [-80, 80]
+//!
+//! [work_object]
+//! name = "wobjBlade"
+//! position_mm = [420, 0, 250]    # of the surface's frame in the robot's base
+//! rpy_deg = [0, 0, 0]            # or quaternion = [w, x, y, z]
+//! origin = "metrology"           # metrology | taught; leave out if not known
+//!
+//! [tool]
+//! name = "tSpindle"
+//! position_mm = [0, 0, 120]      # of the TCP in the flange
+//! quaternion = [1, 0, 0, 0]
+//! mass_kg = 1.2
+//! cog_mm = [0, 0, 55]
+//! radius_mm = 20
+//!
+//! [path]
+//! pattern = "raster"             # raster | spiral | contour
+//! step_over_mm = 8               # or scallop_mm, which needs the tool's radius_mm
+//! speed_mm_s = 40
+//! ```
+//!
+//! | key | meaning | if left out |
+//! |---|---|---|
+//! | `name` | name of the job, fit for a module | `surface` |
+//! | `surface.kind` | `explicit`, `parametric`, `implicit`, `mesh` | required |
+//! | `surface.z`, `x_mm`, `y_mm` | explicit: equation in x and y, ranges in mm | required |
+//! | `surface.x`, `y`, `z`, `u`, `v` | parametric: equations in u and v, ranges | required |
+//! | `surface.f`, `x_mm`, `y_mm`, `z_mm` | implicit: equation in x, y and z, ranges in mm | required |
+//! | `surface.mesh`, `x_mm`, `y_mm` | mesh: name of the STL file, ranges in mm | the ranges: all of it |
+//! | `surface.unit_mm` | mesh: length of the file's unit in mm | 1 |
+//! | `surface.flip_normal` | parametric and mesh: the other side is outside | `false` |
+//! | `work_object.name`, `tool.name` | names of wobjdata and tooldata | required |
+//! | `….position_mm` | of the frame in the robot's base; of the TCP in the flange | required |
+//! | `….quaternion` or `….rpy_deg` | w, x, y, z; or roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll) | no rotation |
+//! | `….origin` | `metrology` or `taught`: with `--surface` it counts as that of a cell file, which must not say otherwise | not known |
+//! | `tool.mass_kg`, `cog_mm` | mass, and centre of gravity in the flange | required |
+//! | `tool.radius_mm` | radius where the tool touches; `step_over_mm` is at most twice as much | required by `scallop_mm` alone |
+//! | `path.pattern` | `raster`, `spiral`, `contour` | required |
+//! | `path.step_over_mm` or `path.scallop_mm` | distance of passes, or height of the cusp between them | one is required |
+//! | `path.along` | direction of a raster: `x` or `y`, of a parametric surface `u` or `v` | the first |
+//! | `path.traverse` | raster: `zigzag`, `one-way` | `zigzag` |
+//! | `path.max_step_mm`, `chord_mm` | bounds on the distance of points | 5 and 0.02 |
+//! | `path.lead_deg`, `tilt_deg` | angles of the tool to the normal | 0 |
+//! | `path.tool_x`, `tool_x_direction` | `fixed` near a direction, or along the `feed` | `fixed`, [1, 0, 0] |
+//! | `path.approach_mm` | height of approach, retract and links | 20 |
+//! | `path.speed_mm_s`, `travel_speed_mm_s` | of cuts; of approach, retract and links | required; 100 |
+//! | `path.zone` | `fine`, `z0`, `z1`, `z5`, … between cuts | `z1` |
+
+use std::fmt::Display;
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+use super::expression::ExpressionError;
+use super::mesh::{Mesh, MeshOptions};
+use super::path::{self, Along, PathOptions, PathPoint, Pattern, Spacing, ToolX, Traverse};
+use super::{Domain, Explicit, Implicit, Parametric, Surface, SurfaceError};
+use truegrind_math::se3::Pose;
+
+/// The zones that controllers know by name.
+pub const ZONES: [&str; 15] = [
+    "fine", "z0", "z1", "z5", "z10", "z15", "z20", "z30", "z40", "z50", "z60", "z80", "z100", "z150", "z200",
+];
+/// A frame that is nearer to its parent than this, but not at it, is taken to be stated in metres.
+const NEAREST_MM: f64 = 2.0;
+/// And none is farther away (mm).
+const FARTHEST_MM: f64 = 1e6;
+/// No speed [mm/s], mass (kg), radius (mm) or unit (mm) is more.
+const MOST: f64 = 1e6;
+
+/// How a tool or work-object frame was obtained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// Drawn or measured, independent of the robot.
+    Metrology,
+    /// Taught with the robot, and therefore wrong by the robot's own error.
+    Taught,
+}
+
+/// A tool on the flange.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tool {
+    /// Name of the tooldata.
+    pub name: String,
+    /// Frame of the TCP in the flange.
+    pub flange_from_tool: Pose,
+    /// Mass in kg.
+    pub mass_kg: f64,
+    /// Centre of gravity in the flange frame in mm.
+    pub cog_mm: Vector3<f64>,
+    /// Radius of the tool where it touches in mm; needed for a scallop height.
+    pub radius_mm: Option<f64>,
+    /// How the TCP was obtained, if stated.
+    pub origin: Option<Origin>,
+}
+
+/// Where the surface is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkObject {
+    /// Name of the wobjdata.
+    pub name: String,
+    /// The surface's frame in the robot's base.
+    pub base_from_work_object: Pose,
+    /// How the frame was obtained, if stated.
+    pub origin: Option<Origin>,
+}
+
+/// What a surface file states, checked and ready to use.
+#[derive(Debug, Clone)]
+pub struct SurfaceFile {
+    /// Name of the job; also fit for the name of a module.
+    pub name: String,
+    /// The surface.
+    pub surface: Surface,
+    /// Its place.
+    pub work_object: WorkObject,
+    /// The tool.
+    pub tool: Tool,
+    /// How the path runs.
+    pub path: PathOptions,
+    /// Feed speed of the TCP on a cut in mm/s.
+    pub speed_mm_s: f64,
+    /// Speed of the TCP on approach, retract and link in mm/s.
+    pub travel_speed_mm_s: f64,
+    /// Zone between cuts: `fine`, `z0`, `z1`, …, as the controller names it.
+    pub zone: String,
+}
+
+impl SurfaceFile {
+    /// Reads the bytes of a surface file. `file` is the name that errors state; a mesh is asked for by the name
+    /// that the file gives it.
+    ///
+    /// # Errors
+    /// File, key (or line and column), what was found, what was expected and what to do.
+    pub fn read<E: Display>(
+        file: &str,
+        bytes: &[u8],
+        resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
+    ) -> Result<Self, SurfaceError> {
+        let text = std::str::from_utf8(bytes).map_err(|error| {
+            let read = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+            toml_error(file, &read, read.len(), "found a byte that is not UTF-8, expected text")
+        })?;
+        let stated: Stated = toml::from_str(text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            toml_error(file, text, at, error.message())
+        })?;
+        let report = Reporter { file };
+        let name = stated.name.unwrap_or_else(|| "surface".to_owned());
+        report.name("name", &name)?;
+        let surface = report.surface(&stated.surface, resolve)?;
+        let work_object = report.work_object(stated.work_object)?;
+        let tool = report.tool(stated.tool)?;
+        let path = report.path(&stated.path, &stated.surface, &tool)?;
+        let motion = &stated.path;
+        let speed_mm_s = report.positive(
+            "path.speed_mm_s",
+            motion.speed_mm_s,
+            "a speed above 0 in mm/s, up to 1,000,000",
+        )?;
+        let travel = motion.travel_speed_mm_s.unwrap_or(100.0);
+        let travel_speed_mm_s =
+            report.positive("path.travel_speed_mm_s", travel, "a speed above 0 in mm/s, up to 1,000,000")?;
+        let zone = motion.zone.clone().unwrap_or_else(|| "z1".to_owned());
+        if !ZONES.contains(&zone.as_str()) {
+            let expected = format!("one of {}", ZONES.join(", "));
+            return Err(report.value(
+                "path.zone",
+                format!("`{zone}`"),
+                expected,
+                "choose a zone by its name",
+            ));
+        }
+        Ok(Self { name, surface, work_object, tool, path, speed_mm_s, travel_speed_mm_s, zone })
+    }
+
+    /// The path over the surface, in the work object.
+    ///
+    /// # Errors
+    /// As [`path::over`].
+    pub fn points(&self) -> Result<Vec<PathPoint>, SurfaceError> {
+        path::over(&self.surface, &self.path)
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    name: Option<String>,
+    surface: StatedSurface,
+    work_object: StatedWorkObject,
+    tool: StatedTool,
+    path: StatedPath,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    Explicit,
+    Parametric,
+    Implicit,
+    Mesh,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StatedSurface {
+    kind: Kind,
+    x: Option<String>,
+    y: Option<String>,
+    z: Option<String>,
+    f: Option<String>,
+    mesh: Option<String>,
+    x_mm: Option<[f64; 2]>,
+    y_mm: Option<[f64; 2]>,
+    z_mm: Option<[f64; 2]>,
+    u: Option<[f64; 2]>,
+    v: Option<[f64; 2]>,
+    unit_mm: Option<f64>,
+    flip_normal: Option<bool>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StatedWorkObject {
+    name: String,
+    position_mm: [f64; 3],
+    quaternion: Option<[f64; 4]>,
+    rpy_deg: Option<[f64; 3]>,
+    origin: Option<Origin>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StatedTool {
+    name: String,
+    position_mm: [f64; 3],
+    quaternion: Option<[f64; 4]>,
+    rpy_deg: Option<[f64; 3]>,
+    mass_kg: f64,
+    cog_mm: [f64; 3],
+    radius_mm: Option<f64>,
+    origin: Option<Origin>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum StatedToolX {
+    Fixed,
+    Feed,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StatedPath {
+    pattern: Pattern,
+    along: Option<String>,
+    traverse: Option<Traverse>,
+    step_over_mm: Option<f64>,
+    scallop_mm: Option<f64>,
+    max_step_mm: Option<f64>,
+    chord_mm: Option<f64>,
+    lead_deg: Option<f64>,
+    tilt_deg: Option<f64>,
+    tool_x: Option<StatedToolX>,
+    tool_x_direction: Option<[f64; 3]>,
+    approach_mm: Option<f64>,
+    speed_mm_s: f64,
+    travel_speed_mm_s: Option<f64>,
+    zone: Option<String>,
+}
+
+/// Turns what is stated into what is meant, and what is wrong into an error that names the file.
+struct Reporter<'a> {
+    file: &'a str,
+}
+
+impl Reporter<'_> {
+    fn value(
+        &self,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        remedy: &str,
+    ) -> SurfaceError {
+        SurfaceError::Value {
+            file: self.file.to_owned(),
+            key: key.to_owned(),
+            found: found.into(),
+            expected: expected.into(),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    fn stated(&self, key: &str, source: SurfaceError) -> SurfaceError {
+        SurfaceError::Stated { file: self.file.to_owned(), key: key.to_owned(), source: Box::new(source) }
+    }
+
+    fn name(&self, key: &str, name: &str) -> Result<(), SurfaceError> {
+        let fits = name.starts_with(|c: char| c.is_ascii_alphabetic())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && name.len() <= 32;
+        if fits {
+            return Ok(());
+        }
+        let expected = "a letter, then letters, digits or _, 32 characters at most";
+        Err(self.value(key, format!("`{name}`"), expected, "choose a name that the controller accepts"))
+    }
+
+    fn positive(&self, key: &str, value: f64, expected: &str) -> Result<f64, SurfaceError> {
+        if (f64::MIN_POSITIVE..=MOST).contains(&value) {
+            Ok(value)
+        } else {
+            Err(self.value(key, value.to_string(), expected, "correct the number"))
+        }
+    }
+
+    fn surface<E: Display>(
+        &self,
+        stated: &StatedSurface,
+        resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
+    ) -> Result<Surface, SurfaceError> {
+        let (kind, wanted, may): (&str, &[&str], &[&str]) = match stated.kind {
+            Kind::Explicit => ("explicit", &["z", "x_mm", "y_mm"], &[]),
+            Kind::Parametric => ("parametric", &["x", "y", "z", "u", "v"], &["flip_normal"]),
+            Kind::Implicit => ("implicit", &["f", "x_mm", "y_mm", "z_mm"], &[]),
+            Kind::Mesh => ("mesh", &["mesh"], &["x_mm", "y_mm", "unit_mm", "flip_normal"]),
+        };
+        let given = [
+            ("x", stated.x.is_some()),
+            ("y", stated.y.is_some()),
+            ("z", stated.z.is_some()),
+            ("f", stated.f.is_some()),
+            ("mesh", stated.mesh.is_some()),
+            ("x_mm", stated.x_mm.is_some()),
+            ("y_mm", stated.y_mm.is_some()),
+            ("z_mm", stated.z_mm.is_some()),
+            ("u", stated.u.is_some()),
+            ("v", stated.v.is_some()),
+            ("unit_mm", stated.unit_mm.is_some()),
+            ("flip_normal", stated.flip_normal.is_some()),
+        ];
+        for (key, is_given) in given {
+            let full = format!("surface.{key}");
+            let list = format!("the keys {} with kind = \"{kind}\"", [wanted, may].concat().join(", "));
+            if is_given && !wanted.contains(&key) && !may.contains(&key) {
+                return Err(self.value(
+                    &full,
+                    "a key without a meaning",
+                    list,
+                    "remove it, or change the kind",
+                ));
+            }
+            if !is_given && wanted.contains(&key) {
+                return Err(self.value(&full, "nothing", list, "state it"));
+            }
+        }
+        let text = |text: &Option<String>| text.clone().unwrap_or_default();
+        let range = |range: Option<[f64; 2]>| range.unwrap_or([f64::NAN; 2]);
+        let flipped = stated.flip_normal.unwrap_or(false);
+        let over_xy = Domain { first: range(stated.x_mm), second: range(stated.y_mm) };
+        let made = match stated.kind {
+            Kind::Explicit => Explicit::new(&text(&stated.z), over_xy).map(Surface::Explicit),
+            Kind::Implicit => {
+                Implicit::new(&text(&stated.f), over_xy, range(stated.z_mm)).map(Surface::Implicit)
+            }
+            Kind::Parametric => {
+                let [x, y, z] = [text(&stated.x), text(&stated.y), text(&stated.z)];
+                let domain = Domain { first: range(stated.u), second: range(stated.v) };
+                Parametric::new([&x, &y, &z], domain, flipped).map(Surface::Parametric)
+            }
+            Kind::Mesh => return self.mesh(stated, &text(&stated.mesh), flipped, resolve),
+        };
+        made.map_err(|error| {
+            let key = match &error {
+                SurfaceError::Expression(ExpressionError { text, .. }) => {
+                    let texts = [("x", &stated.x), ("y", &stated.y), ("z", &stated.z), ("f", &stated.f)];
+                    let holds = |given: &Option<String>| given.as_ref() == Some(text);
+                    texts
+                        .iter()
+                        .find(|(_, given)| holds(given))
+                        .map_or("surface".to_owned(), |(key, _)| format!("surface.{key}"))
+                }
+                SurfaceError::Range { name, .. } if stated.kind == Kind::Parametric => {
+                    format!("surface.{name}")
+                }
+                SurfaceError::Range { name, .. } => format!("surface.{name}_mm"),
+                _ => "surface".to_owned(),
+            };
+            self.stated(&key, error)
+        })
+    }
+
+    fn mesh<E: Display>(
+        &self,
+        stated: &StatedSurface,
+        name: &str,
+        flipped: bool,
+        resolve: impl FnOnce(&str) -> Result<Vec<u8>, E>,
+    ) -> Result<Surface, SurfaceError> {
+        let domain = match (stated.x_mm, stated.y_mm) {
+            (Some(first), Some(second)) => Some(Domain { first, second }),
+            (None, None) => None,
+            (x, _) => {
+                let (given, missing) = if x.is_some() { ("x_mm", "y_mm") } else { ("y_mm", "x_mm") };
+                let key = format!("surface.{missing}");
+                let expected = format!("a range, as {given} is given");
+                return Err(self.value(
+                    &key,
+                    "nothing",
+                    expected,
+                    "state both ranges, or neither for all of the mesh",
+                ));
+            }
+        };
+        let unit_mm = self.positive(
+            "surface.unit_mm",
+            stated.unit_mm.unwrap_or(1.0),
+            "the length of the file's unit in mm, above 0, up to 1,000,000",
+        )?;
+        let bytes = resolve(name).map_err(|error| {
+            let found = format!("`{name}`, which cannot be read ({error})");
+            self.value(
+                "surface.mesh",
+                found,
+                "an STL file beside this file",
+                "correct the name or put the file there",
+            )
+        })?;
+        Mesh::from_stl(&bytes, &MeshOptions { unit_mm, flipped, domain }).map(Surface::Mesh).map_err(
+            |error| {
+                let key = match &error {
+                    SurfaceError::Range { name, .. } => format!("surface.{name}_mm"),
+                    _ => "surface.mesh".to_owned(),
+                };
+                self.stated(&key, error)
+            },
+        )
+    }
+
+    fn work_object(&self, stated: StatedWorkObject) -> Result<WorkObject, SurfaceError> {
+        self.name("work_object.name", &stated.name)?;
+        let frame = self.frame("work_object", stated.position_mm, stated.quaternion, stated.rpy_deg)?;
+        Ok(WorkObject { name: stated.name, base_from_work_object: frame, origin: stated.origin })
+    }
+
+    fn tool(&self, stated: StatedTool) -> Result<Tool, SurfaceError> {
+        self.name("tool.name", &stated.name)?;
+        let frame = self.frame("tool", stated.position_mm, stated.quaternion, stated.rpy_deg)?;
+        let mass_kg =
+            self.positive("tool.mass_kg", stated.mass_kg, "a mass above 0 in kg, up to 1,000,000")?;
+        if !stated.cog_mm.iter().all(|c| c.abs() <= FARTHEST_MM) {
+            let found = format!("{:?}", stated.cog_mm);
+            return Err(self.value(
+                "tool.cog_mm",
+                found,
+                "three finite numbers in mm, within ±1,000,000",
+                "correct the number",
+            ));
+        }
+        let radius_mm = stated
+            .radius_mm
+            .map(|radius| self.positive("tool.radius_mm", radius, "a radius above 0 in mm, up to 1,000,000"))
+            .transpose()?;
+        Ok(Tool {
+            name: stated.name,
+            flange_from_tool: frame,
+            mass_kg,
+            cog_mm: Vector3::from(stated.cog_mm),
+            radius_mm,
+            origin: stated.origin,
+        })
+    }
+
+    fn frame(
+        &self,
+        table: &str,
+        position_mm: [f64; 3],
+        quaternion: Option<[f64; 4]>,
+        rpy_deg: Option<[f64; 3]>,
+    ) -> Result<Pose, SurfaceError> {
+        let key = |key: &str| format!("{table}.{key}");
+        let position = Vector3::from(position_mm);
+        let away = position.norm();
+        if !(away <= FARTHEST_MM) || (away > 0.0 && away < NEAREST_MM) {
+            let found = format!("{position_mm:?}");
+            let remedy = "state millimetres; if these are metres, multiply them by 1000";
+            return Err(self.value(&key("position_mm"), found, "a position in mm", remedy));
+        }
+        let rotation = match (quaternion, rpy_deg) {
+            (Some(_), Some(_)) => {
+                let (found, expected) = ("a rotation beside quaternion", "either quaternion or rpy_deg");
+                return Err(self.value(&key("rpy_deg"), found, expected, "remove one of the two"));
+            }
+            (Some([w, x, y, z]), None) => {
+                let stated = Quaternion::new(w, x, y, z);
+                if stated.norm().is_nan() || (stated.norm() - 1.0).abs() > 1e-3 {
+                    let found = format!("[{w}, {x}, {y}, {z}] of length {}", stated.norm());
+                    let expected = "w, x, y, z of length 1";
+                    return Err(self.value(
+                        &key("quaternion"),
+                        found,
+                        expected,
+                        "correct it, or state rpy_deg",
+                    ));
+                }
+                UnitQuaternion::from_quaternion(stated)
+            }
+            (None, Some(rpy)) => {
+                if !rpy.iter().all(|a| a.abs() <= 360.0) {
+                    let (found, expected) = (format!("{rpy:?}"), "roll, pitch and yaw within 360 degrees");
+                    return Err(self.value(&key("rpy_deg"), found, expected, "correct the angles"));
+                }
+                let [roll, pitch, yaw] = rpy.map(f64::to_radians);
+                UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+            }
+            (None, None) => UnitQuaternion::identity(),
+        };
+        Ok(Pose::from_parts(Translation3::from(position), rotation))
+    }
+
+    fn path(
+        &self,
+        stated: &StatedPath,
+        surface: &StatedSurface,
+        tool: &Tool,
+    ) -> Result<PathOptions, SurfaceError> {
+        let names = if surface.kind == Kind::Parametric { ["u", "v"] } else { ["x", "y"] };
+        let only_raster = |key: &str, given: bool| {
+            if !given || stated.pattern == Pattern::Raster {
+                return Ok(());
+            }
+            let full = format!("path.{key}");
+            Err(self.value(
+                &full,
+                "a key without a meaning",
+                "it with pattern = \"raster\" alone",
+                "remove it",
+            ))
+        };
+        only_raster("along", stated.along.is_some())?;
+        only_raster("traverse", stated.traverse.is_some())?;
+        let along = match stated.along.as_deref() {
+            None => Along::First,
+            Some(name) if name == names[0] => Along::First,
+            Some(name) if name == names[1] => Along::Second,
+            Some(name) => {
+                let expected = format!("`{}` or `{}`", names[0], names[1]);
+                let remedy = "choose the coordinate along which the passes run";
+                return Err(self.value("path.along", format!("`{name}`"), expected, remedy));
+            }
+        };
+        let spacing = match (stated.step_over_mm, stated.scallop_mm, tool.radius_mm) {
+            (Some(step), None, Some(radius)) if step > 2.0 * radius => {
+                let expected = format!("at most {} mm, twice tool.radius_mm", 2.0 * radius);
+                let remedy = "make it smaller: the passes would leave strips between them";
+                return Err(self.value("path.step_over_mm", step.to_string(), expected, remedy));
+            }
+            (Some(step_over_mm), None, _) => Spacing::StepOver { step_over_mm },
+            (None, Some(scallop_mm), Some(tool_radius_mm)) => Spacing::Scallop { scallop_mm, tool_radius_mm },
+            (None, Some(_), None) => {
+                let expected = "the radius where the tool touches, as path.scallop_mm is given";
+                return Err(self.value(
+                    "tool.radius_mm",
+                    "nothing",
+                    expected,
+                    "state it, or give path.step_over_mm",
+                ));
+            }
+            (given, _, _) => {
+                let found = if given.is_some() { "scallop_mm beside it" } else { "nothing" };
+                let expected = "either step_over_mm or scallop_mm";
+                return Err(self.value("path.step_over_mm", found, expected, "state one of the two"));
+            }
+        };
+        let tool_x = match (stated.tool_x, stated.tool_x_direction) {
+            (Some(StatedToolX::Feed), Some(_)) => {
+                let expected = "no direction with tool_x = \"feed\"";
+                return Err(self.value(
+                    "path.tool_x_direction",
+                    "a direction",
+                    expected,
+                    "remove one of the two",
+                ));
+            }
+            (Some(StatedToolX::Feed), None) => ToolX::Feed,
+            (_, direction) => ToolX::Fixed(Vector3::from(direction.unwrap_or([1.0, 0.0, 0.0]))),
+        };
+        let default = PathOptions::default();
+        let options = PathOptions {
+            pattern: stated.pattern,
+            along,
+            traverse: stated.traverse.unwrap_or_default(),
+            spacing,
+            max_step_mm: stated.max_step_mm.unwrap_or(default.max_step_mm),
+            chord_mm: stated.chord_mm.unwrap_or(default.chord_mm),
+            lead_rad: stated.lead_deg.unwrap_or(0.0).to_radians(),
+            tilt_rad: stated.tilt_deg.unwrap_or(0.0).to_radians(),
+            tool_x,
+            approach_mm: stated.approach_mm.unwrap_or(default.approach_mm),
+        };
+        match options.check() {
+            Ok(()) => Ok(options),
+            Err(SurfaceError::Option { option, found, expected }) => {
+                Err(self.value(&format!("path.{option}"), found.to_string(), expected, "correct the number"))
+            }
+            Err(error) => Err(self.stated("path", error)),
+        }
+    }
+}
+
+fn toml_error(file: &str, text: &str, at: usize, message: &str) -> SurfaceError {
+    let before = &text[..text.floor_char_boundary(at)];
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    SurfaceError::Toml {
+        file: file.to_owned(),
+        line,
+        column,
+        message: message.trim_end().replace('\n', ", "),
+    }
+}

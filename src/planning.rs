@@ -1,4 +1,0 @@
-//! From intentions to motions: surfaces to programs, and what to measure.
-
-pub mod toolpath;
-pub mod poses;
