@@ -4,10 +4,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[path = "../tests/it/diagnosis/simulator.rs"]
+#[path = "../crates/calibration/tests/it/diagnosis/simulator.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod simulator;
-#[path = "../tests/it/diagnosis/scenarios.rs"]
+#[path = "../crates/calibration/tests/it/diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod scenarios;
 

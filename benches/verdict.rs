@@ -7,7 +7,7 @@
 // A benchmark says what it measured.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
-#[path = "../tests/it/identification/promise.rs"]
+#[path = "../crates/calibration/tests/it/identification/promise.rs"]
 mod promise;
 
 use std::collections::BTreeMap;

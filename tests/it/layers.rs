@@ -1,98 +1,37 @@
-//! Dependence points down: no module names one that stands above it in ARCHITECTURE.md.
+//! Dependence points down: between crates as ARCHITECTURE.md has it, and between the files of a crate without circles.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What each room may use, itself apart.
-fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
-    let all_below_six = vec![
-        "math",
-        "kinematics",
-        "program",
-        "surface",
-        "robots",
-        "measurement",
-        "estimation",
-        "identification",
-        "diagnosis",
-        "compensation",
-        "planning",
-        "comparison",
-    ];
-    BTreeMap::from([
-        ("math", vec![]),
-        ("kinematics", vec!["math"]),
-        ("program", vec!["math"]),
-        ("surface", vec!["math"]),
-        ("robots", vec!["math", "kinematics"]),
-        ("measurement", vec!["math", "kinematics"]),
-        ("estimation", vec!["math"]),
-        ("identification", vec!["math", "kinematics", "measurement", "estimation"]),
-        ("diagnosis", vec!["math", "kinematics", "measurement", "estimation", "identification"]),
-        ("compensation", vec!["math", "kinematics", "program", "surface"]),
-        (
-            "planning",
-            vec!["math", "kinematics", "measurement", "estimation", "identification", "program", "surface"],
-        ),
-        (
-            "comparison",
-            vec![
-                "math",
-                "kinematics",
-                "program",
-                "surface",
-                "measurement",
-                "estimation",
-                "identification",
-                "compensation",
-                "planning",
-            ],
-        ),
-        ("report", all_below_six.clone()),
-        ("visual", all_below_six),
-    ])
-}
+/// What each crate may use of ours.
+const USES: [(&str, &str); 13] = [
+    ("math", ""),
+    ("arm", "math"),
+    ("programs", "math"),
+    ("surfaces", "math"),
+    ("estimation", "math"),
+    ("calibration", "arm estimation math"),
+    ("compensation", "arm math programs surfaces"),
+    ("planning", "arm calibration compensation estimation math programs surfaces"),
+    ("report", "arm calibration compensation math planning programs"),
+    ("papers", "arm calibration compensation estimation math planning programs report surfaces"),
+    ("pictures", "arm calibration compensation math surfaces"),
+    ("testing", ""),
+    ("measured", "arm calibration math"),
+];
 
-/// The rooms that a source text names through `crate::`, `truegrind::`, or `super::` paths that leave its own room.
-/// `depth` is the number of modules between the crate and this file's own (1 for `src/math.rs`).
-fn named(text: &str, depth: usize) -> Vec<(usize, String)> {
-    let mut out = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let code = line.split("//").next().unwrap_or_default();
-        for root in ["crate::", "truegrind::"] {
-            for (at, _) in code.match_indices(root) {
-                if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
-                    continue;
-                }
-                let rest = &code[at + root.len()..];
-                if let Some(group) = rest.strip_prefix('{') {
-                    let group = group.split('}').next().unwrap_or_default();
-                    out.extend(group.split(',').map(|item| (number + 1, first(item.trim()))));
-                } else {
-                    out.push((number + 1, first(rest)));
-                }
-            }
-        }
-        // super:: as often as the file is deep leads out of the room.
-        let climb = "super::".repeat(depth);
-        for (at, _) in code.match_indices(&climb) {
-            if !code[..at].ends_with("super::") {
-                out.push((number + 1, first(&code[at + climb.len()..])));
-            }
-        }
-    }
-    out.retain(|(_, name)| !name.is_empty());
-    out
-}
+/// Crates that are only for tests.
+const FOR_TESTS: [&str; 2] = ["testing", "measured"];
 
-fn first(path: &str) -> String {
-    path.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
 }
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
         if path.is_dir() {
             sources(&path, out);
         } else if path.extension().is_some_and(|e| e == "rs") {
@@ -101,86 +40,196 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Upward uses in one file: `relative` is its path below `src`.
-fn violations(relative: &Path, text: &str) -> Vec<String> {
-    let parts: Vec<String> =
-        relative.with_extension("").iter().map(|p| p.to_string_lossy().into_owned()).collect();
-    let allowed = allowed();
-    let Some(may) = allowed.get(parts[0].as_str()) else { return Vec::new() };
-    named(text, parts.len())
+/// The sources below `folder`, by their path from there, comments taken out.
+fn code(folder: &Path) -> BTreeMap<String, String> {
+    let mut files = Vec::new();
+    sources(folder, &mut files);
+    let strip = |text: String| text.lines().map(without_comment).collect::<Vec<_>>().join("\n");
+    files
         .into_iter()
-        .filter(|(_, used)| allowed.contains_key(used.as_str()))
-        .filter(|(_, used)| *used != parts[0] && !may.contains(&used.as_str()))
-        .map(|(line, used)| format!("{}:{line}: {} uses {used}", relative.display(), parts[0]))
+        .map(|file| {
+            let name = file.strip_prefix(folder).unwrap().to_string_lossy().replace('\\', "/");
+            (name, strip(fs::read_to_string(&file).unwrap()))
+        })
         .collect()
 }
 
-#[test]
-fn dependence_points_down() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
-    assert!(files.len() > 50, "the sources are read");
-    let found: Vec<String> = files
-        .iter()
-        .flat_map(|f| violations(f.strip_prefix(&root).unwrap(), &fs::read_to_string(f).unwrap()))
-        .collect();
-    assert!(found.is_empty(), "upward uses:\n{}", found.join("\n"));
+fn without_comment(line: &str) -> &str {
+    line.split("//").next().unwrap_or_default()
 }
 
 #[test]
-fn every_room_is_in_the_list() {
-    let lib = include_str!("../../src/lib.rs");
-    let rooms: Vec<&str> =
-        lib.lines().filter_map(|l| l.strip_prefix("pub mod ")).map(|l| l.trim_end_matches(';')).collect();
-    assert!(rooms.len() >= 11);
-    for room in rooms {
-        assert!(allowed().contains_key(room), "{room} has no place in the order");
+fn crates_use_only_what_stands_below_them() {
+    let folder = root().join("crates");
+    let mut seen = BTreeSet::new();
+    for (name, uses) in USES {
+        let manifest = fs::read_to_string(folder.join(name).join("Cargo.toml")).unwrap();
+        let table: toml::Table = manifest.parse().unwrap();
+        let used: BTreeSet<&str> = table["dependencies"]
+            .as_table()
+            .unwrap()
+            .keys()
+            .filter_map(|key| key.strip_prefix("truegrind-"))
+            .collect();
+        assert_eq!(used, uses.split_whitespace().collect(), "{name}");
+        assert!(table["package"].get("description").is_some_and(|text| text.as_str().is_some()), "{name}");
+        seen.insert(name.to_owned());
     }
+    let there: BTreeSet<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    assert_eq!(there, seen, "a crate has no place in the order");
 }
 
-#[test]
-fn a_fixture_that_points_upward_fails() {
-    let upward = "use crate::kinematics::model::Model;\nuse super::super::report::table;\n";
-    let found = violations(Path::new("estimation/filter.rs"), upward);
-    assert_eq!(found.len(), 2, "{found:?}");
-    let grouped = violations(Path::new("math.rs"), "use crate::{kinematics::link, report};\n");
-    assert_eq!(grouped.len(), 2, "{grouped:?}");
-    let down =
-        violations(Path::new("kinematics/model.rs"), "use crate::math::se3::Pose;\nuse super::link::Link;\n");
-    assert!(down.is_empty(), "{down:?}");
+/// The files of a crate that each file names: `modules` by their paths (`""` is `lib`).
+fn graph(modules: &BTreeMap<String, String>) -> BTreeMap<&str, BTreeSet<&str>> {
+    modules
+        .iter()
+        .map(|(name, text)| {
+            let named = paths(text, name)
+                .iter()
+                .filter_map(|path| {
+                    // The longest beginning that is a file.
+                    (0..=path.len()).rev().find_map(|n| modules.get_key_value(&path[..n].join("::")))
+                })
+                .map(|(other, _)| other.as_str())
+                .filter(|other| other != name)
+                .collect();
+            (name.as_str(), named)
+        })
+        .collect()
 }
 
-#[test]
-fn only_visual_names_rerun_and_only_cli_opens_files_or_prints() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
-    for file in files {
-        let relative = file.strip_prefix(&root).unwrap().to_owned();
-        let room = relative.iter().next().unwrap().to_string_lossy().trim_end_matches(".rs").to_owned();
-        let text = fs::read_to_string(&file).unwrap();
-        let code: String =
-            text.lines().map(|l| l.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
-        if room != "visual" {
-            assert!(!code.contains("rerun::"), "{} names rerun", relative.display());
+/// The paths from the crate's root that a text names by `crate::`, `super::` or `self::`, groups taken apart.
+fn paths(text: &str, module: &str) -> Vec<Vec<String>> {
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let own: Vec<String> = module.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect();
+    let mut out = Vec::new();
+    for start in ["crate::", "super::", "self::"] {
+        for (at, _) in text.match_indices(start) {
+            let before = &text[..at];
+            if before.ends_with(word) || before.ends_with(':') || before.ends_with('$') {
+                continue;
+            }
+            let mut base = match start {
+                "crate::" => Vec::new(),
+                "super::" => own[..own.len().saturating_sub(1)].to_vec(),
+                _ => own.clone(),
+            };
+            let mut rest = &text[at + start.len()..];
+            while let Some(shorter) = rest.strip_prefix("super::") {
+                base.pop();
+                rest = shorter;
+            }
+            branches(rest, &base, &mut out);
         }
-        if room != "cli" && room != "main" {
-            for word in ["std::fs", "File::open", "println!(", "eprintln!("] {
-                assert!(!code.contains(word), "{} has {word}", relative.display());
+    }
+    out
+}
+
+/// What a use tree stands for: `a::{b, c::d}` gives two paths.
+fn branches(tree: &str, base: &[String], out: &mut Vec<Vec<String>>) {
+    let mut path = base.to_vec();
+    let mut rest = tree.trim_start();
+    loop {
+        if let Some(inside) = rest.strip_prefix('{') {
+            let (mut depth, mut from) = (0, 0);
+            for (at, c) in inside.char_indices() {
+                match c {
+                    '{' => depth += 1,
+                    '}' if depth == 0 => return branches(&inside[from..at], &path, out),
+                    '}' => depth -= 1,
+                    ',' if depth == 0 => {
+                        branches(&inside[from..at], &path, out);
+                        from = at + 1;
+                    }
+                    _ => {}
+                }
+            }
+            return;
+        }
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        if end == 0 {
+            break;
+        }
+        path.push(rest[..end].to_owned());
+        match rest[end..].strip_prefix("::") {
+            Some(next) => rest = next,
+            None => break,
+        }
+    }
+    out.push(path);
+}
+
+/// Groups of files that reach each other, each with more than one.
+fn circles<'g>(graph: &BTreeMap<&'g str, BTreeSet<&'g str>>) -> Vec<BTreeSet<&'g str>> {
+    let reach = |from: &'g str| {
+        let mut seen = BTreeSet::new();
+        let mut open = vec![from];
+        while let Some(at) = open.pop() {
+            for next in graph.get(at).into_iter().flatten() {
+                if seen.insert(*next) {
+                    open.push(next);
+                }
             }
         }
+        seen
+    };
+    let all: BTreeMap<&str, BTreeSet<&str>> = graph.keys().map(|name| (*name, reach(name))).collect();
+    let mut out: Vec<BTreeSet<&str>> = Vec::new();
+    for (name, reached) in &all {
+        if reached.contains(name) && !out.iter().any(|circle| circle.contains(name)) {
+            out.push(reached.iter().filter(|other| all[**other].contains(name)).copied().collect());
+        }
     }
+    out
+}
+
+fn modules(folder: &Path) -> BTreeMap<String, String> {
+    let name = |file: &str| match file.trim_end_matches(".rs") {
+        "lib" | "main" => String::new(),
+        other => other.replace('/', "::"),
+    };
+    code(folder).into_iter().map(|(file, text)| (name(&file), text)).collect()
+}
+
+#[test]
+fn the_files_of_a_crate_form_no_circle() {
+    for (name, _) in USES {
+        let modules = modules(&root().join("crates").join(name).join("src"));
+        let found = circles(&graph(&modules));
+        assert!(found.is_empty(), "{name}: {found:#?}");
+    }
+    let found = modules(&root().join("src"));
+    let found = circles(&graph(&found)).into_iter().map(|c| format!("{c:?}")).collect::<Vec<_>>();
+    assert!(found.is_empty(), "the command line: {found:#?}");
+}
+
+#[test]
+fn a_circle_is_found_through_groups_and_climbing_paths() {
+    let of = |files: &[(&str, &str)]| {
+        files.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect::<BTreeMap<_, _>>()
+    };
+    let round = of(&[
+        ("", "mod a; mod b;"),
+        ("a", "use crate::{c::x, b::{self, y}};"),
+        ("b", "use super::b::inner;"),
+        ("b::inner", "use super::super::a::Thing;"),
+        ("c", ""),
+    ]);
+    let found = circles(&graph(&round));
+    assert_eq!(found, [BTreeSet::from(["a", "b", "b::inner"])]);
+    let down = of(&[("", ""), ("a", "use crate::b::f;"), ("b", "use self::inner::g;"), ("b::inner", "")]);
+    assert!(circles(&graph(&down)).is_empty());
 }
 
 /// Files are opened in one place and things are printed in one place: only there is an input known by itself, and only
-/// there is text of others made harmless.
+/// there is text of others made harmless. Libraries do neither, and only the pictures know Rerun.
 #[test]
 fn only_one_file_opens_files_and_only_one_prints() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
-    let reading = [
+    const OPENS: [&str; 9] = [
+        "std::fs",
         "fs::read(",
         "fs::read_to_string",
         "File::open",
@@ -190,17 +239,28 @@ fn only_one_file_opens_files_and_only_one_prints() {
         "fs::copy",
         "fs::rename",
     ];
-    let printing = ["println!(", "print!(", "io::stdout()", "io::stderr()"];
-    for file in &files {
-        let name = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
-        let text = fs::read_to_string(file).unwrap();
-        for (number, line) in text.lines().enumerate() {
-            let code = line.split("//").next().unwrap_or_default();
-            let opens = reading.iter().any(|word| code.contains(word)) && !name.starts_with("cli/files");
-            // The ledger asks where stdout goes, the spinner draws itself.
-            let prints = printing.iter().any(|word| code.contains(word))
-                && !["cli/outputs.rs", "cli/progress.rs", "cli/files/ledger.rs"].contains(&name.as_str());
-            assert!(!opens && !prints, "{name}:{}: {line}", number + 1);
+    const PRINTS: [&str; 6] =
+        ["println!(", "print!(", "eprintln!(", "eprint!(", "io::stdout()", "io::stderr()"];
+    let mut read = 0;
+    for (name, _) in USES.iter().filter(|(name, _)| !FOR_TESTS.contains(name)) {
+        for (file, text) in code(&root().join("crates").join(name).join("src")) {
+            read += 1;
+            for word in OPENS.iter().chain(&PRINTS) {
+                assert!(!text.contains(word), "crates/{name}/src/{file} has {word}");
+            }
+            assert!(*name == "pictures" || !text.contains("rerun::"), "crates/{name}/src/{file} names rerun");
         }
+    }
+    assert!(read > 50, "the sources are read");
+    for (file, text) in code(&root().join("src")) {
+        assert!(!text.contains("rerun::"), "src/{file} names rerun");
+        let opens = OPENS[1..].iter().find(|word| text.contains(**word));
+        assert!(opens.is_none() || file.starts_with("cli/files"), "src/{file} has {}", opens.unwrap());
+        // The ledger asks where stdout goes, the spinner draws itself.
+        let may = ["cli/outputs.rs", "cli/progress.rs", "cli/files/ledger.rs"].contains(&file.as_str());
+        let prints = ["println!(", "print!(", "io::stdout()", "io::stderr()"]
+            .iter()
+            .find(|word| text.contains(**word));
+        assert!(may || prints.is_none(), "src/{file} has {}", prints.unwrap());
     }
 }

@@ -170,3 +170,13 @@ impl Link {
         *place = value;
     }
 }
+
+/// Parameters of the arm: links, then effects.
+pub fn arm_parameters(model: &Model) -> Vec<Parameter> {
+    let mut out = link_parameters(model);
+    for (index, effect) in model.effects.iter().enumerate() {
+        let count = effect.parameters().len();
+        out.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
+    }
+    out
+}

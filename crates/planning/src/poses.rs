@@ -29,9 +29,9 @@ use self::rival::Question;
 use self::rows::{Noise, Told};
 use self::schedule::{Row, Visits};
 use truegrind_arm::model::Model;
-use truegrind_arm::parameter::Parameter;
+use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_calibration::identification::calibration::Frames;
-use truegrind_calibration::identification::fit::{arm_parameters, frame_parameters};
+use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 

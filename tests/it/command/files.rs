@@ -290,7 +290,7 @@ fn inputs() -> &'static Path {
         let put = |name: &str, text: &str| fs::write(at.join(name), text).unwrap();
         put("data.csv", CABLE);
         put("other.csv", CABLE);
-        let arms = include_str!("../../../src/robots/abb.toml");
+        let arms = include_str!("../../../crates/arm/src/robots/abb.toml");
         let second = arms.match_indices("[[robot]]").nth(1).map_or(arms.len(), |(at, _)| at);
         put("robot.toml", &arms[..second]);
         let recipe = include_str!("../../data/irb120-cable.toml");

@@ -15,7 +15,7 @@ use super::silence::not_testable;
 use super::validation::{StageError, Validation, nominal};
 use crate::identification::benefit::benefit;
 use crate::identification::calibration::Frames;
-use crate::identification::fit::{Fitted, arm_parameters, frame_parameters};
+use crate::identification::fit::{Fitted, frame_parameters};
 use crate::identification::identify::{
     arm_covariance, arm_of, mean_condition, parameter_table, sensor_name, with_region,
 };
@@ -28,6 +28,7 @@ use crate::measurement::sensor::disturbance::{Course, Disturbance};
 use crate::measurement::split;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
 use truegrind_arm::model::Model;
+use truegrind_arm::parameter::arm_parameters;
 use truegrind_arm::region::Region;
 use truegrind_estimation::problem::Problem;
 

@@ -21,7 +21,7 @@ use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
-use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
 use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::statistics::{ErrorSummary, median};
@@ -38,16 +38,6 @@ pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
             }
         }
         Sensor::Position | Sensor::Pose => out.extend((0..6).map(Parameter::Base)),
-    }
-    out
-}
-
-/// Parameters of the arm: links, then effects.
-pub fn arm_parameters(model: &Model) -> Vec<Parameter> {
-    let mut out = link_parameters(model);
-    for (index, effect) in model.effects.iter().enumerate() {
-        let count = effect.parameters().len();
-        out.extend((0..count).map(|parameter| Parameter::Effect { index, parameter }));
     }
     out
 }

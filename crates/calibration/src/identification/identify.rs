@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::identification::benefit::{Benefit, benefit, lack};
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{
-    Fitted, Observed, Outliers, Start, arm_parameters, errors_on, fit, frame_parameters, outliers, summary_on,
+    Fitted, Observed, Outliers, Start, errors_on, fit, frame_parameters, outliers, summary_on,
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{
@@ -22,7 +22,7 @@ use crate::measurement::split::{self, Split};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
 use truegrind_arm::model::{Joints, Model};
-use truegrind_arm::parameter::{Parameter, link_parameters};
+use truegrind_arm::parameter::{Parameter, arm_parameters, link_parameters};
 use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;

@@ -7,12 +7,11 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::identification::fit::arm_parameters;
 use crate::identification::network::{network_parameters, with_network};
 use crate::identification::tolerance::{SMOOTH_SIGMA_RAD, Tolerance};
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::model::Model;
-use truegrind_arm::parameter::Parameter;
+use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::filter::{ekf, pf, rls, ukf, ukf_vslm};
 use truegrind_estimation::least_squares::{gauss_newton, lm, ltlm, sslm, vslm};

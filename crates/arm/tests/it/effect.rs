@@ -1,0 +1,202 @@
+//! Tests of the effects: slopes, torques, and that each does what its name says.
+
+use nalgebra::{Matrix6, Vector3};
+use truegrind_arm::chain::tables;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::thermal::Thermal;
+use truegrind_arm::effect::{Effect, Statics};
+use truegrind_arm::model::{Joints, Model};
+use truegrind_math::difference::jacobian;
+use truegrind_math::lanes::{Lanes, WIDTH};
+
+use super::arms::{SHEETS, Sheet, generator, joints_within, perturbed, with_effects};
+
+fn condition() -> Condition {
+    Condition { payload_kg: Some(5.0), payload_centre_mm: [5.0, -30.0, 80.0], ..Condition::default() }
+}
+
+fn heavy(sheet: &Sheet, seed: u64) -> Model {
+    let mut random = generator(seed);
+    let mut model = with_effects(&perturbed(&sheet.model(), &mut random, 1.0, 0.5), &mut random);
+    model.gravity = Vector3::new(0.5, 0.1, -0.8).normalize();
+    model
+}
+
+fn assert_near(a: &Matrix6<f64>, b: &Matrix6<f64>, tolerance: f64, what: &str) {
+    assert!((a - b).amax() <= tolerance, "{what}: {a} against {b}");
+}
+
+#[test]
+fn torque_is_the_negative_gradient_of_the_potential_energy() {
+    for sheet in SHEETS {
+        let model = heavy(sheet, 41);
+        let statics = Statics::of(&model);
+        let condition = condition();
+        let bodies = model.bodies.unwrap();
+        // Height of every mass against gravity, summed up from the link poses: nothing of the torque's own code.
+        let energy = |u: &[f64]| {
+            let g = model.gravity * 9.806_65e-3;
+            let mut pose = truegrind_math::se3::Pose::identity();
+            let mut out = 0.0;
+            for (k, link) in model.links.iter().enumerate() {
+                pose *= link.pose(u[k]);
+                let centre = |c: [f64; 3]| (pose * nalgebra::Point3::from(Vector3::from(c))).coords;
+                out -= bodies[k].mass_kg * g.dot(&centre(bodies[k].centre_mm));
+                if k == 5 {
+                    out -= condition.payload_kg.unwrap() * g.dot(&centre(condition.payload_centre_mm));
+                }
+            }
+            out
+        };
+        let mut random = generator(42);
+        for _ in 0..5 {
+            let u = joints_within(&model, &mut random);
+            let (torque, slope) = statics.torques(&u, &condition);
+            let gradient = jacobian(|x, out| out[0] = energy(x), u.as_slice(), 1, &[2e-3; 6]);
+            for j in 0..6 {
+                assert!((torque[j] + gradient[(0, j)]).abs() < 1e-7, "{}: joint {j}", sheet.name);
+            }
+            let twin = jacobian(
+                |x, out| {
+                    out.copy_from_slice(
+                        statics.torques(&Joints::from_column_slice(x), &condition).0.as_slice(),
+                    );
+                },
+                u.as_slice(),
+                6,
+                &[1e-3; 6],
+            );
+            let twin = Matrix6::from_column_slice(twin.as_slice());
+            assert_near(&slope, &twin, 1e-8 * (1.0 + twin.amax()), sheet.name);
+            assert!((slope - slope.transpose()).amax() < 1e-12 * (1.0 + slope.amax()));
+        }
+    }
+}
+
+#[test]
+fn every_slope_has_a_numerical_twin() {
+    let model = heavy(&SHEETS[0], 43);
+    let statics = Statics::of(&model);
+    let condition = condition();
+    let mut random = generator(44);
+    for _ in 0..10 {
+        let u = joints_within(&model, &mut random);
+        for effect in &model.effects {
+            let twin = jacobian(
+                |x, out| {
+                    let there = Joints::from_column_slice(x);
+                    out.copy_from_slice(effect.rotation(&statics, &there, &condition).as_slice());
+                },
+                u.as_slice(),
+                6,
+                &[2e-4; 6],
+            );
+            let twin = Matrix6::from_column_slice(twin.as_slice());
+            assert_near(&effect.slope(&statics, &u, &condition), &twin, 1e-9, effect.name());
+        }
+    }
+}
+
+#[test]
+fn rotation_slopes_count_couplings_and_effects() {
+    let model = heavy(SHEETS.iter().find(|s| s.name == "fanuc-m-20ia").unwrap(), 45);
+    let posed = model.under(&condition());
+    let mut random = generator(46);
+    for _ in 0..10 {
+        let q = joints_within(&model, &mut random);
+        let twin = jacobian(
+            |x, out| out.copy_from_slice(posed.rotations(&Joints::from_column_slice(x)).as_slice()),
+            q.as_slice(),
+            6,
+            &[2e-4; 6],
+        );
+        assert_near(&posed.rotation_slopes(&q), &Matrix6::from_column_slice(twin.as_slice()), 1e-8, "slopes");
+    }
+}
+
+#[test]
+fn an_effect_is_the_sum_of_its_regressors() {
+    let model = heavy(&SHEETS[3], 47);
+    let statics = Statics::of(&model);
+    let condition = Condition { approach: [1, 0, -1, 0, 0, 1], ..condition() };
+    let mut effects = model.effects.clone();
+    effects.push(Effect::Backlash(Backlash { joint: 2, play_rad: 1e-3 }));
+    let mut random = generator(48);
+    let u = joints_within(&model, &mut random);
+    let torque = statics.loads::<f64>(&u.into(), &condition);
+    for effect in &effects {
+        let parameters = effect.parameters();
+        let sum: Joints = effect
+            .regressors(&statics, &u, &condition)
+            .iter()
+            .zip(&parameters)
+            .map(|(regressor, parameter)| regressor * parameter.value)
+            .sum();
+        let rotation = effect.rotation(&statics, &u, &condition);
+        assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
+        let mut turned = [0.0; 6];
+        effect.turn(&statics, &u.into(), &torque, &condition, &mut turned);
+        assert!((rotation - Joints::from(turned)).amax() < 1e-15, "{}", effect.name());
+        assert!(effect.joint().is_none_or(|joint| (0..6).all(|j| j == joint || rotation[j] == 0.0)));
+    }
+}
+
+#[test]
+fn effects_in_lanes_get_the_bits_of_one_row_alone() {
+    let model = heavy(&SHEETS[0], 49);
+    let posed = model.under(&condition());
+    let mut random = generator(50);
+    let rows: [Joints; WIDTH] = std::array::from_fn(|_| joints_within(&model, &mut random));
+    let eight = posed.affected(&std::array::from_fn(|j| Lanes(std::array::from_fn(|k| rows[k][j]))));
+    for (k, row) in rows.iter().enumerate() {
+        let one = posed.affected::<f64>(&(*row).into());
+        assert_eq!(eight.map(|v| v.0[k].to_bits()), one.map(f64::to_bits));
+    }
+}
+
+#[test]
+fn an_effect_whose_circumstance_is_unknown_stands_still() {
+    let nominal = SHEETS[0].model();
+    let mut warm = nominal.clone();
+    warm.effects.push(Effect::ThermalDrift(Thermal {
+        growth: 1e-3,
+        time_constant_h: 1.0,
+        growth_per_k: 1e-4,
+        reference_c: 20.0,
+    }));
+    warm.effects.push(Effect::Backlash(Backlash { joint: 0, play_rad: 1e-3 }));
+    let q = Joints::from([0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
+    let unknown = Condition::default();
+    assert_eq!(warm.forward(&q, &unknown), nominal.forward(&q, &unknown));
+}
+
+#[test]
+fn a_warm_arm_is_the_cold_arm_with_longer_links() {
+    let nominal = SHEETS[0].model();
+    let mut warm = nominal.clone();
+    warm.effects.push(Effect::ThermalDrift(Thermal {
+        growth: 1e-3,
+        time_constant_h: 2.0,
+        growth_per_k: 1e-5,
+        reference_c: 20.0,
+    }));
+    let condition = Condition { time_h: Some(2.0), temperature_c: Some(30.0), ..Condition::default() };
+    let growth = 1e-3 * (1.0 - (-1.0_f64).exp()) + 1e-4;
+    let q = Joints::from([0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
+    let (cold, warm) = (nominal.forward(&q, &condition), warm.forward(&q, &condition));
+    // All lengths grow alike, so the whole arm does.
+    assert!((warm.translation.vector - cold.translation.vector * (1.0 + growth)).norm() < 1e-10);
+    assert!(cold.rotation.angle_to(&warm.rotation) < 1e-7);
+    assert_eq!(tables(&nominal.links).len(), 6);
+}
+
+#[test]
+fn play_is_felt_between_the_two_sides() {
+    let mut model = SHEETS[0].model();
+    model.effects.push(Effect::Backlash(Backlash { joint: 1, play_rad: 2e-3 }));
+    let from = |side: i8| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
+    let q = Joints::zeros();
+    let (above, below) = (model.under(&from(1)).rotations(&q), model.under(&from(-1)).rotations(&q));
+    assert!(((above - below)[1] - 2e-3).abs() < 1e-18);
+}

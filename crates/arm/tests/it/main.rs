@@ -1,0 +1,16 @@
+//! Tests of `kinematics`, and of the mathematics below it.
+
+// A test that cannot go on panics.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod arms;
+mod robots;
+mod files;
+mod batch;
+mod effect;
+mod forward;
+mod inverse;
+mod inverse_path;
+mod jacobian;
+mod lanes;
+mod se3;

@@ -1,0 +1,10 @@
+//! Tests of `diagnosis`: hidden effects are found by name, and nothing is found where nothing is hidden.
+
+#[path = "diagnosis/simulator.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod simulator;
+#[path = "diagnosis/scenarios.rs"]
+#[allow(dead_code, unreachable_pub)]
+pub(crate) mod scenarios;
+mod found;
+mod parts;

@@ -1,0 +1,5 @@
+//! Tests of `identification`.
+
+mod calibration;
+mod promise;
+mod verdict;

@@ -1,0 +1,8 @@
+//! Tests of the calibration, room by room.
+
+// A test that cannot go on panics.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+mod measurement;
+mod identification;
+mod diagnosis;
+mod tracking;

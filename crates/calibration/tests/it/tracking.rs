@@ -1,0 +1,398 @@
+//! A simulated arm that is watched: what moves is named, and a stop changes nothing.
+
+use std::sync::OnceLock;
+
+use truegrind_arm::estimated::Estimated;
+use truegrind_calibration::identification::identify::{self, identify};
+use truegrind_calibration::identification::solver::SOLVERS;
+use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading};
+use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Recipe};
+use truegrind_calibration::measurement::{import, split};
+use truegrind_calibration::tracking::locate::{Form, locate};
+use truegrind_calibration::tracking::{Course, Options, State, TrackError, Tracker, first_poses};
+
+/// A tracker on an arm without effects, so that links are the whole truth.
+const RECIPE: &str = r#"
+robot = "abb-irb-120"
+seed = 9
+[arm.random]
+seed = 4
+a_mm = 0.25
+d_mm = 0.25
+alpha_deg = 0.03
+beta_deg = 0.03
+theta_deg = 0.10
+[poses]
+kind = "random"
+count = 120
+min_deg = [-110.0, -60.0, -80.0, -150.0, -110.0, -180.0]
+max_deg = [110.0, 100.0, 60.0, 150.0, 110.0, 180.0]
+[view]
+box_mm = [[100.0, -550.0, 60.0], [650.0, 550.0, 900.0]]
+[sensor]
+kind = "position"
+frame = { position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }
+reflector_mm = [38.2, 12.6, 61.3]
+[noise]
+sigma_mm = 0.015
+"#;
+
+fn nominal(name: &str) -> Result<truegrind_arm::model::Model, String> {
+    truegrind_arm::robots::load(name).map(|robot| robot.model).map_err(|error| error.to_string())
+}
+
+fn measured(seed: u64, moved: Option<LinkDeviation>) -> Dataset {
+    let mut recipe = Recipe::parse(RECIPE, "track.toml").unwrap();
+    recipe.seed = seed;
+    recipe.arm.link.extend(moved);
+    let simulation = recipe.simulate(nominal).unwrap();
+    import::read("day.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap()
+}
+
+fn model() -> &'static Estimated {
+    static MODEL: OnceLock<Estimated> = OnceLock::new();
+    MODEL.get_or_init(|| {
+        let dataset = measured(1, None);
+        let robot = nominal("abb-irb-120").unwrap();
+        let frames = starts(&dataset, &robot).unwrap().remove(0);
+        let division = |d: &Dataset| split::random(d, 0.2, 0);
+        identify(&dataset, "abb-irb-120", &robot, &frames, &division, &settings()).unwrap().estimated
+    })
+}
+
+fn settings() -> identify::Options {
+    identify::Options {
+        tolerance: Tolerance::default(),
+        solver: &SOLVERS[0],
+        held_out: 0.2,
+        seed: 0,
+        sharpen: false,
+        limit_rmse_mm: None,
+        limit_max_mm: None,
+        stated_frames: None,
+    }
+}
+
+/// `before` rows of the arm as it was identified, then of the arm after a jump.
+fn with_jump(before: usize, moved: LinkDeviation) -> Dataset {
+    let (old, new) = (measured(2, None), measured(2, Some(moved)));
+    let mut out = old.clone();
+    for i in before..out.rows.len() {
+        out.rows[i] = new.rows[i].clone();
+    }
+    out
+}
+
+fn zero_of_joint_3() -> LinkDeviation {
+    LinkDeviation { joint: 2, theta_deg: 0.05, ..LinkDeviation::default() }
+}
+
+#[test]
+fn a_joint_that_lost_its_zero_is_named_with_its_size_and_its_pose() {
+    let dataset = with_jump(70, zero_of_joint_3());
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    assert_eq!(alarms.len(), 1, "{alarms:?}");
+    let alarm = &alarms[0];
+    assert!(
+        alarm.parameter == "link3.theta" || alarm.alternatives.contains(&"link3.theta".to_owned()),
+        "{alarm}"
+    );
+    assert!(alarm.since_row.abs_diff(70) <= 2, "{alarm}");
+    assert!(alarm.noticed_row <= 80, "{alarm}");
+    assert!((alarm.shift.to_degrees() - 0.05).abs() < 0.01, "{alarm}");
+    assert!(alarm.course != Course::Drift, "{alarm}");
+    // The model has followed, and says what happened.
+    let after = tracker.model();
+    let theta = |m: &Estimated| m.model.links[2].theta_rad;
+    assert!(((theta(&after) - theta(model())).to_degrees() - 0.05).abs() < 0.01);
+    assert!(after.verdict.reasons.iter().any(|r| r == &alarm.to_string()));
+    let again = Estimated::from_toml(&after.to_toml().unwrap()).unwrap();
+    assert_eq!(again.model.links[2].theta_rad.to_degrees(), after.model.links[2].theta_rad.to_degrees());
+}
+
+#[test]
+fn a_sensor_that_was_knocked_is_named_as_a_whole() {
+    let mut dataset = measured(2, None);
+    let shift = nalgebra::Vector3::new(0.3, -0.25, 0.1);
+    for row in dataset.rows.iter_mut().skip(70) {
+        let Reading::Position(p) = &mut row.reading else { panic!("a position") };
+        *p += shift;
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    assert_eq!(alarms.len(), 1, "{alarms:#?}");
+    let alarm = &alarms[0];
+    assert_eq!(alarm.parameter, "the sensor against the arm's base", "{alarm}");
+    assert!(alarm.since_row.abs_diff(70) <= 1 && alarm.parts.len() == 6, "{alarm:#?}");
+    assert!((alarm.shift - shift.norm()).abs() < 0.03, "{alarm}");
+    assert!(alarm.to_string().contains("base."), "{alarm}");
+    // The arm's own parameters are what they would be without the knock: joints 2 to 5, since no sensor tells the first
+    // from its frame, and the last from the touched point.
+    let calm = measured(2, None);
+    let mut undisturbed = Tracker::begin(model(), "hash", &calm, &Options::default()).unwrap();
+    undisturbed.take(&calm).unwrap();
+    let (after, calm) = (tracker.model(), undisturbed.model());
+    for joint in 1..5 {
+        let off = after.model.links[joint].theta_rad - calm.model.links[joint].theta_rad;
+        assert!(off.to_degrees().abs() < 0.01, "joint {}: {}", joint + 1, off.to_degrees());
+    }
+    // The state with such an alarm is read again.
+    let text = tracker.state().to_toml().unwrap();
+    assert_eq!(State::from_toml(&text).unwrap().alarms, tracker.state().alarms);
+}
+
+#[test]
+fn measurements_that_are_not_of_this_arm_are_refused_and_not_taken_for_noise() {
+    // Joint 2 lost half a degree between identification and the first pose.
+    let lost = LinkDeviation { joint: 1, theta_deg: 0.5, ..LinkDeviation::default() };
+    let dataset = measured(2, Some(lost));
+    let error = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap_err();
+    assert!(matches!(error, TrackError::Foreign { poses: 30, .. }), "{error}");
+    assert!(error.to_string().contains("identify it anew"), "{error}");
+    // Who knows better says so.
+    let stated = Options { sigma_mm: Some(2.0), ..Options::default() };
+    assert!(Tracker::begin(model(), "hash", &dataset, &stated).is_ok());
+}
+
+/// Rows whose logged angle of joint 3 falls behind the arm by `rate_deg` more with every row from `from` on: what a zero that
+/// drifts looks like.
+fn with_drift(from: usize, rate_deg: f64) -> Dataset {
+    let mut out = measured(2, None);
+    // More rows than one file of the recipe has.
+    out.rows.extend(measured(11, None).rows);
+    for (i, row) in out.rows.iter_mut().enumerate() {
+        row.number = i;
+        row.joints[2] -= rate_deg.to_radians() * i.saturating_sub(from) as f64;
+    }
+    out
+}
+
+#[test]
+fn a_slow_drift_is_named_with_its_rate_and_followed() {
+    let rate = 0.001;
+    let dataset = with_drift(80, rate);
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    let alarm = alarms.first().expect("the drift is noticed");
+    assert!(
+        alarm.parameter == "link3.theta" || alarm.alternatives.contains(&"link3.theta".to_owned()),
+        "{alarm}"
+    );
+    assert!(alarm.course != Course::Jump, "{alarm}");
+    assert!(alarm.since_row.abs_diff(80) <= 12, "{alarm}");
+    // From then on the filter follows: it knows that this parameter drifts.
+    assert!(alarms.len() <= 2, "{alarms:#?}");
+    let theta = |m: &Estimated| m.model.links[2].theta_rad;
+    let last = (theta(&tracker.model()) - theta(model())).to_degrees();
+    let truth = rate * (dataset.rows.len() - 1 - 80) as f64;
+    assert!((last - truth).abs() < 0.02, "{last} {truth}");
+    // And goes on knowing it after a stop.
+    let text = tracker.state().to_toml().unwrap();
+    let state = State::from_toml(&text).unwrap();
+    assert!(state.options.drift.values().any(|d| *d > 0.3 * rate.to_radians()), "{:?}", state.options.drift);
+}
+
+#[test]
+fn a_change_is_found_as_least_squares_with_one_parameter_more_finds_it() {
+    use nalgebra::{DMatrix, DVector};
+    // Forty poses of two rows, three parameters with a prior, a known change of the second one.
+    let (n, per, p) = (40, 2, 3);
+    let mut rng = 12_345_u64;
+    let mut random = || {
+        rng = rng.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (rng >> 33) as f64 / 2f64.powi(31) - 0.5
+    };
+    let j = DMatrix::from_fn(n * per, p, |_, _| 4.0 * random());
+    let covariance = DMatrix::from_diagonal(&DVector::from_vec(vec![0.04, 0.25, 1.0]));
+    for (form, size) in [(Form::Jump, 2.0), (Form::Drift, 0.2)] {
+        let weight = |pose: usize| match form {
+            _ if pose < 22 => 0.0,
+            Form::Jump => 1.0,
+            Form::Drift => (pose - 22 + 1) as f64,
+        };
+        // Residuals are model minus reading: the model has not followed.
+        let r = DVector::from_fn(n * per, |i, _| random() - size * weight(i / per) * j[(i, 1)]);
+        let found = locate(r.as_slice(), j.as_slice(), per, &covariance, &[]).unwrap();
+        assert!(found.together.is_none() && found.nearly.is_none());
+        assert_eq!((found.best.parameter, found.best.form), (1, form));
+        assert!(found.best.since.abs_diff(22) <= 1, "{found:?}");
+        // The same by least squares: prior rows, measured rows, and the change as a fourth column.
+        let since = found.best.since;
+        let change = |pose: usize| match form {
+            _ if pose < since => 0.0,
+            Form::Jump => 1.0,
+            Form::Drift => (pose - since + 1) as f64,
+        };
+        let rows = n * per;
+        let solve = |columns: usize| {
+            let a = DMatrix::from_fn(rows + p, columns, |i, k| match (i < rows, k < p) {
+                (true, true) => j[(i, k)],
+                (true, false) => j[(i, 1)] * change(i / per),
+                (false, _) if i - rows == k => 1.0 / covariance[(k, k)].sqrt(),
+                _ => 0.0,
+            });
+            let b = DVector::from_fn(rows + p, |i, _| if i < rows { -r[i] } else { 0.0 });
+            let x = (a.tr_mul(&a)).cholesky().unwrap().solve(&a.tr_mul(&b));
+            (x.clone(), (&a * &x - &b).norm_squared())
+        };
+        let ((with, cost_with), (_, cost_without)) = (solve(p + 1), solve(p));
+        assert!((found.best.ratio - (cost_without - cost_with)).abs() < 1e-8 * cost_without);
+        let far = if form == Form::Drift { (n - since) as f64 } else { 1.0 };
+        assert!((found.best.shift - with[p] * far).abs() < 1e-9, "{} {}", found.best.shift, with[p] * far);
+    }
+}
+
+#[test]
+fn a_model_that_leaves_effects_unexplained_raises_no_alarm_on_the_arm_that_it_was_made_of() {
+    // The shipped measurements are of an arm with compliance, eccentric gears and play, which links do not hold.
+    let cable = include_bytes!("../../../../tests/data/irb120-cable.csv");
+    let tracker_rows = include_bytes!("../../../../tests/data/irb120-tracker.csv");
+    for (name, bytes) in [("cable", &cable[..]), ("tracker", &tracker_rows[..])] {
+        let dataset = import::read("rows.csv", bytes, &import::Options::default()).unwrap();
+        let half = dataset.rows.len() / 2;
+        let rows = |range: std::ops::Range<usize>| dataset.subset(&range.collect::<Vec<_>>());
+        let (first, second) = (rows(0..half), rows(half..dataset.rows.len()));
+        let robot = nominal("abb-irb-120").unwrap();
+        let frames = starts(&first, &robot).unwrap().remove(0);
+        let division = |d: &Dataset| split::random(d, 0.2, 0);
+        let found = identify(&first, "abb-irb-120", &robot, &frames, &division, &settings()).unwrap();
+        let mut tracker = Tracker::begin(&found.estimated, "hash", &second, &Options::default()).unwrap();
+        let alarms = tracker.take(&second).unwrap();
+        assert!(alarms.is_empty(), "{name}: {alarms:#?}");
+    }
+}
+
+#[test]
+fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing() {
+    // Two accidents near each other are two accidents.
+    let mut dataset = measured(2, None);
+    let other = measured(7, None);
+    for at in [60, 66] {
+        dataset.rows[at].reading = other.rows[at].reading;
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    assert!(tracker.take(&dataset).unwrap().is_empty());
+    assert_eq!(tracker.state().accidents, 2);
+    // Readings that scatter five times as much as they should are no parameter's doing.
+    let mut dataset = measured(2, None);
+    for (k, row) in dataset.rows.iter_mut().enumerate().skip(80) {
+        let Reading::Position(p) = &mut row.reading else { panic!("a position") };
+        let sign = |n: usize| if ((k * 2_654_435_761) >> n) & 1 == 0 { 0.055 } else { -0.055 };
+        *p += nalgebra::Vector3::new(sign(7), sign(11), sign(13));
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    let first = alarms.first().expect("it is noticed");
+    assert!(first.parameter.is_empty(), "{first}");
+    assert!(first.to_string().contains("no single parameter explains it"), "{first}");
+}
+
+#[test]
+fn files_of_a_few_poses_each_begin_a_track_together() {
+    let day = measured(2, None);
+    let file = |k: usize| {
+        let mut out = day.subset(&(12 * k..12 * k + 12).collect::<Vec<_>>());
+        out.file = format!("day-{k}.csv");
+        out
+    };
+    let files: Vec<Dataset> = (0..10).map(file).collect();
+    let first = first_poses(&files, 30).unwrap();
+    assert_eq!((first.rows.len(), first.file.as_str()), (36, "day-0.csv and 2 more"));
+    assert!(first_poses(&[], 30).is_none());
+    let mut apart = Tracker::begin(model(), "hash", &first, &Options::default()).unwrap();
+    files.iter().for_each(|f| assert!(apart.take(f).unwrap().is_empty()));
+    let mut whole = Tracker::begin(model(), "hash", &day, &Options::default()).unwrap();
+    whole.take(&day).unwrap();
+    assert_eq!(apart.deviations(), whole.deviations());
+    assert_eq!(apart.state().consumed.len(), 10);
+}
+
+#[test]
+fn where_the_arm_was_measured_grows_with_the_track_and_outlives_a_stop() {
+    let mut day = measured(2, None);
+    day.rows[70].joints[0] = 150f64.to_radians();
+    day.rows[70].reading = day.rows[71].reading;
+    let far = measured(2, None);
+    let mut tracker = Tracker::begin(model(), "hash", &far, &Options::default()).unwrap();
+    tracker.take(&far).unwrap();
+    let (before, after) = (&model().region, tracker.model().region);
+    assert!(after.samples_deg.len() > before.samples_deg.len());
+    assert!((0..6).all(|i| after.min_deg[i] <= before.min_deg[i] && after.max_deg[i] >= before.max_deg[i]));
+    // A reading that was set aside says nothing of where the arm is known.
+    let mut tracker = Tracker::begin(model(), "hash", &day, &Options::default()).unwrap();
+    tracker.take(&day).unwrap();
+    assert_eq!(tracker.state().accidents, 1);
+    assert!(tracker.model().region.max_deg[0] < 149.0);
+}
+
+#[test]
+fn an_arm_that_stays_raises_no_alarm_and_the_bounds_hold() {
+    for seed in 2..6 {
+        let dataset = measured(seed, None);
+        let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+        let alarms = tracker.take(&dataset).unwrap();
+        assert!(alarms.is_empty(), "seed {seed}: {alarms:?}");
+        let history = &tracker.state().history;
+        let mean = history.iter().map(|s| s.nis).sum::<f64>() / history.len() as f64;
+        // Three rows in a pose: χ² with three degrees of freedom has mean 3.
+        assert!((1.5..4.5).contains(&mean), "seed {seed}: mean NIS {mean}");
+    }
+}
+
+#[test]
+fn one_wrong_reading_is_an_accident_and_no_alarm() {
+    let mut dataset = measured(2, None);
+    let other = measured(7, None);
+    dataset.rows[60].reading = other.rows[3].reading;
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    assert!(tracker.take(&dataset).unwrap().is_empty());
+    assert_eq!(tracker.state().accidents, 1);
+}
+
+#[test]
+fn a_stop_in_the_middle_changes_no_bit() {
+    let dataset = with_jump(70, zero_of_joint_3());
+    let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
+    let mut whole = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
+    whole.take(&dataset).unwrap();
+    let mut parts = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
+    for n in [40, 41, 75, 90, 120] {
+        parts.take(&rows(n)).unwrap();
+        let text = parts.state().to_toml().unwrap();
+        parts = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
+    }
+    assert_eq!(whole.state().alarms, parts.state().alarms);
+    assert_eq!(whole.deviations(), parts.deviations());
+    assert_eq!(whole.state().to_toml().unwrap(), parts.state().to_toml().unwrap());
+    assert_eq!(whole.model().to_toml().unwrap(), parts.model().to_toml().unwrap());
+}
+
+#[test]
+fn what_cannot_be_tracked_is_said() {
+    let dataset = measured(2, None);
+    let few = dataset.subset(&(0..12).collect::<Vec<_>>());
+    let error = Tracker::begin(model(), "hash", &few, &Options::default()).unwrap_err();
+    assert!(error.to_string().contains("12 poses so far, 30 are needed"), "{error}");
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    tracker.take(&few).unwrap();
+    let mut edited = dataset.clone();
+    edited.rows[3].joints[0] += 1e-3;
+    let error = tracker.take(&edited).unwrap_err();
+    assert!(error.to_string().contains("12 rows that were taken in have changed"), "{error}");
+    let cable = import::read(
+        "cable.csv",
+        include_bytes!("../../../../tests/data/irb120-cable.csv"),
+        &import::Options::default(),
+    )
+    .unwrap();
+    assert!(matches!(tracker.take(&cable), Err(TrackError::Sensor { .. })));
+    let mut state = tracker.state().to_toml().unwrap();
+    state = state.replace("truegrind.track/1", "truegrind.track/9");
+    let state = State::from_toml(&state).unwrap();
+    let error = Tracker::resume(model(), state, "state.toml").unwrap_err();
+    assert!(error.to_string().contains("truegrind.track/9"), "{error}");
+    assert!(State::from_toml("x = 1").is_err());
+}

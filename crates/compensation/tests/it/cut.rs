@@ -1,0 +1,210 @@
+//! A cut is corrected as a whole or not at all: a step of the whole correction in the middle of the part is worse than no
+//! correction. The class: any motion that stays (out of bounds, not known from the text, refused by the writer) beside
+//! motions of the same cut that were moved.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::Joints;
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::compensate::{Compensated, compensate};
+use truegrind_compensation::cut::Cuts;
+use truegrind_compensation::deviation::Status;
+use truegrind_compensation::rewrite::{Emit, Options};
+use truegrind_compensation::why::Why;
+use truegrind_programs::motion::Mark;
+use truegrind_programs::nc;
+use truegrind_programs::nc::orientation::Angles;
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rapid::Task;
+use truegrind_programs::reading::Program;
+
+use super::{estimated, perturbed};
+
+fn known() -> Estimated {
+    let mut known = estimated(perturbed(5, 1.0), &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    known
+}
+
+fn target(x: f64, y: f64) -> String {
+    format!("[[{x},{y},400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+}
+
+fn line(x: f64, zone: &str) -> String {
+    format!("MoveL {},v20,{zone},tool0;\n", target(x, 0.0))
+}
+
+fn module(body: &str) -> String {
+    format!("MODULE M\nVAR robtarget seen;\nPROC main()\n{body}ENDPROC\nENDMODULE\n")
+}
+
+fn done(source: &str, cuts: Cuts, tolerance_mm: f64) -> (Compensated, Vec<u8>) {
+    let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
+    assert!(program.listing().opaque.is_empty(), "{source}");
+    let options = Options { cuts, tolerance_mm, ..Options::default() };
+    let mark = Mark { version: "1.0.0".into(), model: "abc".into(), partial: false };
+    let done = compensate(&program, &known(), &Cell::default(), &options, Some(mark)).unwrap();
+    let bytes = done.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    (done, bytes)
+}
+
+fn statuses(done: &Compensated) -> Vec<Status> {
+    done.plan.outcomes.iter().map(|outcome| outcome.status).collect()
+}
+
+use Status::{Changed, Left, Refused};
+
+#[test]
+fn a_target_that_cannot_be_reached_keeps_its_cut_and_no_other() {
+    let body = [
+        line(380.0, "z1"),
+        line(390.0, "z1"),
+        line(900.0, "z1"),
+        line(400.0, "fine"),
+        line(410.0, "z1"),
+        format!("MoveJ {},v100,z10,tool0;\n", target(380.0, 50.0)),
+        line(390.0, "z1"),
+    ]
+    .concat();
+    let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Refused, Refused, Refused, Refused, Changed, Changed, Changed]);
+    let because = |index: usize| done.plan.outcomes[index].reason.unwrap().to_string();
+    assert!(because(0).contains("line 6 stays as it is: out of reach"), "{}", because(0));
+    assert!(because(2).contains("reach"), "{}", because(2));
+    let text = String::from_utf8(bytes).unwrap();
+    for x in ["380", "390", "900", "400"] {
+        assert!(text.contains(&target(x.parse().unwrap(), 0.0)), "{x}: {text}");
+    }
+    assert!(!text.contains(&line(410.0, "z1")));
+    // Where a motion stays it goes where it always went, and the report says so.
+    assert_eq!(done.plan.outcomes[1].after_mm, done.plan.outcomes[1].before_mm);
+}
+
+#[test]
+fn a_target_known_only_at_run_time_keeps_its_cut() {
+    let late = "seen:=CRobT(\\Tool:=tool0);\nMoveL seen,v20,z1,tool0;\n";
+    let body = [line(380.0, "z1"), late.to_owned(), line(390.0, "z1")].concat();
+    let (partly, _) = done(&module(&body), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&partly), [Refused, Left, Refused]);
+    assert!(matches!(partly.plan.outcomes[0].reason, Some(Why::PartOfCut { line: 6, .. })));
+    // All of a cut for one reason: nothing is refused that could have been corrected.
+    let (all_left, _) = done(&module(&late.repeat(2)), Cuts::Whole, 0.05);
+    assert_eq!(statuses(&all_left), [Left, Left]);
+}
+
+#[test]
+fn a_loop_or_a_branch_is_part_of_the_cut_around_it() {
+    let late = "MoveL Offs(seen,0,0,0),v20,z1,tool0;\n";
+    for block in [
+        format!("FOR i FROM 1 TO 3 DO\n{late}ENDFOR\n"),
+        format!("IF DInput(di1)=1 THEN\n{late}ELSE\n{}ENDIF\n", line(385.0, "z1")),
+    ] {
+        let body = [line(380.0, "z1"), block, line(390.0, "z1")].concat();
+        let (done, bytes) = done(&module(&body), Cuts::Whole, 0.05);
+        assert!(!done.changed(), "{:?}", statuses(&done));
+        assert_eq!(String::from_utf8(bytes).unwrap(), module(&body));
+    }
+}
+
+#[test]
+fn another_tool_or_work_object_begins_another_cut() {
+    let other = "MoveL [[385,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,long;\n";
+    let body = [line(900.0, "z1"), other.to_owned()].concat();
+    let source = module(&body).replace(
+        "VAR robtarget",
+        "PERS tooldata long:=[TRUE,[[0,0,60],[1,0,0,0]],[1,[0,0,10],[1,0,0,0],0,0,0]];\nVAR robtarget",
+    );
+    let (done, _) = done(&source, Cuts::Whole, 0.05);
+    assert_eq!(statuses(&done), [Refused, Changed]);
+}
+
+#[test]
+fn what_the_writer_refuses_keeps_its_cut_too() {
+    // Force control has no form with joint targets, which only the writer finds.
+    let pressed = format!("FCPressL {},v20,5,z1,tool0;\n", target(390.0, 0.0));
+    let body = [line(380.0, "z1"), pressed, line(400.0, "fine"), line(405.0, "z1")].concat();
+    let source = module(&body);
+    let program = Program::Rapid(Task::read(&[("p.mod", source.as_bytes())]));
+    let plan = |cuts: Cuts| {
+        let options = Options { cuts, emit: Emit::Joints, ..Options::default() };
+        compensate(&program, &known(), &Cell::default(), &options, None).unwrap()
+    };
+    assert_eq!(statuses(&plan(Cuts::Single)), [Changed, Refused, Changed, Changed]);
+    let whole = plan(Cuts::Whole);
+    assert_eq!(statuses(&whole), [Refused, Refused, Refused, Changed]);
+    assert!(matches!(whole.plan.outcomes[2].reason, Some(Why::PartOfCut { line: 5, .. })));
+    let text = whole.rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    assert!(String::from_utf8(text).unwrap().contains(&line(400.0, "fine")));
+}
+
+#[test]
+fn a_block_that_may_be_skipped_keeps_the_cut_around_it() {
+    let head = "O1\n(truegrind angles wpr)\n(truegrind tool T1 t [[0,0,50],[1,0,0,0]])\n(truegrind frame G54 w [[400,0,250],[1,0,0,0]])\n\
+                G90 G21 G17 G54\nT1 M6\nG43.4 H1\n";
+    let at = |code: &str, x: f64| format!("{code} X{x:.1} Y0. Z20. A180. B0. C0. F600.\n");
+    let cut = |middle: String| {
+        let source =
+            [head, &at("G0", -20.0), &at("G1", -10.0), &middle, &at("G1", 20.0), &at("G0", 20.0), "M30\n"]
+                .concat();
+        let setup = Setup { angles: Some(Angles::Wpr), ..Setup::default() };
+        let program = Program::Nc(nc::Task::read(&[("p.nc", source.as_bytes())], &setup));
+        statuses(&compensate(&program, &known(), &Cell::default(), &Options::default(), None).unwrap())
+    };
+    assert_eq!(cut(at("G1", 0.0)), [Changed; 5]);
+    let skipped = cut(format!("/{}", at("G1", 0.0)));
+    assert_eq!(skipped[1..4], [Refused, Left, Refused], "{skipped:?}");
+}
+
+#[test]
+fn in_part_a_step_between_neighbours_stays_below_the_tolerance() {
+    let body: String =
+        (0..9).map(|k| line(if k == 4 { 900.0 } else { 380.0 + f64::from(k) }, "z1")).collect();
+    let source = module(&body);
+    // The correction is some tenths of a millimetre: nothing of the cut may be moved alone.
+    let (tight, bytes) = done(&source, Cuts::Partial, 0.01);
+    assert!(statuses(&tight).iter().all(|status| *status == Refused));
+    assert!(matches!(tight.plan.outcomes[3].reason, Some(Why::Step { line: 8, mm }) if mm > 0.01));
+    assert_eq!(bytes, source.as_bytes());
+    let (loose, bytes) = done(&source, Cuts::Partial, 5.0);
+    let changed = statuses(&loose).iter().filter(|status| **status == Changed).count();
+    assert_eq!(changed, 8, "{:?}", statuses(&loose));
+    assert!(String::from_utf8(bytes).unwrap().contains("! truegrind 1.0.0 model abc partial\n"));
+    let again = Task::read(&[("p.mod", b"MODULE M\n! truegrind 1.0.0 model abc partial\nENDMODULE\n")]);
+    assert_eq!(
+        again.listing.marks[0],
+        Some(Mark { version: "1.0.0".into(), model: "abc".into(), partial: true })
+    );
+}
+
+/// Random programs of cuts, with targets that cannot be corrected strewn in: of two motions that run into each other
+/// never one is moved and the other not.
+#[test]
+fn no_random_program_has_a_cut_half_corrected() {
+    let (mut moved, mut kept) = (0, 0);
+    for seed in 0..60 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut body = String::new();
+        let mut fine = Vec::new();
+        for k in 0..30 {
+            let zone = if random.random_bool(0.2) { "fine" } else { "z1" };
+            let x = if random.random_bool(0.08) { 900.0 } else { 360.0 + f64::from(k) };
+            fine.push(zone == "fine");
+            body += &if random.random_bool(0.06) {
+                format!("MoveL seen,v20,{zone},tool0;\n")
+            } else {
+                line(x, zone)
+            };
+        }
+        let (done, _) = done(&module(&body), Cuts::Whole, 0.05);
+        let changed: Vec<bool> =
+            statuses(&done).iter().map(|s| matches!(s, Changed | Status::Flagged)).collect();
+        for k in 1..changed.len() {
+            assert!(fine[k - 1] || changed[k] == changed[k - 1], "seed {seed}, motion {k}: {changed:?}");
+        }
+        moved += changed.iter().filter(|c| **c).count();
+        kept += changed.iter().filter(|c| !**c).count();
+    }
+    assert!(moved > 300 && kept > 300, "{moved} {kept}");
+}

@@ -1,0 +1,744 @@
+//! The path between the points: circles kept and replaced, rounded corners, joint speeds, the configuration of what is
+//! put in. The real arm is followed densely here by code of this file's own.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::corner::Corner;
+use truegrind_compensation::curve::{Arc, Curve};
+use truegrind_compensation::cut::Cuts;
+use truegrind_compensation::deviation::Status;
+use truegrind_compensation::rewrite::{Circles, Options, Plan, plan};
+use truegrind_compensation::why::Why;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, MotionKind, Reason, Switch};
+use truegrind_programs::nc::dialect::Dialect;
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rapid::Task;
+use truegrind_programs::rewrite::RewriteOptions;
+
+use super::{estimated, nominal, perturbed};
+
+const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+
+fn module(body: &str) -> String {
+    format!("MODULE M\n PROC main()\n{body} ENDPROC\nENDMODULE\n")
+}
+
+/// `[position, tool down, configuration]`.
+fn down(x: f64, y: f64, z: f64) -> String {
+    format!(
+        "[[{x:.4},{y:.4},{z:.4}],[0,0,1,0],[{},0,{},0],{EXT}]",
+        i32::from(y >= 0.0) - 1,
+        i32::from(y >= 0.0) - 1
+    )
+}
+
+fn known(actual: &Model) -> Estimated {
+    let mut known = estimated(actual.clone(), &[Joints::zeros()]);
+    // Everywhere is measured: these tests are about the path.
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    known
+}
+
+fn rewrite(source: &str, known: &Estimated, options: &Options) -> (Plan, String) {
+    let task = Task::read(&[("p.mod", source.as_bytes())]);
+    let planned = plan(&task.listing, known, &Cell::default(), options);
+    let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    (planned, String::from_utf8(text).unwrap())
+}
+
+/// Tool poses of the ends of all motions, told; tool0 in wobj0, so that they are those of the flange.
+fn told(listing: &Listing) -> Vec<Pose> {
+    let pose =
+        |m: &truegrind_programs::motion::Motion| m.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+    listing.motions.iter().map(pose).collect()
+}
+
+/// Where the real arm takes the tool when the controller goes along told poses.
+fn gone(path: impl Iterator<Item = Pose>, start: &Joints, actual: &Model) -> Vec<Pose> {
+    let sheet = nominal();
+    let inverse = Inverse::new(&sheet, &Condition::default(), &sheet);
+    let posed = actual.under(&Condition::default());
+    let mut near = *start;
+    path.map(|pose| {
+        near = inverse.solve_near(&pose, &near).unwrap().joints;
+        posed.forward(&near)
+    })
+    .collect()
+}
+
+fn start_joints(pose: &Pose) -> Joints {
+    let sheet = nominal();
+    let inverse = Inverse::new(&sheet, &Condition::default(), &sheet);
+    inverse.solve_near(pose, &Joints::new(-0.3, 0.4, 0.2, 0.0, 0.9, -0.3)).unwrap().joints
+}
+
+/// Distance of a point from a circle about a vertical axis.
+fn off_circle(point: &Vector3<f64>, centre: [f64; 3], radius: f64) -> f64 {
+    let off = point - Vector3::from(centre);
+    (off.x.hypot(off.y) - radius).hypot(off.z)
+}
+
+const CENTRE: [f64; 3] = [380.0, 0.0, 320.0];
+const RADIUS: f64 = 60.0;
+
+fn on_circle(degrees: f64) -> String {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    down(CENTRE[0] + RADIUS * cos, CENTRE[1] + RADIUS * sin, CENTRE[2])
+}
+
+/// From −150° over −90° to −20°, a three-point arc of 130°.
+fn arc_program(options: &str, name: &str) -> String {
+    module(&format!(
+        "  MoveL {},v200,fine,tool0;\n  {name} {}, ! over\n   {}{options},v50,z5,tool0;\n  MoveL {},v200,fine,tool0;\n",
+        on_circle(-150.0),
+        on_circle(-90.0),
+        on_circle(-20.0),
+        on_circle(-20.0).replacen("320.0000", "350.0000", 1),
+    ))
+}
+
+#[test]
+fn a_circle_is_kept_and_its_path_checked() {
+    let actual = perturbed(11, 1.0);
+    let source = arc_program("", "MoveC");
+    let (planned, text) = rewrite(&source, &known(&actual), &Options::default());
+    let outcome = &planned.outcomes[1];
+    assert_eq!((outcome.status, outcome.inserted), (Status::Changed, 0), "{outcome:?}");
+    assert!(text.contains("MoveC") && text.contains("! over"));
+    // What is stated is what an arm does that goes along the told circle.
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let ends = told(&task.listing);
+    let via = task.listing.motions[1].targets[0].value.unwrap().cartesian().unwrap().pose();
+    let point = |p: &Pose| Point3::from(p.translation.vector);
+    let arc = Arc::through(&point(&ends[0]), &point(&via), &point(&ends[1]), None).unwrap();
+    let path = (0..=400).map(|k| {
+        let s = f64::from(k) / 400.0;
+        let rotation = ends[0].rotation.slerp(&ends[1].rotation, s);
+        Isometry3::from_parts(arc.at(s).coords.into(), rotation)
+    });
+    let most = gone(path, &start_joints(&ends[0]), &actual)
+        .iter()
+        .map(|pose| off_circle(&pose.translation.vector, CENTRE, RADIUS))
+        .fold(0.0, f64::max);
+    let stated = outcome.bend_mm.unwrap();
+    assert!(most > 1e-4 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
+}
+
+#[test]
+fn a_circle_in_straight_pieces_is_followed_within_the_tolerance_and_smoothly() {
+    let actual = perturbed(11, 1.0);
+    for (name, line) in [("MoveC", "MoveL"), ("MOVEC", "MoveL")] {
+        for tolerance_mm in [0.02, 0.05, 0.3] {
+            let source = arc_program("", name);
+            let options = Options { circles: Circles::Segments, tolerance_mm, ..Options::default() };
+            let known = known(&actual);
+            let (planned, text) = rewrite(&source, &known, &options);
+            let outcome = &planned.outcomes[1];
+            assert_eq!(outcome.status, Status::Changed, "{outcome:?}");
+            assert!(
+                !text.to_uppercase().contains("MOVEC") && text.contains(line) && text.contains("! over"),
+                "{text}"
+            );
+            let task = Task::read(&[("p.mod", text.as_bytes())]);
+            assert!(task.listing.opaque.is_empty(), "{text}");
+            let count = task.listing.motions.len();
+            assert_eq!(count, 3 + outcome.inserted);
+            let ends = told(&task.listing);
+            let pieces = &ends[..count - 1];
+            let path = pieces.windows(2).flat_map(|pair| {
+                let (a, b) = (pair[0], pair[1]);
+                (0..=20).map(move |k| {
+                    let s = f64::from(k) / 20.0;
+                    let position = a.translation.vector.lerp(&b.translation.vector, s);
+                    Isometry3::from_parts(position.into(), a.rotation.slerp(&b.rotation, s))
+                })
+            });
+            let most = gone(path, &start_joints(&ends[0]), &actual)
+                .iter()
+                .map(|pose| off_circle(&pose.translation.vector, CENTRE, RADIUS))
+                .fold(0.0, f64::max);
+            assert!(most <= tolerance_mm, "{most} of {tolerance_mm}");
+            assert!(most > 0.4 * tolerance_mm, "no more pieces than needed: {most} of {tolerance_mm}");
+            // Equal pieces, the speed of the instruction, and a zone that does not stop; the last keeps its own.
+            let long = |pair: &[Pose]| (pair[0].translation.vector - pair[1].translation.vector).norm();
+            let lengths: Vec<f64> = pieces.windows(2).map(long).collect();
+            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+            assert!(lengths.iter().all(|length| (length / mean - 1.0).abs() < 0.02), "{lengths:?}");
+            for motion in &task.listing.motions[1..count - 2] {
+                assert_eq!(motion.kind, MotionKind::Linear);
+                assert_eq!(task.listing.speed(motion).unwrap().text, "v50");
+                let zone = task.listing.zone(motion).unwrap().value.unwrap();
+                assert!(!zone.fine && 2.0 * zone.tcp_mm <= mean, "{zone:?} in pieces of {mean}");
+            }
+            assert_eq!(task.listing.zone(&task.listing.motions[count - 2]).unwrap().text, "z5");
+            // Each target that was put in states the configuration in which it is reached.
+            let nothing = estimated(nominal(), &[Joints::zeros()]);
+            let again = plan(&task.listing, &nothing, &Cell::default(), &Options::default());
+            assert!(again.outcomes.iter().all(|o| o.status != Status::Refused), "{:?}", again.outcomes);
+        }
+    }
+}
+
+#[test]
+fn targets_on_a_long_line_state_the_quarter_in_which_they_lie() {
+    let source = module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n",
+        down(380.0, -230.0, 300.0),
+        down(380.0, 230.0, 300.0)
+    ));
+    let options = Options { tolerance_mm: 0.005, ..Options::default() };
+    let (planned, text) = rewrite(&source, &known(&perturbed(5, 3.0)), &options);
+    assert!(planned.outcomes[1].inserted > 2, "{:?}", planned.outcomes);
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    for motion in &task.listing.motions {
+        let target = *motion.to().unwrap().value.unwrap().cartesian().unwrap();
+        // Far from the border of the quarter, where the sign of y says it.
+        if target.position_mm[1].abs() > 20.0 {
+            let quarter = if target.position_mm[1] > 0.0 { 0 } else { -1 };
+            assert_eq!(target.conf[0], quarter, "{target:?}");
+        }
+    }
+}
+
+#[test]
+fn a_circle_that_may_not_be_split_stays_and_is_flagged() {
+    let actual = perturbed(11, 1.0);
+    let options = Options { circles: Circles::Segments, ..Options::default() };
+    let (planned, text) =
+        rewrite(&arc_program("", "MoveC").replace("v50,", "v50\\T:=3,"), &known(&actual), &options);
+    assert_eq!(planned.outcomes[1].reason, Some(Why::CircleKept));
+    assert_eq!(planned.outcomes[1].status, Status::Flagged);
+    assert!(text.contains("MoveC"));
+    // Nor one whose start nobody knows.
+    let alone = module(&format!("  MoveC {},{},v50,z5,tool0;\n", on_circle(-90.0), on_circle(-20.0)));
+    let (planned, _) = rewrite(&alone, &known(&actual), &options);
+    assert_eq!(planned.outcomes[0].reason, Some(Why::CircleKept));
+    // Three points that make no circle.
+    let line = module(&format!(
+        "  MoveL {0},v50,fine,tool0;\n  MoveC {1},{0},v50,fine,tool0;\n",
+        on_circle(-150.0),
+        on_circle(-90.0)
+    ));
+    let (planned, _) = rewrite(&line, &known(&actual), &Options::default());
+    assert_eq!(planned.outcomes[1].reason, Some(Why::WholeCircle));
+}
+
+#[test]
+fn a_circle_whose_start_stays_is_no_other_circle() {
+    let pose = |x: f64, y: f64| {
+        format!("[[{x},{y},420],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    let of = |seed: u64, radius: f64, start: &str| {
+        let (via, to) = (pose(374.0 + radius, radius), pose(374.0 + 2.0 * radius, 0.0));
+        let source = module(&format!(
+            "  ConfL \\Off;\n  MoveL {start}\n  MoveC {via},{to},v50,fine,tool0;\n  MoveC {},{},v50,fine,tool0;\n",
+            pose(374.0 + radius, -radius),
+            pose(374.0, 0.0)
+        ));
+        let actual = perturbed(seed, 3.0);
+        let options = Options { max_correction_mm: 50.0, tolerance_mm: 50.0, ..Options::default() };
+        let (planned, text) = rewrite(&source, &known(&actual), &options);
+        let shift = planned.outcomes[0].before_mm.or(planned.outcomes[1].before_mm).unwrap();
+        assert!((0.5..20.0).contains(&shift), "{shift}");
+        let reasons: Vec<_> = planned.outcomes.iter().map(|outcome| outcome.reason).collect();
+        assert!(reasons[1].is_none() || text.contains(&format!("MoveC {via},{to}")), "{text}");
+        reasons
+    };
+    let start = pose(374.0, 0.0);
+    let (plain, corrected) = (format!("{start},v50,fine,tool0;"), format!("{start},v50,fine,tool0 \\Corr;"));
+    let unknown = "Offs(p0,0,0,found()),v50,fine,tool0;".to_owned();
+    let sensor = Some(Why::Program(Reason::SensorGuided));
+    let mut strayed = 0;
+    for seed in 11..19 {
+        for radius in [0.5, 100.0] {
+            assert_eq!(of(seed, radius, &plain)[..], [None; 3]);
+        }
+        // With all that begins where it ends.
+        let small = of(seed, 0.5, &corrected);
+        assert!(small == [sensor, None, None] || small[..2] == [sensor, Some(Why::NoCircle)], "{small:?}");
+        strayed += usize::from(small[1].is_some());
+        assert_eq!(of(seed, 100.0, &corrected), [sensor, None, None]);
+        assert_eq!(of(seed, 0.5, &unknown)[1], Some(Why::NoCircle));
+        assert_eq!(of(seed, 100.0, &unknown)[1..], [None; 2]);
+    }
+    assert!(strayed > 3, "{strayed}");
+}
+
+#[test]
+fn every_circular_instruction_has_a_straight_form_of_the_same_process() {
+    let source = include_str!("../../../../programs/circles.mod");
+    let options = Options { circles: Circles::Segments, ..Options::default() };
+    let (planned, text) = rewrite(source, &known(&perturbed(11, 0.5)), &options);
+    // What is triggered along the whole of a circle would be triggered along its last piece.
+    let original = Task::read(&[("p.mod", source.as_bytes())]);
+    for (motion, outcome) in original.listing.motions.iter().zip(&planned.outcomes) {
+        let kept = (Status::Flagged, Some(Why::CircleKept));
+        let expected = if &*motion.instruction == "TriggC" { kept } else { (Status::Changed, None) };
+        assert_eq!((outcome.status, outcome.reason), expected, "{outcome:?}");
+    }
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    assert!(task.listing.opaque.is_empty() && text.contains("! the way back"), "{text}");
+    let names: std::collections::BTreeSet<&str> =
+        task.listing.motions.iter().map(|motion| &*motion.instruction).collect();
+    let expected = [
+        "ArcL",
+        "ArcLEnd",
+        "ArcLStart",
+        "DispL",
+        "FCPressL",
+        "MoveJ",
+        "MoveL",
+        "MoveLDO",
+        "MoveLSync",
+        "PaintL",
+        "TriggC",
+    ];
+    assert!(names.iter().eq(expected.iter()), "{names:?}");
+    // Every end is still there, and nothing is refused when the result is read again.
+    assert_eq!(task.listing.motions.len(), planned.outcomes.iter().map(|o| 1 + o.inserted).sum::<usize>());
+    let again = plan(&task.listing, &estimated(nominal(), &[Joints::zeros()]), &Cell::default(), &options);
+    assert!(again.outcomes.iter().all(|o| o.status != Status::Refused), "{:?}", again.outcomes);
+    assert!(text.contains("DispL [[") && text.contains("ArcLEnd p3,v100,seam1,weld1,fine,tool0;"), "{text}");
+}
+
+fn nc_setup() -> Setup {
+    Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() }
+}
+
+#[test]
+fn nc_arcs_helices_and_whole_circles_are_checked_and_become_straight_pieces_when_asked() {
+    let head = "(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,0],[1,0,0,0]])\n(truegrind frame G54 w [[0,0,0],[1,0,0,0]])\nG90 G17 G54\n";
+    let actual = perturbed(12, 0.3);
+    let known = known(&actual);
+    // Start at (440, 0), about (380, 0); the third rises 12 mm on three quarters of a turn.
+    for (body, sweep, rise) in [
+        ("G3 X320 Y0 I-60 J0", PI, 0.0),
+        ("G2 X320 Y0 R60", -PI, 0.0),
+        ("G3 X380 Y-60 Z332 I-60", 1.5 * PI, 12.0),
+        ("G3 I-60", TAU, 0.0),
+    ] {
+        let source = format!("{head}G1 X440 Y0 Z320 A180 B0 C180 F3000\n{body}\nX400 Y0 Z340\n", body = body)
+            .replace("\nX400", "\nG1 X400");
+        let setup = nc_setup();
+        let task = truegrind_programs::nc::Task::read(&[("p.ngc", source.as_bytes())], &setup);
+        for circles in [Circles::Keep, Circles::Segments] {
+            // An arc of the control lies in its plane, whatever the arm needs: it keeps to the intended one less well.
+            let tolerance_mm = if circles == Circles::Keep { 0.2 } else { 0.05 };
+            let options = Options { circles, tolerance_mm, ..Options::default() };
+            let planned = plan(&task.listing, &known, &Cell::default(), &options);
+            let outcome = &planned.outcomes[1];
+            assert_eq!(outcome.status, Status::Changed, "{body}: {outcome:?}");
+            assert!(outcome.bend_mm.unwrap() <= options.tolerance_mm, "{body}: {outcome:?}");
+            assert_eq!(outcome.inserted > 10, circles == Circles::Segments, "{body}: {outcome:?}");
+            let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
+            let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+            let again = truegrind_programs::nc::Task::read(&[("p.ngc", &text[..])], &setup);
+            if circles == Circles::Keep {
+                assert_eq!(again.listing.motions[1].kind, MotionKind::Circular);
+                continue;
+            }
+            let shown = String::from_utf8_lossy(&text);
+            assert!(again.listing.motions.iter().all(|m| m.kind == MotionKind::Linear), "{shown}");
+            assert!(!shown.contains('I') && !shown.contains('R'), "{shown}");
+            let ends = told(&again.listing);
+            let pieces = &ends[..ends.len() - 1];
+            let path = pieces.windows(2).flat_map(|pair| {
+                let (a, b) = (pair[0], pair[1]);
+                (0..=10).map(move |k| a.lerp_slerp(&b, f64::from(k) / 10.0))
+            });
+            let mut angle = 0.0_f64;
+            for pose in gone(path, &start_joints(&ends[0]), &actual) {
+                let off = pose.translation.vector - Vector3::from(CENTRE);
+                let here = off.y.atan2(off.x);
+                angle = here + ((angle - here) / TAU).round() * TAU;
+                let height = rise * angle / sweep;
+                let off = (off.x.hypot(off.y) - RADIUS).hypot(off.z - height);
+                assert!(off <= options.tolerance_mm + 1e-6, "{body}: {off}");
+            }
+            assert!((angle - sweep).abs() < 1e-3, "{body}: went {angle} of {sweep}");
+        }
+    }
+}
+
+#[test]
+fn an_arc_that_stays_says_its_word_again_after_one_that_became_straight() {
+    let head = "(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,0],[1,0,0,0]])\n(truegrind frame G54 w [[0,0,0],[1,0,0,0]])\nG90 G17 G54\n";
+    let source = format!(
+        "{head}G1 X440 Y0 Z320 A180 B0 C180 F3000\nN20 G03 X320 Y0 I-60 J0\n/N30 X440 I60\nN40 X320 I-60\nN50 G0 X300\n"
+    );
+    let setup = nc_setup();
+    let task = truegrind_programs::nc::Task::read(&[("p.ngc", source.as_bytes())], &setup);
+    // The block that may be skipped stays, and would keep the whole cut.
+    let cuts = Cuts::Single;
+    let options = Options { circles: Circles::Segments, tolerance_mm: 1.0, cuts, ..Options::default() };
+    let planned = plan(&task.listing, &known(&perturbed(12, 1.0)), &Cell::default(), &options);
+    assert!(planned.outcomes[1].inserted > 0 && planned.outcomes[2].inserted == 0);
+    let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
+    let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();
+    assert!(text.contains("N20 G01 X") && text.contains("/N30 G3 X440"), "{text}");
+    let again = truegrind_programs::nc::Task::read(&[("p.ngc", text.as_bytes())], &setup);
+    let kinds: Vec<MotionKind> = again.listing.motions.iter().rev().take(3).map(|m| m.kind).collect();
+    assert_eq!(kinds[1..], [MotionKind::Circular, MotionKind::Circular], "{text}");
+}
+
+// ---- courses and corners in closed form ----
+
+#[test]
+fn a_right_angle_is_rounded_by_a_parabola() {
+    let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+    let way_in = Curve::line(at(-100.0, 0.0), at(0.0, 0.0));
+    let way_out = Curve::line(at(0.0, 0.0), at(0.0, 30.0));
+    let corner = Corner::of(&way_in, &way_out, 10.0);
+    assert!((corner.cut_mm() - 10.0 * 2.0_f64.sqrt() / 4.0).abs() < 1e-12);
+    assert!((corner.at(0.5).translation.vector - Vector3::new(-2.5, 2.5, 0.0)).norm() < 1e-12);
+    // Cut to half of the shorter way.
+    let cut = Corner::of(&way_in, &way_out, 40.0);
+    assert!((cut.at(0.0).translation.vector.x + 15.0).abs() < 1e-12);
+    // Beside the corner, before it and behind it.
+    let off = |x: f64, y: f64, t: f64| corner.distance(&at(x, y), t);
+    let half = 2.5 + 0.1 * std::f64::consts::FRAC_1_SQRT_2;
+    assert!((off(-half, half, 0.4) - 0.1).abs() < 1e-9, "{}", off(-half, half, 0.4));
+    assert!((off(-30.0, 0.2, 0.0) - 0.2).abs() < 1e-12 && (off(0.3, 20.0, 1.0) - 0.3).abs() < 1e-12);
+}
+
+fn motion_with(axis: Option<[f64; 3]>, over: Switch) -> truegrind_programs::motion::Motion {
+    let source = module(&format!("  MoveC {},{},v50,z5,tool0;\n", on_circle(-90.0), on_circle(-20.0)));
+    let task = Task::read(&[("p.mod", source.as_bytes())]);
+    let mut motion = task.listing.motions[0].clone();
+    motion.axis = axis;
+    motion.modal.circle_point_orientation = over;
+    motion
+}
+
+#[test]
+fn on_an_arc_the_tool_keeps_its_orientation_or_turns_with_the_path() {
+    let at = |degrees: f64, turn: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let rotation = UnitQuaternion::from_euler_angles(0.3, 0.0, 0.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
+        Isometry3::from_parts(Vector3::new(50.0 * cos, 50.0 * sin, 7.0).into(), turn * rotation)
+    };
+    for sweep in [100.0, 170.0, 190.0, 300.0] {
+        for (name, turn) in [("kept", 0.0), ("with the path", 1.0)] {
+            let course = Curve::round(
+                at(0.0, 0.0),
+                &at(0.5 * sweep, 0.5 * sweep * turn),
+                at(sweep, sweep * turn),
+                &motion_with(None, Switch::Off),
+            )
+            .unwrap();
+            for k in 0..=20 {
+                let s = f64::from(k) / 20.0;
+                let wanted = at(s * sweep, s * sweep * turn);
+                let found = course.at(s);
+                assert!((found.translation.vector - wanted.translation.vector).norm() < 1e-9);
+                assert!(found.rotation.angle_to(&wanted.rotation) < 1e-9, "{name} {sweep} at {s}");
+            }
+            assert!((course.length_mm() - 50.0 * f64::to_radians(sweep)).abs() < 1e-9);
+            assert!((course.turn_rad() - f64::to_radians(sweep * turn)).abs() < 1e-6);
+        }
+    }
+    // With the circle point's own orientation the tool passes it.
+    let course =
+        Curve::round(at(0.0, 0.0), &at(45.0, 20.0), at(90.0, 0.0), &motion_with(None, Switch::On)).unwrap();
+    assert!(course.at(0.5).rotation.angle_to(&at(45.0, 20.0).rotation) < 1e-9);
+}
+
+#[test]
+fn helices_and_whole_circles_have_their_axis() {
+    let axis = Unit::new_normalize(Vector3::new(0.2, -0.3, 1.0));
+    let x = axis.cross(&Vector3::x()).normalize();
+    let y = axis.cross(&x);
+    let centre = Point3::new(300.0, 20.0, -5.0);
+    for (sweep, rise) in [(1.0, 3.0), (4.0, -8.0), (TAU, 10.0), (TAU, 0.0)] {
+        let at = |s: f64| {
+            let (sin, cos) = (sweep * s).sin_cos();
+            centre + (x * cos + y * sin) * 42.0 + axis.into_inner() * (rise * s)
+        };
+        let arc = Arc::through(&at(0.0), &at(0.5), &at(1.0), Some(&axis)).unwrap();
+        assert!((arc.radius - 42.0).abs() < 1e-9 && (arc.sweep - sweep).abs() < 1e-9, "{arc:?}");
+        for k in 0..=10 {
+            let s = f64::from(k) / 10.0;
+            assert!((arc.at(s) - at(s)).norm() < 1e-9);
+            let out = (at(s) - centre - axis.into_inner() * (rise * s)).normalize();
+            assert!((arc.distance(&(at(s) + out * 0.25), s) - 0.25).abs() < 1e-9);
+        }
+        assert!((arc.length_mm() - (42.0 * sweep).hypot(rise)).abs() < 1e-9);
+    }
+    assert!(Arc::through(&centre, &centre, &centre, Some(&axis)).is_none());
+    let in_line = [0.0, 1.0, 2.0].map(|k| centre + x * k);
+    assert!(Arc::through(&in_line[0], &in_line[1], &in_line[2], None).is_none());
+}
+
+// ---- zones ----
+
+fn square_program(zone: &str) -> String {
+    module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,{zone},tool0;\n  MoveL {},v100,fine,tool0;\n",
+        down(300.0, 20.0, 320.0),
+        down(420.0, 20.0, 320.0),
+        down(420.0, 170.0, 320.0)
+    ))
+}
+
+#[test]
+fn a_rounded_corner_is_checked_along_its_parabola() {
+    let actual = perturbed(21, 3.0);
+    let known = known(&actual);
+    let source = square_program("z50");
+    let (planned, text) = rewrite(&source, &known, &Options { tolerance_mm: 1.0, ..Options::default() });
+    let stop =
+        rewrite(&square_program("fine"), &known, &Options { tolerance_mm: 1.0, ..Options::default() }).0;
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let before = Task::read(&[("p.mod", source.as_bytes())]);
+    let (told, meant) = (told(&task.listing), told(&before.listing));
+    let bezier = |p: &[Pose], t: f64| {
+        // Radius 50 on ways of 120 and 150 mm.
+        let a = p[1].lerp_slerp(&p[0], 50.0 / (p[0].translation.vector - p[1].translation.vector).norm());
+        let c = p[1].lerp_slerp(&p[2], 50.0 / (p[2].translation.vector - p[1].translation.vector).norm());
+        a.lerp_slerp(&p[1], t).lerp_slerp(&p[1].lerp_slerp(&c, t), t)
+    };
+    let path = (0..=300).map(|k| bezier(&told, f64::from(k) / 300.0));
+    let dense: Vec<Vector3<f64>> =
+        (0..=20_000).map(|k| bezier(&meant, f64::from(k) / 20_000.0).translation.vector).collect();
+    let mut most = 0.0_f64;
+    for pose in gone(path, &start_joints(&told[0]), &actual) {
+        let near = |point: &Vector3<f64>| (point - pose.translation.vector).norm();
+        most = most.max(dense.iter().map(near).fold(f64::INFINITY, f64::min));
+    }
+    let stated = planned.outcomes[2].bend_mm.unwrap();
+    let line = stop.outcomes[2].bend_mm.unwrap();
+    // The dense corner has only points of the corner to be near to, spaced by 0.004 mm.
+    assert!(
+        most > 1e-3 && stated >= line && (most.max(line) - stated).abs() < 5e-3,
+        "{most} {line} {stated}"
+    );
+}
+
+#[test]
+fn a_zone_that_inserted_targets_cut_short_is_flagged() {
+    let known = known(&perturbed(5, 3.0));
+    let source = module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,z200,tool0;\n  MoveL {},v100,fine,tool0;\n",
+        down(250.0, -230.0, 320.0),
+        down(420.0, -230.0, 320.0),
+        down(420.0, 230.0, 320.0)
+    ));
+    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 5.0, ..Options::default() });
+    assert_eq!(planned.outcomes[2].reason, None, "{:?}", planned.outcomes);
+    let (planned, _) = rewrite(&source, &known, &Options { tolerance_mm: 0.005, ..Options::default() });
+    let outcome = &planned.outcomes[2];
+    assert!(outcome.inserted > 0, "{outcome:?}");
+    assert!(matches!(outcome.reason, Some(Why::Corner { mm }) if mm > 1.0), "{outcome:?}");
+    assert_eq!(outcome.status, Status::Flagged);
+}
+
+// ---- speed ----
+
+#[test]
+fn a_joint_that_cannot_follow_is_named_with_its_ratio() {
+    // About axis 1, the tool turning with the path: axis 1 alone moves, at v / r.
+    let limit = nominal().limits.speed_rad_s.unwrap()[0];
+    let radius = 300.0;
+    let at = |degrees: f64| {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
+        let q = (turn * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), PI)).into_inner();
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let quarter = (degrees / 90.0).floor();
+        format!(
+            "[[{:.6},{:.6},400],[{:.9},{:.9},{:.9},{:.9}],[{quarter},0,0,0],{EXT}]",
+            radius * cos,
+            radius * sin,
+            q.w,
+            q.i,
+            q.j,
+            q.k
+        )
+    };
+    for (speed, flagged) in [(0.9, false), (1.25, true)] {
+        let mm_s = speed * limit * radius;
+        let source = module(&format!(
+            "  ConfL\\Off;\n  MoveL {},v100,fine,tool0;\n  MoveC {},{},[{mm_s},20000,1,1],fine,tool0;\n",
+            at(-40.0),
+            at(0.0),
+            at(40.0)
+        ));
+        let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
+        let reason = planned.outcomes[1].reason;
+        if flagged {
+            let Some(Why::TooFast { joint, ratio }) = reason else { panic!("{:?}", planned.outcomes) };
+            assert_eq!(joint, 0);
+            assert!((ratio - speed).abs() < 1e-6, "{ratio}");
+        } else {
+            assert_eq!(reason, None, "{:?}", planned.outcomes);
+        }
+    }
+    // A line near axis 1 turns it far more quickly than one far away.
+    let far = |x: f64| {
+        module(&format!(
+            "  ConfL\\Off;\n  MoveL {},v100,fine,tool0;\n  MoveL {},v1000,fine,tool0;\n",
+            down(x, -100.0, 400.0),
+            down(x, 100.0, 400.0)
+        ))
+    };
+    let ratio = |x: f64| {
+        let (planned, _) = rewrite(&far(x), &known(&nominal()), &Options::default());
+        match planned.outcomes[1].reason {
+            Some(Why::TooFast { joint: 0, ratio }) => Some(ratio),
+            _ => None,
+        }
+    };
+    // Half way of the line axis 1 turns at v / x.
+    assert_eq!(ratio(400.0), None);
+    let near = ratio(200.0).unwrap();
+    let expected = 1000.0 / 200.0 / limit;
+    assert!(near > 0.85 * expected && near <= expected, "{near} of {expected}");
+}
+
+#[test]
+fn the_speed_that_an_option_states_counts() {
+    let line = |speed: &str| {
+        let source = module(&format!(
+            "  ConfL\\Off;\n  MoveL {},v100,fine,tool0;\n  MoveL {},{speed},fine,tool0;\n",
+            down(200.0, -100.0, 400.0),
+            down(200.0, 100.0, 400.0)
+        ));
+        let source = source.replace("MODULE M\n", "MODULE M\n CONST num slow:=100;\n");
+        let (planned, _) = rewrite(&source, &known(&nominal()), &Options::default());
+        match planned.outcomes[1].reason {
+            Some(Why::TooFast { joint: 0, ratio }) => Some(ratio),
+            None => None,
+            other => panic!("{speed}: {other:?}"),
+        }
+    };
+    let fast = line("[1000,500,1,1]").unwrap();
+    // 200 mm at 1,000 mm/s; the option stands in place of v_tcp, or of both speeds.
+    for speed in ["v100\\V:=1000", "v10\\V:=2*500", "v100\\T:=0.2"] {
+        assert!((line(speed).unwrap() - fast).abs() < 1e-9, "{speed}");
+    }
+    for speed in ["v100", "v1000\\V:=100", "v1000\\V:=slow", "v1000\\T:=2"] {
+        assert_eq!(line(speed), None, "{speed}");
+    }
+    // What is known only at run time is not judged.
+    assert_eq!(line("v1000\\V:=GetSpeed()"), None);
+    assert_eq!(line("v1000\\T:=GetSpeed()"), None);
+}
+
+#[test]
+fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
+    let source = module(&format!(
+        "  MoveJ {},v100,fine,tool0;\n  MoveJ {},v100,fine,tool0;\n",
+        down(300.0, 60.0, 320.0),
+        down(420.0, 200.0, 380.0)
+    ));
+    let actual = perturbed(3, 2.0);
+    let (planned, text) = rewrite(&source, &known(&actual), &Options::default());
+    let (before, after) = (Task::read(&[("p", source.as_bytes())]), Task::read(&[("p", text.as_bytes())]));
+    let sheet = nominal();
+    let joints = |listing: &Listing| told(listing).iter().map(start_joints).collect::<Vec<_>>();
+    let (b, a) = (joints(&before.listing), joints(&after.listing));
+    let posed = (sheet.under(&Condition::default()), actual.under(&Condition::default()));
+    let most = (0..=50)
+        .map(|k| {
+            let s = f64::from(k) / 50.0;
+            let meant = posed.0.forward(&b[0].lerp(&b[1], s)).translation.vector;
+            (posed.1.forward(&a[0].lerp(&a[1], s)).translation.vector - meant).norm()
+        })
+        .fold(0.0, f64::max);
+    let stated = planned.outcomes[1].bend_mm.unwrap();
+    assert!(most > 1e-3 && (most - stated).abs() < 4e-3, "{most} stated as {stated}");
+    assert_eq!(planned.outcomes[1].reason, None);
+}
+
+#[test]
+fn external_axes_of_what_is_put_in_go_in_proportion_to_the_way() {
+    let actual = perturbed(11, 1.0);
+    let with = |target: String, a: &str, b: &str| target.replace(EXT, &format!("[{a},{b},9E9,9E9,9E9,9E9]"));
+    let source = module(&format!(
+        "  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n  MoveC {},{},v100,fine,tool0;\n",
+        with(down(320.0, 30.0, 300.0), "100", "7"),
+        with(down(480.0, 30.0, 300.0), "200", "7"),
+        with(down(420.0, 90.0, 300.0), "9E9", "9E9"),
+        with(down(360.0, 30.0, 300.0), "20", "7"),
+    ));
+    // What is put in before the line and before the arc, and the places of all ends.
+    let run = |tolerance_mm: f64, source: &str| {
+        let options = Options { tolerance_mm, circles: Circles::Segments, ..Options::default() };
+        let (planned, text) = rewrite(source, &known(&actual), &options);
+        let task = Task::read(&[("p.mod", text.as_bytes())]);
+        let targets = task.listing.motions.iter().map(|m| m.to().unwrap().value.unwrap());
+        let places: Vec<(Vector3<f64>, [Option<f64>; 6])> = targets
+            .map(|value| value.cartesian().copied().unwrap())
+            .map(|target| (Vector3::from(target.position_mm), target.external))
+            .collect();
+        (planned.outcomes[1].inserted, planned.outcomes[2].inserted, places, text)
+    };
+    let (line, _, places, _) = run(0.001, &source);
+    assert!(line >= 1, "{line}");
+    for (at, external) in &places[..=line + 1] {
+        let share = (at.x - places[0].0.x) / (places[line + 1].0.x - places[0].0.x);
+        assert!((external[0].unwrap() - 100.0 - 100.0 * share).abs() < 0.1, "{at} {external:?}");
+        assert_eq!(external[1..3], [Some(7.0), None]);
+    }
+    let (line, arc, places, _) = run(0.01, &source);
+    assert!(arc >= 8, "{arc}");
+    // Half a turn from (480, 30) over (420, 90) to (360, 30).
+    for (at, external) in &places[line + 1..] {
+        let share = (at.y - 30.0).atan2(at.x - 420.0) / PI;
+        assert!((external[0].unwrap() - 200.0 + 180.0 * share).abs() < 2.0, "{at} {external:?}");
+    }
+    // Where none moves, they stay as they are written.
+    let still = source.replace("[200,7", "[100,7").replace("[20,7", "[100,7").replace("[100,7", "[1E2,07.0");
+    let (_, arc, places, text) = run(0.01, &still);
+    assert_eq!(text.matches("[1E2,07.0,9E9").count(), 3, "{text}");
+    assert!(arc >= 8 && places.iter().all(|place| place.1[..3] == [Some(100.0), Some(7.0), None]), "{text}");
+}
+
+#[test]
+fn nothing_is_put_in_where_the_wrist_is_interpolated_by_itself() {
+    let actual = perturbed(11, 1.0);
+    let options = Options { tolerance_mm: 0.001, ..Options::default() };
+    let body = |area: &str| {
+        module(&format!(
+            "  SingArea {area};\n  MoveL {},v100,fine,tool0;\n  MoveL {},v100,fine,tool0;\n",
+            down(320.0, 30.0, 300.0),
+            down(480.0, 30.0, 300.0)
+        ))
+    };
+    let (off, _) = rewrite(&body("\\Off"), &known(&actual), &options);
+    assert!(off.outcomes[1].inserted > 0);
+    assert!(!off.notes.iter().any(|note| note.contains("SingArea")), "{:?}", off.notes);
+    let (wrist, text) = rewrite(&body("\\Wrist"), &known(&actual), &options);
+    assert_eq!(wrist.outcomes[1].inserted, 0);
+    assert_eq!(text.matches("MoveL").count(), 2);
+    assert!(matches!(wrist.outcomes[1].reason, Some(Why::Bend { mm }) if mm > 0.001));
+    let note = wrist.notes.iter().find(|note| note.contains("SingArea")).unwrap();
+    assert!(note.starts_with("on 2 of the lines and arcs") && note.ends_with("(lines 4, 5)"), "{note}");
+}
+
+#[test]
+fn a_configuration_that_the_text_does_not_tell_is_said_to_be_taken() {
+    let actual = perturbed(11, 0.5);
+    let body = |conf: &str| {
+        module(&format!(
+            "  {conf};\n  MoveJ {},v100,fine,tool0;\n  MoveJ {},v100,fine,tool0;\n",
+            down(320.0, 30.0, 300.0),
+            down(330.0, 30.0, 300.0)
+        ))
+    };
+    let (planned, _) = rewrite(&body("ConfJ\\Off"), &known(&actual), &Options::default());
+    let note = planned.notes.iter().find(|note| note.contains("configuration next to where")).unwrap();
+    // Only the first: the second goes from there.
+    assert!(note.starts_with("1 of the motions") && note.ends_with("(line 4)"), "{note}");
+    let (planned, _) = rewrite(&body("ConfJ\\On"), &known(&actual), &Options::default());
+    assert!(!planned.notes.iter().any(|note| note.contains("configuration next to where")));
+}

@@ -1,0 +1,104 @@
+//! What programs say that the arm carries.
+
+use truegrind_compensation::payload::{Grip, Load, Loads};
+use truegrind_programs::rapid::Task;
+
+const HEAD: &str = "MODULE M\n PERS tooldata t := [TRUE,[[0,0,100],[1,0,0,0]],[2,[0,0,50],[1,0,0,0],0,0,0]];\n \
+                    PERS loaddata part := [3,[0,0,20],[1,0,0,0],0,0,0];\n VAR loaddata weighed;\n";
+
+/// The grips at each motion of a program whose moves are written `m;`.
+fn grips(body: &str) -> (Task<'static>, Loads) {
+    let target = "[[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let body = body.replace("m;", &format!("MoveL {target},v100,fine,t;")).replace("TARGET", target);
+    let text: &'static str = Box::leak(format!("{HEAD}{body}ENDMODULE\n").into_boxed_str());
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let loads = Loads::of_task(&task);
+    (task, loads)
+}
+
+fn masses(body: &str) -> Vec<Option<f64>> {
+    let (task, loads) = grips(body);
+    let arm = super::nominal();
+    let listing = &task.listing;
+    (0..listing.motions.len())
+        .map(|k| loads.at(k, &listing.motions[k], listing, &arm).map(|load: Load| load.mass_kg))
+        .collect()
+}
+
+#[test]
+fn a_grip_is_followed_through_statements_branches_loops_and_calls() {
+    let tool = Some(2.0);
+    let both = Some(5.0);
+    assert_eq!(masses("PROC main()\n m;\n m;\nENDPROC\n"), [tool, tool]);
+    assert_eq!(
+        masses("PROC main()\n m;\n GripLoad part;\n m;\n GripLoad load0;\n m;\nENDPROC\n"),
+        [tool, both, tool]
+    );
+    // Both branches take it: known after; one does: not known, and the tool alone is counted.
+    let body = "PROC main()\n IF a THEN\n GripLoad part;\n ELSE\n GripLoad part;\n ENDIF\n m;\nENDPROC\n";
+    assert_eq!(masses(body), [both]);
+    let (_, loads) = grips("PROC main()\n IF a THEN\n GripLoad part;\n ENDIF\n m;\nENDPROC\n");
+    assert_eq!((loads.grips.as_slice(), loads.unknown()), (&[Grip::Unknown][..], 1));
+    // At the beginning of a loop the part may be held from the last turn.
+    let (_, loads) =
+        grips("PROC main()\n FOR i FROM 1 TO 2 DO\n m;\n GripLoad part;\n m;\n ENDFOR\n m;\nENDPROC\n");
+    assert!(matches!(loads.grips[..], [Grip::Unknown, Grip::Holds(_), Grip::Unknown]), "{:?}", loads.grips);
+    // Through routines, whichever comes first in the file.
+    let body = "PROC main()\n m;\n take;\n m;\n place;\n m;\nENDPROC\nPROC take()\n GripLoad part;\nENDPROC\n\
+                PROC place()\n m;\n GripLoad load0;\nENDPROC\n";
+    assert_eq!(masses(body), [tool, both, tool, both]);
+    // A load that the program weighs is not in the text.
+    let (_, loads) = grips("PROC main()\n GripLoad weighed;\n m;\nENDPROC\n");
+    assert_eq!(loads.unknown(), 1);
+}
+
+#[test]
+fn loads_add_up_at_their_common_centre_and_tload_stands_for_both() {
+    let (task, loads) = grips("PROC main()\n GripLoad part;\n m;\nENDPROC\n");
+    let listing = &task.listing;
+    let arm = super::nominal();
+    let load = loads.at(0, &listing.motions[0], listing, &arm).unwrap();
+    // 2 kg at 50 mm and 3 kg at 20 mm beyond the TCP at 100 mm.
+    assert!((load.centre_mm[2] - (2.0 * 50.0 + 3.0 * 120.0) / 5.0).abs() < 1e-9, "{load:?}");
+    let body = "PROC main()\n GripLoad part;\n MoveL TARGET,v100,fine,t\\TLoad:=part;\n \
+                MoveL TARGET,v100,fine,t\\TLoad:=load0;\nENDPROC\n";
+    assert_eq!(masses(body), [Some(3.0), Some(5.0)]);
+    // A tool without a stated mass says nothing.
+    let text = "MODULE M\n PERS tooldata u := [TRUE,[[0,0,1],[1,0,0,0]],[-1,[0,0,0],[1,0,0,0],0,0,0]];\n PROC main()\n \
+                MoveL [[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,u;\n ENDPROC\nENDMODULE\n";
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    assert_eq!(Loads::default().at(0, &task.listing.motions[0], &task.listing, &arm), None);
+}
+
+#[test]
+fn a_grip_changes_in_functions_by_names_in_traps_and_from_cycle_to_cycle() {
+    let unknown = |body: &str| grips(body).1.unknown();
+    let take = "PROC take1()\n GripLoad part;\nENDPROC\nFUNC bool took()\n take1;\n RETURN TRUE;\nENDFUNC\n";
+    let none = "PROC take1()\nENDPROC\nFUNC bool took()\n take1;\n RETURN TRUE;\nENDFUNC\n";
+    for body in [
+        "IF took() THEN\n ENDIF\n m;\n",
+        "IF took() m;\n",
+        "b := took();\n m;\n",
+        "WHILE took() DO\n ENDWHILE\n m;\n",
+        "CallByVar \"take\",1;\n m;\n",
+        "MoveLSync TARGET,v100,z10,t,\"take1\";\n m;\n",
+        "%\"take1\"%;\n m;\n",
+    ] {
+        // Nothing is held again when the next cycle begins.
+        let main = format!("PROC main()\n{body} GripLoad load0;\nENDPROC\n");
+        let motions = body.matches("m;").count() + body.matches("TARGET").count();
+        assert_eq!(unknown(&format!("{main}{take}")), motions, "{body}");
+        if !body.contains('%') {
+            assert_eq!(unknown(&format!("{main}{none}")), 0, "{body}");
+        }
+    }
+    let trap = "TRAP tr\n GripLoad part;\nENDTRAP\n";
+    assert_eq!(unknown(&format!("PROC main()\n m;\nENDPROC\n{trap}")), 1);
+    // What main holds at its end it holds when it begins again.
+    assert_eq!(unknown("PROC main()\n m;\n GripLoad part;\n m;\nENDPROC\n"), 1);
+    // load0 is nothing, whatever the tool weighs.
+    let (_, loads) = grips("PROC main()\n GripLoad load0;\n m;\nENDPROC\n");
+    assert_eq!(loads.grips, [Grip::Empty]);
+    let load0 = "PROC main()\n MoveL TARGET,v100,fine,t\\TLoad:=load0;\nENDPROC\n";
+    assert_eq!(masses(load0), [Some(2.0)]);
+}

@@ -1,0 +1,278 @@
+//! Backlash and payload: the rewritten program is run by a simulation that knows nothing of sides. It follows the
+//! controller's joints in small steps, and each link is dragged along by the flank against which it lies (the play
+//! operator): θ stays where it is until q − b/2 or q + b/2 takes it along.
+
+use nalgebra::{Point3, Vector3};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::deviation::Status;
+use truegrind_compensation::payload::Loads;
+use truegrind_compensation::rewrite::{Options, Plan, plan};
+use truegrind_compensation::why::Why;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Listing, MotionKind, TargetValue};
+use truegrind_programs::rapid::Task;
+use truegrind_programs::rewrite::RewriteOptions;
+
+use super::{estimated, nominal, perturbed, run_on, worst};
+
+/// To how much the distance from the line is told (mm).
+const CHORD_MM: f64 = 0.003;
+
+const PLAY_DEG: [f64; 6] = [0.02, 0.015, 0.02, 0.0, 0.03, 0.0];
+
+/// The arm with play and compliance.
+fn worn(seed: u64) -> Model {
+    let mut arm = perturbed(seed, 0.5);
+    let plays = PLAY_DEG.iter().enumerate().filter(|(_, play)| **play != 0.0);
+    arm.effects
+        .extend(plays.map(|(joint, play)| Effect::Backlash(Backlash { joint, play_rad: play.to_radians() })));
+    arm.effects.extend(
+        [1, 2].map(|joint| Effect::JointCompliance(Compliance { joint, compliance_rad_per_nm: 6e-5 })),
+    );
+    arm
+}
+
+fn without_play(arm: &Model) -> Model {
+    let mut arm = arm.clone();
+    arm.effects.retain(|effect| !matches!(effect, Effect::Backlash(_)));
+    arm
+}
+
+/// Lines to and fro in y, each 20 mm farther out; joint 1 turns at every end, joints 2, 3 and 5 half way on each line.
+/// The gripper takes a kilogram after the third line.
+fn source() -> String {
+    let mut text = String::from(
+        "MODULE M\n PERS tooldata tGrip := [TRUE,[[0,0,60],[1,0,0,0]],[1.5,[10,0,40],[1,0,0,0],0,0,0]];\n \
+         PERS loaddata part := [1,[0,0,30],[1,0,0,0],0,0,0];\n PROC main()\n  GripLoad load0;\n",
+    );
+    for k in 0..6 {
+        let x = 380 + 20 * k;
+        let (from, to) = if k % 2 == 0 { (-120, 120) } else { (120, -120) };
+        if k == 3 {
+            text += "  GripLoad part;\n";
+        }
+        let step = if k == 0 { "MoveJ" } else { "MoveL" };
+        for (name, y) in [(step, from), ("MoveL", to)] {
+            let cf1 = if y < 0 { -1 } else { 0 };
+            text += &format!(
+                "  {name} [[{x},{y},260],[0,0,1,0],[{cf1},0,{cf1},0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tGrip;\n"
+            );
+        }
+    }
+    text + " ENDPROC\nENDMODULE\n"
+}
+
+/// What the arm carries: tool and part, worked out by hand on the flange, which is the last frame of this arm.
+fn carried(y_lines: usize) -> Condition {
+    let (payload_kg, payload_centre_mm) = if y_lines < 3 {
+        (1.5, [10.0, 0.0, 40.0])
+    } else {
+        (2.5, [15.0 / 2.5, 0.0, (1.5 * 40.0 + (60.0 + 30.0)) / 2.5])
+    };
+    Condition { payload_kg: Some(payload_kg), payload_centre_mm, ..Condition::default() }
+}
+
+/// One place on the way, with where the tool is there.
+struct Passed {
+    motion: usize,
+    /// Whether it is the end of the motion.
+    end: bool,
+    tip: Point3<f64>,
+}
+
+/// Runs a program in small steps. `part_from`: the first motion with the part in the gripper.
+fn run(listing: &Listing, arm: &Model, part_from: usize) -> Vec<Passed> {
+    let sheet = nominal();
+    let controller = Inverse::new(&sheet, &Condition::default(), &sheet);
+    let stiff = without_play(arm);
+    let [light, heavy] = [0, 3].map(|lines| stiff.under(&carried(lines)).clone());
+    let tool = Pose::translation(0.0, 0.0, 60.0);
+    let half = PLAY_DEG.map(|play| 0.5 * play.to_radians());
+    let mut out = Vec::new();
+    let mut at: Option<(Pose, Joints)> = None;
+    let mut link = Joints::zeros();
+    for (m, motion) in listing.motions.iter().enumerate() {
+        let Some(Ok(TargetValue::Cartesian(target))) = motion.to().map(|t| t.value) else { continue };
+        let told = target.pose();
+        let wanted = truegrind_arm::inverse::configuration::Configuration {
+            cf1: target.conf[0],
+            cf4: target.conf[1],
+            cf6: target.conf[2],
+            cfx: target.conf[3],
+        };
+        let flange = |pose: &Pose| pose * tool.inverse();
+        let Some((from, start)) = at else {
+            let joints = controller.solve_configured(&flange(&told), &wanted, None).unwrap().joints;
+            (at, link) = (Some((told, joints)), joints);
+            continue;
+        };
+        let steps = 400;
+        let mut near = start;
+        let end = controller.solve_near(&flange(&told), &start).unwrap().joints;
+        for k in 1..=steps {
+            let s = f64::from(k) / f64::from(steps);
+            near = match motion.kind {
+                MotionKind::Linear => {
+                    let position = from.translation.vector.lerp(&told.translation.vector, s);
+                    let pose = Pose::from_parts(position.into(), from.rotation.slerp(&told.rotation, s));
+                    controller.solve_near(&flange(&pose), &near).unwrap().joints
+                }
+                _ => start.lerp(&end, s),
+            };
+            link = Joints::from_fn(|j, _| link[j].clamp(near[j] - half[j], near[j] + half[j]));
+            let posed = if m < part_from { &light } else { &heavy };
+            let tip = posed.forward(&link) * tool * Point3::origin();
+            out.push(Passed { motion: m, end: k == steps, tip });
+        }
+        at = Some((told, near));
+    }
+    out
+}
+
+fn options(tolerance_mm: f64, loads: Option<Loads>) -> Options {
+    Options { tolerance_mm, loads, ..Options::default() }
+}
+
+fn rewrite(text: &str, arm: &Model, options: &Options) -> (Plan, Vec<u8>) {
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let spread: Vec<Joints> = (0..3).map(|k| Joints::repeat(f64::from(k) - 1.0)).collect();
+    let mut known = estimated(arm.clone(), &spread);
+    known.covariance *= 1e-4;
+    let planned = plan(&task.listing, &known, &Cell::default(), options);
+    let edits = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();
+    (planned, edits.files[0].edits.apply(text.as_bytes()).unwrap())
+}
+
+fn intended(text: &str) -> Vec<Vector3<f64>> {
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let value = |m: &truegrind_programs::motion::Motion| m.to().unwrap().value.unwrap();
+    task.listing.motions.iter().map(|m| value(m).cartesian().unwrap().pose().translation.vector).collect()
+}
+
+/// The largest deviation at the ends of lines beyond the first two, at which the flanks have settled. No targets were put in.
+fn worst_end(program: &[u8], text: &str, arm: &Model) -> f64 {
+    let task = Task::read(&[("p.mod", program)]);
+    let meant = intended(text);
+    let passed = run(&task.listing, arm, 6);
+    let ends = passed.iter().filter(|p| p.end && p.motion > 2);
+    ends.map(|p| (p.tip.coords - meant[p.motion]).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn sides_and_loads_of_the_program_leave_nothing_and_the_middle_does() {
+    let text = source();
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let loads = Loads::of_task(&task);
+    for seed in 0..3 {
+        let arm = worn(seed);
+        let full = options(5.0, Some(loads.clone()));
+        let (planned, program) = rewrite(&text, &arm, &full);
+        assert!(planned.outcomes.iter().all(|o| o.status == Status::Changed || o.status == Status::Flagged));
+        let right = worst_end(&program, &text, &arm);
+        assert!(right < 1e-3, "with sides and loads {right} mm are left");
+        // Without sides: the middle of the play.
+        let (_, middle) = rewrite(&text, &without_play(&arm), &full);
+        let middle = worst_end(&middle, &text, &arm);
+        assert!(middle > 0.05, "in the middle of the play only {middle} mm are left");
+        // Without loads: a bare arm.
+        let (_, bare) = rewrite(&text, &arm, &options(5.0, None));
+        let bare = worst_end(&bare, &text, &arm);
+        assert!(bare > 0.1, "without the load only {bare} mm are left");
+    }
+}
+
+#[test]
+fn the_path_between_targets_takes_up_the_play_where_joints_turn() {
+    let text = source();
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let loads = Loads::of_task(&task);
+    let arm = worn(4);
+    let meant = intended(&text);
+    let off_path = |program: &[u8], planned: &Plan| {
+        let changed = Task::read(&[("p.mod", program)]);
+        // The first motion with the part: the sixth of the original ones.
+        let part_from = 6 + planned.outcomes[..6].iter().map(|o| o.inserted).sum::<usize>();
+        let begin = 3 + planned.outcomes[..3].iter().map(|o| o.inserted).sum::<usize>();
+        let distance = |p: &Point3<f64>| {
+            meant
+                .windows(2)
+                .map(|ends| {
+                    let along = ends[1] - ends[0];
+                    let s = ((p.coords - ends[0]).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+                    (p.coords - ends[0] - along * s).norm()
+                })
+                .fold(f64::INFINITY, f64::min)
+        };
+        let passed = run(&changed.listing, &arm, part_from);
+        // Where the gripper takes the part the arm sags at once, before any target can put it right, and the joints that
+        // lift it again have their play to take up.
+        let taken = |p: &Passed| p.motion == part_from || (p.tip.coords - meant[5]).norm() < 1.0;
+        passed.iter().filter(|p| p.motion > begin && !taken(p)).map(|p| distance(&p.tip)).fold(0.0, f64::max)
+    };
+    let (planned, program) = rewrite(&text, &arm, &options(5.0, Some(loads.clone())));
+    assert!(planned.outcomes.iter().all(|o| o.inserted == 0));
+    let loose = off_path(&program, &planned);
+    // A link does not jump from flank to flank, it waits, and so it is stated.
+    let stated = |planned: &Plan| {
+        let without_part = planned.outcomes.iter().enumerate().filter(|(k, _)| *k > 3 && *k != 6);
+        without_part.filter_map(|(_, o)| o.bend_mm).fold(0.0, f64::max)
+    };
+    assert!(loose > 0.05, "play bends the path: {loose}");
+    assert!((stated(&planned) - loose).abs() < CHORD_MM, "stated {}, found {loose}", stated(&planned));
+    let tolerance = 0.02;
+    let (planned, program) = rewrite(&text, &arm, &options(tolerance, Some(loads)));
+    assert!(planned.outcomes.iter().skip(2).all(|o| o.inserted > 0), "{:?}", planned.outcomes);
+    let left = off_path(&program, &planned);
+    assert!(left < tolerance + CHORD_MM, "targets where joints turn leave {left} mm of {loose}");
+    assert!((stated(&planned) - left).abs() < CHORD_MM, "stated {}, found {left}", stated(&planned));
+    // Where the part is taken more than the tolerance is left for a moment, and that is said.
+    for (k, outcome) in planned.outcomes.iter().enumerate() {
+        let bent = matches!(outcome.reason, Some(Why::Bend { mm }) if mm > tolerance);
+        assert_eq!(bent, k == 6, "{outcome:?}");
+    }
+}
+
+#[test]
+fn the_judge_sees_what_the_simulation_sees_and_a_start_without_sides_is_said() {
+    let text = source();
+    let arm = worn(7);
+    let (planned, program) = rewrite(&text, &arm, &options(5.0, None));
+    // The same arm judges: under its own sides nothing is left, but for the start, where no side is known.
+    let report = run_on(&arm, text.as_bytes(), &program, &Cell::default());
+    assert!(worst(&report, true) < 1e-3, "{}", worst(&report, true));
+    assert!(worst(&report, false) > 0.1);
+    let note = planned.notes.iter().find(|note| note.contains("backlash")).expect("a note on backlash");
+    assert!(note.contains("joint 1: 0.0200°") && note.contains("cannot be told"), "{note}");
+    // Half the play of each joint is in σ at the start and no longer when all joints have moved.
+    let sigma = |k: usize| planned.outcomes[k].sigma_mm.unwrap();
+    assert!(sigma(0) > 0.09, "σ at the start {}", sigma(0));
+    let settled = planned.outcomes[3..].iter().filter_map(|o| o.sigma_mm).fold(0.0, f64::max);
+    assert!(settled < 0.2 * sigma(0), "σ later {settled}");
+}
+
+/// The class: what is followed along a line must be followed as well where the line begins under another tool or work
+/// object than that in which it ends. The path is the same, and so are the sides at its end.
+#[test]
+fn joints_turn_on_lines_that_begin_in_another_object_too() {
+    let unit = "[[0,0,0],[1,0,0,0]]";
+    let object = format!(" PERS wobjdata wSame := [FALSE,TRUE,\"\",{unit},{unit}];\n PROC main()");
+    let mut text = String::new();
+    for (k, line) in source().replace(" PROC main()", &object).lines().enumerate() {
+        // Lines that follow each other name one object and the other.
+        let other = k % 2 == 0 && line.contains("Move");
+        text += &if other { line.replace("tGrip;", "tGrip\\WObj:=wSame;") } else { line.to_owned() };
+        text.push('\n');
+    }
+    assert!(text.contains("tGrip;") && text.contains("wSame;"));
+    let task = Task::read(&[("p.mod", text.as_bytes())]);
+    let arm = worn(0);
+    let (_, program) = rewrite(&text, &arm, &options(5.0, Some(Loads::of_task(&task))));
+    let left = worst_end(&program, &text, &arm);
+    assert!(left < 1e-3, "where the object changes {left} mm are left");
+}

@@ -1,0 +1,325 @@
+//! Every reason why a motion is left, refused or flagged shows in a program.
+
+use std::collections::BTreeSet;
+
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::Joints;
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::cut::Cuts;
+use truegrind_compensation::deviation::Status;
+use truegrind_compensation::rewrite::{Circles, Options, Plan, plan};
+use truegrind_compensation::why::Why;
+use truegrind_programs::rapid::Task;
+
+use super::{estimated, nominal, perturbed};
+
+/// Every variant by name: a new one does not compile until it stands here.
+fn name(why: &Why) -> &'static str {
+    match why {
+        Why::Program(_) => "program",
+        Why::MovingBase { .. } => "moving base",
+        // Only with a cell file (tests/it/compensation/taught.rs).
+        Why::Contradicted => "contradicted",
+        // Only where a program is rewritten (tests/it/programs.rs).
+        Why::Same => "same",
+        Why::JointTarget => "joint target",
+        Why::Inverse(_) => "inverse",
+        Why::OutsideLimits { .. } => "outside limits",
+        Why::TooFar { .. } => "too far",
+        Why::TooMuchTurn { .. } => "too much turn",
+        Why::NearSingularity => "near singularity",
+        Why::JointJump { .. } => "joint jump",
+        Why::SingularWay => "singular way",
+        Why::OtherBranch => "other branch",
+        Why::OpenBranch => "open branch",
+        Why::Bend { .. } => "bend",
+        Why::Corner { .. } => "corner",
+        Why::CircleKept => "circle kept",
+        Why::TooFast { .. } => "too fast",
+        Why::NoCircle => "no circle",
+        Why::WholeCircle => "whole circle",
+        Why::JointNotMeasured { .. } => "joint not measured",
+        Why::PartOfCut { .. } => "part of cut",
+        Why::Step { .. } => "step",
+        Why::NotCovered { .. } => "not covered",
+        Why::Uncertain { .. } => "uncertain",
+    }
+}
+
+const NAMES: [&str; 23] = [
+    "program",
+    "moving base",
+    "joint target",
+    "inverse",
+    "outside limits",
+    "too far",
+    "too much turn",
+    "near singularity",
+    "joint jump",
+    "singular way",
+    "other branch",
+    "open branch",
+    "bend",
+    "corner",
+    "circle kept",
+    "too fast",
+    "no circle",
+    "whole circle",
+    "joint not measured",
+    "part of cut",
+    "step",
+    "not covered",
+    "uncertain",
+];
+
+fn known() -> Estimated {
+    let mut known = estimated(perturbed(5, 3.0), &[Joints::zeros()]);
+    (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
+    known.region.spacing_deg = 1e6;
+    known
+}
+
+/// Each motion by itself, so that its own reason shows and not that of its cut.
+fn planned(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    planned_in_cuts(source, known, cell, &Options { cuts: Cuts::Single, ..options.clone() })
+}
+
+fn planned_in_cuts(source: &[u8], known: &Estimated, cell: &Cell, options: &Options) -> Plan {
+    let task = Task::read(&[("p.mod", source)]);
+    assert!(task.listing.opaque.is_empty(), "{:?}", task.listing.opaque);
+    plan(&task.listing, known, cell, options)
+}
+
+fn sample(name: &str) -> Vec<u8> {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs");
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+fn fine() -> Options {
+    Options { tolerance_mm: 0.005, circles: Circles::Segments, ..Options::default() }
+}
+
+#[test]
+fn each_motion_of_the_sample_states_the_reason_beside_it() {
+    let source = sample("refusals.mod");
+    let task = Task::read(&[("p.mod", &source)]);
+    let plan = planned(&source, &known(), &Cell::default(), &fine());
+    let text = String::from_utf8(source.clone()).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let mut wrong = Vec::new();
+    for (motion, outcome) in task.listing.motions.iter().zip(&plan.outcomes) {
+        let line = lines[motion.place.line as usize - 1];
+        let expected = line.split("! expect: ").nth(1).unwrap();
+        let found = outcome.reason.map_or("nothing".to_owned(), |why| why.to_string());
+        if !found.contains(expected) {
+            wrong.push(format!("{}: {expected}: {found} ({outcome:?})", motion.place.line));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Plans of the scenes that `programs/bounds.mod` names.
+fn scene(name: &str, source: &[u8]) -> Vec<Plan> {
+    let cell = Cell::default();
+    let (mut arm, mut options) = (known(), Options::default());
+    match name {
+        "bound" => options.max_correction_mm = 1e-4,
+        "turn" => options.max_turn_rad = 1e-7,
+        "singular" => options.min_singularity = 1.0,
+        "unsure" => arm.region.sigma_mm = 1e-12,
+        "elsewhere" => (arm.region.spacing_deg, arm.region.samples_deg) = (1.0, vec![[150.0; 6]]),
+        "narrow" => arm.region.max_deg[1] = 5.0,
+        "loose" => (options.tolerance_mm, options.circles) = (0.5, Circles::Segments),
+        "joints" => options.joint_targets = true,
+        "branch" => {
+            options.min_singularity = 0.0;
+            (options.max_turn_rad, options.max_correction_mm) = (1.0, 50.0);
+            let arms = (0..12).map(|seed| estimated(perturbed(seed, 1.0), &[Joints::zeros()]));
+            return arms.map(|arm| planned(source, &arm, &cell, &options)).collect();
+        }
+        other => panic!("no scene {other}"),
+    }
+    vec![planned(source, &arm, &cell, &options)]
+}
+
+#[test]
+fn each_motion_of_the_sample_states_the_reason_of_its_scene() {
+    let source = sample("bounds.mod");
+    let task = Task::read(&[("p.mod", &source)]);
+    let text = String::from_utf8(source.clone()).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let mut scenes: BTreeSet<&str> = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for (index, motion) in task.listing.motions.iter().enumerate() {
+        let line = lines[motion.place.line as usize - 1];
+        let Some(expected) = line.split("! expect ").nth(1) else { continue };
+        for expected in expected.split(" | ") {
+            let (name, expected) = expected.split_once(": ").unwrap();
+            scenes.insert(name);
+            let reasons = scene(name, &source).into_iter().map(|plan| plan.outcomes[index].reason);
+            let found: Vec<String> =
+                reasons.map(|why| why.map_or("nothing".to_owned(), |why| why.to_string())).collect();
+            if !found.iter().any(|found| found.contains(expected)) {
+                wrong.push(format!("{} {name}: {expected}: {found:?}", motion.place.line));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert_eq!(scenes.len(), 9);
+}
+
+#[test]
+fn every_reason_there_is_shows_in_a_program() {
+    let mut seen: BTreeSet<&str> = BTreeSet::new();
+    let mut look = |plan: &Plan| {
+        for outcome in &plan.outcomes {
+            if let Some(why) = &outcome.reason {
+                assert_ne!(outcome.status, Status::Changed);
+                assert!(!why.to_string().is_empty());
+                seen.insert(name(why));
+            }
+        }
+    };
+    let refusals = sample("refusals.mod");
+    let cell = Cell::default();
+    look(&planned(&refusals, &known(), &cell, &fine()));
+    look(&planned(&sample("switches.mod"), &known(), &cell, &fine()));
+    look(&planned(&sample("track.mod"), &known(), &cell, &fine()));
+    let bounds = [
+        Options { max_correction_mm: 1e-4, ..fine() },
+        Options { max_turn_rad: 1e-7, ..fine() },
+        Options { joint_targets: true, ..fine() },
+        Options { min_singularity: 1.0, ..fine() },
+        Options { tolerance_mm: 0.5, ..fine() },
+    ];
+    for options in &bounds {
+        look(&planned(&refusals, &known(), &cell, options));
+    }
+    for cuts in [Cuts::Whole, Cuts::Partial] {
+        let line = |x: u32| {
+            format!("MoveL [[{x},0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0;\n")
+        };
+        let source = ["MODULE M\nPROC main()\n", &line(380), &line(900), "ENDPROC\nENDMODULE\n"].concat();
+        look(&planned_in_cuts(source.as_bytes(), &known(), &cell, &Options { cuts, ..fine() }));
+    }
+    let mut unsure = known();
+    unsure.region.sigma_mm = 1e-12;
+    look(&planned(&refusals, &unsure, &cell, &fine()));
+    let mut elsewhere = known();
+    elsewhere.region.spacing_deg = 1.0;
+    elsewhere.region.samples_deg = vec![[150.0; 6]];
+    look(&planned(&refusals, &elsewhere, &cell, &fine()));
+    let mut narrow = known();
+    narrow.region.max_deg[1] = 5.0;
+    look(&planned(&refusals, &narrow, &cell, &fine()));
+    // Axis 5 almost straight, so that a correction turns it to the other side; no bound on singularity.
+    let mut near = String::from("MODULE M\n PROC main()\n");
+    for angle in [-0.006, -0.003, 0.003, 0.006_f64] {
+        let q = nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Vector3::y_axis(),
+            std::f64::consts::FRAC_PI_2 + angle,
+        );
+        let cfx = if angle > 0.0 { 0 } else { 1 };
+        near += &format!(
+            "  MoveJ [[374,0,{:.6}],[{:.9},0,{:.9},0],[0,0,0,{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n",
+            630.0 - 72.0 * angle,
+            q.w,
+            q.j
+        );
+    }
+    near += " ENDPROC\nENDMODULE\n";
+    let options = Options { min_singularity: 0.0, max_turn_rad: 1.0, max_correction_mm: 50.0, ..fine() };
+    for seed in 0..12 {
+        look(&planned(
+            near.as_bytes(),
+            &estimated(perturbed(seed, 1.0), &[Joints::zeros()]),
+            &cell,
+            &options,
+        ));
+    }
+    for min_singularity in [1e-3, 0.02] {
+        look(&planned(singular().as_bytes(), &known(), &cell, &Options { min_singularity, ..fine() }));
+    }
+    let missing: Vec<&&str> = NAMES.iter().filter(|name| !seen.contains(*name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+/// A target close to the wrist singularity, a line through it, and a joint motion without configuration to a pose of which
+/// another solution is nearer.
+fn singular() -> String {
+    let at = |q_deg: [f64; 6], conf: [i32; 4]| {
+        let q = Joints::from_fn(|j, _| q_deg[j].to_radians());
+        let pose = nominal().under(&Condition::default()).forward(&q);
+        let (t, r) = (pose.translation.vector, pose.rotation.quaternion());
+        let [cf1, cf4, cf6, cfx] = conf;
+        format!(
+            "[[{:.6},{:.6},{:.6}],[{:.9},{:.9},{:.9},{:.9}],[{cf1},{cf4},{cf6},{cfx}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n",
+            t.x, t.y, t.z, r.w, r.i, r.j, r.k
+        )
+    };
+    let mut text = String::from("MODULE M\n PROC main()\n");
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 0.8, 30.0], [0; 4]));
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 40.0, 20.0, 30.0], [0; 4]));
+    text += &format!("  MoveL {}", at([10.0, 20.0, -10.0, 40.0, -12.0, 30.0], [0, 0, 0, 1]));
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 10.0, 70.0, 10.0], [0; 4]));
+    text += "  ConfJ\\Off;\n";
+    text += &format!("  MoveJ {}", at([10.0, 20.0, -10.0, 150.0, 25.0, 175.0], [0; 4]));
+    text + " ENDPROC\nENDMODULE\n"
+}
+
+#[test]
+fn an_axis_that_carries_the_base_refuses_its_motions() {
+    let source = sample("track.mod");
+    let reasons = |cell: &Cell| -> Vec<Option<Why>> {
+        planned(&source, &known(), cell, &Options::default()).outcomes.iter().map(|o| o.reason).collect()
+    };
+    let base = Some(Why::MovingBase { axis: 0 });
+    // Farther away than the arm is long: the axis must carry the base, there and where it stands at 0.
+    let found = reasons(&Cell::default());
+    assert_eq!(found, [base, base, base, None]);
+    let stated = |text: &str| Cell::from_toml(&format!("[[external]]\naxis = \"{text}")).unwrap();
+    assert_eq!(reasons(&stated("a\"\ncarries = \"base\"\n")), [base, base, base, None]);
+    let both = stated("b\"\ncarries = \"base\"\n");
+    assert_eq!(reasons(&both)[3], Some(Why::MovingBase { axis: 1 }));
+    // Stated not to: then the far target is out of reach, and says so.
+    let other = reasons(&stated("a\"\ncarries = \"other\"\n"));
+    assert_eq!(other[0], None);
+    assert!(matches!(other[1], Some(Why::Inverse(_))), "{other:?}");
+    assert!(Cell::from_toml("[[external]]\naxis = \"g\"\ncarries = \"base\"\n").is_err());
+    let notes = planned(&source, &known(), &Cell::default(), &Options::default()).notes;
+    assert!(
+        notes.iter().any(|note| note.contains("external axis a") && note.contains("[[external]]")),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn where_no_configuration_reaches_a_target_the_reason_is_what_forbids_the_nearest() {
+    for conf in ["ConfL\\Off;", "ConfL\\On;"] {
+        // A tool that points up at this height turns joint 5 too far.
+        let source = format!(
+            "MODULE M\nPROC main()\n{conf}\nMoveL [[350,0,450],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n\
+             ENDPROC\nENDMODULE\n"
+        );
+        let planned = planned(source.as_bytes(), &known(), &Cell::default(), &Options::default());
+        let outcome = &planned.outcomes[0];
+        assert_eq!(outcome.status, Status::Refused);
+        assert!(matches!(outcome.reason, Some(Why::OutsideLimits { .. })), "{conf} {:?}", outcome.reason);
+    }
+}
+
+#[test]
+fn a_called_program_that_is_not_read_is_named() {
+    let go = "G1 X500. Y0. Z500. A180. B0. C0. F600.";
+    let notes = |body: &str| {
+        let source = format!("O1\n(truegrind angles wpr)\nG90 G21 G17 G54\nT1 M6\nG43.4 H1\n{body}\nM30\n");
+        let setup = truegrind_programs::nc::setup::Setup::default();
+        let task = truegrind_programs::nc::Task::read(&[("p.nc", source.as_bytes())], &setup);
+        plan(&task.listing, &known(), &Cell::default(), &Options::default()).notes
+    };
+    let found = notes(&format!("{go}\nM98 P2000\n{go}\nM98 P3000\n{go}"));
+    let note = found.iter().find(|note| note.contains("do not stand in their file")).unwrap();
+    assert!(note.starts_with("2 of the blocks") && note.ends_with("(lines 7, 9)"), "{note}");
+    assert!(!notes(go).iter().any(|note| note.contains("in their file")));
+}

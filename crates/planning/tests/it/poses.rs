@@ -1,0 +1,334 @@
+//! What to measure: the chosen poses tell more than random ones, the program goes there, and what the plan promises to
+//! decide it decides.
+
+use nalgebra::{DMatrix, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind_calibration::identification::tolerance::Tolerance;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_estimation::least_squares::lm;
+use truegrind_planning::poses::candidate::Bounds;
+use truegrind_planning::poses::design::{Design, Index};
+use truegrind_planning::poses::drive::{Drive, draft};
+use truegrind_planning::poses::rival::{Suspect, effects_of, questions};
+use truegrind_planning::poses::rows::{Noise, Told, rig};
+use truegrind_planning::poses::schedule::Purpose;
+use truegrind_planning::poses::sight::{clearance_mm, segment_distance};
+use truegrind_planning::poses::{Options, Plan, PlanError, Wanted, plan};
+use truegrind_programs::motion::{MotionKind, TargetValue};
+use truegrind_programs::rapid::{Task, writer};
+
+fn nominal() -> Model {
+    truegrind_arm::robots::load("abb-irb-120").unwrap().model
+}
+
+fn cable() -> Frames {
+    let mut frames = Frames::at_origin(1);
+    frames.outlets_mm[0] = Vector3::new(750.0, 200.0, 40.0);
+    frames.flange_from_target.translation.vector = Vector3::new(10.0, -5.0, 40.0);
+    frames
+}
+
+fn tracker() -> Frames {
+    let mut frames = Frames::at_origin(1);
+    frames.base_from_sensor.translation.vector = Vector3::new(2000.0, -500.0, 300.0);
+    frames.flange_from_target.translation.vector = Vector3::new(35.0, 10.0, 60.0);
+    frames
+}
+
+/// Small, so that it is quick.
+fn small() -> Options {
+    Options {
+        poses: 30,
+        candidates: 300,
+        bounds: Bounds { box_mm: Some([[-100.0, -600.0, 50.0], [700.0, 600.0, 900.0]]), ..Bounds::default() },
+        ..Options::default()
+    }
+}
+
+fn planned(sensor: Sensor, frames: &Frames, options: &Options) -> Plan {
+    let nominal = nominal();
+    plan(&Wanted { nominal: &nominal, sensor, frames }, options).unwrap()
+}
+
+#[test]
+fn chosen_poses_tell_more_than_random_ones() {
+    for (sensor, frames, least) in
+        [(Sensor::Cable, cable(), 0.9), (Sensor::Position, tracker(), 0.97), (Sensor::Pose, tracker(), 0.99)]
+    {
+        for index in [Index::D, Index::O1] {
+            let found = planned(sensor, &frames, &Options { index, ..small() });
+            let quality = found.quality;
+            assert_eq!(found.poses.len(), 30);
+            assert!(quality.log_det > quality.random_log_det, "{sensor:?} {index:?}: {quality:?}");
+            let ratio = quality.reading_sigma_mm / quality.random_reading_sigma_mm;
+            assert!(ratio < least, "{sensor:?} {index:?}: held-out sigma {ratio:.3} of that of random poses");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_plan_for_any_threads() {
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| planned(Sensor::Cable, &cable(), &small()))
+    };
+    let one = of(1);
+    assert_eq!(one, of(3));
+    assert_ne!(one.poses, planned(Sensor::Cable, &cable(), &Options { seed: 1, ..small() }).poses);
+}
+
+#[test]
+fn exchange_finds_the_best_pair_and_weighs_what_is_asked() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let mut asked_more = 0;
+    for _ in 0..20 {
+        let readings = DMatrix::from_fn(5, 24, |_, _| random.random_range(-3.0..3.0));
+        let mut told =
+            Told { readings, per_row: 1, parameters: Vec::new(), scale: vec![1.0; 5], interest: Vec::new() };
+        let best = |told: &Told| {
+            let design = Design { told, index: Index::D };
+            let pairs = (0..24).flat_map(|a| (0..a).map(move |b| [b, a]));
+            let best = pairs
+                .map(|pair| (design.value(&pair).unwrap(), pair))
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap();
+            let found = design.choose(2).unwrap();
+            let value = design.value(&found).unwrap();
+            assert!(value <= best.0 + 1e-12);
+            // A local optimum, at the worst a few percent of a parameter's information below the best.
+            assert!(
+                told.interest.is_empty().then_some(value).is_none_or(|v| ((v - best.0) / 5.0).exp() > 0.85)
+            );
+            (value > best.0 - 1e-9, found)
+        };
+        // One exchange at a time may end beside the best pair.
+        let (plain, without) = best(&told);
+        told.interest = vec![4];
+        let (asked, with) = best(&told);
+        asked_more += usize::from(plain) + usize::from(asked);
+        // What is known of the fifth parameter alone does not become less.
+        let sigma = |set: &[usize]| {
+            let covariance = told.covariance(&told.information(set)).unwrap();
+            covariance[(4, 4)]
+        };
+        assert!(sigma(&with) <= sigma(&without) + 1e-9, "{} {}", sigma(&with), sigma(&without));
+    }
+    assert!(asked_more >= 24, "{asked_more} of 40 are the best pair of all");
+}
+
+#[test]
+fn every_row_is_within_its_bounds_and_the_cable_clears_the_arm() {
+    let (frames, nominal) = (cable(), nominal());
+    let mut options = small();
+    options.bounds.distance_mm = Some([250.0, 1000.0]);
+    options.bounds.clearance_mm = Some(80.0);
+    let found = planned(Sensor::Cable, &frames, &options);
+    let inverse = Inverse::new(&nominal, &Condition::default(), &nominal);
+    let posed = nominal.under(&Condition::default());
+    let outlet = frames.outlets_mm[0];
+    for row in &found.rows {
+        let pose = &found.poses[row.pose];
+        for joints in [&pose.joints, &row.approach_from] {
+            assert_eq!(nominal.limits.violated(joints), None);
+        }
+        assert!(inverse.smallest_singular_value(&pose.joints) >= 0.05);
+        let chain = posed.frames(&pose.joints);
+        let touched = posed.forward(&pose.joints)
+            * nalgebra::Point3::from(frames.flange_from_target.translation.vector);
+        assert!((250.0..=1000.0).contains(&(touched.coords - outlet).norm()));
+        assert!(clearance_mm(&chain, &outlet, &touched.coords, 120.0) >= 80.0);
+        for (k, side) in row.approach.iter().enumerate() {
+            let off = row.approach_from[k] - pose.joints[k];
+            assert!((off - f64::from(*side) * 3.0_f64.to_radians()).abs() < 1e-12);
+        }
+    }
+    assert!(found.passed.hidden > 0 && found.passed.distance > 0, "{:?}", found.passed);
+}
+
+#[test]
+fn repeats_other_sides_and_warm_up_are_there() {
+    let found = planned(Sensor::Position, &tracker(), &small());
+    let of = |purpose: Purpose| found.rows.iter().filter(|r| r.purpose == purpose).count();
+    assert_eq!(of(Purpose::Geometry), 30);
+    assert_eq!(of(Purpose::OtherSide), 12);
+    assert_eq!(of(Purpose::Repeat), 8);
+    assert_eq!(of(Purpose::WarmUp), 7);
+    for pair in found.rows.windows(2).filter(|p| p[1].purpose == Purpose::OtherSide) {
+        // At once after the first visit, but for a warm-up row in between.
+        if pair[0].purpose == Purpose::Geometry {
+            assert_eq!(pair[0].pose, pair[1].pose);
+            assert!((0..6).all(|k| pair[0].approach[k] == -pair[1].approach[k]));
+        }
+    }
+    for row in found.rows.iter().filter(|r| r.purpose == Purpose::Repeat) {
+        let first = found.rows.iter().find(|r| r.pose == row.pose).unwrap();
+        assert_eq!(first.approach, row.approach, "a repeat comes from the same side");
+    }
+    let warm: Vec<f64> =
+        found.rows.iter().filter(|r| r.purpose == Purpose::WarmUp).map(|r| r.time_h).collect();
+    let middle = found.rows.last().unwrap().time_h / 2.0;
+    assert!(warm.iter().filter(|t| **t < middle).count() >= 4, "often at first: {warm:?}");
+}
+
+#[test]
+fn the_program_goes_to_every_pose_and_reads_back_byte_for_byte() {
+    let (frames, nominal) = (cable(), nominal());
+    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
+    let found = plan(&wanted, &small()).unwrap();
+    let program = writer::write(&draft(&found, &wanted, &Drive::default())).unwrap();
+    let task = Task::read(&[("poses.mod", program.as_slice())]);
+    assert_eq!(task.trees[0].source(), program.as_slice());
+    assert!(task.listing.opaque.is_empty());
+    let motions = &task.listing.motions;
+    assert_eq!(motions.len(), 2 * found.rows.len());
+    for (pair, row) in motions.chunks(2).zip(&found.rows) {
+        for (motion, wanted) in pair.iter().zip([&row.approach_from, &found.poses[row.pose].joints]) {
+            assert_eq!(motion.kind, MotionKind::AbsoluteJoint);
+            let Ok(TargetValue::Joint(target)) = motion.targets[0].value else { panic!("no joints") };
+            for k in 0..6 {
+                assert!((target.robot_deg[k] - wanted[k].to_degrees()).abs() < 1e-6);
+            }
+        }
+    }
+    let text = String::from_utf8(program).unwrap();
+    assert_eq!(text.matches("WaitTime 2;").count(), found.rows.len());
+    assert!(text.contains("! row 0: pose 1 (geometry), from "), "{}", &text[..800]);
+}
+
+/// Cost that is left when the readings of an arm with `effect` are fitted by geometry and frames alone: half the
+/// non-centrality.
+fn left_by_geometry(found: &Plan, sensor: Sensor, frames: &Frames, effect: Effect, options: &Options) -> f64 {
+    let nominal = nominal();
+    let actual = Model { effects: vec![effect], ..nominal.clone() };
+    let rig = rig(&Wanted { nominal: &nominal, sensor, frames });
+    let rows: Vec<Row> = found
+        .rows
+        .iter()
+        .enumerate()
+        .map(|(number, row)| {
+            let condition =
+                Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };
+            let joints = found.poses[row.pose].joints;
+            let reading = rig.predict(&actual.forward(&joints, &condition), 0).unwrap();
+            Row { condition, ..Row::new(number, joints, reading) }
+        })
+        .collect();
+    let weight = Weight { per_mm: 1.0 / options.noise.reading_mm, per_rad: 1.0 / options.noise.reading_rad };
+    let weights = vec![weight; rows.len()];
+    let dataset = Dataset::new("made", sensor, rows);
+    let priors = Tolerance::default().priors(&found.parameters, &nominal);
+    let task = Calibration::new(&dataset, &nominal, frames, &found.parameters, &priors, &weights);
+    lm::solve(&task, &vec![0.0; found.parameters.len()], &lm::Options::default()).cost
+}
+
+#[test]
+fn what_the_plan_promises_to_decide_it_decides() {
+    let options = Options { noise: Noise { reading_mm: 0.05, reading_rad: 1e-4 }, ..small() };
+    for (sensor, frames) in [(Sensor::Cable, cable()), (Sensor::Position, tracker())] {
+        let found = planned(sensor, &frames, &options);
+        let smallest = |effect: &str, joint: usize| {
+            let of = |d: &&truegrind_planning::poses::power::Decidable| {
+                d.effect == effect && d.joint == Some(joint)
+            };
+            found.decidable.iter().find(of).and_then(|d| d.smallest).unwrap()
+        };
+        for (name, joint, unit) in [
+            ("joint-compliance", 1, 1e-6),
+            ("gear-ratio", 2, 1e-3),
+            ("backlash", 1, 1.0_f64.to_radians()),
+            ("backlash", 3, 1.0_f64.to_radians()),
+        ] {
+            let mut effect = effects_of(&Suspect { effect: name.into(), joints: vec![joint] }).remove(0);
+            effect.set(0, smallest(name, joint) * unit);
+            let lambda = 2.0 * left_by_geometry(&found, sensor, &frames, effect, &options);
+            assert!((lambda / 25.0 - 1.0).abs() < 0.1, "{sensor:?} {name} {joint}: λ = {lambda}");
+        }
+        // Of two parameters the worst direction: any other phase shows more.
+        let mut effect =
+            effects_of(&Suspect { effect: "gear-eccentricity".into(), joints: vec![2] }).remove(0);
+        let size = smallest("gear-eccentricity", 2).to_radians();
+        for phase in [0.0_f64, 0.8, 1.6, 2.4] {
+            effect.set(0, size * phase.cos());
+            effect.set(1, size * phase.sin());
+            let lambda = 2.0 * left_by_geometry(&found, sensor, &frames, effect.clone(), &options);
+            assert!(lambda > 22.0, "{sensor:?}, phase {phase}: λ = {lambda}");
+        }
+        // The offset of joint 6 and what turns with it cannot be seen by a cable at the flange's axis, for one.
+        assert!(found.decidable.iter().all(|d| d.smallest.is_none_or(|s| s > 0.0 && s.is_finite())));
+    }
+}
+
+#[test]
+fn a_diagnosis_that_is_ambiguous_gets_the_poses_that_decide() {
+    let text = r#"{ "schema": "truegrind.diagnosis/1", "fits": {},
+        "findings": [
+            { "effect": "joint-compliance", "confidence": "ambiguous", "joints": [2],
+              "alternatives": [{"effect": "gear-eccentricity", "joints": [2], "cv_rmse_mm": 0.1}] },
+            { "effect": "gear-ratio", "confidence": "identified", "joints": [3], "alternatives": [] } ],
+        "not_testable": [{"effect": "backlash", "reason": "no approach columns", "remedy": "both sides"}] }"#;
+    let asked = questions(text).unwrap();
+    assert_eq!(asked.len(), 2, "{asked:?}");
+    assert_eq!(asked[0].suspects[0], Suspect { effect: "joint-compliance".into(), joints: vec![1] });
+    let plain = Options { poses: 24, ..small() };
+    let deciding = Options { questions: asked, ..plain.clone() };
+    let shows = |options: &Options, effect: &str| {
+        let found = planned(Sensor::Cable, &cable(), options);
+        let of = |d: &&truegrind_planning::poses::power::Decidable| d.effect == effect && d.joint == Some(1);
+        found.decidable.iter().find(of).and_then(|d| d.shows).unwrap()
+    };
+    let (before, after) = (shows(&plain, "joint-compliance"), shows(&deciding, "joint-compliance"));
+    assert!(after < before, "smaller compliance is decided: {after:.4} against {before:.4} degrees");
+    let both = planned(Sensor::Cable, &cable(), &deciding);
+    let sides = both.rows.iter().filter(|r| r.purpose == Purpose::OtherSide).count();
+    assert_eq!(sides, 20, "more from both sides, for backlash");
+    assert!(questions(r#"{"schema": "other/1"}"#).unwrap_err().contains("truegrind.diagnosis/1"));
+    assert!(questions("no json").is_err());
+}
+
+#[test]
+fn too_narrow_bounds_say_what_failed() {
+    let (frames, nominal) = (cable(), nominal());
+    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Cable, frames: &frames };
+    let mut options = small();
+    options.bounds.box_mm = Some([[5000.0, 0.0, 0.0], [5001.0, 1.0, 1.0]]);
+    let error = plan(&wanted, &options).unwrap_err();
+    assert!(matches!(error, PlanError::TooFew { found: 0, .. }));
+    assert!(error.to_string().contains("outside the box"), "{error}");
+    let questions = vec![truegrind_planning::poses::rival::Question { suspects: Vec::new() }];
+    let options = Options { index: Index::O1, questions, ..small() };
+    assert_eq!(plan(&wanted, &options), Err(PlanError::IndexOfQuestions));
+}
+
+#[test]
+fn segments_have_the_distance_of_their_closest_points() {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut point = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0));
+    for k in 0..200 {
+        let (a, b, c) = (point(), point(), point());
+        let d = if k % 5 == 0 { c + (b - a) * 0.7 } else { point() };
+        let found = segment_distance(&a, &b, &c, &d);
+        let sampled = (0..=200)
+            .flat_map(|i| (0..=200).map(move |j| (f64::from(i) / 200.0, f64::from(j) / 200.0)))
+            .map(|(s, t)| (a.lerp(&b, s) - c.lerp(&d, t)).norm())
+            .fold(f64::INFINITY, f64::min);
+        assert!(found <= sampled + 1e-12 && found > sampled - 0.02, "{found} {sampled}");
+    }
+    assert_eq!(segment_distance(&point(), &Vector3::zeros(), &Vector3::zeros(), &Vector3::zeros()), 0.0);
+}
+
+#[test]
+fn a_pose_target_reads_what_it_should() {
+    let (frames, nominal) = (tracker(), nominal());
+    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Pose, frames: &frames };
+    let q = Joints::from([0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
+    let flange = nominal.forward(&q, &Condition::default());
+    let Some(Reading::Pose(pose)) = rig(&wanted).predict(&flange, 0) else { panic!("no pose") };
+    let back = frames.base_from_sensor * pose * frames.flange_from_target.inverse();
+    assert!((back.translation.vector - flange.translation.vector).norm() < 1e-9);
+}

@@ -1,0 +1,17 @@
+//! Tests of `program`.
+
+// A test that cannot go on panics.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod tree;
+mod grammar;
+mod samples;
+mod rewriting;
+mod side_effects;
+mod slow;
+mod numbers;
+mod evaluation;
+mod circumstances;
+mod writing;
+mod edits;
+mod nc;

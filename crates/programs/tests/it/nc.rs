@@ -1,0 +1,584 @@
+//! NC programs: reading loses nothing, what holds in each block is followed, rewriting writes what is wanted.
+
+use proptest::prelude::*;
+use truegrind_programs::motion::{Listing, Mark, MotionKind, Origin, Reason, RobTarget, Role, TargetValue};
+use truegrind_programs::nc::dialect::Dialect;
+use truegrind_programs::nc::orientation::{Angles, spun, vector_and_spin};
+use truegrind_programs::nc::parser::parse;
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::nc::{Task, mark};
+use truegrind_programs::rewrite::{Change, Extra, NewTarget, Outcome, RewriteOptions, Rewritten};
+
+use super::samples::{root, told};
+
+mod arcs;
+mod certain;
+mod blocks;
+mod frames;
+mod klartext;
+mod origins;
+mod m_words;
+mod stays;
+mod subprograms;
+
+const DIALECTS: [Dialect; 5] =
+    [Dialect::Iso, Dialect::Fanuc, Dialect::LinuxCnc, Dialect::Siemens, Dialect::Heidenhain];
+
+/// The NC samples of `programs/`.
+pub(crate) fn samples() -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> =
+        std::fs::read_dir(root().join("programs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+        .into_iter()
+        .filter(|file| {
+            ["nc", "mpf", "ngc", "h"].iter().any(|wanted| file.extension().is_some_and(|e| e == *wanted))
+        })
+        .map(|file| (file.file_name().unwrap().to_str().unwrap().to_owned(), std::fs::read(&file).unwrap()))
+        .collect()
+}
+
+pub(crate) fn read<'s>(name: &str, bytes: &'s [u8]) -> Task<'s> {
+    Task::read(&[(name, bytes)], &Setup::default())
+}
+
+#[test]
+fn every_sample_comes_back_and_is_listed_as_expected() {
+    let update = std::env::var_os("TRUEGRIND_UPDATE_LISTINGS").is_some();
+    let samples = samples();
+    assert!(samples.len() >= 6, "{}", samples.len());
+    for (name, bytes) in &samples {
+        let task = read(name, bytes);
+        assert_eq!(task.trees[0].print(), *bytes, "{name}");
+        let found = format!("{}\n{}", task.dialects[0].text(), told(&task.listing, &task.names));
+        let path = root().join("tests/it/program/listings").join(format!("{name}.txt"));
+        if update {
+            std::fs::write(&path, &found).unwrap();
+        }
+        let expected = std::fs::read_to_string(&path).unwrap_or_default();
+        assert_eq!(
+            found, expected,
+            "{name}: run with TRUEGRIND_UPDATE_LISTINGS=1 to write {path:?}, then read it"
+        );
+    }
+}
+
+#[test]
+fn each_sample_is_known_by_its_signs() {
+    let found: Vec<(String, Dialect)> =
+        samples().iter().map(|(name, bytes)| (name.clone(), Dialect::of(bytes))).collect();
+    let expected = [
+        ("circles.nc", Dialect::Iso),
+        ("fanuc.nc", Dialect::Fanuc),
+        ("heidenhain.h", Dialect::Heidenhain),
+        ("linuxcnc.ngc", Dialect::LinuxCnc),
+        ("plain.nc", Dialect::Iso),
+        ("robot.nc", Dialect::Iso),
+        ("siemens.mpf", Dialect::Siemens),
+    ];
+    for (name, dialect) in expected {
+        assert!(found.contains(&(name.to_owned(), dialect)), "{name}: {found:?}");
+    }
+}
+
+fn check(source: &[u8], dialect: Dialect) {
+    let tree = parse(source, dialect);
+    assert_eq!(tree.print(), source);
+    assert_eq!(tree.nodes[0].size as usize, tree.nodes.len());
+    let mut open: Vec<(usize, u32, u32)> = vec![];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        while open.last().is_some_and(|&(end, ..)| end <= index) {
+            open.pop();
+        }
+        assert!(node.first <= node.end && node.size > 0, "{index} {node:?}");
+        if let Some((_, least, most)) = open.last_mut() {
+            assert!(node.first >= *least && node.end <= *most, "{index} {node:?} {least} {most}");
+            *least = node.end;
+        }
+        open.push((index + node.size as usize, node.first, node.end));
+    }
+    // Listing and a rewrite of everything end, whatever the bytes.
+    let setup = Setup { dialect: Some(dialect), angles: Some(Angles::Wpr), ..Setup::default() };
+    let task = Task::read(&[("x", source)], &setup);
+    let rewritten =
+        task.rewrite(&moved(&task.listing, [0.25, -0.5, 0.125]), &RewriteOptions::default()).unwrap();
+    rewritten.files[0].edits.apply(source).unwrap();
+}
+
+/// Every target that is known, moved.
+fn moved(listing: &Listing, by: [f64; 3]) -> Vec<Change> {
+    (0_u32..)
+        .zip(&listing.motions)
+        .filter(|(_, motion)| motion.reason().is_none() && !motion.targets.is_empty())
+        .map(|(motion, listed)| {
+            let targets = listed.targets.iter().map(|target| match target.value {
+                Ok(TargetValue::Cartesian(t)) => NewTarget::Cartesian {
+                    position_mm: std::array::from_fn(|i| t.position_mm[i] + by[i]),
+                    quaternion: t.quaternion,
+                    conf: None,
+                },
+                _ => NewTarget::Keep,
+            });
+            Change { motion, targets: targets.collect(), before: vec![] }
+        })
+        .collect()
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_come_back(bytes in proptest::collection::vec(any::<u8>(), 0..300), dialect in 0_usize..5) {
+        check(&bytes, DIALECTS[dialect]);
+    }
+
+    #[test]
+    fn any_order_of_words_comes_back(words in proptest::collection::vec(0_usize..84, 0..80), dialect in 0_usize..5) {
+        let pieces = ["G0", "G1", "G2", "G3", "G91", "G90", "G92", "G53", "G54", "G41", "G40", "G43.4", "G43.5", "G68", "G28",
+            "X1.", "Y-2.5", "Z.5", "A180.", "B0", "C-.5", "I5.", "J-5.", "K1", "R10.", "F600", "X#1", "#1=2", "#1=[#2*3]",
+            "X[1+2]", "X=IC(5)", "A3=0.1", "B3=0", "C3=1", "THETA=5", "R1=5", "X=R1", "TRAORI", "TRANS", "ROT", "M30", "M98",
+            "P5", "\n", "\n", "\n", "/", "N10", "(c)", "; c\n", "%\n", "[", "]", "(", ")", "=", "O5", "GOTO", "L", "L X+1 Y+2",
+            "CC X+1 Y+1", "C X+3 Y+1 DR+", "Q1 = +5", "LBL 1",
+            "M99", "M97", "M19", "M129", "M205", "M17", "CIP", "CT", "RND=2", "PLANE RESET TURN", "FN 25: PRESET = X/+0/+1", "CP IPA+90 DR+",
+            "5 ;c~\n", "LN X+1 TX+0 TY+0 TZ+1", "DEF INT R=1", "G52", "G92.1", "G69", "G80", "$A%\n"];
+        let text: String = words.iter().map(|&word| format!("{} ", pieces[word])).collect();
+        check(text.as_bytes(), DIALECTS[dialect]);
+    }
+
+    #[test]
+    fn a_damaged_sample_comes_back(sample in 0_usize..6, at in 0_usize..2000, cut in 0_usize..40, insert in proptest::collection::vec(any::<u8>(), 0..6)) {
+        let samples = samples();
+        let (_, bytes) = &samples[sample % samples.len()];
+        let mut bytes = bytes.clone();
+        let at = at % bytes.len();
+        let end = (at + cut).min(bytes.len());
+        bytes.splice(at..end, insert);
+        check(&bytes, Dialect::of(&bytes));
+    }
+
+    #[test]
+    fn angles_mean_the_same_rotation_and_stay_near(a in -200.0..200.0_f64, b in -200.0..200.0_f64, c in -200.0..200.0_f64, d in -0.5..0.5_f64) {
+        for angles in [Angles::Abc, Angles::Wpr, Angles::Rxyz, Angles::RotationVector] {
+            let rotation = angles.rotation([a, b, c]);
+            let found = angles.angles(&rotation, [a + d, b - d, c + d]);
+            prop_assert!(angles.rotation(found).angle_to(&rotation) < 1e-7, "{angles:?} {found:?}");
+            if angles != Angles::RotationVector && (b.abs() - 90.0).abs() > 5.0 {
+                for (found, wanted) in found.iter().zip([a, b, c]) {
+                    prop_assert!((found - wanted).abs() < 1e-6, "{angles:?} {found} {wanted}");
+                }
+            }
+        }
+        let rotation = Angles::Wpr.rotation([a, b, c]);
+        let (vector, spin) = vector_and_spin(&rotation, c);
+        prop_assert!(spun(vector, spin).unwrap().angle_to(&rotation) < 1e-7);
+        prop_assert!((spin - c).abs() <= 180.0 + 1e-9);
+    }
+}
+
+#[test]
+fn gimbal_lock_keeps_the_rotation() {
+    for angles in [Angles::Abc, Angles::Wpr, Angles::Rxyz] {
+        for middle in [90.0, -90.0] {
+            let rotation = angles.rotation([30.0, middle, 50.0]);
+            let found = angles.angles(&rotation, [31.0, middle, 49.0]);
+            assert!(angles.rotation(found).angle_to(&rotation) < 1e-7, "{angles:?} {found:?}");
+        }
+    }
+}
+
+// ---- what holds in a block ----
+
+const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
+
+fn listing_of(body: &str, dialect: Dialect) -> Listing {
+    let source = format!("{HEAD}{body}");
+    let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    assert!(task.listing.opaque.is_empty(), "{body}: {:?}", task.listing.opaque);
+    task.listing
+}
+
+fn ends(body: &str, dialect: Dialect) -> Vec<Result<[f64; 3], Reason>> {
+    let listing = listing_of(body, dialect);
+    let round = |x: f64| (x * 1e6).round() / 1e6;
+    listing
+        .motions
+        .iter()
+        .map(|motion| match motion.reason() {
+            Some(reason) => Err(reason),
+            None => {
+                let value = motion.to().unwrap().value.unwrap();
+                Ok(value.cartesian().unwrap().position_mm.map(round))
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn modal_words_increments_units_and_shifts_are_followed() {
+    let all = "G1 X1 Y2 Z3 A0 B0 C0\n";
+    let cases: &[(&str, &[[f64; 3]])] = &[
+        ("X5\nZ-1", &[[1.0, 2.0, 3.0], [5.0, 2.0, 3.0], [5.0, 2.0, -1.0]]),
+        ("G91 X5\nZ-1", &[[1.0, 2.0, 3.0], [6.0, 2.0, 3.0], [6.0, 2.0, 2.0]]),
+        ("G20 X1\nG21 Y.5", &[[1.0, 2.0, 3.0], [25.4, 2.0, 3.0], [25.4, 0.5, 3.0]]),
+        ("G92 X0 Z0\nX5 Z1", &[[1.0, 2.0, 3.0], [6.0, 2.0, 4.0]]),
+        ("G92 X0\nX5\nG92.1\nX5", &[[1.0, 2.0, 3.0], [6.0, 2.0, 3.0], [5.0, 2.0, 3.0]]),
+        ("G52 X10\nX5\nG52 X0\nX5", &[[1.0, 2.0, 3.0], [15.0, 2.0, 3.0], [5.0, 2.0, 3.0]]),
+        ("#1=2\n#2=[#1*3+SIN[30]]\nX#2 Y-#1 Z[#1-1]", &[[1.0, 2.0, 3.0], [6.5, -2.0, 1.0]]),
+        ("N5 x 1 . 5", &[[1.0, 2.0, 3.0]]),
+    ];
+    for (body, expected) in &cases[..cases.len() - 1] {
+        let found = ends(&format!("{all}{body}\n"), Dialect::LinuxCnc);
+        assert_eq!(found, expected.iter().map(|p| Ok(*p)).collect::<Vec<_>>(), "{body}");
+    }
+    let siemens = ends(
+        "TRAORI\nG1 X1 Y2 Z3 A0 B0 C0\nX=IC(4) R1=5\nY=AC(7) G91\nX1 Z=AC(R1)\nG90 X=R1*2-1",
+        Dialect::Siemens,
+    );
+    let expected = [[1.0, 2.0, 3.0], [5.0, 2.0, 3.0], [5.0, 7.0, 3.0], [6.0, 7.0, 5.0], [9.0, 7.0, 5.0]];
+    assert_eq!(siemens, expected.map(Ok));
+}
+
+#[test]
+fn a_block_that_begins_with_its_centre_can_become_straight() {
+    use truegrind_programs::motion::MotionKind;
+    use truegrind_programs::rewrite::{Change, NewTarget, RewriteOptions};
+    let source = format!("{HEAD}G1 X0 Y0 Z0 A0 B0 C0 F100\nG2 X20 Y0 I10 J0\n I10 J0 X40\n");
+    let setup = Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let motion = &task.listing.motions[2];
+    assert!(motion.straightens && motion.reason().is_none(), "{motion:?}");
+    let end = *motion.to().unwrap().value.unwrap().cartesian().unwrap();
+    let new = NewTarget::Cartesian { position_mm: [40.0, 0.5, 0.0], quaternion: end.quaternion, conf: None };
+    let targets = motion.targets.iter().map(|t| if t.role == Role::Via { NewTarget::Drop } else { new });
+    let change = Change { motion: 2, targets: targets.collect(), before: Vec::new() };
+    let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    let again = Task::read(&[("x", &text)], &setup);
+    let motion = &again.listing.motions[2];
+    assert_eq!(motion.kind, MotionKind::Linear, "{}", String::from_utf8_lossy(&text));
+    assert_eq!(motion.to().unwrap().value.unwrap().cartesian().unwrap().position_mm, [40.0, 0.5, 0.0]);
+}
+
+#[test]
+fn heidenhain_presets_and_datum_shifts_are_followed() {
+    let go = "L X+1 Y+2 Z+3 A+0 B+0 C+0\n";
+    let in_base = |body: &str| -> Vec<Result<[f64; 3], Reason>> {
+        let preset = "; truegrind frame PRESET1 w [[600,0,0],[1,0,0,0]]\n";
+        let listing = listing_of(&format!("{preset}M128 F1000\n{body}"), Dialect::Heidenhain);
+        let stands = |motion: &truegrind_programs::motion::Motion| {
+            if let Some(reason) = motion.reason() {
+                return Err(reason);
+            }
+            let object = listing.work_object(motion).unwrap().value.clone().unwrap();
+            let told = motion.to().unwrap().value.unwrap().cartesian().unwrap().pose();
+            let pose = object.user_frame.pose() * object.object_frame.pose() * told;
+            Ok(pose.translation.vector.map(|x| (x * 1e6).round() / 1e6).into())
+        };
+        listing.motions.iter().map(stands).collect()
+    };
+    let shift = "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+10\nCYCL DEF 7.2 Y-5,5\n";
+    assert_eq!(
+        in_base(&format!("{go}{shift}{go}CYCL DEF 7.1 IX+5\n{go}CYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\n{go}")),
+        [[501.0, 2.0, 3.0], [511.0, -3.5, 3.0], [516.0, -3.5, 3.0], [501.0, 2.0, 3.0]].map(Ok)
+    );
+    assert_eq!(
+        in_base(&format!("TRANS DATUM AXIS Z+7\n{go}TRANS DATUM RESET\n{go}")),
+        [[501.0, 2.0, 10.0], [501.0, 2.0, 3.0]].map(Ok)
+    );
+    assert_eq!(
+        in_base(&format!("CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;NUMBER\n{go}{shift}{go}")),
+        [[601.0, 2.0, 3.0], [611.0, -3.5, 3.0]].map(Ok)
+    );
+    // A preset of which nobody says where it is, a row of a table, a turn.
+    let left = |body: &str| in_base(&format!("{body}\n{go}"))[0];
+    assert_eq!(left("CYCL DEF 247 DATUM SETTING Q339=+4"), Err(Reason::WorkObjectUnknown));
+    assert_eq!(left("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 #5"), Err(Reason::Transformed));
+    assert_eq!(left("CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+30"), Err(Reason::Transformed));
+}
+
+fn via(listing: &Listing, motion: usize) -> [f64; 3] {
+    let target = listing.motions[motion].targets.iter().find(|target| target.role == Role::Via).unwrap();
+    target.value.unwrap().cartesian().unwrap().position_mm
+}
+
+#[test]
+fn arcs_by_centre_and_by_radius_in_three_planes() {
+    let half = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
+    let cases: &[(&str, [f64; 3])] = &[
+        ("G17 G3 X0 Y10 I-10 J0", [half, half, 0.0]),
+        ("G17 G2 X0 Y10 I-10 J0", [-half, -half, 0.0]),
+        ("G17 G3 X0 Y10 R10", [half, half, 0.0]),
+        ("G17 G3 X0 Y10 R-10", [10.0 + half, 10.0 + half, 0.0]),
+        ("G17 G2 X0 Y10 R10", [10.0 - half, 10.0 - half, 0.0]),
+        ("G17 G3 X-10 Y0 Z4 I-10 J0", [0.0, 10.0, 2.0]),
+        ("G17 G3 I-10", [-10.0, 0.0, 0.0]),
+        ("G17 G90.1 G3 X0 Y10 I0 J0", [half, half, 0.0]),
+        ("G18 G3 X0 Z-10 I-10 K0", [half, 0.0, -half]),
+        ("G18 G2 X0 Z10 I-10 K0", [half, 0.0, half]),
+    ];
+    for (body, expected) in cases {
+        let listing = listing_of(&format!("G1 X10 Y0 Z0 A0 B0 C0\n{body}\n"), Dialect::LinuxCnc);
+        assert_eq!(listing.motions[1].kind, MotionKind::Circular);
+        let found = via(&listing, 1);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-9, "{body}: {found} {expected}");
+        }
+    }
+    let listing = listing_of("G1 X0 Y10 Z0 A0 B0 C0\nG19 G3 Y0 Z10 J-10 K0\n", Dialect::LinuxCnc);
+    assert!((via(&listing, 1)[1] - half).abs() < 1e-9);
+}
+
+#[test]
+fn orientations_by_angles_and_by_vector() {
+    let of = |body: &str, dialect: Dialect| -> RobTarget {
+        let listing = listing_of(body, dialect);
+        *listing.motions.last().unwrap().to().unwrap().value.unwrap().cartesian().unwrap()
+    };
+    let down = of("G1 X0 Y0 Z0 A180 B0 C0\n", Dialect::Iso).pose().rotation;
+    // A tool vector points away from the work: z of the tool frame points into it.
+    let vector = of("TRAORI\nG1 X0 Y0 Z0 A3=0 B3=0 C3=2 THETA=0\n", Dialect::Siemens).pose().rotation;
+    assert!(vector.angle_to(&down) < 1e-9);
+    let fanuc = of("G43.5 H1\nG1 X0. Y0. Z0. K1.\n", Dialect::Fanuc).pose().rotation;
+    assert!(fanuc.angle_to(&down) < 1e-9);
+    let tilted = of("TRAORI\nG1 X0 Y0 Z0 A3=1 C3=1\n", Dialect::Siemens).pose().rotation;
+    let axis = tilted * nalgebra::Vector3::z();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!((axis - nalgebra::Vector3::new(-half, 0.0, -half)).norm() < 1e-9, "{axis}");
+    let rpy = of("TRAORI ORIRPY\nG1 X0 Y0 Z0 A2=10 B2=20 C2=30\n", Dialect::Siemens).pose().rotation;
+    assert!(rpy.angle_to(&Angles::Wpr.rotation([10.0, 20.0, 30.0])) < 1e-9);
+}
+
+#[test]
+fn the_way_goes_past_a_subprogram_of_linuxcnc() {
+    let sub = "o<shift> sub\nG91 G1 X5\n#1=7\no<shift> endsub\n";
+    let before = "G1 X1 Y2 Z3 A0 B0 C0\n#1=4\n";
+    let found = ends(&format!("{before}{sub}X#1 Y5\n"), Dialect::LinuxCnc);
+    assert_eq!(found, [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
+    // A call may leave G91 behind, and another value of #1.
+    let found = ends(&format!("{before}{sub}o<shift> call\nG1 X2 Y5 Z3\n"), Dialect::LinuxCnc);
+    assert_eq!(found[2..], [Err(Reason::Subprogram), Err(Reason::UnknownFlow)]);
+}
+
+#[test]
+fn computed_jumps_and_synchronised_actions_leave_nothing_known() {
+    let go = "G1 X1 Y2 Z3 A0 B0 C0\n";
+    // A computed jump may go to any numbered block.
+    for jump in ["GOTO#5", "GOTO #5", "GOTO [#5+1]"] {
+        let body = format!("G90\n{go}#2=4\nN10 #1=3\nG1 X#2 Y2 Z3 A0 B0 C0\n{jump}\n");
+        let tree = parse(body.as_bytes(), Dialect::Iso);
+        assert!(tree.opaque.is_empty(), "{jump}: {:?}", tree.opaque);
+        assert_eq!(ends(&body, Dialect::Iso), [Ok([1.0, 2.0, 3.0]), Err(Reason::UnknownFlow)], "{jump}");
+    }
+    let action = "N29 ID=1 WHEN $AA_IW[X]>10 DO R5=5\n";
+    let body =
+        format!("TRAORI\nR5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\n{action}R5=4\nG1 X=R5 Y2 Z3 A0 B0 C0\nX1 Y2 Z3\n");
+    assert!(parse(body.as_bytes(), Dialect::Siemens).opaque.is_empty());
+    let found = ends(&body, Dialect::Siemens);
+    assert_eq!(found[..2], [Ok([4.0, 2.0, 3.0]), Err(Reason::Variable)]);
+    for call in ["G65 <MY_SUB> A1.", "M98 <O1000>"] {
+        assert!(parse(call.as_bytes(), Dialect::Fanuc).opaque.is_empty(), "{call}");
+    }
+}
+
+#[test]
+fn after_a_jump_only_what_the_whole_file_sets_alike_still_holds() {
+    let body = "G90 G1 X1 Y2 Z3 A0 B0 C0\nN10 X2\nG1 X2 Y2 Z2 A0 B0 C0\nIF [#1 GT 5] GOTO 10\nX3\n";
+    let found = ends(body, Dialect::LinuxCnc);
+    assert_eq!(found[1], Err(Reason::UnknownFlow), "the motion word is forgotten at a jump's aim");
+    assert_eq!(found[2], Ok([2.0, 2.0, 2.0]));
+    assert_eq!(found[3], Ok([3.0, 2.0, 2.0]));
+    // With both G90 and G91 in the file what the numbers mean is not known.
+    let found = ends(&format!("{body}G91 X1\n"), Dialect::LinuxCnc);
+    assert_eq!(found[2], Err(Reason::UnknownFlow));
+    // Nor what a variable is worth that only a condition sets.
+    let found = ends("#1=5\n#2=4\nIF [#2 EQ 1] THEN #1=7\nG1 X#1 Y2 Z3 A0 B0 C0\nX#2 Y2 Z3\n", Dialect::Iso);
+    assert_eq!(found, [Err(Reason::UnknownFlow), Ok([4.0, 2.0, 3.0])]);
+    // A skipped block makes unsure what it changes, no more.
+    let found = ends("G1 X1 Y2 Z3 A0 B0 C0\n/X9\nY5\nX4\n", Dialect::LinuxCnc);
+    assert_eq!(found[1..], [Err(Reason::Skippable), Err(Reason::UnknownFlow), Ok([4.0, 5.0, 3.0])]);
+}
+
+// ---- rewriting ----
+
+fn rewrite_as(
+    source: &str,
+    dialect: Dialect,
+    changes: impl FnOnce(&Listing) -> Vec<Change>,
+) -> (String, Rewritten) {
+    let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let rewritten = task.rewrite(&changes(&task.listing), &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    (String::from_utf8(text).unwrap(), rewritten)
+}
+
+fn change_of(listing: &Listing, motion: u32, by: [f64; 3]) -> Change {
+    moved(listing, by).into_iter().find(|change| change.motion == motion).unwrap()
+}
+
+#[test]
+fn words_keep_their_place_and_missing_ones_are_put_in() {
+    let source =
+        format!("{HEAD}N10 G1 X1 Y2. Z3.00 A0 B0 C0 F100 ; begin\nN20 X 5.5\nN30 M8\nN40 Y-7 (cool)\n");
+    let (text, rewritten) =
+        rewrite_as(&source, Dialect::LinuxCnc, |listing| vec![change_of(listing, 1, [0.25, 0.125, 0.0])]);
+    assert_eq!(rewritten.outcomes, [Outcome::InPlace]);
+    // X in place with enough decimals, Y put in; the next motion, which stays, says X again and goes on with its own Y.
+    let expected = source.replace("X 5.5", "X 5.7500 Y2.1250").replace("Y-7", "X5.5000 Y-7");
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn the_same_values_change_no_byte() {
+    for (name, bytes) in &samples() {
+        let task = read(name, bytes);
+        let mut changes = moved(&task.listing, [3e-11, -2e-11, 0.0]);
+        for change in &mut changes {
+            for target in &mut change.targets {
+                if let NewTarget::Cartesian { quaternion, .. } = target {
+                    *quaternion = quaternion.map(|q| -q * (1.0 + 1e-13));
+                }
+            }
+        }
+        assert!(name == "plain.nc" || name == "robot.nc" || !changes.is_empty(), "{name}");
+        let rewritten = task.rewrite(&changes, &RewriteOptions::default()).unwrap();
+        let edits: Vec<_> = rewritten.files[0]
+            .edits
+            .iter()
+            .map(|(range, text)| (range, String::from_utf8_lossy(text).into_owned()))
+            .collect();
+        assert!(edits.is_empty(), "{name}: {edits:?}");
+    }
+}
+
+/// Rewrites every motion that can be, reads the result back: changed motions are where they shall be, all others where
+/// they were.
+fn round_trip(name: &str, bytes: &[u8], setup: &Setup, by: [f64; 3], turn_deg: f64) {
+    let task = Task::read(&[(name, bytes)], setup);
+    let turn =
+        nalgebra::UnitQuaternion::from_euler_angles(turn_deg.to_radians(), -0.5 * turn_deg.to_radians(), 0.0);
+    let mut changes = moved(&task.listing, by);
+    for change in &mut changes {
+        for target in &mut change.targets {
+            if let NewTarget::Cartesian { quaternion: [w, x, y, z], .. } = target {
+                let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(*w, *x, *y, *z))
+                    * turn;
+                (*w, *x, *y, *z) = (q.w, q.i, q.j, q.k);
+            }
+        }
+    }
+    // Every third stays, so that what holds on between must be said again.
+    changes.retain(|change| change.motion % 3 != 2);
+    let rewritten = task.rewrite(&changes, &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(bytes).unwrap();
+    let again = Task::read(&[(name, &text[..])], setup);
+    assert_eq!(again.listing.motions.len(), task.listing.motions.len(), "{name}");
+    for (index, (old, new)) in task.listing.motions.iter().zip(&again.listing.motions).enumerate() {
+        let place =
+            format!("{name}:{}: {}", old.place.line, String::from_utf8_lossy(&text[new.statement.range()]));
+        let change =
+            changes.iter().zip(&rewritten.outcomes).find(|(change, _)| change.motion == index as u32);
+        let refused = change.is_some_and(|(_, outcome)| matches!(outcome, Outcome::Refused(_)));
+        let change = change.filter(|_| !refused).map(|(change, _)| change);
+        if old.left.is_some() && old.left == new.left {
+            continue;
+        }
+        assert_eq!(old.reason(), new.reason(), "{place}");
+        for (at, (old, new)) in old.targets.iter().zip(&new.targets).enumerate() {
+            let (Ok(old_value), Ok(new_value)) = (old.value, new.value) else {
+                assert_eq!(old.value, new.value, "{place}");
+                continue;
+            };
+            let (old_value, new_value) = (old_value.cartesian().unwrap(), new_value.cartesian().unwrap());
+            let (wanted, q) = match change.map(|change| change.targets[at]) {
+                Some(NewTarget::Cartesian { position_mm, quaternion, .. }) => (position_mm, quaternion),
+                _ => (old_value.position_mm, old_value.quaternion),
+            };
+            if new.role == Role::Via {
+                // The point half way of the new circle need not be the wanted one; the circle goes near it.
+                continue;
+            }
+            for (axis, (new, wanted)) in new_value.position_mm.iter().zip(&wanted).enumerate() {
+                let off = new - wanted;
+                assert!(off.abs() < 6e-4, "{place}: axis {axis} off by {off} mm");
+            }
+            let wanted =
+                nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
+            let off = new_value.pose().rotation.angle_to(&wanted).to_degrees();
+            assert!(off < 1e-4, "{place}: turned off by {off}°");
+        }
+    }
+}
+
+#[test]
+fn what_is_written_is_read_back_where_it_shall_be() {
+    for (name, bytes) in &samples() {
+        round_trip(name, bytes, &Setup::default(), [0.213, -0.117, 0.051], 0.0);
+        if name != "linuxcnc.ngc" {
+            round_trip(name, bytes, &Setup::default(), [0.213, -0.117, 0.051], 0.08);
+        }
+    }
+}
+
+#[test]
+fn arcs_get_a_centre_that_fits_both_ends() {
+    for body in ["G3 X0 Y10 I-10 J0", "G2 X0 Y10 R-10", "G3 X0 Y10 Z2 I-10", "G2 I-10 J0"] {
+        let source = format!("{HEAD}G17 G1 X10 Y0 Z0 A0 B0 C0\n{body}\nG1 X5\n");
+        let (text, rewritten) =
+            rewrite_as(&source, Dialect::LinuxCnc, |listing| moved(listing, [0.25, 0.5, 0.0]));
+        // A whole circle goes with its start: nothing in its block changes.
+        let fine = |(at, outcome): (usize, &Outcome)| {
+            *outcome == Outcome::InPlace || at == 1 && body.starts_with("G2 I")
+        };
+        assert!(rewritten.outcomes.iter().enumerate().all(fine), "{text} {:?}", rewritten.outcomes);
+        let task = Task::read(
+            &[("x", text.as_bytes())],
+            &Setup { dialect: Some(Dialect::LinuxCnc), ..Setup::default() },
+        );
+        let old = listing_of(&format!("G17 G1 X10 Y0 Z0 A0 B0 C0\n{body}\nG1 X5\n"), Dialect::LinuxCnc);
+        let (old, new) = (via(&old, 1), via(&task.listing, 1));
+        for axis in 0..3 {
+            assert!(
+                (new[axis] - old[axis] - [0.25, 0.5, 0.0][axis]).abs() < 2e-4,
+                "{body}: {old:?} {new:?}\n{text}"
+            );
+        }
+    }
+}
+
+#[test]
+fn blocks_are_put_in_before_a_motion_and_a_mark_after_the_head() {
+    let source = "%\nO0001 (TEST)\n(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,100],[1,0,0,0]])\n(truegrind frame G54 w [[500,0,0],[1,0,0,0]])\nG43.4 H1\nN10 G1 X0. Y0. Z0. A180. B0. C0. F600.\nN20 X10. F300.\n%\n";
+    let setup = Setup::default();
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let extra = Extra {
+        kind: MotionKind::Linear,
+        target: NewTarget::Cartesian {
+            position_mm: [5.0, 0.1, 0.0],
+            quaternion: [0.0, 1.0, 0.0, 0.0],
+            conf: None,
+        },
+        external: None,
+    };
+    let change = Change { motion: 1, targets: vec![NewTarget::Keep], before: vec![extra] };
+    let mark_of = Mark { version: "9.9.9".into(), model: "0123456789ab".into(), partial: false };
+    let options = RewriteOptions { mark: Some(mark_of.clone()), ..RewriteOptions::default() };
+    let rewritten = task.rewrite(&[change], &options).unwrap();
+    let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();
+    let expected = source
+        .replace("O0001 (TEST)\n", "O0001 (TEST)\n(truegrind 9.9.9 model 0123456789ab)\n")
+        .replace("N20 X10.", "G1 X5.0000 Y0.1000 Z0.0000 F300.\nN20 X10. Y0.0000");
+    assert_eq!(text, expected);
+    let again = Task::read(&[("x", text.as_bytes())], &setup);
+    assert_eq!(again.listing.marks, [Some(mark_of)]);
+    assert_eq!(mark::read(b"(a comment about truegrind)"), None);
+}
+
+#[test]
+fn computed_words_become_numbers_and_their_origin_says_so() {
+    let source = format!("{HEAD}#1=2\nG1 X[#1*2] Y1 Z#1 A0 B0 C0\n");
+    let listing = listing_of("#1=2\nG1 X[#1*2] Y1 Z#1 A0 B0 C0\n", Dialect::LinuxCnc);
+    assert_eq!(listing.motions[0].targets[0].origin, Origin::Computed);
+    let (text, rewritten) = rewrite_as(&source, Dialect::LinuxCnc, |listing| moved(listing, [0.5, 0.0, 0.0]));
+    assert_eq!(rewritten.outcomes, [Outcome::Inlined]);
+    assert_eq!(text, source.replace("X[#1*2]", "X4.5000"));
+}

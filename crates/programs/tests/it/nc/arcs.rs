@@ -1,0 +1,189 @@
+//! Arcs keep to the way that was meant, or stay with all that hangs on them.
+
+use truegrind_programs::motion::Reason::*;
+use truegrind_programs::motion::{Listing, Reason};
+use truegrind_programs::nc::Task;
+use truegrind_programs::nc::arc::{Arc, Plane};
+use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc, Siemens};
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rewrite::{Change, Outcome};
+
+use super::certain::{HEAD, begin, check, left};
+use super::{change_of, rewrite_as};
+
+const BY: [f64; 3] = [1.7771, -1.1912, -0.8686];
+
+/// All motions moved by much the same, each a little more than the one before.
+fn nearly_alike(listing: &Listing, step: [f64; 2]) -> Vec<Change> {
+    let all = (0..listing.motions.len() as u32)
+        .filter(|&motion| listing.motions[motion as usize].reason().is_none());
+    all.map(|motion| {
+        let more = f64::from(motion);
+        change_of(listing, motion, [BY[0] + more * step[0], BY[1] + more * step[1], BY[2]])
+    })
+    .collect()
+}
+
+/// The lines after the first motion, and what became of all motions that were to change.
+fn run(dialect: Dialect, body: &str, step: [f64; 2]) -> (Vec<String>, Vec<Outcome>) {
+    let source = format!("{HEAD}{}{body}\n", begin(dialect));
+    let (text, rewritten) = rewrite_as(&source, dialect, |listing| nearly_alike(listing, step));
+    let skip = source.lines().count() - body.lines().count();
+    (text.lines().skip(skip).map(str::to_owned).collect(), rewritten.outcomes)
+}
+
+/// The number after a letter.
+fn number(line: &str, letter: char) -> f64 {
+    let at = line.find(letter).unwrap_or_else(|| panic!("{letter} in {line}")) + 1;
+    let end = line[at..].find(|c: char| !"+-.0123456789".contains(c)).map_or(line.len(), |end| at + end);
+    line[at..end].parse().unwrap()
+}
+
+#[test]
+fn an_arc_whose_start_stays_is_no_circle_of_another_radius() {
+    let refused = [Outcome::Refused(Reason::BeforeLeftArc), Outcome::Refused(WrongShape)];
+    // The quarter begins where an arc that is left has ended: its end alone would move.
+    let (text, outcomes) =
+        run(Heidenhain, "CC X+6 Y+2\nC X+1 Y+2 DR+\nCR X+0 Y+3 R+1 DR+\nL X+0 Y+9", [0.0; 2]);
+    assert_eq!(text[..3], ["CC X+6 Y+2", "C X+1 Y+2 DR+", "CR X+0 Y+3 R+1 DR+"]);
+    assert_eq!(outcomes[0], Outcome::Refused(WrongShape));
+    assert_eq!(outcomes[1], Outcome::InPlace);
+    // The same behind a turn that rises, which no circle closes.
+    let (text, outcomes) = run(LinuxCnc, "G3 X1 Y2 Z2 I5 J0\nG3 X0 Y3 I-1 J0\nG1 X0 Y9", [1e-2, 0.0]);
+    assert_eq!(text[..2], ["G3 X1 Y2 Z2 I5 J0", "G3 X0 Y3 I-1 J0"]);
+    assert_eq!(outcomes[..2], refused);
+    assert_eq!(outcomes[2], Outcome::Refused(WrongShape));
+    let (text, _) = run(Siemens, "G2 I5 J0 TURN=1\nG2 X3 Y4 I2 J0\nG1 X0 Y9", [0.0; 2]);
+    assert_eq!(text[..2], ["G2 I5 J0 TURN=1", "G2 X3 Y4 I2 J0"]);
+}
+
+#[test]
+fn an_almost_closed_arc_keeps_its_centre() {
+    for (line, plane) in [
+        ("G3 X0.9994 Y2.0004 I3 J4", "IJ"),
+        ("G3 X1 Y1.999 I50 J0", "IJ"),
+        ("G3 X1.004 Y1.997 I4.065 J7.955", "IJ"),
+        ("G2 X1 Y2.001 I50 J0", "IJ"),
+        ("G18 G3 X1.0008 Z3.0006 I4.065 K7.955", "IK"),
+    ] {
+        for step in [[0.0, 0.0], [3e-5, -4e-5], [-2e-4, 1e-4]] {
+            let (text, outcomes) = run(LinuxCnc, line, step);
+            if outcomes[1] != Outcome::InPlace {
+                // What is left of so small a gap may turn the other way: then it stays.
+                assert_eq!(text[0], line);
+                continue;
+            }
+            for letter in plane.chars() {
+                let off = number(&text[0], letter) - number(line, letter);
+                assert!(off.abs() < 0.02, "{line} -> {} {step:?}", text[0]);
+            }
+        }
+    }
+    // Not by staying.
+    assert_eq!(
+        run(LinuxCnc, "G3 X0.9994 Y2.0004 I3 J4", [3e-5, -4e-5]).1,
+        [Outcome::InPlace, Outcome::InPlace]
+    );
+    assert_eq!(
+        run(LinuxCnc, "G3 X1.004 Y1.997 I4.065 J7.955", [-2e-4, 1e-4]).1,
+        [Outcome::InPlace, Outcome::InPlace]
+    );
+}
+
+#[test]
+fn a_whole_circle_stays_whole_where_its_end_is_rounded() {
+    for (line, step) in
+        [("G3 X1.001 Y2 I50 J0", 0.0), ("G3 X1.001 Y2 I5 J0", 3e-4), ("G2 X1.001 Y2 I5 J0", -3e-4)]
+    {
+        let (text, outcomes) = run(LinuxCnc, line, [step, 0.0]);
+        assert_eq!(outcomes, [Outcome::InPlace, Outcome::InPlace], "{line}");
+        assert_eq!(number(&text[0], 'X'), 1.0 + BY[0], "{}", text[0]);
+        assert!((number(&text[0], 'I') - number(line, 'I')).abs() < 2e-3, "{}", text[0]);
+    }
+    let whole = Arc::about(Plane::XY, [10.0, 0.0, 0.0], [10.001, 0.0, 0.0], [60.0, 0.0], true).unwrap();
+    assert!(whole.is_whole());
+}
+
+#[test]
+fn a_short_arc_keeps_its_radius_and_its_way() {
+    for (line, chord) in
+        [("G3 X1.05 Y2 R10", 0.05), ("G2 X1.02 Y2.01 R50", 0.022), ("G3 X1.3 Y2.1 I-3 J9", 0.316)]
+    {
+        for step in [[0.0, 0.0], [3e-5, -4e-5], [-4e-5, 5e-5]] {
+            let (text, outcomes) = run(LinuxCnc, line, step);
+            assert_eq!(outcomes, [Outcome::InPlace, Outcome::InPlace], "{line} {chord}");
+            if line.contains('R') {
+                let (now, was) = (number(&text[0], 'R'), number(line, 'R'));
+                assert!((now / was - 1.0).abs() < 0.05, "{line} -> {}", text[0]);
+            } else {
+                assert!((number(&text[0], 'J') / 9.0 - 1.0).abs() < 0.05, "{line} -> {}", text[0]);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_refused_keeps_every_word() {
+    // No change is asked for the arc: what ends at its start stays as well, and what comes before is moved.
+    for (dialect, body) in
+        [(Fanuc, "X20.\nG3 X20.001 Y2. I5. J0.\nG1 X30."), (LinuxCnc, "X20\nG2 X30 Y2 I5 J0\nG1 X40")]
+    {
+        let source = format!("{HEAD}{}{body}\n", begin(dialect));
+        let (text, rewritten) = rewrite_as(&source, dialect, |listing| {
+            nearly_alike(listing, [0.0; 2]).into_iter().filter(|change| change.motion != 2).collect()
+        });
+        let arc = body.lines().nth(1).unwrap();
+        assert!(text.lines().any(|line| line == arc), "{text}");
+        assert_eq!(rewritten.outcomes[1], Outcome::Refused(BeforeLeftArc));
+        assert_eq!(rewritten.outcomes[2], Outcome::InPlace);
+    }
+}
+
+#[test]
+fn an_arc_behind_other_motions_that_stay_begins_where_it_always_did() {
+    let before = left(BeforeLeftPath);
+    let unknown = left(PositionUnknown);
+    check(
+        LinuxCnc,
+        &[
+            ("X10\nX20\nG55\nZ45\nG2 X25 Y0 I5 J0", &[None, before, unknown, unknown]),
+            // Where a motion between says where the arc begins, the one before it may move.
+            ("X10\nX20\nG55\nX20 Y0\nG2 X25 Y0 I5 J0", &[None, None, unknown, unknown]),
+            ("X10\nX20\nG55\nG91 X2 Y0\nG90 G2 X25 Y0 I5 J0", &[None, before, unknown, unknown]),
+        ],
+    );
+    check(
+        Siemens,
+        &[
+            ("X10\nX20\nTRANS\nZ45\nG2 X30 Y0 I5 J0", &[None, before, unknown, unknown]),
+            // Y counts from where the motion before the change of frame ended, through all that comes between.
+            (
+                "X10\nX20\nTRANS\nX5 Y=IC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                &[None, before, unknown, unknown, unknown, unknown],
+            ),
+            (
+                "X10\nX20\nTRANS\nX5 Y=AC(1) Z30\nX7\nX8 Z9\nG3 X9 Y2 I0 J1",
+                &[None, None, None, None, None, None],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn nothing_is_put_before_a_block_that_starts_the_spindle() {
+    let insertable = |dialect: Dialect, words: &str| {
+        let source = format!("{HEAD}{}X50 {words}\nG2 X60 Y2 I5 J0 {words}\n", begin(dialect));
+        let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        let task = Task::read(&[("x", source.as_bytes())], &setup);
+        assert!(task.listing.motions.iter().all(|motion| motion.reason().is_none()), "{source}");
+        (task.listing.motions[1].insertable, task.listing.motions[2].straightens)
+    };
+    for dialect in [LinuxCnc, Siemens] {
+        for words in ["", "M5", "M9", "M1"] {
+            assert_eq!(insertable(dialect, words), (true, true), "{words}");
+        }
+        for words in ["M3 S1000", "M8", "S500", "M4", "M7"] {
+            assert_eq!(insertable(dialect, words), (false, false), "{words}");
+        }
+    }
+}

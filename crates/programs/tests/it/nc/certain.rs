@@ -1,0 +1,397 @@
+//! A motion is changed only where its value and its circumstances are certain: what is not known is listed, what ends one
+//! state does not end another, what is left goes where it always went.
+
+use truegrind_programs::motion::Reason::{self, *};
+use truegrind_programs::nc::Task;
+use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rewrite::{Outcome, RewriteOptions};
+
+use super::{change_of, ends, moved, rewrite_as};
+
+pub(super) const HEAD: &str = "; truegrind angles wpr\n; truegrind tool T0 t [[0,0,100],[1,0,0,0]]\n; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n; truegrind frame G54 w [[500,0,0],[1,0,0,0]]\n; truegrind frame G55 v [[500,0,0],[0.7071068,0,0,0.7071068]]\n; truegrind frame G500 w [[500,0,0],[1,0,0,0]]\n";
+
+/// What begins a program so that its first motion is certain.
+pub(super) fn begin(dialect: Dialect) -> &'static str {
+    match dialect {
+        Fanuc => "G90 G21 G17 G54\nG43.4 H1\nG1 X1. Y2. Z3. A180. B0. C0. F600.\n",
+        Iso | LinuxCnc => "G90 G21 G17 G54\nG1 X1 Y2 Z3 A180 B0 C0 F600\n",
+        Siemens => "G90 G71 G17 G54\nTRAORI\nG1 X1 Y2 Z3 A=180 B=0 C=0 F600\n",
+        Heidenhain => "TOOL CALL 1 Z S1000\nM128\nL X+1 Y+2 Z+3 A+180 B+0 C+0 R0 F600\n",
+    }
+}
+
+/// The motions after the first one: `None` where they would be changed.
+pub(super) fn reasons(dialect: Dialect, body: &str) -> Vec<Option<Reason>> {
+    let source = format!("{HEAD}{}{body}\n", begin(dialect));
+    let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let found: Vec<_> = task.listing.motions.iter().map(|motion| motion.reason()).collect();
+    // An arc that stays keeps the first motion where it was.
+    assert!(matches!(found[0], None | Some(BeforeLeftArc | BeforeLeftPath)), "{body}: {found:?}");
+    found[1..].to_vec()
+}
+
+pub(super) fn check(dialect: Dialect, cases: &[(&str, &[Option<Reason>])]) {
+    for (body, expected) in cases {
+        assert_eq!(reasons(dialect, body), *expected, "{dialect:?}: {body}");
+    }
+}
+
+pub(super) fn left(reason: Reason) -> Option<Reason> {
+    Some(reason)
+}
+
+/// A block that states everything.
+pub(super) const F: &str = "G1 X5. Y5. Z5. A180. B0. C0.";
+pub(super) const G: &str = "G1 X5 Y5 Z5 A180 B0 C0";
+pub(super) const S: &str = "G1 X5 Y5 Z5 A=180 B=0 C=0";
+
+#[test]
+fn words_that_are_not_known_are_never_passed_over() {
+    let unknown: &[Option<Reason>] = &[left(UnknownWord), left(UnknownWord)];
+    for code in ["G999", "G999 X9.", "G5.4 X9.", "G12.7", "G141 X9.", "G43.7 H1"] {
+        check(Fanuc, &[(&format!("{code}\n{F}"), unknown)]);
+    }
+    for code in ["G999", "G154 P1 X5", "G6.2 X1"] {
+        check(LinuxCnc, &[(&format!("{code}\n{G}"), unknown)]);
+    }
+    for name in ["GLUE=5", "X1=100", "A1=5", "FROBNICATE X5", "G290", "G7 X9"] {
+        check(Siemens, &[(&format!("{name}\n{S}"), unknown)]);
+    }
+    for block in ["PRESET SELECT #3", "FROBNICATE", "CYCL DEF 800", "L X+5 M777 Y+5", "FUNCTION PARAXMODE X"]
+    {
+        check(Heidenhain, &[(&format!("{block}\nL X+5 Y+5 Z+5 A+180 B+0 C+0"), unknown)]);
+    }
+    // A computed code may be any; what it set holds on until each is said again.
+    check(LinuxCnc, &[(&format!("G[#<c>]\n{G}"), &[left(Variable), left(Variable)])]);
+    // A value that is worked out is as good as a written one.
+    check(LinuxCnc, &[("#1=0\nG[#1] X5", &[None])]);
+}
+
+#[test]
+fn states_end_with_their_own_word() {
+    let t = left(Transformed);
+    check(
+        Fanuc,
+        &[
+            (&format!("G51.1 X0.\nG68 X0. Y0. R30.\nG69\n{F}\nG50.1 X0.\n{F}"), &[t, None]),
+            (&format!("G51 X0. Y0. P2000\nG16\nG15\n{F}\nG50\n{F}"), &[t, None]),
+            (&format!("G12.1\n{F}\nG13.1\n{F}"), &[t, None]),
+            (&format!("G07.1 C50.\n{F}\nG07.1 C0\n{F}"), &[t, None]),
+            (&format!("G101 X0.\n{F}\nG100 X0.\n{F}"), &[t, None]),
+            (&format!("G43 H1\n{F}\nG43.4 H1\n{F}"), &[left(NoTipControl), None]),
+            (&format!("G41.2 D1\n{F}\nG40\n{F}"), &[left(RadiusCompensation), None]),
+            (&format!("G154 P2\n{F}\nG54\n{F}"), &[left(WorkObjectUnknown), None]),
+            (&format!("G66 P9010\n{F}\nG67\n{F}"), &[left(Subprogram), left(Subprogram), None]),
+        ],
+    );
+    check(
+        Siemens,
+        &[
+            (&format!("MIRROR X0\nORIWKS\n{S}\nMIRROR\n{S}"), &[t, None]),
+            (&format!("SCALE X2\nTRAFOOF\nTRAORI\n{S}\nSCALE\n{S}"), &[t, None]),
+            (
+                &format!("CYCLE800(1,\"TC\",0,57,0,0,0)\nTRANS X10\nORIWKS\n{S}\nCYCLE800()\n{S}"),
+                &[left(Cycle), t, None],
+            ),
+            (&format!("DIAMON\n{S}\nDIAMOF\n{S}"), &[t, None]),
+            (&format!("TOFRAME\nTRANS\n{S}\nTOROTOF\n{S}"), &[t, None]),
+            (&format!("PAROT\n{S}\nPAROTOF\n{S}"), &[t, None]),
+            (&format!("TRANSMIT\n{S}\nTRAORI\n{S}"), &[t, None]),
+            (&format!("TRANS X10 A30\n{S}\nTRANS\n{S}"), &[t, None]),
+            (&format!("ORIMKS\n{S}\nORIWKS\n{S}"), &[t, None]),
+        ],
+    );
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let mirror = "CYCL DEF 8.0 MIRROR\nCYCL DEF 8.1";
+    check(
+        Heidenhain,
+        &[
+            (&format!("{mirror} X\nPLANE RESET STAY\n{l}\n{mirror}\n{l}"), &[t, None]),
+            (&format!("CYCL DEF 10.0 ROT\nCYCL DEF 10.1 ROT+30\n{l}\nCYCL DEF 10.1 ROT+0\n{l}"), &[t, None]),
+            (&format!("CYCL DEF 19.0 PLANE\nCYCL DEF 19.1 A+0 B+0 C+0\n{l}"), &[None]),
+            (&format!("TRANS MIRROR AXIS X\n{l}\nTRANS MIRROR RESET\n{l}"), &[t, None]),
+        ],
+    );
+    check(
+        LinuxCnc,
+        &[
+            (&format!("G7\n{G}\nG8\n{G}"), &[t, None]),
+            (&format!("G41.1 D5\n{G}"), &[left(RadiusCompensation)]),
+        ],
+    );
+}
+
+#[test]
+fn where_the_tool_stands_is_not_known_after_what_changes_coordinates() {
+    let p = left(PositionUnknown);
+    let o = left(OrientationUnknown);
+    check(
+        Fanuc,
+        &[
+            ("G49\nG43.4 H1\nZ5.", &[p]),
+            ("G10 L2 P1 X510. Y0. Z0.\nX5.", &[p]),
+            ("G1 U-2.\nX5.", &[left(ExternalOnly), p]),
+            ("X30. ,A45.\nX5.", &[left(NotFollowed), p]),
+            (&format!("/M99 P100\nG55\nN100 {F}"), &[left(UnknownFlow)]),
+            // In a program that leaves G91 behind, where a first block of a subprogram leads is not known.
+            (
+                "M98 P1000\nM30\nO1000\nX5.\nG1 X5. Y5. Z5. A180. B0. C0.\nG91 X1.\nM99",
+                &[left(Subprogram), left(UnknownFlow), left(UnknownFlow), left(UnknownFlow)],
+            ),
+        ],
+    );
+    check(
+        LinuxCnc,
+        &[
+            ("G10 L2 P1 X510 Y0 Z0\nX5", &[p]),
+            ("G33.1 Z-5 K1\nG1 X5", &[left(NotFollowed), p]),
+            ("G55\nX5 Y5 Z5", &[o]),
+            ("T1 M6\nX5 Y5 Z5", &[o]),
+            ("G53 G0 X4 A10\nG1 X5 Y5 Z5", &[left(MachineCoordinates), o]),
+            ("X1.2.3\nX5", &[left(Unread), p]),
+            // Of what a program says before its ways part only the last counts.
+            (&format!("G49\nT1 M6\nG43 H1\n{G}\no100 while [#1 lt 5]\no100 endwhile\n{G}"), &[None, None]),
+            (
+                &format!("o100 while [#1 lt 5]\nG91 {G}\no100 endwhile\n{G}"),
+                &[left(UnknownFlow), left(UnknownFlow)],
+            ),
+            // R, I and K of a straight block round or cut its corner.
+            ("X5 R2\nG0 X6 K1\nX7", &[left(NotFollowed), left(NotFollowed), None]),
+            ("X EXISTS[#<a>]\nX5", &[left(Variable), None]),
+        ],
+    );
+    check(
+        Siemens,
+        &[
+            ("G111 X0 Y0\nAP=30 RP=20\nZ5", &[left(Transformed), p]),
+            ("POS[X]=30\nZ5", &[left(NotFollowed), p]),
+            ("X30 ANG=45\nZ5", &[left(NotFollowed), p]),
+            ("X30 MEAS=1\nX5", &[left(Probe), p]),
+            ("X30 A5=0 B5=0 C5=1\nX5 Y5 Z5", &[o, o]),
+            ("POLY PO[X]=(20,1) PL=3\nX5 Y5 Z5", &[left(NotFollowed), left(NotFollowed)]),
+        ],
+    );
+    check(
+        Heidenhain,
+        &[
+            ("M129\nM128\nL Z+5", &[p]),
+            ("L X+5 M99\nL Y+5", &[left(Cycle), p]),
+            ("M118 X1 Y1\nL Z+5", &[None]),
+            ("L X+5 F AUTO\nL X+6 FQ5", &[None, None]),
+            // A jump may pass over what is set after it.
+            (
+                "FN 9: IF +Q1 EQU +Q2 GOTO LBL 5\nTOOL CALL 2 Z\nLBL 5\nL X+1 Y+1 Z+1 A+180 B+0 C+0",
+                &[left(UnknownFlow)],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn tools_and_offsets_that_the_program_sets_are_not_those_from_outside() {
+    let (w, t) = (left(WorkObjectAssigned), left(ToolAssigned));
+    check(
+        Fanuc,
+        &[
+            (&format!("#5221=400.\n{F}"), &[w]),
+            (&format!("#5201=400.\n{F}"), &[w]),
+            (&format!("#2001=40.\n{F}"), &[t]),
+            (&format!("G10 L2 P0 X10. Y0. Z0.\n{F}"), &[w]),
+            (&format!("G10 L10 P1 R100.\n{F}"), &[t]),
+            (&format!("G43.4 H2\n{F}"), &[left(ToolUnknown)]),
+            (&format!("G10 L50\n{F}"), &[left(UnknownWord), left(UnknownWord)]),
+        ],
+    );
+    check(
+        LinuxCnc,
+        &[
+            (&format!("G10 L20 P1 X0 Y0 Z0\n{G}"), &[w]),
+            (&format!("G10 L2 P[#9] X1 Y1 Z1\n{G}"), &[w]),
+            (&format!("G10 L2 P1 X510 Y0 Z0 A10\n{G}"), &[w]),
+            (&format!("G10 L1 P1 Z50\n{G}"), &[t]),
+            (&format!("G43.1 Z10\n{G}"), &[t]),
+            (&format!("G43 H2\n{G}\nG43 H0\n{G}"), &[left(ToolUnknown), None]),
+            (&format!("#5241=1\n{G}\nG55\n{G}"), &[None, w]),
+            (&format!("G92 A0\n{G}\nG92.1\n{G}"), &[left(Transformed), None]),
+        ],
+    );
+    check(
+        Siemens,
+        &[
+            (&format!("D2\n{S}\nD1\n{S}"), &[left(ToolUnknown), None]),
+            (&format!("TOFFL=5\n{S}"), &[t]),
+            (&format!("$TC_DP12[1,1]=5\n{S}"), &[t]),
+            (&format!("$P_UIFR[1]=CTRANS(X,400)\n{S}\nG54\n{S}"), &[w, None]),
+            (&format!("$P_UBFR=CTRANS(X,5)\n{S}"), &[w]),
+            (&format!("$P_PFRAME=CTRANS(X,5)\n{S}\n$P_PFRAME=CMIRROR(X)\n{S}"), &[None, left(Transformed)]),
+        ],
+    );
+    let l = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+    let named = left(ToolUnknown);
+    for call in ["\"MILL\" Z S1", "Q5 Z", "5.1 Z", "1 Z DL+5", "DL+2"] {
+        check(Heidenhain, &[(&format!("TOOL CALL {call}\n{l}"), &[named])]);
+    }
+    check(Heidenhain, &[(&format!("TOOL CALL 1 Z S500 DL+0\n{l}\nTOOL CALL S900\n{l}"), &[None, None])]);
+}
+
+#[test]
+fn values_are_those_of_the_control() {
+    let after = |body: &str, dialect| ends(&format!("{}{body}\n", begin(dialect)), dialect)[1..].to_vec();
+    let at = |x, y, z| Ok([x, y, z]);
+    // LinuxCNC reads the whole line before it assigns.
+    assert_eq!(after("#3=15\n#3=6 X#3\nX#3", LinuxCnc), [at(15.0, 2.0, 3.0), at(6.0, 2.0, 3.0)]);
+    assert_eq!(after("#3=15\n#3=6 X#3", Iso), [Err(Variable)]);
+    assert_eq!(after("XSQRT[16]", LinuxCnc), [at(4.0, 2.0, 3.0)]);
+    let rounds = "#1=-1.2\n#2=FIX[#1]\n#3=FUP[#1]\nG1 X#2 Y#3";
+    assert_eq!(after(rounds, LinuxCnc), [at(-2.0, -1.0, 3.0)]);
+    assert_eq!(after(rounds, Fanuc), [at(-1.0, -2.0, 3.0)]);
+    assert_eq!(after(rounds, Iso), [Err(Variable)]);
+    assert_eq!(after("#1=[7 AND 3]\nX#1", Fanuc), [Err(Variable)]);
+    assert_eq!(after("R1=2EX1\nX=R1 Y=1.5EX-1", Siemens), [at(20.0, 0.15, 3.0)]);
+    let sets = "QL1 = 7\nQ1 = +20\nQ2 = SIN 30 * Q1\nQ4 = Q1 DIV +8\nL X+Q1 Y+QL1 Z+Q2\nL X+Q4";
+    let heidenhain = ends(
+        &format!("; truegrind tool T1 t [[0,0,50],[1,0,0,0]]\n{}{sets}\n", begin(Heidenhain)),
+        Heidenhain,
+    );
+    assert_eq!(heidenhain[1..], [at(20.0, 7.0, 10.0), at(2.5, 7.0, 10.0)]);
+    assert_eq!(after("M70\nG20 G91\nM72\nX5", LinuxCnc), [at(5.0, 2.0, 3.0)]);
+}
+
+#[test]
+fn numbers_and_words_that_do_not_fit_are_never_edited() {
+    for block in ["X1.2.3", "X21,5", "X22 5 7", "X10 X12", "G0 G1 X5", "XY5.", "X +0. 12 34"] {
+        for dialect in [Iso, LinuxCnc, Fanuc] {
+            let source = format!("{HEAD}{}{block}\nG1 X9. Y9. Z9. A180. B0. C0.\n", begin(dialect));
+            let (text, _) = rewrite_as(&source, dialect, |listing| moved(listing, [1.0, -1.0, 0.5]));
+            assert!(text.contains(&format!("\n{block}\n")), "{dialect:?}: {text}");
+            assert_eq!(reasons(dialect, block), [left(Unread)], "{dialect:?}: {block}");
+        }
+    }
+}
+
+#[test]
+fn every_block_that_moves_is_listed() {
+    check(
+        LinuxCnc,
+        &[("G0 W5\nG1 U3\nG1 E5\nX5", &[left(ExternalOnly), left(ExternalOnly), left(ExternalOnly), None])],
+    );
+    check(Fanuc, &[("N10 /X20.\nN20 X25. /Y3.", &[left(Skippable), left(Skippable)])]);
+    check(Fanuc, &[(&format!("O1000 G0 X20.\n{F}"), &[left(UnknownFlow), None])]);
+    let contour = "G71 U2.5 R1.0\nG71 P9 Q14 U1.5\nN9 G0 X20.\nX21.\nN14 X25.\nG70 P9 Q14";
+    check(
+        Fanuc,
+        &[(
+            &format!("{contour}\n{F}"),
+            &[left(Cycle), left(Cycle), left(Cycle), left(Cycle), left(Cycle), left(Cycle), None],
+        )],
+    );
+    check(Siemens, &[("MYSUB P3\nG1 X5", &[left(Subprogram), left(UnknownFlow)])]);
+    check(Siemens, &[("MCALL CYCLE81(50,0,2,-5)\nX5\nMCALL\nX6 Y6 Z6", &[left(Cycle), None])]);
+    check(Heidenhain, &[("X+20\nL Y+5\nB+10 C+170 FMAX\nL X+1", &[None, None, None, None])]);
+    // A unit is a unit only where it is one.
+    check(Fanuc, &[(&format!("G70 I5. J30. L6\n{F}"), &[left(Cycle), None])]);
+    check(Iso, &[(&format!("G71\n{G}"), &[None])]);
+    check(LinuxCnc, &[("G28.1\nX5\nG30.1\nX6", &[None, None])]);
+}
+
+#[test]
+fn the_name_of_a_file_tells_its_control_where_the_text_does_not() {
+    for (name, text, dialect) in [
+        ("a.ngc", "#3=15\nG1 X#3\n", LinuxCnc),
+        ("a.nc", "#3=15\nG1 X#3\n", Fanuc),
+        ("a.ngc", "G43.4 H1\nG1 X5.\n", Fanuc),
+        ("a.ngc", "TRAORI\nG1 X5\n", Siemens),
+        ("A.MPF", "TRANS X10\nG1 X5\n", Siemens),
+        ("a.spf", "G1 X5\n", Siemens),
+        ("a.h", "L X+5\n", Heidenhain),
+        ("a.nc", "G1 X5\n", Iso),
+    ] {
+        assert_eq!(Dialect::of_named(name, text.as_bytes()), dialect, "{name} {text}");
+    }
+    // DIN/ISO of Heidenhain has other meanings: nothing of it is changed.
+    let task =
+        Task::read(&[("a.nc", b"%X G71 *\nN1 G54 X+10 Y+5 *\nN2 G01 X+1 Y+2 Z+3 *\n")], &Setup::default());
+    assert!(task.listing.motions.iter().all(|motion| motion.left == Some(UnknownWord)));
+    // A text that is no program moves nothing.
+    for text in ["Dear reader,\nnothing here moves.\n", "q1_deg,q2_deg,x_mm\n0,1,2\n3.5,4,5\n"] {
+        let task = Task::read(&[("a.txt", text.as_bytes())], &Setup::default());
+        assert!(task.listing.motions.is_empty(), "{text}: {:?}", task.listing.motions);
+    }
+    // Lines that end with CR alone are lines.
+    let task = Task::read(&[("a.nc", b"G90 G54\rG1 X1 Y2 Z3\rX5\r")], &Setup::default());
+    assert_eq!(task.listing.motions.len(), 2);
+    assert_eq!(task.listing.motions[1].place.line, 3);
+}
+
+#[test]
+fn what_is_left_goes_where_it_always_went() {
+    let go = |dialect, body: &str, motion| {
+        let source = format!("{HEAD}{}{body}\n", begin(dialect));
+        let (text, rewritten) =
+            rewrite_as(&source, dialect, |listing| vec![change_of(listing, motion, [0.5, -0.25, 0.125])]);
+        (text[HEAD.len()..].lines().skip(2).map(str::to_owned).collect::<Vec<_>>(), rewritten.outcomes)
+    };
+    let (text, _) = go(LinuxCnc, "G1 X#100\nX5", 0);
+    assert_eq!(text, ["G1 X#100 Y2.0000 Z3.0000", "X5"]);
+    let (text, _) = go(LinuxCnc, "/X35\nX5 Y5", 0);
+    assert_eq!(text, ["/X35 Y2.0000 Z3.0000", "X5 Y5 Z3.0000"]);
+    // An increment that stays counts from where the tool stands now.
+    let (text, _) = go(Siemens, "G91 X5 RND=2\nX5", 0);
+    assert_eq!(text[1..], ["G91 X4.5000 Y0.2500 Z-0.1250 RND=2", "X5"]);
+    // No centre in a C block of Heidenhain, and nothing that moves its start.
+    let source = format!("{HEAD}{}CC X+20 Y+2\nC X+39 Y+2 DR-\nL X+30\n", begin(Heidenhain));
+    let (text, _) = rewrite_as(&source, Heidenhain, |listing| moved(listing, [0.5, 0.0, 0.0]));
+    assert_eq!(text, source.replace("L X+30", "L X+30.5000"));
+    // A whole turn that rises, of which start and end move apart, is refused with the motion before it.
+    let source = format!("{HEAD}{}G3 X1 Y2 Z-3 I5 J0\nG1 X5\n", begin(LinuxCnc));
+    let (text, rewritten) = rewrite_as(&source, LinuxCnc, |listing| {
+        vec![
+            change_of(listing, 0, [0.5, 0.0, 0.0]),
+            change_of(listing, 1, [0.25, 0.0, 0.0]),
+            change_of(listing, 2, [0.5, 0.0, 0.0]),
+        ]
+    });
+    assert_eq!(rewritten.outcomes[..2], [Outcome::Refused(BeforeLeftArc), Outcome::Refused(WrongShape)]);
+    assert_eq!(text, source.replace("G1 X5\n", "G1 X5.5000\n"));
+    // Without TRAORI a tool vector is no word.
+    let vector = "TRAORI\nG1 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=0 F600\n";
+    let source = format!("{HEAD}{vector}TRAFOOF\nG1 X5 Y5 Z5\n");
+    let (text, _) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 0, [0.5, -0.25, 0.125])]);
+    assert!(text.ends_with("\nTRAFOOF\nG1 X5 Y5 Z5\n"), "{text}");
+    // A Fanuc takes eight digits in a word.
+    let source = format!("{HEAD}{}", begin(Fanuc));
+    let setup = Setup { dialect: Some(Fanuc), ..Setup::default() };
+    let task = Task::read(&[("x", source.as_bytes())], &setup);
+    let mut change = change_of(&task.listing, 0, [0.0; 3]);
+    let turn = truegrind_programs::nc::orientation::Angles::Wpr.rotation([180.123_456_7, 0.0, 0.0]);
+    if let truegrind_programs::rewrite::NewTarget::Cartesian { quaternion, .. } = &mut change.targets[0] {
+        *quaternion = [turn.w, turn.i, turn.j, turn.k];
+    }
+    let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    let text = rewritten.files[0].edits.apply(source.as_bytes()).unwrap();
+    assert!(String::from_utf8_lossy(&text).contains("A180.12346 "), "{}", String::from_utf8_lossy(&text));
+    assert_eq!(Reason::BeforeLeftArc.text(), "an arc that stays as it is starts where this ends");
+}
+
+#[test]
+fn a_cycle_whose_line_breaks_off_is_no_panic() {
+    for line in [
+        "CYCL",
+        "CYCL DEF",
+        "CYCL CALL",
+        "TOOL",
+        "TOOL CALL",
+        "TOOL DEF",
+        "PLANE",
+        "FUNCTION",
+        "TRANS",
+        "TRANS DATUM",
+    ] {
+        let source = format!("BEGIN PGM P MM\n{line}\nL X+1 Y+2 Z+3\nEND PGM P MM\n");
+        let setup = Setup { dialect: Some(Dialect::Heidenhain), ..Setup::default() };
+        let task = Task::read(&[("p.h", source.as_bytes())], &setup);
+        assert!(task.listing.motions.iter().all(|motion| motion.reason().is_some()), "{line}");
+    }
+}

@@ -1,0 +1,176 @@
+//! Work offsets, shifts and tools: what each control makes of them.
+
+use truegrind_programs::motion::Reason::*;
+use truegrind_programs::nc::dialect::Dialect::{Fanuc, Heidenhain, Iso, LinuxCnc, Siemens};
+
+use super::certain::{F, G, S, begin, check, left, reasons};
+use super::{ends, listing_of};
+
+const L: &str = "L X+5 Y+5 Z+5 A+180 B+0 C+0";
+
+#[test]
+fn a_number_beside_a_work_offset_is_not_passed_over() {
+    check(
+        Fanuc,
+        &[
+            (&format!("G54 P2\n{F}\nG54\n{F}"), &[left(WorkObjectUnknown), None]),
+            // The number belongs to the call, the dwell.
+            (&format!("G54 M98 P1000\n{F}"), &[left(Subprogram), None]),
+            (&format!("G54 G4 P500\n{F}"), &[None]),
+        ],
+    );
+    check(Iso, &[(&format!("G54 P2\n{G}"), &[left(WorkObjectUnknown)])]);
+    let named = "(truegrind frame G54 P2 w [[500,0,0],[1,0,0,0]])";
+    check(Fanuc, &[(&format!("{named}\nG54 P2\n{F}"), &[None])]);
+}
+
+#[test]
+fn offsets_in_incremental_mode_are_values_for_linuxcnc() {
+    let body = "G90 G54\nG10 L2 P1 X350 Y0 Z250 R0\nG91 G10 L2 P1 X10 Y1 Z2\nG90\nG1 X1 Y2 Z3 A180 B0 C0\n";
+    let at = |dialect| {
+        let listing = listing_of(body, dialect);
+        let motion = listing.motions.last().unwrap();
+        listing
+            .work_object(motion)
+            .unwrap()
+            .value
+            .as_ref()
+            .map(|value| value.user_frame.position_mm)
+            .map_err(|r| *r)
+    };
+    assert_eq!(at(LinuxCnc), Ok([10.0, 1.0, 2.0]));
+    // A plain file may be for either.
+    assert_eq!(at(Iso), Err(Assigned));
+}
+
+#[test]
+fn a_shift_within_a_shift_is_not_known() {
+    let shifted = left(Displacement);
+    check(
+        Fanuc,
+        &[
+            ("G92 X100. Y0. Z50.\nG52 X5.\nG1 X100. Y0. Z50.", &[shifted]),
+            ("G52 X5.\nG92 X100.\nX101.\nG52 X0.\nX5. Y5. Z5.", &[None, shifted]),
+            ("G52 X5.\nG52 X6.\nX5. Y5. Z5. A180. B0. C0.", &[None]),
+            // Only the axes that are named lose their shift.
+            (&format!("G92 X0. Y0.\nG92.1 X0.\n{F}"), &[shifted]),
+            (&format!("G92 X0. Y0.\nG92.1 X0. Y0. Z0.\n{F}"), &[None]),
+            (&format!("G92 X0. Y0.\nG92.1\n{F}"), &[shifted]),
+            (&format!("G92.1\n{F}"), &[None]),
+        ],
+    );
+    let found =
+        ends(&format!("{}G92 X0 Y0\nG52 X5\nX1\nG92.1\nX1 Y1 Z1 A180 B0 C0\n", begin(LinuxCnc)), LinuxCnc);
+    assert_eq!(found[1..], [Ok([6.0, 2.0, 3.0]), Ok([1.0, 1.0, 1.0])]);
+}
+
+#[test]
+fn a_preset_may_end_the_shift_within_the_one_before() {
+    let preset = "; truegrind frame PRESET2 w [[600,0,0],[1,0,0,0]]\n";
+    let shift = "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+40";
+    let next = "CYCL DEF 247 DATUM SETTING Q339=+2";
+    check(
+        Heidenhain,
+        &[
+            (&format!("{preset}{shift}\n{next}\n{L}"), &[left(Displacement)]),
+            (&format!("{preset}{next}\n{L}"), &[None]),
+            (&format!("{preset}{shift}\n{next}\nTRANS DATUM RESET\n{L}"), &[None]),
+            (&format!("{preset}{shift}\n{next}\nCYCL DEF 7.1 X+0 Y+0 Z+0\n{L}"), &[None]),
+            (&format!("{preset}{shift}\n{next}\nCYCL DEF 7.1 X+0\n{L}"), &[left(Transformed)]),
+        ],
+    );
+}
+
+#[test]
+fn data_that_the_program_writes_are_not_those_from_outside() {
+    let w = left(WorkObjectAssigned);
+    check(
+        Heidenhain,
+        &[
+            (&format!("FN 25: PRESET = X / +0 / +100\n{L}"), &[w]),
+            (&format!("M143\n{L}"), &[w]),
+            (&format!("FN 17: SYSWRITE ID 220 NR2 IDX1 = +10\n{L}"), &[left(UnknownWord), left(UnknownWord)]),
+            (&format!("FN17: SYSWRITE ID 220 NR2 IDX1 = +10\n{L}"), &[left(UnknownWord), left(UnknownWord)]),
+            (&format!("M114\n{L}"), &[left(UnknownWord), left(UnknownWord)]),
+            (&format!("FN 18: SYSREAD Q1 = ID270 NR1 IDX1\n{L}"), &[None]),
+        ],
+    );
+    // In G70 the control's own data stay in its unit.
+    let t = left(ToolAssigned);
+    check(
+        Siemens,
+        &[
+            (&format!("G70\n$TC_DP3[1,1]=2\nG71\nT1 D1\nG54\n{S}"), &[t]),
+            (&format!("G71\n$TC_DP3[1,1]=2\nT1 D1\nG54\n{S}"), &[None]),
+            (&format!("G70\n$P_UIFR[1]=CTRANS(X,1)\nG71\nG54\n{S}"), &[w]),
+        ],
+    );
+}
+
+#[test]
+fn a_tool_is_in_when_it_has_been_changed() {
+    let tool = |body: &str| {
+        let listing = listing_of(&format!("G90 G54\n{body}\nG1 X1 Y2 Z3 A180 B0 C0\n"), LinuxCnc);
+        listing.tool(listing.motions.last().unwrap()).unwrap().name.clone()
+    };
+    assert_eq!(tool("T5"), "T0");
+    assert_eq!(tool("T5 M6"), "T5");
+    assert_eq!(tool("T5\nM61 Q7"), "T7");
+    assert_eq!(tool("M61 Q#1"), "T?");
+}
+
+#[test]
+fn a_shift_turns_nothing() {
+    check(
+        Heidenhain,
+        &[
+            ("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+10\nL X+10 Y+0 Z+50", &[None]),
+            ("TRANS DATUM AXIS X+10\nL X+10 Y+0 Z+50\nTRANS DATUM RESET\nL X+10 Y+0 Z+50", &[None, None]),
+            ("CYCL DEF 7.1 X+10\nL X+10", &[left(PositionUnknown)]),
+        ],
+    );
+}
+
+#[test]
+fn what_ends_where_nothing_is_on_changes_nothing() {
+    for code in ["G69", "G15", "G13.1", "G50", "G50.1 X0.", "G7.1 C0."] {
+        check(Fanuc, &[(&format!("{code}\nG1 X20."), &[None])]);
+    }
+    check(Siemens, &[("CYCLE800()\nX20\nTOROTOF\nX21\nPAROTOF\nX22", &[None, None, None])]);
+    check(Heidenhain, &[("PLANE RESET STAY\nL X+20\nTRANS ROTATION RESET\nL X+21", &[None, None])]);
+    // Where it has been on, the axes are counted anew.
+    check(Fanuc, &[("G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50.", &[left(OrientationUnknown)])]);
+    assert_eq!(reasons(Fanuc, "/G68 X0. Y0. R30.\nG69\nG1 X20. Y0. Z50."), [left(OrientationUnknown)]);
+}
+
+#[test]
+fn what_adds_to_a_shift_that_is_not_known_is_not_known() {
+    let go = "G1 X5 Y5 Z5 A=180 B=0 C=0";
+    let t = left(Transformed);
+    check(
+        Siemens,
+        &[
+            (&format!("/TRANS X10\nG500\n{go}\nTRANS\n{go}"), &[left(UnknownFlow), None]),
+            (&format!("/TRANS X10\nATRANS X5\n{go}\nTRANS X5\n{go}"), &[t, None]),
+            (&format!("TRANS X1\nAGAIN:\nATRANS X5\n{go}\nGOTOB AGAIN"), &[t]),
+        ],
+    );
+}
+
+/// The class: what an offset holds where the program states a part of it. What is not said stays, and is known only where it was.
+#[test]
+fn an_offset_of_which_the_turn_is_not_said_keeps_the_turn_it_has() {
+    let value = |begin: &str, offset: &str, dialect| {
+        let source = format!("{begin}G90 G57\nG10 L2 P4 {offset}\nG1 X1 Y2 Z3 A180 B0 C0\n");
+        let listing = listing_of(&source, dialect);
+        let motion = listing.motions.last().unwrap();
+        let object = listing.work_object(motion).unwrap();
+        object.value.as_ref().map(|value| value.user_frame.quaternion).map_err(|reason| *reason)
+    };
+    assert_eq!(value("", "X350 Y10 Z250", LinuxCnc), Err(Assigned));
+    assert_eq!(value("", "X350 Y10 Z250", Iso), Err(Assigned));
+    assert_eq!(value("", "X350 Y10 Z250 R0", LinuxCnc), Ok([1.0, 0.0, 0.0, 0.0]));
+    assert_eq!(value("", "X350. Y10. Z250.", Fanuc), Ok([1.0, 0.0, 0.0, 0.0]));
+    let turned = "; truegrind frame G57 w [[500,0,0],[0,0,0,1]]\n";
+    assert_eq!(value(turned, "X350 Y10 Z250", LinuxCnc), Ok([0.0, 0.0, 0.0, 1.0]));
+}

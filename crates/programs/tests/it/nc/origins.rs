@@ -1,0 +1,89 @@
+//! The class: what stays counts from where a corrected motion ends (an origin that is set there, an increment, a position
+//! that is read), and goes elsewhere than it always did. The motion that ends there stays then, over all ways.
+
+use truegrind_programs::motion::Reason;
+use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, LinuxCnc, Siemens};
+use truegrind_programs::rewrite::Outcome;
+
+use super::certain::{HEAD, begin};
+use super::{moved, rewrite_as};
+
+/// What becomes of the first motion, where all that can move shall.
+fn first(dialect: Dialect, body: &str) -> Outcome {
+    let source = format!("{HEAD}{}{body}\n", begin(dialect));
+    let (_, rewritten) = rewrite_as(&source, dialect, |listing| moved(listing, [1.5, -1.25, 0.75]));
+    rewritten.outcomes[0].clone()
+}
+
+#[test]
+fn an_origin_from_which_what_stays_counts_keeps_the_motion_that_ends_there() {
+    let refused = Outcome::Refused(Reason::BeforeOrigin);
+    for body in [
+        "G92 X0. Y0. Z0.\n#103=0\nWHILE [#103 LT 2] DO1\nG1 X20. Y-30. A175.\n#103=#103+1\nEND1",
+        "G92 X0. Y0. Z0.\nN10 G1 X20.\nIF [#1 EQ 0] GOTO 10",
+        "G92 X0. Y0. Z0.\nG81 X5. Y5. Z-5. R2.",
+        "G92 X0. Y0. Z0.\nM98 P1000",
+        "/G92 X0. Y0. Z0.\nG1 X5. Y5. Z5.",
+        "G92 X#501\nG1 X5. Y5. Z5.",
+        "G92 A0.\nG1 X5. Y5. Z5. A10.",
+        "G10 L20 P1 X0. Y0.\nG1 X5. Y5. Z5.",
+    ] {
+        assert_eq!(first(Fanuc, body), refused, "{body}");
+    }
+    assert_eq!(first(LinuxCnc, "G10 L20 P1 X0 Y0 Z0\nG1 X5 Y5 Z5"), refused);
+    assert_eq!(first(LinuxCnc, "G92 X0\nG92.2\nG92.3\nG1 X5 Y5 Z5"), refused);
+    assert_eq!(first(Siemens, "PRESETON(X,0)\nG1 X5 Y5 Z5"), refused);
+    assert_eq!(first(Siemens, "TOFRAME\nG1 X5 Y5 Z5"), refused);
+}
+
+#[test]
+fn increments_and_positions_that_are_read_keep_the_motion_that_ends_there() {
+    let refused = Outcome::Refused(Reason::BeforeIncrement);
+    for body in [
+        "#103=0\nWHILE [#103 LT 2] DO1\nG91 G1 X20.\n#103=#103+1\nEND1",
+        "#1=#5041\nG1 X#1",
+        "G1 X[#5041+5.]",
+    ] {
+        assert_eq!(first(Fanuc, body), refused, "{body}");
+    }
+    assert_eq!(first(Siemens, "R1=$AA_IM[X]\nG1 X=R1"), refused);
+}
+
+#[test]
+fn what_is_said_again_or_counts_from_elsewhere_keeps_nothing() {
+    for body in [
+        "G92 X0. Y0. Z0.\nG1 X20. Y-30. Z5.",
+        "G92 X0. Y0. Z0.\nG92 X0. Y0. Z0.\nG52 X0. Y0. Z0.",
+        "G91 G28 Z0.",
+        "G0 G53 Z0.",
+        "G91 G1 X5.",
+        "G54",
+    ] {
+        assert_eq!(first(Fanuc, body), Outcome::InPlace, "{body}");
+    }
+}
+
+/// A block that is put in before another is read with what held before that one.
+#[test]
+fn nothing_is_put_in_before_a_block_that_changes_what_numbers_mean() {
+    for (body, free) in [("G1 X9. Y9. Z9.", true), ("G20 G1 X1. Y1. Z1.", false)] {
+        let source = format!("{HEAD}{}{body}\n", begin(Fanuc));
+        let setup = truegrind_programs::nc::setup::Setup { dialect: Some(Fanuc), ..Default::default() };
+        let task = truegrind_programs::nc::Task::read(&[("x", source.as_bytes())], &setup);
+        assert_eq!(task.listing.motions[1].insertable, free, "{body}");
+    }
+}
+
+/// The class: a block that may be skipped says again what was corrected, so that the tool stands in one of two places. What
+/// is written as an increment from there is right on one way only: then nothing is corrected there.
+#[test]
+fn an_increment_behind_a_block_that_may_be_skipped_keeps_the_motion_before() {
+    let refused = Outcome::Refused(Reason::BeforeIncrement);
+    for body in ["/Y-10\nX=IC(5) Y-7", "/A=175\nX4 A=IC(5)", "/Z7\nG91 X5 Y1 Z1", "/Y-10\nG91 Z4"] {
+        assert_eq!(first(Siemens, body), refused, "{body}");
+    }
+    assert_eq!(first(Fanuc, "/Y-10.\nG91 X5."), refused);
+    assert_eq!(first(LinuxCnc, "/Y-10\nG91 X5"), refused);
+    // A value needs no place to count from.
+    assert_eq!(first(Siemens, "/Y-10\nX5 Y-7"), Outcome::InPlace);
+}

@@ -1,0 +1,201 @@
+//! A path that is left goes where it always went: its start and the words that it leaves out.
+
+use proptest::prelude::*;
+use truegrind_programs::motion::Reason::*;
+use truegrind_programs::nc::Task;
+use truegrind_programs::nc::dialect::Dialect::{self, Fanuc, Heidenhain, LinuxCnc, Siemens};
+use truegrind_programs::nc::setup::Setup;
+use truegrind_programs::rewrite::Outcome;
+
+use super::certain::{HEAD, begin, check, left};
+use super::{moved, rewrite_as};
+
+/// The text after a rewrite of everything that can be, without its head.
+fn rewritten(dialect: Dialect, body: &str) -> String {
+    let source = format!("{HEAD}{}{body}\n", begin(dialect));
+    let (text, _) = rewrite_as(&source, dialect, |listing| moved(listing, [0.5, -0.25, 0.125]));
+    text[HEAD.len()..].lines().skip(begin(dialect).lines().count()).map(|line| format!("{line}\n")).collect()
+}
+
+#[test]
+fn the_start_of_a_path_that_is_left_stays() {
+    let path = left(BeforeLeftPath);
+    let other = left(NotFollowed);
+    check(
+        Siemens,
+        &[
+            ("X10\nX20\nCIP X40 Y0 I1=30 J1=10 K1=50\nG1 X50 Y0 Z50", &[None, path, other, None]),
+            // A path that goes on in the direction of the motion before needs the start of that as well.
+            ("X10\nX20\nX30\nCT X60 Y10", &[None, path, path, other]),
+            ("X10\nX20\nX30 ANG=45", &[None, path, other]),
+        ],
+    );
+    check(
+        Heidenhain,
+        &[
+            ("L X+10\nL X+20\nCC X+20 Y+10\nCP IPA+90 DR+", &[None, path, other]),
+            ("L X+10\nL X+20\nL X+30\nCT X+50 Y+20", &[None, path, path, other]),
+            ("L X+10\nL X+20\nRND R2", &[None, None, other]),
+        ],
+    );
+    check(LinuxCnc, &[("X10\nX20\nG5.1 X30 Y5 I2 J3", &[None, path, other])]);
+}
+
+#[test]
+fn words_that_such_a_path_leaves_out_hold_what_they_held() {
+    assert_eq!(
+        rewritten(Siemens, "X10\nX20\nCIP X40 Y0 I1=30 J1=10 K1=50"),
+        "X10.5000\nX20 Y2.0000 Z3.0000\nCIP X40 Y0 I1=30 J1=10 K1=50\n"
+    );
+    assert_eq!(
+        rewritten(Heidenhain, "L X+10\nL X+20\nCC X+20 Y+10\nCP IPA+90 DR+"),
+        "L X+10.5000\nL X+20 Y+2.0000 Z+3.0000\nCC X+20 Y+10\nCP IPA+90 DR+\n"
+    );
+}
+
+#[test]
+fn a_cycle_runs_where_it_always_ran() {
+    assert_eq!(rewritten(Heidenhain, "L X+4 M99\nL IX+2 M99"), "L X+4 Y+2.0000 Z+3.0000 M99\nL IX+2 M99\n");
+}
+
+#[test]
+fn blocks_that_take_no_other_words_are_written_as_they_were() {
+    for block in ["X+20 R+", "LN X+20 NX+0.1 NY+0 NZ+0.995"] {
+        let body = format!("L X+4 Y+5\nL X+10\n{block}\nL X+1 R0\n");
+        let expected = format!("L X+4.5000 Y+4.7500\nL X+10 Y+5.0000 Z+3.0000\n{block}\nL X+1 R0\n");
+        let found = rewritten(Heidenhain, &body);
+        let lines = |text: &str| text.lines().take(3).map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(lines(&found), lines(&expected), "{block}");
+    }
+    let all = "LN X+20 Y+5 Z+3 NX+0.1 NY+0 NZ+0.995";
+    let text = rewritten(Heidenhain, &format!("L X+4 Y+5\n{all}"));
+    assert_eq!(text, format!("L X+4.5000 Y+4.7500\n{all}\n"));
+}
+
+#[test]
+fn a_shift_that_has_moved_with_the_tool_moves_nothing_that_is_left() {
+    // G92 calls a place X0 that is now 0.5 mm on; G52 says its shift whole.
+    assert_eq!(rewritten(LinuxCnc, "G92 X0\nX10\nG52 X4\nX3"), "G92 X0\nX10\nG52 X4\nX3.5000\n");
+    assert_eq!(rewritten(LinuxCnc, "G92 X0\n/X7"), "G92 X0\n/X6.5000 Y2.0000 Z3.0000\n");
+}
+
+#[test]
+fn a_tool_vector_that_is_left_out_is_said_again() {
+    let source = format!(
+        "{HEAD}G90 G71 G17 G54\nTRAORI\nG1 X10 Y0 Z50 A3=0 B3=0 C3=1 THETA=0 F600\nG1 X9 Y1 RND=2\nX10 Y0 Z50\n/X5\nX6 A3=0 B3=0 C3=1\n"
+    );
+    let (text, _) = rewrite_as(&source, Siemens, |listing| {
+        let mut changes = moved(listing, [0.0; 3]);
+        let turn = truegrind_programs::nc::orientation::Angles::Wpr.rotation([180.4, 0.0, 0.3]);
+        for change in &mut changes {
+            if let truegrind_programs::rewrite::NewTarget::Cartesian { quaternion, .. } =
+                &mut change.targets[0]
+            {
+                *quaternion = [turn.w, turn.i, turn.j, turn.k];
+            }
+        }
+        changes.retain(|change| change.motion != 4);
+        changes
+    });
+    let lines: Vec<&str> = text.lines().collect();
+    let line = |begin: &str| *lines.iter().find(|line| line.starts_with(begin)).unwrap();
+    let again = "A3=0.0000000 B3=0.0000000 C3=1.0000000 THETA=0.000000";
+    assert_eq!(line("G1 X9"), format!("G1 X9 Y1 {again} RND=2"));
+    assert_eq!(line("/X5"), format!("/X5 {again}"));
+    // After a block that may be skipped both are said.
+    assert!(line("X6").contains("THETA="), "{text}");
+}
+
+/// The class: words that are left out are taken from a memory that the control does not have. Where the tool is turned by
+/// a vector, by angles of axes or by A2, B2, C2, the words of the other two hold nothing that is known.
+#[test]
+fn angles_from_before_a_tool_vector_are_not_remembered() {
+    for (dialect, turn, block) in [
+        (Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1", "L X+7 Y+8 Z+9 B+10"),
+        (Siemens, "X4 Y5 Z6 A3=0 B3=0 C3=1", "X7 Y8 Z9 B=10"),
+        (Siemens, "X4 Y5 Z6 A2=180 B2=0 C2=0", "X7 Y8 Z9 B=10"),
+    ] {
+        let text = rewritten(dialect, &format!("{turn}\n{block}"));
+        assert_eq!(text.lines().last(), Some(block), "{text}");
+    }
+    // An increment of which the turn is not known stays, and with it the place that it counts from.
+    let text = rewritten(Heidenhain, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0");
+    assert_eq!(text, "LN X+4 Y+5 Z+6 TX+0 TY+0 TZ+1\nL IX-10 B+0\n");
+}
+
+/// The class: a word that may say nothing, because its variable has never been set, is taken to say something. The block may
+/// not move at all: nothing is put into it, and what begins there hangs on the motion before.
+#[test]
+fn a_block_that_may_not_move_gets_no_words() {
+    let head = "X4. Y5. Z6.\n";
+    for block in ["G0 Y#149", "G1 X10. Y#149", "G1 A#149", "/G0 Y#149", "G0 Z-#149"] {
+        let text = rewritten(Fanuc, &format!("{head}{block}\nG1 X7. Y8. Z9. A180. B0. C0."));
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[..2], ["X4.5000 Y4.7500 Z6.1250", block], "{text}");
+        assert_eq!(lines[2], "G1 X7.5000 Y7.7500 Z9.1250 A180. B0. C0.");
+    }
+    // An arc that stays begins where such a block ends, or the one before it.
+    let text = rewritten(Fanuc, &format!("{head}G0 Y#149\nG2 X14. Y5. I5."));
+    assert_eq!(text, "X4. Y5. Z6.\nG0 Y#149\nG2 X14. Y5. I5.\n");
+    // A variable that is set has a value.
+    let text = rewritten(Fanuc, &format!("{head}#149=7.\n/G0 Y#149"));
+    assert_eq!(text.lines().last(), Some("/G0 X4.0000 Y#149 Z6.0000"), "{text}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+    #[test]
+    fn whatever_is_left_starts_where_it_started(blocks in proptest::collection::vec(0_usize..24, 1..12), dialect in 0_usize..3) {
+        let (dialect, pieces): (Dialect, &[&str]) = match dialect {
+            0 => (Siemens, &[
+                "X10", "X20 Y5", "Z7", "G1 X9 Y1 Z2", "G91 X1 Y1", "G90 X3", "CIP X40 Y0 I1=30 J1=10 K1=50", "CT X6 Y1", "G1 X5", "G2 X15 Y2 I5 J0",
+                "G3 X5 Y2 CR=6", "X30 ANG=45", "X5 RND=1", "X7 F50", "A=170", "A3=0 B3=0 C3=1 X2", "THETA=5 Y3", "TRANS X5", "TRANS", "CYCLE81(5,0,2,-5)",
+                "G0 X1 Y2 Z3 A=180 B=0 C=0", "X=R5", "POLY X3", "G33 Z5 K1",
+            ]),
+            1 => (Heidenhain, &[
+                "L X+10", "L X+20 Y+5", "L IZ+7", "L X+9 Y+1 Z+2 A+180 B+0 C+0", "CC X+20 Y+10", "CP IPA+90 DR+", "C X+30 Y+2 DR+", "CR X+15 Y+8 R+10 DR-",
+                "CT X+6 Y+1", "RND R2", "APPR LT X+5 Y+5 LEN5", "DEP LT LEN5", "L X+7 F50", "L A+170", "M99", "L X+4 M99", "L X+5 M129", "M128", "FC DR+ R5",
+                "CYCL DEF 7.1 X+5", "L X+3 M", "LP PR+5 PA+3", "TRANS DATUM RESET", "L X+5 RL",
+            ]),
+            _ => (LinuxCnc, &[
+                "X10", "X20 Y5", "Z7", "G1 X9 Y1 Z2", "G91 X1 Y1", "G90 X3", "G5.1 X30 Y5 I2 J3", "G5 X5 Y5 I1 J1 P1 Q1", "G1 X5", "G2 X15 Y2 I5 J0",
+                "G3 X5 Y2 R6", "G3 I5", "X7 F50", "A170", "X8 F9", "G92.1", "G52 X4", "G33 Z5 K1", "G81 Z-5 R2", "G80 G1", "G0 X1 Y2 Z3 A180 B0 C0", "X#5",
+                "M66 E0", "G28",
+            ]),
+        };
+        let body: String = blocks.iter().map(|&block| format!("{}\n", pieces[block])).collect();
+        let source = format!("{HEAD}{}{body}", begin(dialect));
+        let by = [0.5, -0.25, 0.125];
+        let (text, rewritten) = rewrite_as(&source, dialect, |listing| moved(listing, by));
+        let setup = Setup { dialect: Some(dialect), ..Setup::default() };
+        let before = Task::read(&[("x", source.as_bytes())], &setup);
+        let after = Task::read(&[("x", text.as_bytes())], &setup);
+        prop_assert_eq!(before.listing.motions.len(), after.listing.motions.len(), "{}", text);
+        let changes = moved(&before.listing, by);
+        let taken = |index: usize| {
+            changes.iter().zip(&rewritten.outcomes).any(|(change, outcome)| {
+                change.motion as usize == index && !matches!(outcome, Outcome::Refused(_))
+            })
+        };
+        let end = |task: &Task<'_>, index: usize| {
+            let target = *task.listing.motions[index].to()?.value.ok()?.cartesian()?;
+            Some((target.position_mm, target.quaternion))
+        };
+        for (index, (old, new)) in before.listing.motions.iter().zip(&after.listing.motions).enumerate() {
+            prop_assert_eq!(old.reason(), new.reason(), "{}\n{}", source, text);
+            let (Some((a, qa)), Some((b, qb))) = (end(&before, index), end(&after, index)) else { continue };
+            let at = |axis: usize| a[axis] + if taken(index) { by[axis] } else { 0.0 };
+            let off = (0..3).map(|axis| (b[axis] - at(axis)).abs()).fold(0.0, f64::max);
+            prop_assert!(off < 1e-3, "motion {} is off by {}\n{}\n{}", index, off, source, text);
+            prop_assert!((0..4).all(|i| (qa[i] - qb[i]).abs() < 1e-6), "motion {}\n{}\n{}", index, source, text);
+            // Where a path that is neither line nor arc begins nothing has moved.
+            let path = before.listing.motions.get(index + 1);
+            if let Some(path) = path
+                && path.left == Some(NotFollowed)
+                && !["RND", "G1", "G0"].contains(&&*path.instruction)
+            {
+                prop_assert!(!taken(index), "motion {}\n{}\n{}", index, source, text);
+            }
+        }
+    }
+}

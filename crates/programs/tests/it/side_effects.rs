@@ -1,0 +1,143 @@
+//! The class: an expression is replaced by its value, or asked twice, and with it goes or comes what it does besides. Nothing
+//! that does more than answer may be taken out of a program or said again.
+
+use truegrind_programs::motion::{Listing, MotionKind, Reason};
+use truegrind_programs::rapid::Task;
+use truegrind_programs::rapid::predefined;
+use truegrind_programs::rewrite::{Change, Extra, NewTarget, RewriteOptions};
+
+const DATA: &str = "CONST robtarget p:=[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n\
+    CONST robtarget a{2}:=[[[400,0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],\
+    [[400,9,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];\nVAR num n:=0;\nVAR iodev d;\n";
+
+/// Functions that ignore what they are given, and some that act.
+const ROUTINES: &str = "FUNC robtarget at(robtarget t,num layer)\nRETURN t;\nENDFUNC\n\
+    FUNC robtarget through(robtarget t,num k)\nRETURN at(t,k);\nENDFUNC\n\
+    FUNC robtarget divided(robtarget t,num k)\nRETURN at(t,1/k);\nENDFUNC\n\
+    FUNC robtarget maybe(robtarget t\\num k)\nRETURN t;\nENDFUNC\n\
+    FUNC num one(num k)\nRETURN 1;\nENDFUNC\n\
+    FUNC num sum(num k)\nRETURN k+2;\nENDFUNC\n\
+    FUNC num sets(num k)\nn:=k;\nRETURN k;\nENDFUNC\n\
+    FUNC num calls(num k)\nRETURN sets(k);\nENDFUNC\n\
+    FUNC num writes(INOUT num k)\nk:=1;\nRETURN 1;\nENDFUNC\n\
+    FUNC num outputs(num k)\nSetDO do1,1;\nRETURN k;\nENDFUNC\n\
+    FUNC num says(num k)\nTPWrite \"x\";\nRETURN k;\nENDFUNC\n\
+    FUNC num waits(num k)\nWaitTime 1;\nRETURN k;\nENDFUNC\n\
+    FUNC num raises(num k)\nIF k>1 RAISE 1;\nRETURN k;\nENDFUNC\n\
+    FUNC num moves(num k)\nMoveL p,v100,fine,tool0;\nRETURN k;\nENDFUNC\n\
+    FUNC num late(num k)\n%\"other\"%;\nRETURN k;\nENDFUNC\n\
+    FUNC num loops(num k)\nWHILE k>1 DO\nENDWHILE\nRETURN k;\nENDFUNC\n";
+
+fn source(instruction: &str) -> String {
+    format!("MODULE M\n{DATA}PROC main()\n{instruction}\nENDPROC\n{ROUTINES}ENDMODULE\n")
+}
+
+fn first(instruction: &str) -> (Option<Reason>, bool, Listing) {
+    let source = source(instruction);
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.opaque.is_empty(), "{source} {:?}", task.listing.opaque);
+    let motion = &task.listing.motions[0];
+    (motion.reason(), motion.insertable, task.listing.clone())
+}
+
+#[test]
+fn a_target_that_does_more_than_answer_stays() {
+    let acting = [
+        "sets(20)",
+        "calls(20)",
+        "writes(n)",
+        "outputs(1)",
+        "says(1)",
+        "waits(1)",
+        "raises(1)",
+        "moves(1)",
+        "late(1)",
+        "loops(1)",
+        "one(sets(3))",
+        "1+sum(sets(3))",
+        "Abs(sets(2))",
+        "ReadNum(d)",
+        "GInput(gi1)",
+        "ClkRead(c)",
+        "1/n0",
+        "unknown(3)",
+    ];
+    for argument in acting {
+        for target in ["at(p,#)", "through(p,#)", "maybe(p\\k:=#)", "Offs(at(p,#),1,2,3)", "a{one(#)}"] {
+            let target = target.replace('#', argument);
+            let line = format!("MoveL {target},v100,fine,tool0;");
+            let (reason, ..) = first(&line);
+            assert!(reason.is_some(), "{line}");
+        }
+    }
+    let (reason, ..) = first("MoveL at(p,sets(20)),v100,fine,tool0;");
+    assert_eq!(reason, Some(Reason::SideEffect));
+    let (reason, ..) = first("MoveL divided(p,0),v100,fine,tool0;");
+    assert_eq!(reason, Some(Reason::SideEffect));
+    // The circle point goes where a circle becomes straight.
+    let (reason, ..) = first("MoveC at(p,sets(1)),Offs(p,1,2,3),v100,fine,tool0;");
+    assert_eq!(reason, Some(Reason::SideEffect));
+    // The declaration is written anew where it is computed.
+    let (reason, ..) = first("VAR robtarget q:=at(p,sets(1));\nMoveL q,v100,fine,tool0;");
+    assert!(reason.is_some());
+}
+
+#[test]
+fn a_target_that_only_computes_is_replaced() {
+    for target in
+        ["at(p,2)", "at(p,n)", "at(p,sum(2))", "through(p,one(3))", "a{one(7)}", "Offs(p,Abs(-1),sum(1),0)"]
+    {
+        let (reason, ..) = first(&format!("MoveL {target},v100,fine,tool0;"));
+        assert_eq!(reason, None, "{target}");
+    }
+}
+
+#[test]
+fn an_argument_that_does_more_than_compute_is_asked_once() {
+    let acting = [
+        "v100\\V:=ReadNum(d)",
+        "v100\\V:=sets(3)",
+        "v100\\V:=GInput(gi1)",
+        "v100\\V:=UINumEntry(\\Header:=\"x\")",
+    ];
+    for speed in acting {
+        let line = format!("MoveL p,v100,fine,tool0;\nMoveL Offs(p,1,0,0),{speed},fine,tool0;");
+        let source = source(&line);
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        assert!(!task.listing.motions[1].insertable, "{speed}");
+        assert!(!task.listing.motions[1].straightens, "{speed}");
+    }
+    let source = source("MoveL p,v100,fine,tool0;\nMoveL Offs(p,9,0,0),v100\\V:=Abs(-50),fine,tool0;");
+    let task = Task::read(&[("m.mod", source.as_bytes())]);
+    assert!(task.listing.motions[1].insertable);
+    let between = NewTarget::Cartesian {
+        position_mm: [404.0, 0.0, 400.0],
+        quaternion: [0.0, 0.0, 1.0, 0.0],
+        conf: None,
+    };
+    let before = vec![Extra { kind: MotionKind::Linear, target: between, external: None }];
+    let change = Change { motion: 1, targets: vec![NewTarget::Keep], before };
+    let rewritten = task.rewrite(&[change], &RewriteOptions::default()).unwrap();
+    let text = String::from_utf8(rewritten.files[0].edits.apply(source.as_bytes()).unwrap()).unwrap();
+    assert_eq!(text.matches("Abs(-50)").count(), 2, "{text}");
+}
+
+#[test]
+fn what_only_computes_is_listed_in_order_and_writes_nothing() {
+    assert!(predefined::ANSWERERS.is_sorted());
+    for name in predefined::ANSWERERS {
+        assert!(predefined::only_reads(name.as_bytes()), "{name}");
+        assert!(
+            !predefined::waits(name.as_bytes()) && predefined::displaces(name.as_bytes()).is_none(),
+            "{name}"
+        );
+    }
+}
+
+/// A displacement that is counted from where the robot stands moves with the motion that ends there.
+#[test]
+fn a_displacement_from_where_the_robot_stands_keeps_that_motion() {
+    let reason = |line: &str| first(line).0;
+    assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn p,tool0;"), Some(Reason::BeforeDisplacement));
+    assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn\\ExeP:=p,p,tool0;\nPDispOff;"), None);
+}

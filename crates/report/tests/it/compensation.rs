@@ -1,0 +1,211 @@
+//! What became of each motion: the contract field by field, reasons, coverage, page.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+use truegrind_arm::inverse::InverseError;
+use truegrind_compensation::deviation::Status;
+use truegrind_compensation::rewrite::{MotionOutcome, Plan};
+use truegrind_compensation::why::Why;
+use truegrind_programs::motion::{Listing, Reason};
+use truegrind_programs::rapid::Task;
+use truegrind_report::compensation::{self as view, ProgramFile};
+use truegrind_report::format::{csv, terminal};
+
+use super::examples::leave;
+
+const PROGRAM: &[u8] = b"MODULE Grind
+  CONST robtarget p1:=[[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST jointtarget home:=[[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PROC main()
+    MoveAbsJ home,v100,fine,tool0;
+    MoveJ p1,v100,fine,tool0;
+    MoveL Offs(p1,10,0,0),v50,z1,tool0;
+    MoveL Offs(p1,20,0,0),v50,z1,tool0;
+    MoveL Offs(p1,30,0,0),v50,z1,tool0;
+    MoveL Offs(p1,40,0,0),v50,z1,tool0;
+  ENDPROC
+  what is this ???;
+ENDMODULE
+";
+
+const SECOND: &[u8] = b"MODULE Other
+  PROC other()
+    MoveL [[400,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,z1,tool0;
+  ENDPROC
+ENDMODULE
+";
+
+fn outcome(motion: u32, status: Status, reason: Option<Why>) -> MotionOutcome {
+    MotionOutcome {
+        motion,
+        status,
+        reason,
+        before_mm: Some(1.5),
+        after_mm: Some(if status == Status::Changed { 0.0004 } else { 1.5 }),
+        sigma_mm: Some(0.12),
+        bend_mm: None,
+        inserted: 0,
+    }
+}
+
+/// Seven motions, one of each fate and more.
+fn example() -> (Plan, Listing, Vec<ProgramFile>) {
+    let task = Task::read(&[("grind.mod", PROGRAM), ("other.mod", SECOND)]);
+    let mut outcomes = vec![
+        outcome(0, Status::Left, Some(Why::JointTarget)),
+        outcome(1, Status::Changed, None),
+        outcome(2, Status::Flagged, Some(Why::JointNotMeasured { joint: 4, by_deg: 5.0 })),
+        outcome(3, Status::Flagged, Some(Why::JointNotMeasured { joint: 4, by_deg: 7.25 })),
+        outcome(4, Status::Refused, Some(Why::TooFar { mm: 12.345 })),
+        outcome(5, Status::Refused, Some(Why::Inverse(InverseError::Unreachable { beyond_mm: f64::NAN }))),
+        outcome(6, Status::Left, Some(Why::Program(Reason::Displacement))),
+    ];
+    outcomes[0].before_mm = None;
+    outcomes[0].after_mm = None;
+    outcomes[0].sigma_mm = None;
+    outcomes[1].inserted = 2;
+    let plan = Plan {
+        changes: Vec::new(),
+        outcomes,
+        points: Vec::new(),
+        notes: vec!["tool disc: origin not stated, taken as metrology".to_owned()],
+    };
+    let files = vec![
+        ProgramFile { file: "grind.mod".to_owned(), output: Some("out/grind.mod".to_owned()) },
+        ProgramFile { file: "other.mod".to_owned(), output: None },
+    ];
+    (plan, task.listing, files)
+}
+
+fn keys(value: &Value) -> BTreeSet<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn the_json_is_the_contract_field_by_field() {
+    let (plan, listing, files) = example();
+    assert_eq!(listing.motions.len(), 7);
+    let json = view::json(&plan, &listing, &files);
+    assert_eq!(keys(&json), BTreeSet::from(["schema", "programs"]));
+    assert_eq!(json["schema"], "truegrind.compensation/1");
+    let programs = json["programs"].as_array().unwrap();
+    assert_eq!(programs.len(), 2);
+    for program in programs {
+        assert_eq!(keys(program), BTreeSet::from(["file", "output", "opaque_regions", "motions"]));
+        for region in program["opaque_regions"].as_array().unwrap() {
+            assert_eq!(keys(region), BTreeSet::from(["line", "reason"]));
+        }
+        for motion in program["motions"].as_array().unwrap() {
+            assert_eq!(
+                keys(motion),
+                BTreeSet::from([
+                    "line",
+                    "instruction",
+                    "status",
+                    "reason",
+                    "before_mm",
+                    "after_mm",
+                    "sigma_mm"
+                ])
+            );
+            assert!(["changed", "left", "refused", "flagged"].contains(&motion["status"].as_str().unwrap()));
+        }
+    }
+    assert_eq!(programs[0]["file"], "grind.mod");
+    assert_eq!(programs[0]["output"], "out/grind.mod");
+    assert!(programs[1]["output"].is_null(), "nothing was written");
+    assert_eq!(programs[0]["motions"].as_array().unwrap().len(), 6);
+    assert_eq!(programs[1]["motions"].as_array().unwrap().len(), 1);
+    assert_eq!(programs[1]["motions"][0]["line"], 3);
+    let motion = &programs[0]["motions"][0];
+    assert_eq!(motion["line"], 5);
+    assert_eq!(motion["instruction"], "MoveAbsJ");
+    assert!(motion["before_mm"].is_null() && motion["sigma_mm"].is_null(), "absent is null, never 0");
+    assert!(programs[0]["motions"][1]["reason"].is_null());
+    assert_eq!(programs[0]["motions"][1]["after_mm"], 0.0004);
+    assert_eq!(programs[0]["motions"][4]["reason"], Why::TooFar { mm: 12.345 }.to_string());
+    let opaque = programs[0]["opaque_regions"].as_array().unwrap();
+    assert!(!opaque.is_empty() && opaque[0]["line"] == 12, "{opaque:?}");
+}
+
+#[test]
+fn reasons_are_counted_with_their_worst_and_their_first_lines() {
+    let (plan, listing, files) = example();
+    let text = csv::table(&view::reason_table(&plan, &listing, &files)).replace('\r', "");
+    let expected = "\
+status,motions,reason,worst,lines
+refused,1,correction exceeds the bound (--max-correction),12.345 mm,grind.mod 9
+refused,1,target is out of reach,,grind.mod 10
+flagged,2,joint 5 is outside the range in which the arm was measured,7.25°,\"grind.mod 7, 8\"
+left,1,\"joint target: states joints, not a pose (--joint-targets rewrites it too)\",,grind.mod 5
+left,1,a program displacement or external offset is or may be active,,other.mod 3
+";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn many_lines_are_cut_short() {
+    let (mut plan, listing, files) = example();
+    plan.outcomes = (0..7).map(|i| outcome(i, Status::Refused, Some(Why::NearSingularity))).collect();
+    let text = csv::table(&view::reason_table(&plan, &listing, &files[..1]));
+    assert!(text.contains("\"5, 6, 7, 8, 9, 10 and 1 more\""), "{text}");
+}
+
+#[test]
+fn the_table_has_a_row_for_each_motion_and_dashes_for_what_is_not_known() {
+    let (plan, listing, files) = example();
+    let table = view::table(&plan, &listing, &files);
+    assert_eq!(table.rows.len(), 7);
+    let text = terminal::table(&table, 220);
+    let words = |instruction: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.contains(instruction)).unwrap();
+        line.split_whitespace().map(str::to_owned).take(9).collect()
+    };
+    let unknown = ["grind.mod", "5", "MoveAbsJ", "○", "left", "–", "–", "–", "–"];
+    assert_eq!(words("MoveAbsJ"), unknown, "{text}");
+    let changed = ["grind.mod", "6", "MoveJ", "✓", "changed", "1.500", "0.0004", "0.120", "–"];
+    assert_eq!(words("MoveJ "), changed, "{text}");
+    // One file needs no column for it.
+    assert_eq!(view::table(&plan, &listing, &files[..1]).columns[0].key, "line");
+}
+
+#[test]
+fn coverage_counts_and_never_rounds_to_all_or_nothing() {
+    let (mut plan, ..) = example();
+    assert_eq!(
+        view::coverage(&plan),
+        "7 motions: 1 changed (14.3 %), 2 flagged (28.6 %), 2 refused (28.6 %), 2 left (28.6 %)"
+    );
+    plan.outcomes = (0..100_000)
+        .map(|i| outcome(i, if i == 0 { Status::Refused } else { Status::Changed }, None))
+        .collect();
+    assert_eq!(
+        view::coverage(&plan),
+        "100000 motions: 99999 changed (> 99.9 %), 0 flagged (0 %), 1 refused (< 0.1 %), 0 left (0 %)"
+    );
+    plan.outcomes.clear();
+    assert_eq!(view::coverage(&plan), "the program holds no motion");
+}
+
+#[test]
+fn verdict_and_page_tell_what_to_look_at() {
+    let (mut plan, listing, files) = example();
+    let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
+    assert!(text.contains("[warning] Rewritten, but look at what was refused or flagged"), "{text}");
+    assert!(text.contains("the path steps by the correction"), "{text}");
+    assert!(text.contains("2 targets put in"), "{text}");
+    assert!(text.contains("- tool disc: origin not stated"), "{text}");
+    assert!(text.contains("written to out/grind.mod"), "{text}");
+    let page = leave("compensation.html", &view::document(&plan, &listing, &files, &[]));
+    assert!(page.contains(">Motions</h2>") && page.contains(">What could not be read</h2>"));
+    for (status, sentence) in [
+        (Status::Changed, "[ok] Everything that can be rewritten is rewritten"),
+        (Status::Left, "[not evaluated] Nothing was rewritten"),
+        (Status::Refused, "[failed] Nothing could be rewritten"),
+    ] {
+        plan.outcomes.iter_mut().for_each(|outcome| outcome.status = status);
+        let text = terminal::document(&view::summary(&plan, &listing, &files), 200);
+        assert!(text.contains(sentence), "{text}");
+    }
+}

@@ -1,0 +1,362 @@
+//! Deviation tables, the summary block and pages.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use truegrind_arm::region::Outside;
+use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::MotionKind;
+use truegrind_report::deviation as view;
+use truegrind_report::format::{csv, markdown, terminal};
+use truegrind_report::table::Cell;
+
+use super::examples::leave;
+
+/// A work object off the base, turned by a quarter about z.
+fn base_from_object() -> Pose {
+    Pose::from_parts(
+        Translation3::new(300.0, 50.0, 100.0),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2),
+    )
+}
+
+fn deviation(vector_mm: [f64; 3], surface: bool) -> Deviation {
+    let vector_mm = Vector3::from(vector_mm);
+    Deviation { vector_mm, angle_rad: 0.1_f64.to_radians(), normal_mm: surface.then_some(vector_mm.z) }
+}
+
+fn point(
+    index: usize,
+    at: [f64; 3],
+    before: Option<[f64; 3]>,
+    after: Option<[f64; 3]>,
+    surface: bool,
+) -> PathPoint {
+    PathPoint {
+        index,
+        line: 10 + index as u32,
+        instruction: "MoveL".to_owned(),
+        kind: MotionKind::Linear,
+        cutting: true,
+        base_from_object: base_from_object(),
+        flange_from_tool: Pose::identity(),
+        intended: base_from_object() * Pose::translation(at[0], at[1], at[2]),
+        normal: surface.then(Vector3::z),
+        joints_before: None,
+        joints_after: None,
+        before: before.map(|v| deviation(v, surface)),
+        after: after.map(|v| deviation(v, surface)),
+        sigma_mm: Some(0.12),
+        outside: None,
+        status: Status::Changed,
+        reason: None,
+    }
+}
+
+fn report(model: &str, points: Vec<PathPoint>) -> PathReport {
+    PathReport {
+        program: "blade.mod".to_owned(),
+        model: model.to_owned(),
+        after: After::PredictedRemainder,
+        points,
+        held_out_mm: Some(0.46),
+    }
+}
+
+/// Three points: one as it should be, one flagged, one of which little is known.
+fn three(surface: bool) -> PathReport {
+    let mut points = vec![
+        point(0, [1.0, 2.0, 3.0], Some([0.3, -0.4, 1.2]), Some([0.0, 0.0, -0.0004]), surface),
+        point(1, [2.0, 2.0, 3.0], Some([0.0, 0.0, -1.0]), Some([0.003, 0.004, 0.0]), surface),
+        point(2, [3.0, 2.0, 3.0], None, None, false),
+    ];
+    points[1].status = Status::Flagged;
+    points[1].reason = Some("joint 5 is 5.0° outside the range in which the arm was measured".to_owned());
+    points[1].outside = Some(Outside::Joint { joint: 4, by_deg: 5.0 });
+    points[2].status = Status::Refused;
+    points[2].reason = Some("target is out of reach".to_owned());
+    points[2].line = 0;
+    points[2].sigma_mm = None;
+    report("model.toml", points)
+}
+
+/// A raster of passes over a part with approaches, its deviation a smooth field.
+fn raster(model: &str, after: After, remains: f64) -> PathReport {
+    let mut points = Vec::new();
+    for pass in 0..14 {
+        for step in 0..42 {
+            let along = if pass % 2 == 0 { step } else { 41 - step };
+            let (x, y) = (5.0 * f64::from(along), 8.0 * f64::from(pass));
+            let cutting = step != 0 && step != 41;
+            let z = if cutting { 20.0 * (x / 70.0).sin() } else { 60.0 };
+            let before = [0.6 + 0.002 * x, -0.3 + 0.004 * y, 1.1 * (x / 60.0).cos() + 0.004 * y + 0.3];
+            let rest = before.map(|v| v * remains * (1.0 + 0.3 * (f64::from(step) * 1.7).sin()));
+            let mut point = point(points.len(), [x, y, z], Some(before), Some(rest), true);
+            point.cutting = cutting;
+            point.sigma_mm = Some(0.09 + 0.0006 * x);
+            if pass == 13 && step > 25 {
+                point.status = Status::Flagged;
+                point.reason =
+                    Some("no measured pose is near: 1.4 times the distance of measured poses".to_owned());
+            }
+            points.push(point);
+        }
+    }
+    PathReport { after, ..report(model, points) }
+}
+
+#[test]
+fn the_table_stands_in_the_work_object_with_every_column() {
+    let table = view::table(&three(true));
+    let text = csv::table(&table);
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(
+        lines[0],
+        "index,line,instruction,x_mm,y_mm,z_mm,before_dx_mm,before_dy_mm,before_dz_mm,before_norm_mm,before_normal_mm,\
+         predicted_remainder_dx_mm,predicted_remainder_dy_mm,predicted_remainder_dz_mm,predicted_remainder_norm_mm,\
+         predicted_remainder_normal_mm,sigma_mm,status,reason"
+    );
+    // Intended is turned back from the base into the work object.
+    let number = |row: usize, column: usize| match table.rows[row][column] {
+        Cell::Number(value) => value,
+        ref other => panic!("{other:?}"),
+    };
+    for (column, expected) in
+        [(3, 1.0), (4, 2.0), (5, 3.0), (6, 0.3), (7, -0.4), (8, 1.2), (9, 1.3), (10, 1.2)]
+    {
+        assert!((number(0, column) - expected).abs() < 1e-12, "column {column}");
+    }
+    assert!((number(1, 14) - 0.005).abs() < 1e-12);
+    // What is not known is empty in a file and a dash on paper, the line that no program holds too.
+    assert!(lines[3].starts_with("2,,MoveL,3,"), "{}", lines[3]);
+    assert!(lines[3].contains(",,,,,,,,,,,refused,target is out of reach"), "{}", lines[3]);
+    assert!(table.rows[2][6..17].iter().all(|cell| *cell == Cell::Missing));
+    assert!(table.title.contains("held-out error 0.460 mm RMSE"), "{}", table.title);
+    assert!(table.notes.join(" ").contains("does not say how far the real arm will be off"));
+}
+
+#[test]
+fn only_an_acting_arm_makes_it_achieved() {
+    let mut judged = three(true);
+    judged.after = After::Achieved;
+    let table = view::table(&judged);
+    assert_eq!(table.columns[11].key, "achieved_dx_mm");
+    assert_eq!(table.columns[11].label(), "achieved dx [mm]");
+    assert!(!table.notes.join(" ").contains("remainder"));
+    assert_eq!(view::table(&three(true)).columns[11].label(), "remainder dx [mm]");
+    let page = terminal::document(&view::document(&[judged]), 200);
+    assert!(page.contains("(achieved)") && !page.contains("predicted remainder"), "{page}");
+}
+
+#[test]
+fn the_block_is_that_of_table_8() {
+    // Signed deviations 1 … 9 before, a tenth of them after: five points at the middles of five equal sections.
+    let points = (1..=9)
+        .map(|k| {
+            let v = f64::from(k) - 3.0;
+            point(k as usize, [f64::from(k), 0.0, 0.0], Some([0.0, 0.0, v]), Some([0.0, 0.0, 0.1 * v]), true)
+        })
+        .collect();
+    let table = view::block_table(&[report("lm.toml", points)]);
+    let text = terminal::table(&table, 200);
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "Deviation of path points before and after compensation [mm]");
+    assert_eq!(
+        lines[1],
+        "Path                              P1     P2     P3     P4     P5   mean  mean |d|     SD    max     1σ  held-out"
+    );
+    // Values −2 … 6: mean 2, mean size (2 + 1 + 0 + … + 6)/9 = 24/9, SD √7.5.
+    assert_eq!(
+        lines[3],
+        "before                        -2.000  0.000  2.000  3.000  5.000  2.000     2.667  2.739  6.000  0.120     0.460"
+    );
+    assert_eq!(
+        lines[4],
+        "lm.toml, predicted remainder  -0.200  0.000  0.200  0.300  0.500  0.200     0.267  0.274  0.600  0.120     0.460"
+    );
+    let notes = table.notes.join(" ");
+    assert!(
+        notes.contains("along the outward surface normal") && notes.contains("mean is signed"),
+        "{notes}"
+    );
+}
+
+#[test]
+fn models_that_agree_about_the_path_before_share_its_row() {
+    let one = three(true);
+    let mut two = three(true);
+    two.model = "other.toml".to_owned();
+    let path =
+        |row: &Vec<Cell>| if let Cell::Text(text) = &row[0] { text.clone() } else { panic!("{row:?}") };
+    let names = |reports: &[PathReport]| view::block_table(reports).rows.iter().map(path).collect::<Vec<_>>();
+    assert_eq!(
+        names(&[one.clone(), two.clone()]),
+        ["before", "model.toml, predicted remainder", "other.toml, predicted remainder"]
+    );
+    two.points[0].before = Some(deviation([0.0, 0.0, 2.0], true));
+    assert_eq!(
+        names(&[one.clone(), two.clone()]),
+        [
+            "before, under model.toml",
+            "before, under other.toml",
+            "model.toml, predicted remainder",
+            "other.toml, predicted remainder"
+        ]
+    );
+    // A second program brings a column for the program, and a path that nobody rewrote has no row after.
+    two.program = "other.mod".to_owned();
+    two.points.iter_mut().for_each(|point| point.after = None);
+    let table = view::block_table(&[one, two]);
+    assert_eq!(table.columns[0].key, "program");
+    assert_eq!(table.rows.len(), 3);
+    assert_eq!(table.rows[2][0], Cell::Text("other.mod".to_owned()));
+}
+
+#[test]
+fn without_a_surface_nothing_is_signed() {
+    let table = view::table(&three(false));
+    assert!(table.rows.iter().all(|row| row[10] == Cell::Missing && row[15] == Cell::Missing));
+    assert!(table.notes.join(" ").contains("No surface is known"));
+    let block = view::block_table(&[three(false)]);
+    assert!(block.notes[0].contains("have no sign"), "{}", block.notes[0]);
+    assert!(view::short_table(&three(false)).columns.iter().all(|column| !column.key.contains("normal")));
+}
+
+#[test]
+fn a_shift_of_the_whole_path_is_no_shape_error() {
+    let corners = [[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 80.0, 0.0], [0.0, 80.0, 10.0]];
+    let points = corners
+        .iter()
+        .enumerate()
+        .map(|(k, at)| point(k, *at, Some([3.0, 4.0, 0.0]), Some([0.0, 0.0, 0.0]), false))
+        .collect();
+    let table = view::registered_table(&[report("m", points)]);
+    let (Cell::Number(as_it_stands), Cell::Number(registered)) = (&table.rows[0][1], &table.rows[0][2])
+    else {
+        panic!("{:?}", table.rows)
+    };
+    assert!((as_it_stands - 5.0).abs() < 1e-12 && *registered < 1e-9);
+    // Two points have no shape.
+    let mut short = three(false);
+    short.points.truncate(2);
+    assert_eq!(view::registered_table(&[short]).rows[0][2], Cell::Missing);
+}
+
+#[test]
+fn flags_are_listed_by_line_with_their_reasons() {
+    let rows = |report: &PathReport| -> Vec<String> {
+        csv::table(&view::flag_table(report)).lines().skip(1).map(str::to_owned).collect()
+    };
+    assert_eq!(
+        rows(&three(true)),
+        [
+            "11,1,1,flagged,joint 5 is 5.0° outside the range in which the arm was measured",
+            ",2,1,refused,target is out of reach",
+        ]
+    );
+    // Neighbours of a kind share a row; another joint or another fate does not.
+    let mut long = report("m", (0..6).map(|k| point(k, [k as f64, 0.0, 0.0], None, None, false)).collect());
+    for (k, (joint, by)) in [(5, "5.0"), (5, "5.5"), (5, "6.0"), (6, "6.0"), (6, "6.0")].iter().enumerate() {
+        long.points[k].status = Status::Flagged;
+        long.points[k].reason = Some(format!("joint {joint} is {by}° outside"));
+    }
+    assert_eq!(
+        rows(&long),
+        [
+            "10–12,0–2,3,flagged,joint 5 is 5.0° outside (the first)",
+            "13–14,3–4,2,flagged,joint 6 is 6.0° outside",
+        ]
+    );
+}
+
+#[test]
+fn the_json_names_what_after_is_and_holds_every_point() {
+    let json = view::json(&[three(true)]);
+    assert_eq!(json["schema"], "truegrind.deviation/1");
+    let model = &json["programs"][0]["models"][0];
+    assert_eq!(json["programs"][0]["program"], "blade.mod");
+    assert_eq!(model["after_is"], "predicted-remainder");
+    assert_eq!(model["model_held_out_rmse_mm"], 0.46);
+    let points = model["points"].as_array().unwrap();
+    assert_eq!(points.len(), 3);
+    assert!((points[0]["intended_mm"][1].as_f64().unwrap() - 2.0).abs() < 1e-12);
+    assert_eq!(points[0]["before"]["dz_mm"], 1.2);
+    assert!((points[0]["before"]["turn_deg"].as_f64().unwrap() - 0.1).abs() < 1e-12);
+    assert_eq!(points[1]["status"], "flagged");
+    assert_eq!(points[1]["outside"]["joint"], 5);
+    assert!(points[2]["line"].is_null() && points[2]["before"].is_null() && points[2]["sigma_mm"].is_null());
+    assert_eq!(model["summary"]["before"]["points"], 2);
+    assert!((model["summary"]["before"]["mean_mm"].as_f64().unwrap() - 0.1).abs() < 1e-12);
+}
+
+#[test]
+fn one_file_holds_all_programs_and_models() {
+    let mut second = three(true);
+    second.program = "other.mod".to_owned();
+    second.after = After::Achieved;
+    second.held_out_mm = None;
+    let text = csv::table(&view::whole_table(&[three(true), second]));
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(
+        lines[0].starts_with("program,model,after_is,model_held_out_rmse_mm,index,line,"),
+        "{}",
+        lines[0]
+    );
+    assert!(lines[0].contains(",after_norm_mm,"), "{}", lines[0]);
+    assert_eq!(lines.len(), 7);
+    assert!(lines[1].starts_with("blade.mod,model.toml,predicted remainder,0.46,0,10,"), "{}", lines[1]);
+    assert!(lines[4].starts_with("other.mod,model.toml,achieved,,0,10,"), "{}", lines[4]);
+    assert!(lines[6].starts_with("other.mod,model.toml,,,2,,"), "nothing was achieved there: {}", lines[6]);
+}
+
+#[test]
+fn pages_of_one_model_of_several_and_of_nothing() {
+    let one = view::document(&[raster("model.toml", After::PredictedRemainder, 2e-4)]);
+    let text = leave("deviation-one.html", &one);
+    assert_eq!(text.matches("<figure>").count(), 3);
+    assert!(text.contains("16 points flagged: rewritten with a warning"), "one count per point");
+    assert!(!text.contains("NaN"));
+    let several = view::document(&[
+        raster("lm", After::Achieved, 0.12),
+        raster("ltlm", After::Achieved, 0.11),
+        raster("lm-as-printed", After::Achieved, 0.3),
+    ]);
+    let text = leave("deviation-several.html", &several);
+    assert!(text.contains("depending on the model"));
+    assert_eq!(text.matches("<figure>").count(), 4);
+    assert_eq!(
+        several,
+        view::document(&[
+            raster("lm", After::Achieved, 0.12),
+            raster("ltlm", After::Achieved, 0.11),
+            raster("lm-as-printed", After::Achieved, 0.3),
+        ])
+    );
+    // A program of which no point is known, and no program at all.
+    let empty = markdown::document(&view::document(&[report("m", Vec::new())]));
+    assert!(empty.contains("not known"), "{empty}");
+    assert!(markdown::document(&view::document(&[])).contains("No program has a path"));
+}
+
+#[test]
+fn a_correction_smaller_than_its_sigma_is_called_so() {
+    let mut unsure = raster("m", After::PredictedRemainder, 1e-4);
+    unsure.points.iter_mut().for_each(|point| (point.status, point.reason) = (Status::Changed, None));
+    let page = |report: &PathReport| terminal::document(&view::document(std::slice::from_ref(report)), 200);
+    assert!(page(&unsure).contains("[ok] The largest deviation goes from"));
+    unsure.points.iter_mut().for_each(|point| point.sigma_mm = Some(4.0));
+    let text = page(&unsure);
+    assert!(text.contains("[warning] The largest deviation goes from"), "{text}");
+    assert!(text.contains("predicted 1σ of 4.000 mm exceeds the deviation that it corrects"), "{text}");
+}
+
+#[test]
+fn a_correction_that_makes_it_worse_is_called_so() {
+    let mut worse = three(true);
+    worse.after = After::Achieved;
+    worse.points[0].after = Some(deviation([0.0, 0.0, 3.0], true));
+    let text = terminal::document(&view::document(&[worse]), 200);
+    assert!(
+        text.contains("[failed] The largest deviation goes from 1.200 mm to 3.000 mm (achieved)"),
+        "{text}"
+    );
+}

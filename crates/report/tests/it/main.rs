@@ -1,0 +1,16 @@
+//! Tests of `report`.
+
+// A test that cannot go on panics.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod compensation;
+mod deviation;
+mod examples;
+mod formats;
+mod identification;
+mod numbers;
+mod page;
+mod parquet;
+mod plots;
+mod robots;
+mod study;

@@ -1,6 +1,0 @@
-//! Tests of `identification`.
-
-mod calibration;
-mod promise;
-mod real;
-mod verdict;

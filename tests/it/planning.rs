@@ -1,4 +1,0 @@
-//! Tests of `planning`.
-
-mod poses;
-mod toolpath;
