@@ -69,10 +69,11 @@ shipped() {
   run plan-for plan "${arm[@]}" --sensor cable --poses 20 --candidates 300 --outlet 500,0,0 \
     --for "../diagnose-irb120-cable/result.json" -o poses.mod --json plan.json
   run experiments compare --list
-  for experiment in ltlm-table-8 ukf-vslm-d3-distance rls-degradation; do
+  for experiment in ltlm-table-8 ukf-vslm-d3-distance; do
     run "compare-$experiment" compare --experiment "$experiment" --rows 60 --json result.json --csv table.csv
   done
-  run compare-measured compare "$tracker" "${arm[@]}" --experiment ltlm-table-6 --json result.json
+  run compare-degradation compare --experiment rls-degradation --json result.json --csv table.csv
+  run compare-measured compare "$tracker" "${arm[@]}" --experiment ltlm-table-6 --rows 200 --json result.json
   local model="../diagnose-irb120-tracker/model.toml"
   run track track "$tracker" --model "$model" --date 2026-05-04T12:30:00Z -o models --json result.json --csv table.csv
   for surface in blade dome saddle-implicit plate; do
@@ -114,7 +115,7 @@ measured() {
   run diagnose-ur10-d diagnose "$d" --robot universal-robots-ur10 "${both[@]}"
   run identify-ur5 identify "$ur5" --robot universal-robots-ur5 "${both[@]}"
   run diagnose-ur5 diagnose "$ur5" --robot universal-robots-ur5 "${both[@]}"
-  run compare-robotcali compare "$irb" --robot abb-irb-120 --experiment ltlm-table-6-80-20 "${both[@]}"
+  run compare-robotcali compare "$irb" --robot abb-irb-120 --experiment ltlm-table-6-80-20 --rows 120 "${both[@]}"
   digest measured.sha256
 }
 
