@@ -87,7 +87,9 @@ fn graph(modules: &BTreeMap<String, String>) -> BTreeMap<&str, BTreeSet<&str>> {
     modules
         .iter()
         .map(|(name, text)| {
-            let named = paths(text, name)
+            let mut all = paths(text, name);
+            all.extend(children(text, name));
+            let named = all
                 .iter()
                 .filter_map(|path| {
                     // The longest beginning that is a file.
@@ -126,6 +128,20 @@ fn paths(text: &str, module: &str) -> Vec<Vec<String>> {
         }
     }
     out
+}
+
+/// The modules that a text declares and names by their bare name.
+fn children(text: &str, module: &str) -> Vec<Vec<String>> {
+    let declared = text.lines().filter_map(|line| line.trim().strip_suffix(';')?.rsplit_once("mod "));
+    declared
+        .map(|(_, child)| child)
+        .filter(|child| {
+            text.match_indices(&format!("{child}::")).any(|(at, _)| {
+                !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
+            })
+        })
+        .map(|child| module.split("::").filter(|part| !part.is_empty()).chain([child]).map(str::to_owned).collect())
+        .collect()
 }
 
 /// What a use tree stands for: `a::{b, c::d}` gives two paths.
@@ -220,6 +236,8 @@ fn a_circle_is_found_through_groups_and_climbing_paths() {
     ]);
     let found = circles(&graph(&round));
     assert_eq!(found, [BTreeSet::from(["a", "b", "b::inner"])]);
+    let bare = of(&[("", "pub mod a;"), ("a", "mod b;\nuse b::f;"), ("a::b", "use super::T;")]);
+    assert_eq!(circles(&graph(&bare)), [BTreeSet::from(["a", "a::b"])]);
     let down = of(&[("", ""), ("a", "use crate::b::f;"), ("b", "use self::inner::g;"), ("b::inner", "")]);
     assert!(circles(&graph(&down)).is_empty());
 }
