@@ -136,11 +136,12 @@ fn children(text: &str, module: &str) -> Vec<Vec<String>> {
     declared
         .map(|(_, child)| child)
         .filter(|child| {
-            text.match_indices(&format!("{child}::")).any(|(at, _)| {
-                !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
-            })
+            text.match_indices(&format!("{child}::"))
+                .any(|(at, _)| !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'))
         })
-        .map(|child| module.split("::").filter(|part| !part.is_empty()).chain([child]).map(str::to_owned).collect())
+        .map(|child| {
+            module.split("::").filter(|part| !part.is_empty()).chain([child]).map(str::to_owned).collect()
+        })
         .collect()
 }
 

@@ -31,6 +31,7 @@ pub mod design;
 pub mod held;
 pub mod score;
 pub mod intervals;
+pub mod candidates;
 pub mod board;
 pub mod lines;
 pub mod levels;

@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
+use super::candidates::{Catalogue, Scored};
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::{Design, Linear, Projected, Whole};
@@ -15,7 +16,6 @@ use super::extension::{Extended, Subject};
 use super::intervals::{self, Strip};
 use super::lines;
 use super::score::score_projected;
-use super::selection::{Catalogue, Scored};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 

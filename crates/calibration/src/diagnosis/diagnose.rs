@@ -80,9 +80,6 @@ pub struct Diagnosed {
 /// With frames alone fitted, an error beyond this is no tolerance but a mistake (mm).
 const WRONG_ARM_MM: f64 = 25.0;
 
-/// Non-centrality from which an effect can be counted on to be found.
-pub const VISIBLE: f64 = 40.0;
-
 /// Diagnoses `dataset` of the arm `nominal` (by name `robot`), frames starting at `frames`. `tell` hears of each step.
 ///
 /// # Errors

@@ -16,6 +16,9 @@ use super::catalogue::Candidate;
 use super::design::{Design, Projected};
 use truegrind_math::tail::log_chi_square_tail;
 
+/// Non-centrality from which an effect can be counted on to be found.
+pub const VISIBLE: f64 = 40.0;
+
 /// A scored candidate.
 #[derive(Debug, Clone)]
 pub struct Score {

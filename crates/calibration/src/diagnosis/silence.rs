@@ -4,13 +4,14 @@
 use nalgebra::DVector;
 
 use super::account::pendant;
+use super::candidates::Scored;
 use super::catalogue::{Columns, Regressor, STILL_RAD};
 use super::cause::Cause;
 use super::design::Design;
-use super::diagnose::VISIBLE;
 use super::finding::NotTestable;
 use super::rows::Prepared;
-use super::selection::{Scored, scale_beside_growth};
+use super::score::VISIBLE;
+use super::selection::scale_beside_growth;
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::effect::Effect;
 use truegrind_math::spectral;

@@ -12,25 +12,18 @@ pub mod csv;
 pub mod xlsx;
 mod columns;
 mod error;
+mod options;
 mod rows;
 mod rounding;
 
 pub use error::{ImportError, Place};
+pub use options::Options;
 
 use sha2::{Digest, Sha256};
 
 use self::cell::Table;
 use self::columns::Columns;
 use super::dataset::Dataset;
-
-/// How a file is read.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Options {
-    /// Sheet of a workbook; without it the first that has the columns.
-    pub sheet: Option<String>,
-    /// Takes angles that look like radians and lengths that look like metres at their word.
-    pub allow_odd_units: bool,
-}
 
 /// Reads a measurement file. `file` is the name that messages and reports print; the format is told by the bytes.
 pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, ImportError> {

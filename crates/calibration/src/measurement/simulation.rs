@@ -12,15 +12,18 @@ mod arm;
 mod poses;
 mod fault;
 mod table;
+mod error;
+mod stream;
+
+pub use error::RecipeError;
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal, StandardNormal, StudentT};
-use thiserror::Error;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use self::recipe::{Noise, Recipe};
+use self::stream::{Stream, stream};
 use super::dataset::{Reading, Sensor};
 use super::sensor::Rig;
 use truegrind_arm::condition::Condition;
@@ -52,63 +55,6 @@ pub struct SimulatedRow {
     pub anchor: usize,
     /// The reading that a perfect sensor would give.
     pub reading: Reading,
-}
-
-/// Why a recipe gives no measurements.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum RecipeError {
-    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
-    #[error("{file}: line {line}: {message}")]
-    Syntax {
-        /// File.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// What the TOML reader found and expected.
-        message: String,
-    },
-    /// A value that cannot be used.
-    #[error("{key}: found {found}, expected {expected}")]
-    Invalid {
-        /// Key, as a path.
-        key: String,
-        /// Value.
-        found: String,
-        /// What it should be.
-        expected: &'static str,
-    },
-    /// The robot is not known.
-    #[error("robot: {message}")]
-    Robot {
-        /// What the catalogue says.
-        message: String,
-    },
-    /// No pose satisfies the recipe.
-    #[error(
-        "poses: found {found} of {wanted} poses after {tries} tries; expected poses inside the joint ranges that the \
-         sensor sees; widen the joint box, `view.box_mm`, `view.distance_mm` or `view.tilt_deg`"
-    )]
-    NoPose {
-        /// Poses found.
-        found: usize,
-        /// Poses asked for.
-        wanted: usize,
-        /// Draws.
-        tries: usize,
-    },
-}
-
-/// Independent streams of one seed.
-enum Stream {
-    Poses,
-    Circumstances,
-    Noise,
-}
-
-fn stream(seed: u64, stream: Stream) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(stream as u64 + 1);
-    rng
 }
 
 impl Recipe {

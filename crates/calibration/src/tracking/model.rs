@@ -1,6 +1,6 @@
 //! The model that a track writes: the one it began with, moved to where the filter stands, with its covariance.
 
-use super::Tracker;
+use super::tracker::Tracker;
 use crate::identification::calibration::Calibration;
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Verdict};

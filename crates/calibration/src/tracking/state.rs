@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::{Alarm, Options};
+use super::alarm::Alarm;
+use super::options::Options;
 use crate::measurement::dataset::{Reading, Row};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;

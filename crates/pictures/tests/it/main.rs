@@ -2,8 +2,6 @@
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
-#![cfg(feature = "visual")]
-
 mod colour;
 mod measured;
 mod path;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Calibration;
+use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::chain::{self, Chain, LinkTable, cross, dot, minus, scaled_chain};

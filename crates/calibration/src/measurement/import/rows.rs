@@ -2,10 +2,10 @@
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::Options;
 use super::cell::{Cell, Line, Table};
 use super::columns::Columns;
 use super::error::{ImportError, Place};
+use super::options::Options;
 use super::rounding;
 use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::RecipeError;
+use super::error::RecipeError;
 use super::recipe::{Deviations, LinkDeviation};
 use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Model};

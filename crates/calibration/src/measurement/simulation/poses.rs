@@ -3,8 +3,9 @@
 use nalgebra::Point3;
 use rand::RngExt;
 
+use super::error::RecipeError;
 use super::recipe::{Approach, Circumstances, Poses, Recipe};
-use super::{RecipeError, Stream, stream};
+use super::stream::{Stream, stream};
 use crate::measurement::sensor::Rig;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};

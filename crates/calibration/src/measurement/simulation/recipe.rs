@@ -42,14 +42,13 @@ mod checks;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::RecipeError;
+use super::error::RecipeError;
 use super::fault::Fault;
 use crate::measurement::sensor::{Rig, Sight};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Body;
 use truegrind_math::se3::Pose;
 
-pub use self::checks::MOST_ROWS;
 pub use super::fault::Fault as SensorFault;
 
 /// A stated arm, measured in a stated way.

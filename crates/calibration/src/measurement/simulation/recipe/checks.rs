@@ -1,12 +1,12 @@
 //! What the types of a recipe leave open: numbers that are none, arms that cannot be, and more rows than anyone measures.
 
 use super::{Circumstances, Frame, Poses, Recipe, SensorFault as Fault, SensorSetup, View};
-use crate::measurement::simulation::RecipeError;
+use crate::measurement::simulation::error::RecipeError;
 use truegrind_arm::bounds::{self, Bound, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, Unfit, shown};
 use truegrind_arm::effect::bounds::effects;
 
 /// Most rows of a simulated file.
-pub const MOST_ROWS: usize = 1_000_000;
+const MOST_ROWS: usize = 1_000_000;
 /// Most faults, and most rows that lists of faults name.
 const MOST_FAULTS: usize = 10_000;
 

@@ -1,0 +1,259 @@
+//! Measured rows by columns, and what each effect and disturbance adds to them.
+
+use rayon::prelude::*;
+
+use super::frames::{Frames, Weight};
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::sensor::disturbance::Kind;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Statics;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::Parameter;
+use truegrind_math::lanes::WIDTH;
+
+/// Rows from which their columns are made on all threads; fewer are not worth the call.
+const MANY_ROWS: usize = 8192;
+
+/// Measured rows by columns, padded to whole lanes with rows of weight 0.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Columns {
+    pub(super) sin: [Vec<f64>; 6],
+    pub(super) cos: [Vec<f64>; 6],
+    /// Cable: length. Position: x, y, z. Pose: x, y, z and the nine entries of the rotation, column-major.
+    pub(super) reading: Vec<Vec<f64>>,
+    pub(super) per_mm: Vec<f64>,
+    pub(super) per_rad: Vec<f64>,
+    pub(super) anchor: Vec<usize>,
+    /// Joint rotations that the starting model's effects add; empty without effects.
+    pub(super) extra: Option<[Vec<f64>; 6]>,
+    /// Relative growth of the starting model's links; empty without.
+    pub(super) growth: Vec<f64>,
+    /// For each free effect parameter: rotations and growth per unit.
+    pub(super) effects: Vec<EffectColumns>,
+    /// Where in `effects` each parameter of x is; out of range for those that are no effect's.
+    pub(super) effect_at: Vec<usize>,
+    /// How far each disturbance goes in each row.
+    pub(super) courses: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    /// The columns of the parameter at place `k` of x, where it is an effect's or a load's.
+    #[inline(always)]
+    pub(super) fn effect_of(&self, k: usize) -> Option<&EffectColumns> {
+        self.effect_at.get(k).and_then(|&e| self.effects.get(e))
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+pub(super) struct EffectColumns {
+    /// Position of the parameter in x.
+    pub(super) place: usize,
+    pub(super) rotation: [Option<Vec<f64>>; 6],
+    pub(super) growth: Option<Vec<f64>>,
+}
+
+impl Columns {
+    /// The rows at `rows`, padded as all are.
+    pub(super) fn subset(&self, rows: &[usize]) -> Self {
+        let n = rows.len();
+        let padded = n.div_ceil(WIDTH) * WIDTH;
+        let row = |i: usize| rows[i.min(n.saturating_sub(1))];
+        let picked = |all: &[f64]| -> Vec<f64> {
+            if all.is_empty() || n == 0 { Vec::new() } else { (0..padded).map(|i| all[row(i)]).collect() }
+        };
+        let weights = |all: &[f64]| -> Vec<f64> {
+            (0..padded).map(|i| if i < n { all[row(i)] } else { 0.0 }).collect()
+        };
+        if n == 0 {
+            return Self::default();
+        }
+        Self {
+            sin: std::array::from_fn(|j| picked(&self.sin[j])),
+            cos: std::array::from_fn(|j| picked(&self.cos[j])),
+            reading: self.reading.iter().map(|column| picked(column)).collect(),
+            per_mm: weights(&self.per_mm),
+            per_rad: weights(&self.per_rad),
+            anchor: (0..padded).map(|i| self.anchor[row(i)]).collect(),
+            extra: self.extra.as_ref().map(|extra| std::array::from_fn(|j| picked(&extra[j]))),
+            growth: picked(&self.growth),
+            effects: self
+                .effects
+                .iter()
+                .map(|effect| EffectColumns {
+                    place: effect.place,
+                    rotation: std::array::from_fn(|j| effect.rotation[j].as_deref().map(&picked)),
+                    growth: effect.growth.as_deref().map(&picked),
+                })
+                .collect(),
+            effect_at: self.effect_at.clone(),
+            courses: self.courses.iter().map(|course| picked(course)).collect(),
+        }
+    }
+
+    pub(super) fn of(
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        weights: &[Weight],
+    ) -> Self {
+        let n = dataset.rows.len();
+        let padded = n.div_ceil(WIDTH) * WIDTH;
+        let row = |i: usize| &dataset.rows[i.min(n.saturating_sub(1))];
+        let column = |value: &(dyn Fn(usize) -> f64 + Sync)| -> Vec<f64> {
+            if padded < MANY_ROWS {
+                return (0..padded).map(value).collect();
+            }
+            (0..padded).into_par_iter().map(value).collect()
+        };
+        if n == 0 {
+            return Self::default();
+        }
+        let mapped: Vec<_> = (0..padded).map(|i| start.joint_map * row(i).joints).collect();
+        let components = match dataset.sensor {
+            Sensor::Cable => 1,
+            Sensor::Position => 3,
+            Sensor::Pose => 12,
+        };
+        let reading = (0..components)
+            .map(|k| {
+                column(&|i| match &row(i).reading {
+                    Reading::Cable(length) => *length,
+                    Reading::Position(v) => v[k.min(2)],
+                    Reading::Pose(pose) if k < 3 => pose.translation.vector[k],
+                    Reading::Pose(pose) => pose.rotation.to_rotation_matrix().matrix()[k - 3],
+                })
+            })
+            .collect();
+        let weight = |i: usize| (i < n).then(|| weights[i]);
+        let mut out = Self {
+            sin: std::array::from_fn(|j| column(&|i| mapped[i][j].sin())),
+            cos: std::array::from_fn(|j| column(&|i| mapped[i][j].cos())),
+            reading,
+            per_mm: column(&|i| weight(i).map_or(0.0, |w| w.per_mm)),
+            per_rad: column(&|i| weight(i).map_or(0.0, |w| w.per_rad)),
+            anchor: (0..padded).map(|i| row(i).anchor).collect(),
+            ..Self::default()
+        };
+        let loads = frames.disturbances.iter().any(|d| matches!(d.kind, Kind::Load { .. }));
+        if !start.effects.is_empty() || loads {
+            out.add_effects(dataset, start, parameters, padded);
+        }
+        out.courses =
+            frames.disturbances.iter().map(|d| column(&|i| d.course.at(row(i)))).collect::<Vec<_>>();
+        if loads {
+            out.add_loads(dataset, start, frames, parameters, padded);
+        }
+        out.effect_at = vec![usize::MAX; parameters.len()];
+        for (e, effect) in out.effects.iter().enumerate() {
+            out.effect_at[effect.place] = e;
+        }
+        out
+    }
+
+    /// Loads that the log does not tell of bend the joints like an effect, in the rows of their course.
+    fn add_loads(
+        &mut self,
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        padded: usize,
+    ) {
+        let torques = flange_torques(dataset, start);
+        for (index, disturbance) in frames.disturbances.iter().enumerate() {
+            let Kind::Load { joints, compliance } = &disturbance.kind else { continue };
+            let course = self.courses[index].clone();
+            let along = |k: usize, parameter: usize| match compliance {
+                Some(compliance) => compliance[k],
+                None => f64::from(u8::from(k == parameter)),
+            };
+            for parameter in 0..disturbance.values.len() {
+                let rotation: [Option<Vec<f64>>; 6] = std::array::from_fn(|joint| {
+                    let k = joints.iter().position(|&j| j == joint)?;
+                    let factor = along(k, parameter);
+                    (factor != 0.0).then(|| {
+                        (0..padded)
+                            .map(|i| {
+                                factor * course[i] * torques[i.min(torques.len().saturating_sub(1))][joint]
+                            })
+                            .collect()
+                    })
+                });
+                if let Some(extra) = &mut self.extra {
+                    for (column, rotation) in extra.iter_mut().zip(&rotation) {
+                        let Some(rotation) = rotation else { continue };
+                        for (e, r) in column.iter_mut().zip(rotation) {
+                            *e += disturbance.values[parameter] * r;
+                        }
+                    }
+                }
+                let here = Parameter::Disturbance { index, parameter };
+                if let Some(place) = parameters.iter().position(|p| *p == here) {
+                    self.effects.push(EffectColumns { place, rotation, growth: None });
+                }
+            }
+        }
+    }
+
+    fn add_effects(&mut self, dataset: &Dataset, start: &Model, parameters: &[Parameter], padded: usize) {
+        let n = dataset.rows.len();
+        let mut extra: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; padded]);
+        let mut growth = vec![0.0; padded];
+        let free: Vec<(usize, usize, usize)> = parameters
+            .iter()
+            .enumerate()
+            .filter_map(|(place, p)| match *p {
+                Parameter::Effect { index, parameter } => Some((place, index, parameter)),
+                _ => None,
+            })
+            .collect();
+        let mut effects: Vec<EffectColumns> =
+            free.iter().map(|&(place, ..)| EffectColumns { place, ..EffectColumns::default() }).collect();
+        let still = Condition::default();
+        let mut posed = start.under(&still);
+        for (i, row) in dataset.rows.iter().enumerate() {
+            if posed.condition != row.condition {
+                posed = start.under(&row.condition);
+            }
+            let rotation = posed.rotations(&row.joints) - start.joint_map * row.joints;
+            for j in 0..6 {
+                extra[j][i] = rotation[j];
+            }
+            growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
+            let mut at = (usize::MAX, Vec::new(), Vec::new());
+            for (columns, &(_, index, parameter)) in effects.iter_mut().zip(&free) {
+                if at.0 != index {
+                    let growth = start.effects[index].growth_regressors(&row.condition);
+                    at = (index, posed.effect_regressors(index, &row.joints), growth);
+                }
+                let regressor = at.1[parameter];
+                for j in (0..6).filter(|&j| regressor[j] != 0.0) {
+                    columns.rotation[j].get_or_insert_with(|| vec![0.0; padded])[i] = regressor[j];
+                }
+                let grown = at.2.get(parameter).copied().unwrap_or(0.0);
+                if grown != 0.0 {
+                    columns.growth.get_or_insert_with(|| vec![0.0; padded])[i] = grown;
+                }
+            }
+        }
+        // Padding repeats the last row, with weight 0.
+        for i in n..padded {
+            for column in &mut extra {
+                column[i] = column[n - 1];
+            }
+            growth[i] = growth[n - 1];
+        }
+        self.extra = Some(extra);
+        self.growth = growth;
+        self.effects = effects;
+    }
+}
+
+/// Torque about each joint of 1 kg at the flange, for every row (N m).
+pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+    let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
+    let statics = Statics::of(&bare);
+    let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
+    dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
+}

@@ -1,0 +1,43 @@
+//! Where the sensor stands and what it touches.
+
+use nalgebra::Vector3;
+
+use crate::measurement::sensor::disturbance::Disturbance;
+use truegrind_math::se3::Pose;
+
+/// How the sensor stands to the arm: what a calibration must find beside the arm itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// The sensor's frame in the arm's base (position and pose sensors).
+    pub base_from_sensor: Pose,
+    /// What the sensor touches, on the flange: hook, reflector or target. It is not the TCP.
+    pub flange_from_target: Pose,
+    /// Outlet of each cable in the base (mm).
+    pub outlets_mm: Vec<Vector3<f64>>,
+    /// What must be added to each cable's free length to give its reading (mm).
+    pub zeros_mm: Vec<f64>,
+    /// What disturbed the measurement; empty for an undisturbed one.
+    pub disturbances: Vec<Disturbance>,
+}
+
+impl Frames {
+    /// Everything at the origin, for `anchors` cables.
+    pub fn at_origin(anchors: usize) -> Self {
+        Self {
+            base_from_sensor: Pose::identity(),
+            flange_from_target: Pose::identity(),
+            outlets_mm: vec![Vector3::zeros(); anchors],
+            zeros_mm: vec![0.0; anchors],
+            disturbances: Vec::new(),
+        }
+    }
+}
+
+/// Weights of one row: 1/σ of a length [1/mm] and of an angle [1/rad]. Weight 0 sets a row aside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weight {
+    /// For cable lengths and positions.
+    pub per_mm: f64,
+    /// For orientations; used by full poses alone.
+    pub per_rad: f64,
+}

@@ -1,0 +1,241 @@
+//! Passes over the rows: residuals, Jacobians and normal equations in blocks that do not depend on the number of threads.
+
+use std::ops::Range;
+
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+
+use super::kernel::{self, State};
+use super::task::Calibration;
+use crate::measurement::dataset::Sensor;
+use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
+use truegrind_math::lanes::WIDTH;
+
+/// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
+const BLOCK_LANES: usize = 64;
+
+/// Groups of eight rows that one thread passes over where the pass costs much: few, so that threads end together.
+const COST_LANES: usize = 16;
+
+/// Parameters with which such a buffer stays there.
+const FEW: usize = 64;
+
+/// Bytes of a buffer for more of them.
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// Groups of eight rows in a block, for p parameters and c components: a function of the task alone, so that sums are the
+/// same for any number of threads.
+fn block_lanes(p: usize, c: usize) -> usize {
+    if p <= FEW { BLOCK_LANES } else { (BUFFER_BYTES / ((p + 1) * c * WIDTH * 8)).clamp(4, BLOCK_LANES) }
+}
+
+impl Calibration {
+    /// Residuals at `x` without weights: mm for a cable (model minus reading) and for the three coordinates of a
+    /// position (reading minus model, in the base), then rad for the orientation of a pose. One entry per scalar row.
+    pub fn plain_residuals(&self, x: &[f64]) -> Vec<f64> {
+        let per = self.rows_per_observation();
+        let state = State::of(self, x);
+        let mut out = vec![0.0; self.rows()];
+        let chunk = COST_LANES * WIDTH;
+        out.par_chunks_mut(chunk * per).enumerate().for_each(|(k, out)| {
+            let first = k * chunk;
+            self.scatter(&state, first..first + out.len() / per, Some(out), None);
+            for (i, r) in out.iter_mut().enumerate() {
+                let (row, component) = (first + i / per, i % per);
+                let weight = if component < 3 { &self.columns.per_mm } else { &self.columns.per_rad }[row];
+                *r /= weight;
+            }
+        });
+        out
+    }
+
+    /// Residuals at `x`, n, and the Jacobian transposed, p × n, rows in the order of the trait.
+    ///
+    /// # Panics
+    /// Where nothing may move.
+    pub fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let state = State::of(self, x);
+        let (p, n, per) = (self.parameters.len(), self.rows(), self.components());
+        assert!(p > 0, "a task without parameters has no Jacobian");
+        let chunk = COST_LANES * WIDTH;
+        let (mut residuals, mut transposed) = (DVector::zeros(n), DMatrix::zeros(p, n));
+        residuals
+            .as_mut_slice()
+            .par_chunks_mut(chunk * per)
+            .zip(transposed.as_mut_slice().par_chunks_mut(chunk * per * p))
+            .enumerate()
+            .for_each(|(k, (residuals, transposed))| {
+                let (first, rows) = (k * chunk, residuals.len());
+                let mut jacobian = vec![0.0; rows * p];
+                self.scatter(&state, first..first + rows / per, Some(residuals), Some(&mut jacobian));
+                for (i, row) in transposed.chunks_exact_mut(p).enumerate() {
+                    row.iter_mut().enumerate().for_each(|(k, v)| *v = jacobian[k * rows + i]);
+                }
+            });
+        (residuals, transposed)
+    }
+
+    /// The size of each row's position error at `x` (mm): signed for a cable, the norm otherwise.
+    pub fn errors_mm(&self, x: &[f64]) -> Vec<f64> {
+        let plain = self.plain_residuals(x);
+        match self.sensor {
+            Sensor::Cable => plain,
+            Sensor::Position => plain.chunks(3).map(|v| Vector3::from_column_slice(v).norm()).collect(),
+            Sensor::Pose => plain.chunks(6).map(|v| Vector3::from_column_slice(&v[..3]).norm()).collect(),
+        }
+    }
+
+    /// Fills columns of residuals (last) and Jacobian for `lanes` groups of eight rows from group `from`:
+    /// `out[(k · components + c) · (8 · lanes) + i]`, k = p for the residual.
+    fn fill(&self, state: &State, from: usize, lanes: usize, jacobian: bool, out: &mut [f64]) {
+        kernel::fill(self, state, from, lanes, jacobian, out);
+    }
+}
+
+impl Problem for Calibration {
+    fn parameters(&self) -> usize {
+        self.parameters.len()
+    }
+
+    fn rows(&self) -> usize {
+        self.rows * self.components()
+    }
+
+    fn rows_per_observation(&self) -> usize {
+        self.components()
+    }
+
+    fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
+        let c = self.components();
+        let state = State::of(self, x);
+        self.scatter(&state, rows.start / c..rows.end / c, Some(out), None);
+    }
+
+    fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+        let c = self.components();
+        let state = State::of(self, x);
+        self.scatter(&state, rows.start / c..rows.end / c, Some(residuals), Some(jacobian));
+    }
+
+    fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    fn thinned(&self, observations: &[usize]) -> Option<Box<dyn Problem + '_>> {
+        Some(Box::new(Self {
+            start: self.start.clone(),
+            frames: self.frames.clone(),
+            sensor: self.sensor,
+            parameters: self.parameters.clone(),
+            priors: self.priors.clone(),
+            columns: self.columns.subset(observations),
+            rows: observations.len(),
+        }))
+    }
+
+    fn row_cost(&self, x: &[f64]) -> f64 {
+        let state = State::of(self, x);
+        let c = self.components();
+        let parts: Vec<f64> = self
+            .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
+            .into_par_iter()
+            .map(|(from, lanes)| {
+                let mut out = vec![0.0; c * lanes * WIDTH];
+                self.fill(&state, from, lanes, false, &mut out);
+                0.5 * out.iter().map(|r| r * r).sum::<f64>()
+            })
+            .collect();
+        parts.iter().sum()
+    }
+
+    fn normal_equations(&self, x: &[f64]) -> NormalEquations {
+        let state = State::of(self, x);
+        let (p, c) = (self.parameters.len(), self.components());
+        let most = block_lanes(p, c);
+        let blocks = self.blocks_of(most);
+        // A square of its own for each block would cost more than its products where parameters are many.
+        let together = if p > FEW { (2 * p).div_ceil(most * WIDTH * c) } else { 1 };
+        let parts: Vec<DMatrix<f64>> = blocks
+            .par_chunks(together)
+            .map_init(
+                || vec![0.0; (p + 1) * c * most * WIDTH],
+                |buffer, blocks| {
+                    let mut square = DMatrix::zeros(p + 1, p + 1);
+                    for &(from, lanes) in blocks {
+                        let rows = c * lanes * WIDTH;
+                        let columns = &mut buffer[..(p + 1) * rows];
+                        self.fill(&state, from, lanes, true, columns);
+                        add_gram(columns, rows, &mut square);
+                    }
+                    square
+                },
+            )
+            .collect();
+        let total = parts.into_iter().reduce(|sum, part| sum + part);
+        let square = total.unwrap_or_else(|| DMatrix::zeros(p + 1, p + 1));
+        let mut out = NormalEquations {
+            matrix: square.view((0, 0), (p, p)).into_owned(),
+            gradient: DVector::from_iterator(p, square.row(p).iter().take(p).copied()),
+            cost: 0.5 * square[(p, p)],
+        };
+        out.mirror();
+        out
+    }
+}
+
+/// Adds [J r]ᵀ[J r] of columns of `rows` entries, the residual in the last, to the lower triangle of `square`.
+fn add_gram(columns: &[f64], rows: usize, square: &mut DMatrix<f64>) {
+    let size = square.nrows();
+    let a = MatRef::from_column_major_slice(columns, rows, size);
+    let out = MatMut::from_column_major_slice_mut(square.as_mut_slice(), size, size);
+    let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
+    triangular::matmul(out, lower, Accum::Add, a.transpose(), full, a, full, 1.0, Par::Seq);
+}
+
+impl Calibration {
+    /// First group of eight rows and number of groups of each block of at most `lanes` groups.
+    fn blocks_of(&self, lanes: usize) -> Vec<(usize, usize)> {
+        let groups = self.rows.div_ceil(WIDTH);
+        (0..groups).step_by(lanes).map(|from| (from, lanes.min(groups - from))).collect()
+    }
+
+    /// Writes rows in the order of the trait: observation by observation, components inside.
+    fn scatter(
+        &self,
+        state: &State,
+        observations: Range<usize>,
+        residuals: Option<&mut [f64]>,
+        jacobian: Option<&mut [f64]>,
+    ) {
+        let (p, c) = (self.parameters.len(), self.components());
+        let (first, last) = (observations.start / WIDTH, observations.end.div_ceil(WIDTH));
+        let total = observations.len() * c;
+        let with_jacobian = jacobian.is_some();
+        let mut places: Vec<&mut [f64]> = Vec::new();
+        if let Some(jacobian) = jacobian {
+            places.extend(jacobian.chunks_mut(total.max(1)).take(p));
+        }
+        if let Some(residuals) = residuals {
+            places.push(residuals);
+        }
+        let columns = if with_jacobian { p + 1 } else { 1 };
+        let mut buffer = vec![0.0; columns * c * BLOCK_LANES.min(last - first) * WIDTH];
+        for from in (first..last).step_by(BLOCK_LANES) {
+            let lanes = BLOCK_LANES.min(last - from);
+            let rows = lanes * WIDTH;
+            self.fill(state, from, lanes, with_jacobian, &mut buffer[..columns * c * rows]);
+            let (begin, end) =
+                (observations.start.max(from * WIDTH), observations.end.min(from * WIDTH + rows));
+            for (k, place) in places.iter_mut().enumerate() {
+                for component in 0..c {
+                    let column = &buffer[(k * c + component) * rows..][..rows];
+                    for row in begin..end {
+                        place[(row - observations.start) * c + component] = column[row - from * WIDTH];
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What a calibration is asked: a start, what may move, the rows and their weights.
+
+use nalgebra::Vector6;
+
+use super::columns::Columns;
+use super::frames::{Frames, Weight};
+use crate::measurement::dataset::{Dataset, Sensor};
+use truegrind_arm::model::Model;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::problem::Prior;
+use truegrind_math::se3::moved;
+
+/// A calibration task. See the module page.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    pub(super) start: Model,
+    pub(super) frames: Frames,
+    pub(super) sensor: Sensor,
+    pub(super) parameters: Vec<Parameter>,
+    pub(super) priors: Vec<Prior>,
+    pub(super) columns: Columns,
+    pub(super) rows: usize,
+}
+
+impl Calibration {
+    /// Sets up the task.
+    ///
+    /// `start` and `frames` are the starting values, `parameters` what may move, `priors` one for each parameter
+    /// (mean in deviations from the start) or empty, `weights` one for each row of `dataset`.
+    pub fn new(
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        priors: &[Prior],
+        weights: &[Weight],
+    ) -> Self {
+        let columns = Columns::of(dataset, start, frames, parameters, weights);
+        Self {
+            start: start.clone(),
+            frames: frames.clone(),
+            sensor: dataset.sensor,
+            parameters: parameters.to_vec(),
+            priors: priors.to_vec(),
+            columns,
+            rows: dataset.rows.len(),
+        }
+    }
+
+    /// The same task with other weights, one for each row.
+    pub fn reweighted(&self, weights: &[Weight]) -> Self {
+        self.clone().weighted(weights)
+    }
+
+    /// This task itself with other weights, one for each row.
+    pub fn weighted(mut self, weights: &[Weight]) -> Self {
+        for (i, w) in weights.iter().enumerate().take(self.rows) {
+            self.columns.per_mm[i] = w.per_mm;
+            self.columns.per_rad[i] = w.per_rad;
+        }
+        self
+    }
+
+    /// Weight of a row.
+    ///
+    /// # Panics
+    /// Beyond the last row.
+    pub fn weight(&self, row: usize) -> Weight {
+        Weight { per_mm: self.columns.per_mm[row], per_rad: self.columns.per_rad[row] }
+    }
+
+    /// What may move, in the order of x.
+    pub fn parameters_list(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// The starting model.
+    pub fn start(&self) -> &Model {
+        &self.start
+    }
+
+    /// The starting frames.
+    pub fn starting_frames(&self) -> &Frames {
+        &self.frames
+    }
+
+    /// The model and the frames that `x` stands for.
+    pub fn apply(&self, x: &[f64]) -> (Model, Frames) {
+        let (mut model, mut frames) = (self.start.clone(), self.frames.clone());
+        let (mut sensor, mut tool) = (Vector6::zeros(), Vector6::zeros());
+        for (parameter, &value) in self.parameters.iter().zip(x) {
+            match *parameter {
+                Parameter::Base(k) => sensor[k] += value,
+                Parameter::Tool(k) => tool[k] += value,
+                Parameter::Link { joint, coordinate } => {
+                    let link = &mut model.links[joint];
+                    link.set(coordinate, link.get(coordinate) + value);
+                }
+                Parameter::Effect { index, parameter } => {
+                    let before = model.effects[index].parameters()[parameter].value;
+                    model.effects[index].set(parameter, before + value);
+                }
+                Parameter::Outlet { anchor, axis } => frames.outlets_mm[anchor][axis] += value,
+                Parameter::Zero { anchor } => frames.zeros_mm[anchor] += value,
+                Parameter::Disturbance { index, parameter } => {
+                    frames.disturbances[index].values[parameter] += value;
+                }
+            }
+        }
+        frames.base_from_sensor = moved(&frames.base_from_sensor, &sensor);
+        frames.flange_from_target = moved(&frames.flange_from_target, &tool);
+        (model, frames)
+    }
+
+    pub(super) fn components(&self) -> usize {
+        match self.sensor {
+            Sensor::Cable => 1,
+            Sensor::Position => 3,
+            Sensor::Pose => 6,
+        }
+    }
+}

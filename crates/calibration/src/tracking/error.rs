@@ -1,0 +1,62 @@
+//! Why an arm cannot be tracked.
+
+use thiserror::Error;
+
+use crate::identification::start::NoStart;
+
+/// Why an arm cannot be tracked.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TrackError {
+    /// Not enough poses yet.
+    #[error(
+        "{file}: {found} poses so far, {asked} are needed to place the sensor; run it again when there are more \
+         (--first-poses asks for fewer)"
+    )]
+    TooFew {
+        /// File.
+        file: String,
+        /// Poses there are.
+        found: usize,
+        /// Poses needed.
+        asked: usize,
+    },
+    /// The rows do not place the sensor.
+    #[error(transparent)]
+    Placing(#[from] NoStart),
+    /// The first poses do not fit the model.
+    #[error(
+        "{file}: the first {poses} poses leave {left_mm:.3} mm under this model, which left {held_out_mm:.3} mm on rows \
+         that it had not seen: the arm has changed since, or these are not its measurements; identify it anew, or begin all \
+         the same with --sigma {left_mm:.3}"
+    )]
+    Foreign {
+        /// File.
+        file: String,
+        /// Poses that placed the sensor.
+        poses: usize,
+        /// What they leave, of one coordinate or length (mm).
+        left_mm: f64,
+        /// What the model left on held-out rows, likewise (mm).
+        held_out_mm: f64,
+    },
+    /// Another sensor than before.
+    #[error(
+        "{file}: has {found} readings, and the track so far has {expected}: start a new track with another --state"
+    )]
+    Sensor {
+        /// File.
+        file: String,
+        /// What it has.
+        found: &'static str,
+        /// What was tracked.
+        expected: String,
+    },
+    /// The state file cannot be used.
+    #[error("{file}: {why}")]
+    State {
+        /// File.
+        file: String,
+        /// Why.
+        why: String,
+    },
+}

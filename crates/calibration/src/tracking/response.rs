@@ -1,0 +1,244 @@
+//! When a track raises an alarm, and how the filter goes on from there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alarm::{Alarm, Course, Part};
+use super::bounds::{accident_bound, window_bound};
+use super::locate::{Form, Found, Group, Together, locate};
+use super::state::Snapshot;
+use super::tracker::Tracker;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::problem::Problem;
+
+/// A change of one parameter is named where its likelihood ratio is above this: 1 in 10⁵ for one parameter and one pose,
+/// still 1 in a hundred after looking through them all; and where it explains most of the window's excess.
+const SURE: f64 = 20.0;
+
+/// Poses that are waited for after the bound was left, before what moved is named: a few poses fit many explanations.
+const SETTLE: usize = 5;
+
+/// How far a frame of the sensor may have been moved (mm, rad), for [`Group`].
+const REACH_MM: f64 = 10.0;
+const REACH_RAD: f64 = 0.05;
+
+impl Tracker {
+    /// Looks at the window, and where it is out of bounds finds out what moved.
+    pub(super) fn alarm(&mut self) -> Option<Alarm> {
+        let window = self.state.options.window.max(1);
+        let history = &self.state.history;
+        // The window never reaches back behind the first poses, which place the sensor.
+        let earliest = self.state.quiet_until.max(self.state.options.first_poses + window);
+        if history.len() < window || self.state.poses < earliest {
+            return None;
+        }
+        let per = self.rows_per_pose();
+        let bound = window_bound(window * per);
+        // A lone accident says nothing; of those that follow each other it takes three or four.
+        let counted = |at: usize| match history[at].nis {
+            _ if self.is_lone_accident(at) => per as f64,
+            nis if nis.is_finite() => nis.min(bound / 4.0),
+            _ => bound / 4.0,
+        };
+        let sum: f64 = (history.len() - window..history.len()).map(counted).sum();
+        if sum > bound && self.state.pending_since == 0 {
+            self.state.pending_since = self.state.poses;
+        }
+        if self.state.pending_since == 0 || self.state.poses < self.state.pending_since + SETTLE {
+            return None;
+        }
+        self.state.pending_since = 0;
+        let groups = self.groups();
+        let found = self.what_moved(&groups)?;
+        let ratio = found.together.as_ref().map_or(found.best.ratio, |t| t.ratio);
+        let last = self.state.history.last()?;
+        // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
+        // explains most of what was too much (0.7).
+        let measured = |at: usize| match history[at].nis {
+            _ if self.is_lone_accident(at) => per as f64,
+            nis if nis.is_finite() => nis,
+            _ => bound,
+        };
+        let all: f64 = (history.len() - window..history.len()).map(measured).sum();
+        if !(ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
+            let alarm = Alarm {
+                noticed_file: last.file.clone(),
+                noticed_row: last.row,
+                since_file: last.file.clone(),
+                since_row: last.row,
+                since_time_h: last.time_h,
+                parameter: String::new(),
+                unit: String::new(),
+                course: Course::Open,
+                shift: 0.0,
+                sigma: 0.0,
+                poses: 0,
+                ratio,
+                alternatives: Vec::new(),
+                window_nis: [sum, bound],
+                parts: Vec::new(),
+            };
+            // The same poses are not complained of again.
+            self.state.quiet_until = self.state.poses + window;
+            return Some(alarm);
+        }
+        let since = found.together.as_ref().map_or(found.best.since, |t| t.since);
+        let onset = &self.state.history[since];
+        let name = |k: usize| self.parameters[k].to_string();
+        let best = &found.best;
+        let mut alarm = Alarm {
+            noticed_file: last.file.clone(),
+            noticed_row: last.row,
+            since_file: onset.file.clone(),
+            since_row: onset.row,
+            since_time_h: onset.time_h,
+            parameter: name(best.parameter),
+            unit: self.parameters[best.parameter].unit().to_owned(),
+            course: match (found.other_form, best.form) {
+                (Some(_), _) => Course::Open,
+                (None, Form::Jump) => Course::Jump,
+                (None, Form::Drift) => Course::Drift,
+            },
+            shift: best.shift,
+            sigma: best.sigma,
+            poses: history.len() - since,
+            ratio,
+            alternatives: found
+                .alternatives
+                .iter()
+                .map(|c| name(c.parameter))
+                .chain(found.nearly.map(|g| format!("a move of {}", groups[g].name)))
+                .collect(),
+            window_nis: [sum, bound],
+            parts: Vec::new(),
+        };
+        if let Some(together) = &found.together {
+            self.as_a_whole(&mut alarm, &groups[together.group], together);
+        }
+        self.reopen(&found, &groups);
+        Some(alarm)
+    }
+
+    /// Writes into an alarm what moved as a whole.
+    fn as_a_whole(&self, alarm: &mut Alarm, group: &Group, together: &Together) {
+        let part = |(a, (k, _)): (usize, &(usize, f64))| Part {
+            parameter: self.parameters[*k].to_string(),
+            unit: self.parameters[*k].unit().to_owned(),
+            shift: together.shifts[a],
+            sigma: together.covariance[(a, a)].max(0.0).sqrt(),
+        };
+        alarm.parts = group.members.iter().enumerate().map(part).collect();
+        (alarm.shift, alarm.sigma) = self.displaced(group, together);
+        (alarm.parameter, alarm.unit, alarm.course) = (group.name.clone(), "mm".to_owned(), Course::Jump);
+        alarm.alternatives.clear();
+    }
+
+    /// By how much the readings of the changed poses moved on average (mm), and its standard deviation: a frame that turned
+    /// far from where it is measured has no place of its own where a distance would mean anything.
+    fn displaced(&self, group: &Group, together: &Together) -> (f64, f64) {
+        let poses = &self.state.history;
+        let (per, p) = (self.rows_per_pose(), self.parameters.len());
+        let rows = poses.len() * per;
+        let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
+        self.task(poses).jacobian(&self.state.reference.x, 0..rows, &mut r, &mut j);
+        // The rows of position; a pose has three more.
+        let axes = per.min(3);
+        let changed = (poses.len() - together.since).max(1) as f64;
+        let mean = DMatrix::from_fn(axes, group.members.len(), |axis, a| {
+            let column = &j[group.members[a].0 * rows..][..rows];
+            let of = |pose: usize| column[pose * per + axis] / poses[pose].per_mm;
+            (together.since..poses.len()).map(of).sum::<f64>() / changed
+        });
+        let way = &mean * DVector::from_column_slice(&together.shifts);
+        let length = way.norm();
+        let along = mean.tr_mul(&(way / length.max(f64::MIN_POSITIVE)));
+        (length, (&together.covariance * &along).dot(&along).max(0.0).sqrt())
+    }
+
+    /// What may move as a whole: the sensor against the arm's base, the point that it touches, the outlet of a cable.
+    fn groups(&self) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            let name = match parameter {
+                Parameter::Base(_) => "the sensor against the arm's base".to_owned(),
+                Parameter::Tool(_) => "the touched point".to_owned(),
+                Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
+                Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
+                _ => continue,
+            };
+            let reach = if parameter.unit() == "mm" { REACH_MM } else { REACH_RAD };
+            match groups.iter_mut().find(|g| g.name == name) {
+                Some(group) => group.members.push((k, reach)),
+                None => groups.push(Group { name, members: vec![(k, reach)] }),
+            }
+        }
+        groups
+    }
+
+    /// Whether a pose of the history was set aside and its neighbours were not. After a jump one pose after the other is
+    /// set aside; one alone is an accident and has no say.
+    fn is_lone_accident(&self, at: usize) -> bool {
+        let bound = accident_bound(self.rows_per_pose());
+        let aside = |at: Option<usize>| {
+            at.and_then(|at| self.state.history.get(at)).is_some_and(|s| !(s.nis <= bound))
+        };
+        aside(Some(at)) && !aside(at.checked_sub(1)) && !aside(Some(at + 1))
+    }
+
+    fn what_moved(&self, groups: &[Group]) -> Option<Found> {
+        let poses = &self.state.history;
+        let per = self.rows_per_pose();
+        let reference = &self.state.reference;
+        let (rows, p) = (poses.len() * per, self.parameters.len());
+        let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * p]);
+        self.task(poses).jacobian(&reference.x, 0..rows, &mut r, &mut j);
+        for (pose, seen) in poses.iter().enumerate() {
+            if self.is_lone_accident(pose) || !seen.nis.is_finite() {
+                let of_pose = pose * per..(pose + 1) * per;
+                r[of_pose.clone()].fill(0.0);
+                j.chunks_mut(rows).for_each(|column| column[of_pose.clone()].fill(0.0));
+            }
+        }
+        locate(&r, &j, per, &reference.covariance()?, groups)
+    }
+
+    /// Takes the history in again, with room for what moved. What looks alike may have moved alike, each by its own
+    /// measure. What drifts may go on: its process noise becomes what it drifted by from pose to pose, and stays so.
+    fn reopen(&mut self, found: &Found, groups: &[Group]) {
+        let Some(recursion) = self.state.reference.recursion() else { return };
+        self.recursion = recursion;
+        let poses = std::mem::take(&mut self.state.history);
+        let task = self.task(&poses);
+        let single = found.together.is_none();
+        let all = || std::iter::once(&found.best).chain(&found.alternatives).filter(|_| single);
+        for at in 0..poses.len() {
+            let mut room = vec![0.0; self.parameters.len()];
+            let mut any = false;
+            for change in all().filter(|c| c.since == at) {
+                any = true;
+                match change.form {
+                    Form::Jump => room[change.parameter] = 3.0 * change.shift.abs(),
+                    Form::Drift => {
+                        let rate = change.shift.abs() / (poses.len() - at) as f64;
+                        let drift = &mut self.drift[change.parameter];
+                        *drift = drift.max(rate);
+                        let name = self.parameters[change.parameter].to_string();
+                        self.state.options.drift.insert(name, *drift);
+                    }
+                }
+            }
+            if let Some(together) = found.together.as_ref().filter(|t| t.since == at) {
+                any = true;
+                for ((k, _), shift) in groups[together.group].members.iter().zip(&together.shifts) {
+                    room[*k] = 3.0 * shift.abs();
+                }
+            }
+            if any {
+                self.recursion.predict(&room);
+            }
+            self.update(&task, at);
+        }
+        // What came before the change is settled.
+        let snapshot = Snapshot::of(&self.recursion, 0);
+        (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
+    }
+}

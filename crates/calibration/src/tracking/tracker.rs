@@ -1,0 +1,409 @@
+//! The filter that follows an arm, pose by pose.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alarm::Alarm;
+use super::bounds::accident_bound;
+use super::error::TrackError;
+use super::options::Options;
+use super::state::{Consumed, SCHEMA, Seen, Snapshot, State, digest, reach};
+use crate::identification::calibration::{Calibration, Frames, Weight};
+use crate::identification::fit::{Observed, frame_parameters};
+use crate::identification::identify::{observe, sensor_name};
+use crate::identification::register::register;
+use crate::identification::rounding;
+use crate::identification::tolerance::Tolerance;
+use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::Joints;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::filter::rls::{Memory, Recursion};
+use truegrind_estimation::problem::Problem;
+use truegrind_math::se3::{pose_from_vector, vector_from_pose};
+
+/// The first poses of files that are tracked together: those of the first file, or of as many as it takes. `None` without
+/// a file.
+pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
+    let mut out = datasets.first()?.clone();
+    let mut files = 1;
+    for dataset in datasets[1..].iter().take_while(|d| d.sensor == out.sensor) {
+        if out.rows.len() >= poses {
+            break;
+        }
+        out.rows.extend(dataset.rows.iter().cloned());
+        files += 1;
+    }
+    if files > 1 {
+        out.file = format!("{} and {} more", out.file, files - 1);
+    }
+    Some(out)
+}
+
+/// A model that follows its arm.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    /// The model that tracking began with.
+    pub(super) begun: Estimated,
+    pub(super) parameters: Vec<Parameter>,
+    pub(super) drift: Vec<f64>,
+    pub(super) frames: Frames,
+    pub(super) recursion: Recursion,
+    pub(super) state: State,
+    pub(super) condition: Condition,
+}
+
+/// What one pose said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Taken {
+    /// Normalised innovation squared.
+    pub nis: f64,
+    /// Whether the pose was set aside as an accident.
+    pub set_aside: bool,
+}
+
+impl Tracker {
+    /// Places the sensor with the first poses of `dataset` and begins; no pose is taken in yet.
+    ///
+    /// # Errors
+    /// [`TrackError`] where the poses are too few or do not place the sensor.
+    pub fn begin(
+        model: &Estimated,
+        model_hash: &str,
+        dataset: &Dataset,
+        options: &Options,
+    ) -> Result<Self, TrackError> {
+        if dataset.rows.len() < options.first_poses {
+            return Err(TrackError::TooFew {
+                file: dataset.file.clone(),
+                found: dataset.rows.len(),
+                asked: options.first_poses,
+            });
+        }
+        let first = dataset.subset(&(0..options.first_poses).collect::<Vec<_>>());
+        let (observed, _) = observe(&first, &model.nominal, false);
+        let fitted = register(&observed, &model.model, &Tolerance::default())?.fitted;
+        // A reading cannot agree better with the model than held-out readings did when it was identified; a few poses that
+        // have just placed the sensor seem to.
+        let axes: f64 = if dataset.sensor == Sensor::Cable { 1.0 } else { 3.0 };
+        let unexplained_mm = model.geometry.held_out.rmse / axes.sqrt();
+        let left_mm = fitted.sigma_mm;
+        if options.sigma_mm.is_none()
+            && unexplained_mm > 0.0
+            && left_mm > FOREIGN * unexplained_mm
+            && left_mm > FOREIGN_MM
+        {
+            return Err(TrackError::Foreign {
+                file: dataset.file.clone(),
+                poses: options.first_poses,
+                left_mm,
+                held_out_mm: unexplained_mm,
+            });
+        }
+        let sigma_mm = options.sigma_mm.unwrap_or(left_mm.max(unexplained_mm));
+        let frames = fitted.frames;
+        let sensing = frame_parameters(dataset);
+        let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
+        let (arm, p) = (model.order.len(), parameters.len());
+        // The sensor was placed by a few poses under this very model: from there its frame may lie within what links of
+        // ordinary tolerance can shift it by, and the poses that placed it are taken in like all others.
+        let priors = Tolerance {
+            target_mm: 10.0,
+            target_rad: 0.02,
+            frame_mm: 20.0,
+            frame_rad: 0.04,
+            ..Tolerance::default()
+        }
+        .priors(&parameters, &model.model);
+        let covariance = DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
+            (true, _) => model.covariance[(i, j)] + if i == j { SMALLEST_VARIANCE } else { 0.0 },
+            (false, true) => priors[i].sigma * priors[i].sigma,
+            (false, false) => 0.0,
+        });
+        let recursion =
+            Recursion::new(DVector::zeros(p), covariance, Memory::SquareRoot).ok_or_else(|| {
+                TrackError::State {
+                    file: model.provenance.file.clone(),
+                    why: "the model's covariance is not positive definite".to_owned(),
+                }
+            })?;
+        let snapshot = Snapshot::of(&recursion, 0);
+        let state = State {
+            schema: SCHEMA.to_owned(),
+            model_hash: model_hash.to_owned(),
+            sensor: sensor_name(dataset.sensor).to_owned(),
+            poses: 0,
+            accidents: 0,
+            options: options.clone(),
+            outlets_mm: frames.outlets_mm.iter().map(|o| (*o).into()).collect(),
+            zeros_mm: frames.zeros_mm.clone(),
+            base_from_sensor: vector_from_pose(&frames.base_from_sensor),
+            flange_from_target: vector_from_pose(&frames.flange_from_target),
+            sigma_mm,
+            sigma_rad: fitted.sigma_rad,
+            now: snapshot.clone(),
+            reference: snapshot.clone(),
+            middle: snapshot,
+            region: model.region.clone(),
+            quiet_until: 0,
+            pending_since: 0,
+            consumed: Vec::new(),
+            alarms: Vec::new(),
+            history: Vec::new(),
+        };
+        Self::resume(model, state, "a new track")
+    }
+
+    /// Goes on from a state; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`TrackError::State`] where the state does not belong to the model or is damaged.
+    pub fn resume(model: &Estimated, state: State, file: &str) -> Result<Self, TrackError> {
+        let wrong = |why: &str| TrackError::State { file: file.to_owned(), why: why.to_owned() };
+        if state.schema != SCHEMA {
+            return Err(wrong(&format!("`schema` is \"{}\", expected \"{SCHEMA}\"", state.schema)));
+        }
+        let mut frames = Frames::at_origin(state.outlets_mm.len());
+        frames.outlets_mm = state.outlets_mm.iter().map(|o| (*o).into()).collect();
+        frames.zeros_mm.clone_from(&state.zeros_mm);
+        frames.base_from_sensor = pose_from_vector(&state.base_from_sensor);
+        frames.flange_from_target = pose_from_vector(&state.flange_from_target);
+        let sensor = match state.sensor.as_str() {
+            "cable" => Sensor::Cable,
+            "position" => Sensor::Position,
+            "pose" => Sensor::Pose,
+            other => return Err(wrong(&format!("unknown sensor \"{other}\""))),
+        };
+        // A row of the last cable makes as many outlets as the track has.
+        let mut shape = Row::new(0, Joints::zeros(), Reading::Cable(0.0));
+        shape.anchor = state.outlets_mm.len().saturating_sub(1);
+        let sensing = frame_parameters(&Dataset::new(file, sensor, vec![shape]));
+        let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
+        let snapshots = [&state.now, &state.reference, &state.middle];
+        if snapshots.iter().any(|s| s.x.len() != parameters.len()) {
+            return Err(wrong(
+                "the number of parameters is another than the model's: it belongs to another model",
+            ));
+        }
+        let recursion =
+            state.now.recursion().ok_or_else(|| wrong("the root of the covariance is damaged"))?;
+        let drift = parameters.iter().map(|p| drift_of(p, &state.options)).collect();
+        let condition = model.condition;
+        Ok(Self { begun: model.clone(), parameters, drift, frames, recursion, state, condition })
+    }
+
+    /// Takes in the rows of a file that it has not seen yet. Gives the alarms that this raised.
+    ///
+    /// # Errors
+    /// [`TrackError`] where the file has another sensor, or rows that were taken in have changed.
+    pub fn take(&mut self, dataset: &Dataset) -> Result<Vec<Alarm>, TrackError> {
+        let sensor = sensor_name(dataset.sensor);
+        if sensor != self.state.sensor {
+            return Err(TrackError::Sensor {
+                file: dataset.file.clone(),
+                found: sensor,
+                expected: self.state.sensor.clone(),
+            });
+        }
+        let done = self.state.consumed.iter().position(|c| c.file == dataset.file);
+        let from = done.map_or(0, |at| self.state.consumed[at].rows);
+        if let Some(at) = done {
+            let known = &self.state.consumed[at];
+            if dataset.rows.len() < known.rows || digest(&dataset.rows[..known.rows]) != known.digest {
+                return Err(TrackError::State {
+                    file: dataset.file.clone(),
+                    why: format!(
+                        "the {} rows that were taken in have changed: start a new track with another --state",
+                        known.rows
+                    ),
+                });
+            }
+        }
+        if from == dataset.rows.len() {
+            return Ok(Vec::new());
+        }
+        let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
+        let (observed, _) = observe(&fresh, &self.begun.nominal, false);
+        let seen = self.seen(&observed);
+        let task = self.task(&seen);
+        let mut alarms = Vec::new();
+        for (at, (row, seen)) in observed.dataset.rows.iter().zip(seen).enumerate() {
+            self.condition = row.condition;
+            alarms.extend(self.pose(&task, at, seen));
+        }
+        let consumed =
+            Consumed { file: dataset.file.clone(), rows: dataset.rows.len(), digest: digest(&dataset.rows) };
+        match done {
+            Some(at) => self.state.consumed[at] = consumed,
+            None => self.state.consumed.push(consumed),
+        }
+        self.state.now = Snapshot::of(&self.recursion, self.state.history.len());
+        Ok(alarms)
+    }
+
+    /// Observation `at` of `task`, which is `seen`. Gives the alarm, where it raises one.
+    pub(super) fn pose(&mut self, task: &Calibration, at: usize, mut seen: Seen) -> Option<Alarm> {
+        let taken = self.update(task, at);
+        seen.nis = taken.nis;
+        self.state.poses += 1;
+        self.state.accidents += usize::from(taken.set_aside);
+        seen.error_mm = self.error_mm(task, at, seen.per_mm);
+        if !taken.set_aside {
+            reach(&mut self.state.region, &seen.joints);
+        }
+        self.state.history.push(seen);
+        if let Some(alarm) = self.alarm() {
+            self.state.alarms.push(alarm.clone());
+            return Some(alarm);
+        }
+        let options = &self.state.options;
+        let length = self.state.history.len();
+        if length == options.history / 2 && self.state.middle.before == 0 {
+            self.state.middle = Snapshot::of(&self.recursion, length);
+        } else if length >= options.history.max(2) {
+            let half = self.state.middle.before;
+            self.state.history.drain(..half);
+            self.state.reference = Snapshot { before: 0, ..self.state.middle.clone() };
+            self.state.middle = Snapshot::of(&self.recursion, self.state.history.len());
+        }
+        None
+    }
+
+    /// Takes in observation `pose` of `task`: process noise, linearisation, one update for each row. This is the whole
+    /// cost of a pose but for the alarm.
+    pub fn update(&mut self, task: &Calibration, pose: usize) -> Taken {
+        let (p, per) = (self.parameters.len(), task.rows_per_observation());
+        self.recursion.predict(&self.drift);
+        let mut trial = self.recursion.clone();
+        let (mut r, mut j) = (vec![0.0; per], vec![0.0; per * p]);
+        let at = trial.x.clone();
+        task.jacobian(at.as_slice(), pose * per..(pose + 1) * per, &mut r, &mut j);
+        let mut a = DVector::zeros(p);
+        let mut nis = 0.0;
+        for i in 0..per {
+            (0..p).for_each(|k| a[k] = j[k * per + i]);
+            let e = r[i] + a.dot(&trial.x) - a.dot(&at);
+            let variance = trial.update(&a, e, 1.0);
+            nis += e * e / variance;
+        }
+        let finite = nis.is_finite() && trial.x.iter().all(|x| x.is_finite());
+        // Written so that not-a-number is set aside too.
+        let set_aside = !(finite && nis <= accident_bound(per));
+        if !set_aside {
+            self.recursion = trial;
+        }
+        Taken { nis, set_aside }
+    }
+
+    pub(super) fn task(&self, poses: &[Seen]) -> Calibration {
+        let rows = poses.iter().map(|seen| seen.row_of(&self.state.sensor)).collect();
+        let sensor = match self.state.sensor.as_str() {
+            "cable" => Sensor::Cable,
+            "position" => Sensor::Position,
+            _ => Sensor::Pose,
+        };
+        let dataset = Dataset::new("track", sensor, rows);
+        let weights: Vec<_> = poses.iter().map(|s| Weight { per_mm: s.per_mm, per_rad: s.per_rad }).collect();
+        Calibration::new(&dataset, &self.begun.model, &self.frames, &self.parameters, &[], &weights)
+    }
+
+    pub(super) fn seen(&self, observed: &Observed) -> Vec<Seen> {
+        let weights = rounding::weights(
+            &observed.dataset,
+            &self.begun.model,
+            &self.frames,
+            &observed.angles,
+            self.state.sigma_mm,
+            self.state.sigma_rad,
+        );
+        let one = |(row, weight): (&Row, &Weight)| Seen {
+            file: observed.dataset.file.clone(),
+            row: row.number,
+            time_h: row.condition.time_h,
+            joints: row.joints.into(),
+            reading: match &row.reading {
+                Reading::Cable(length) => vec![*length],
+                Reading::Position(p) => p.as_slice().to_vec(),
+                Reading::Pose(pose) => vector_from_pose(pose).to_vec(),
+            },
+            condition: row.condition,
+            anchor: row.anchor,
+            per_mm: weight.per_mm,
+            per_rad: weight.per_rad,
+            nis: 0.0,
+            error_mm: 0.0,
+        };
+        observed.dataset.rows.iter().zip(&weights).map(one).collect()
+    }
+
+    /// Error of a pose with the state after it (mm): signed for a cable, the norm otherwise.
+    pub(super) fn error_mm(&self, task: &Calibration, at: usize, per_mm: f64) -> f64 {
+        let per = task.rows_per_observation();
+        let mut r = vec![0.0; per];
+        task.residuals(self.recursion.x.as_slice(), at * per..(at + 1) * per, &mut r);
+        match r.as_slice() {
+            [length] => length / per_mm,
+            rows => rows.iter().take(3).map(|v| v * v).sum::<f64>().sqrt() / per_mm,
+        }
+    }
+
+    pub(super) fn rows_per_pose(&self) -> usize {
+        match self.state.sensor.as_str() {
+            "cable" => 1,
+            "position" => 3,
+            _ => 6,
+        }
+    }
+
+    /// Name of the robot.
+    pub fn robot(&self) -> &str {
+        &self.begun.robot
+    }
+
+    /// What must be saved.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// What moves, in the order of the state.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// Deviations of the parameters from the model that tracking began with.
+    pub fn deviations(&self) -> &[f64] {
+        self.recursion.x.as_slice()
+    }
+
+    /// Standard deviations of these.
+    pub fn sigmas(&self) -> Vec<f64> {
+        self.recursion.covariance().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+    }
+
+    /// A task of rows for [`Tracker::update`], with the weights that tracking gives them.
+    pub fn prepare(&self, dataset: &Dataset) -> Calibration {
+        let (observed, _) = observe(dataset, &self.begun.nominal, false);
+        self.task(&self.seen(&observed))
+    }
+}
+
+/// First poses that leave so many times what the model left on held-out rows, and more than so many mm, are no noise.
+const FOREIGN: f64 = 5.0;
+const FOREIGN_MM: f64 = 0.05;
+
+/// A covariance of an identification may be singular to rounding; this is nothing beside any tolerance (mm², rad²).
+const SMALLEST_VARIANCE: f64 = 1e-14;
+
+fn drift_of(parameter: &Parameter, options: &Options) -> f64 {
+    if let Some(own) = options.drift.get(&parameter.to_string()) {
+        return *own;
+    }
+    match (parameter.is_of_arm(), parameter.unit()) {
+        (true, "mm") => options.drift_length_mm,
+        (true, "rad") => options.drift_angle_rad,
+        // Parameters of effects have units of their own: they stay unless a drift is stated for them.
+        (true, _) => 0.0,
+        (false, "mm") => options.drift_frame_mm,
+        (false, _) => options.drift_frame_rad,
+    }
+}
