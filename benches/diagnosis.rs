@@ -17,7 +17,7 @@ use std::time::Instant;
 use rand::RngExt;
 use scenarios::{FIELD, KINDS, Outcome, draw, hide, log, outcome, stream};
 use simulator::{Hidden, Log, Setup};
-use truegrind::measurement::dataset::Sensor;
+use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::robots;
 
 /// Arms in turn.

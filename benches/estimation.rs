@@ -118,19 +118,19 @@ fn recursive_least_squares(bencher: Bencher<'_, '_>, n: usize) {
 
 /// Rows of the recipe that the experiments ship with, and the 24 link parameters with known frames.
 mod arm {
-    use truegrind::comparison::experiment::Experiment;
-    use truegrind::comparison::simulated;
-    use truegrind::identification::calibration::{Calibration, Weight};
-    use truegrind::identification::fit::{Start, fit, frame_parameters};
-    use truegrind::identification::identify::{Options, identify, observe};
-    use truegrind::identification::solver::SOLVERS;
-    use truegrind::identification::start::starts;
-    use truegrind::identification::tolerance::Tolerance;
-    use truegrind::kinematics::estimated::Estimated;
-    use truegrind::kinematics::model::Model;
-    use truegrind::kinematics::parameter::link_parameters;
-    use truegrind::measurement::dataset::Dataset;
-    use truegrind::measurement::{import, split};
+    use truegrind::arm::estimated::Estimated;
+    use truegrind::arm::model::Model;
+    use truegrind::arm::parameter::link_parameters;
+    use truegrind::calibration::identification::calibration::{Calibration, Weight};
+    use truegrind::calibration::identification::fit::{Start, fit, frame_parameters};
+    use truegrind::calibration::identification::identify::{Options, identify, observe};
+    use truegrind::calibration::identification::solver::SOLVERS;
+    use truegrind::calibration::identification::start::starts;
+    use truegrind::calibration::identification::tolerance::Tolerance;
+    use truegrind::calibration::measurement::dataset::Dataset;
+    use truegrind::calibration::measurement::{import, split};
+    use truegrind::papers::experiment::Experiment;
+    use truegrind::papers::simulated;
 
     fn nominal(name: &str) -> Result<Model, String> {
         truegrind::robots::load(name).map(|r| r.model).map_err(|e| e.to_string())
@@ -183,17 +183,17 @@ mod arm {
 }
 
 /// Every method on 100 cable rows of an arm, as the papers set it up: seconds of the whole search.
-#[divan::bench(args = truegrind::identification::solver::all().map(|s| s.name).collect::<Vec<_>>())]
+#[divan::bench(args = truegrind::calibration::identification::solver::all().map(|s| s.name).collect::<Vec<_>>())]
 fn method_on_100_cable_rows(bencher: Bencher<'_, '_>, name: &str) {
     let task = arm::cable(100);
-    let solver = truegrind::identification::solver::by_name(name).expect("in the list");
+    let solver = truegrind::calibration::identification::solver::by_name(name).expect("in the list");
     bencher.bench_local(|| solver.solve(&task, &[0.0; 24], 0));
 }
 
 /// One pose taken in by a track: process noise, linearisation, update.
 #[divan::bench(args = ["cable", "position", "pose"])]
 fn track_one_pose(bencher: Bencher<'_, '_>, sensor: &str) {
-    use truegrind::tracking::{Options, Tracker};
+    use truegrind::calibration::tracking::{Options, Tracker};
     let (model, dataset) = arm::measured(sensor);
     let mut tracker = Tracker::begin(&model, "bench", &dataset, &Options::default()).expect("placed");
     let task = tracker.prepare(&dataset);

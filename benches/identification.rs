@@ -8,14 +8,14 @@
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::model::{Joints, Model};
+use truegrind::arm::parameter::{Parameter, link_parameters};
+use truegrind::calibration::identification::calibration::{Calibration, Frames, Weight};
+use truegrind::calibration::identification::tolerance::Tolerance;
+use truegrind::calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind::estimation::least_squares::lm;
 use truegrind::estimation::problem::{Prior, Problem, prior_cost};
-use truegrind::identification::calibration::{Calibration, Frames, Weight};
-use truegrind::identification::tolerance::Tolerance;
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::model::{Joints, Model};
-use truegrind::kinematics::parameter::{Parameter, link_parameters};
-use truegrind::measurement::dataset::{Dataset, Reading, Row, Sensor};
 
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");

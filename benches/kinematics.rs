@@ -5,14 +5,14 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use nalgebra::{Matrix6, Vector3};
-use truegrind::kinematics::batch::{JointColumns, PoseColumns};
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::effect::Effect;
-use truegrind::kinematics::effect::compliance::Compliance;
-use truegrind::kinematics::effect::harmonic::Harmonic;
-use truegrind::kinematics::inverse::Inverse;
-use truegrind::kinematics::link::{Link, LinkModel};
-use truegrind::kinematics::model::{Body, Joints, Limits, Model};
+use truegrind::arm::batch::{JointColumns, PoseColumns};
+use truegrind::arm::condition::Condition;
+use truegrind::arm::effect::Effect;
+use truegrind::arm::effect::compliance::Compliance;
+use truegrind::arm::effect::harmonic::Harmonic;
+use truegrind::arm::inverse::Inverse;
+use truegrind::arm::link::{Link, LinkModel};
+use truegrind::arm::model::{Body, Joints, Limits, Model};
 use truegrind::math::se3::Pose;
 
 fn main() {

@@ -13,21 +13,21 @@ use divan::counter::BytesCount;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
+use truegrind::arm::model::Joints;
+use truegrind::arm::parameter::{Parameter, link_parameters};
+use truegrind::arm::region::Region;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::rewrite::{Options, plan};
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::estimated::{Estimated, Judgement, Provenance, StageErrors, Verdict};
-use truegrind::kinematics::model::Joints;
-use truegrind::kinematics::parameter::{Parameter, link_parameters};
-use truegrind::kinematics::region::Region;
 use truegrind::math::statistics::ErrorSummary;
 use truegrind::planning::toolpath::toolpath;
-use truegrind::program::motion::MotionKind;
-use truegrind::program::rapid::Task;
-use truegrind::program::rapid::lexer::lex;
-use truegrind::program::rapid::parser::parse;
-use truegrind::program::rapid::writer;
-use truegrind::program::rewrite::{Change, NewTarget, RewriteOptions, Rewritten};
+use truegrind::programs::motion::MotionKind;
+use truegrind::programs::rapid::Task;
+use truegrind::programs::rapid::lexer::lex;
+use truegrind::programs::rapid::parser::parse;
+use truegrind::programs::rapid::writer;
+use truegrind::programs::rewrite::{Change, NewTarget, RewriteOptions, Rewritten};
 
 fn main() {
     divan::main();
@@ -73,7 +73,7 @@ fn moved(task: &Task<'_>) -> Rewritten {
 
 /// A grinding path of so many MoveL: the cuts of the blade that ships with the project, over and over, inline.
 fn blade(moves: usize) -> (Vec<u8>, Vec<Joints>) {
-    let file = truegrind::surface::sample::BLADE.read().expect("ships with the project");
+    let file = truegrind::surfaces::sample::BLADE.read().expect("ships with the project");
     let nominal = truegrind::robots::load("abb-irb-120").expect("in the catalogue").model;
     let path = toolpath(&file, &nominal, "abb-irb-120").expect("is reached");
     let mut draft = path.draft.clone();

@@ -1,44 +1,156 @@
 //! truegrind learns how one real robot arm differs from its data sheet, names the causes, and rewrites RAPID and NC
 //! programs so that the real arm follows the intended path.
 //!
-//! Inside, lengths are millimetres and angles radians; degrees and other units live at the edges of files. A frame is
-//! named by what it takes to what: `base_from_flange * flange_from_tool` cancels. Three models of one arm are kept apart:
-//! *nominal* (the data sheet, what the controller computes with), *estimated* (nominal and everything identified) and
-//! *actual* (the real arm, known only in a simulation).
+//! Lengths are millimetres and angles radians; degrees and other units live at the edges of files. A frame is named by what
+//! it takes to what: `base_from_flange * flange_from_tool` cancels. Three models of one arm are kept apart: *nominal* (the
+//! data sheet, what the controller computes with), *estimated* (nominal and everything identified) and *actual* (the real
+//! arm, known only in a simulation).
+//!
+//! # From measurements to a corrected program
 //!
 //! ```
-//! use truegrind::kinematics::condition::Condition;
-//! use truegrind::kinematics::effect::Effect;
-//! use truegrind::kinematics::effect::harmonic::Harmonic;
-//! use truegrind::kinematics::model::Joints;
-//! use truegrind::robots;
+//! use truegrind::{
+//!     Cell, CompensateOptions, DiagnoseOptions, ImportOptions, NcSetup, Program, Tolerance, compensate, diagnose,
+//!     read_measurements, robots, starting_frames,
+//! };
 //!
-//! let nominal = robots::load("abb-irb-120")?.model;
-//! // The same arm with a gear of joint 1 that runs 0.05° out of centre.
-//! let mut real = nominal.clone();
-//! let sine_rad = 0.05_f64.to_radians();
-//! real.effects.push(Effect::GearEccentricity(Harmonic { joint: 0, order: 1.0, sine_rad, cosine_rad: 0.0 }));
-//! let joints = Joints::new(1.0, 0.2, -0.1, 0.0, 0.5, 0.0);
-//! let still = Condition::default();
-//! let off = nominal.forward(&joints, &still).translation.vector - real.forward(&joints, &still).translation.vector;
-//! assert!(off.norm() > 0.3 && off.norm() < 0.5, "the flange is {:.2} mm away", off.norm());
-//! # Ok::<(), truegrind::robots::RobotError>(())
+//! # let (csv, module): (&[u8], &[u8]) = (include_bytes!("../tests/data/irb120-rounded.csv"), include_bytes!("../programs/told.mod"));
+//! // What was measured, on which arm.
+//! let robot = robots::load("abb-irb-120")?;
+//! let rows = read_measurements("poses.csv", csv, &ImportOptions::default())?;
+//! // The arm that gives these readings, with the causes of what geometry does not explain.
+//! let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), true)?;
+//! let options = DiagnoseOptions::default();
+//! let found = diagnose(&rows, "abb-irb-120", &robot.model, &frames, &options, &|_| {})?;
+//! println!("held-out RMSE [mm]: {:.3}", found.diagnosis.fits.extended.cv_rmse_mm);
+//! // A program that this arm runs as it was meant.
+//! let program = Program::read(&[("blade.mod", module)], &NcSetup::default());
+//! let done = compensate(&program, &found.estimated, &Cell::default(), &CompensateOptions::default(), None)?;
+//! for (motion, outcome) in program.listing().motions.iter().zip(&done.plan.outcomes) {
+//!     println!("line {}: {:?}", motion.place.line, outcome.status);
+//! }
+//! let corrected: Vec<u8> = done.rewritten.files[0].edits.apply(module)?;
+//! # assert!(!corrected.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The modules in reading order: what is measured and moved ([`math`], [`kinematics`], [`program`], [`surface`],
-//! [`robots`], [`measurement`]), what is learnt from it ([`estimation`], [`identification`], [`diagnosis`],
-//! [`comparison`]), what is done with it ([`compensation`], [`planning`]), and how it is told ([`report`]).
+//! Whether a model may be used is in [`Estimated::verdict`]; why a motion stayed as it is, in its [`MotionOutcome`]. What the
+//! names below do not reach is in the crates, which stand here by their names: [`arm`], [`programs`], [`surfaces`],
+//! [`estimation`], [`calibration`], [`compensation`], [`planning`], [`report`], [`papers`], [`math`].
 
-pub use truegrind_arm as kinematics;
-pub use truegrind_arm::robots;
-pub use truegrind_calibration::{diagnosis, identification, measurement, tracking};
+// The arm.
+pub use truegrind_arm::arm_file::{ArmFile, LinkFile};
+pub use truegrind_arm::batch::{JointColumns, PoseColumns};
+pub use truegrind_arm::condition::Condition;
+pub use truegrind_arm::effect::backlash::Backlash;
+pub use truegrind_arm::effect::compliance::Compliance;
+pub use truegrind_arm::effect::coupling::Coupling;
+pub use truegrind_arm::effect::harmonic::Harmonic;
+pub use truegrind_arm::effect::load::{GravityLoad, Lump};
+pub use truegrind_arm::effect::map::JointMap;
+pub use truegrind_arm::effect::ratio::Ratio;
+pub use truegrind_arm::effect::smooth::Smooth;
+pub use truegrind_arm::effect::thermal::Thermal;
+pub use truegrind_arm::effect::{Effect, EffectParameter};
+pub use truegrind_arm::estimated::{
+    Estimated, EstimatedParameter, Judgement, Provenance, RidingPoint, StageErrors, Verdict,
+};
+pub use truegrind_arm::inverse::Inverse;
+pub use truegrind_arm::inverse::configuration::Configuration;
+pub use truegrind_arm::inverse::solution::{InverseError, Singularity, SingularityDistances, Solution};
+pub use truegrind_arm::link::{Link, LinkModel};
+pub use truegrind_arm::model::{Body, Joints, Limits, Model};
+pub use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+pub use truegrind_arm::region::{Outside, Region};
+pub use truegrind_arm::robots::{self, Robot, RobotError};
+pub use truegrind_math::se3::Pose;
+pub use truegrind_math::statistics::ErrorSummary;
+
+// What was measured.
+pub use truegrind_calibration::measurement::convention::AngleConvention;
+pub use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+pub use truegrind_calibration::measurement::import::{
+    ImportError, Options as ImportOptions, Place as ImportPlace, read as read_measurements,
+};
+pub use truegrind_calibration::measurement::plausibility::{UnitSuspicion, plausibility};
+pub use truegrind_calibration::measurement::sensor::disturbance::Disturbance;
+pub use truegrind_calibration::measurement::simulation::recipe::Recipe;
+pub use truegrind_calibration::measurement::simulation::{RecipeError, SimulatedRow, Simulation};
+pub use truegrind_calibration::measurement::split::{self, NoiseFloor, Split};
+
+// What it tells of the arm.
+pub use truegrind_calibration::diagnosis::cause::Cause;
+pub use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options as DiagnoseOptions, diagnose};
+pub use truegrind_calibration::diagnosis::finding::{
+    Alternative, Confidence, DiagnoseError, Diagnosis, Finding, Fits, FoundParameter, Gain, NotTestable,
+    Stage,
+};
+pub use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
+pub use truegrind_calibration::identification::identifiability::{Identifiability, identifiability};
+pub use truegrind_calibration::identification::identify::{
+    Identification, IdentifyError, Options as IdentifyOptions, identify, observe,
+};
+pub use truegrind_calibration::identification::register::{Registered, register, starting_frames};
+pub use truegrind_calibration::identification::solver::{Solver, by_name as solver_by_name};
+pub use truegrind_calibration::identification::start::NoStart;
+pub use truegrind_calibration::identification::tolerance::Tolerance;
+pub use truegrind_calibration::tracking::{
+    Alarm, Options as TrackOptions, State as TrackState, TrackError, Tracker,
+};
+
+// Solvers, for any problem.
+pub use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
+pub use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
+
+// Programs.
+pub use truegrind_programs::draft::{Draft, Step};
+pub use truegrind_programs::edit::{EditError, Edits};
+pub use truegrind_programs::motion::{
+    Frame as ProgramFrame, JointTarget, Listing, Mark, Motion, MotionKind, MotionTarget, OpaqueRegion, Place,
+    RobTarget, Role, Speed, Tool, WorkObject, Zone,
+};
+pub use truegrind_programs::nc::dialect::Dialect as NcDialect;
+pub use truegrind_programs::nc::orientation::Angles as NcAngles;
+pub use truegrind_programs::nc::setup::Setup as NcSetup;
+pub use truegrind_programs::nc::writer::write as write_nc;
+pub use truegrind_programs::rapid::writer::write as write_rapid;
+pub use truegrind_programs::reading::{Language, Program};
+pub use truegrind_programs::rewrite::{Change, FileEdits, NewTarget, Outcome, RewriteOptions, Rewritten};
+
+// Surfaces, and paths over them.
+pub use truegrind_planning::poses::{
+    Options as PosesOptions, Plan as PosesPlan, PlanError, Wanted as PosesWanted, plan as plan_poses,
+};
+pub use truegrind_planning::taught_cell::taught_cell;
+pub use truegrind_planning::toolpath::{Toolpath, ToolpathError, toolpath};
+pub use truegrind_surfaces::{Contact, Domain, Mesh, Surface, SurfaceFile};
+
+// What is corrected, and by how much.
+pub use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin, Teaches};
+pub use truegrind_compensation::compensate::{CompensateError, Compensated, compensate};
+pub use truegrind_compensation::cut::Cuts;
+pub use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
+pub use truegrind_compensation::rewrite::{
+    Circles, Emit, MotionOutcome, Options as CompensateOptions, Plan as CompensatePlan,
+};
+pub use truegrind_compensation::verify::{Acting, Judged, judge};
+pub use truegrind_compensation::why::Why;
+
+// How it is told.
+pub use truegrind_report::document::{Block, Document, Figure};
+pub use truegrind_report::format;
+pub use truegrind_report::table::{Column, Table};
+
+// The crates, by their names.
+pub use truegrind_arm as arm;
+pub use truegrind_calibration as calibration;
 pub use truegrind_compensation as compensation;
 pub use truegrind_estimation as estimation;
 pub use truegrind_math as math;
-pub use truegrind_papers as comparison;
+pub use truegrind_papers as papers;
 #[cfg(feature = "visual")]
-pub use truegrind_pictures as visual;
+pub use truegrind_pictures as pictures;
 pub use truegrind_planning as planning;
-pub use truegrind_programs as program;
+pub use truegrind_programs as programs;
 pub use truegrind_report as report;
-pub use truegrind_surfaces as surface;
+pub use truegrind_surfaces as surfaces;

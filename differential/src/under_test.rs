@@ -3,16 +3,16 @@
 use std::ops::Range;
 
 use nalgebra::Point3;
+use truegrind::arm::estimated::Estimated;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::{CompensateError, Compensated, compensate};
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::rewrite::{self, Circles, Emit};
-use truegrind::kinematics::estimated::Estimated;
-use truegrind::program::motion::Mark;
-use truegrind::program::nc::setup::Setup;
-use truegrind::program::reading::Program;
+use truegrind::programs::motion::Mark;
+use truegrind::programs::nc::setup::Setup;
+use truegrind::programs::reading::Program;
 
 use crate::model::Case;
 
@@ -133,7 +133,7 @@ pub fn corrected_task(
     let estimated = Estimated::from_toml(&case.model_toml)?;
     let cell = Cell::from_toml(cell)?;
     let mut setup = Setup::default();
-    let frame = |p: truegrind::math::se3::Pose| truegrind::program::motion::Frame::from_pose(&p);
+    let frame = |p: truegrind::math::se3::Pose| truegrind::programs::motion::Frame::from_pose(&p);
     setup.tools.extend(cell.tool.iter().filter_map(|f| Some((f.name.clone(), frame(f.pose()?)))));
     setup.frames.extend(cell.wobj.iter().filter_map(|f| Some((f.name.clone(), frame(f.pose()?)))));
     let program = Program::read(files, &setup);
@@ -200,7 +200,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
 }
 
 /// Where edits stand in the old and in the new bytes.
-fn placed(edits: &truegrind::program::edit::Edits) -> Vec<Edit> {
+fn placed(edits: &truegrind::programs::edit::Edits) -> Vec<Edit> {
     let mut list: Vec<(Range<usize>, usize)> =
         edits.iter().map(|(range, text)| (range, text.len())).collect();
     list.sort_by_key(|(range, _)| (range.start, range.end));

@@ -5,27 +5,27 @@ mod workbook;
 
 use std::sync::LazyLock;
 
-use truegrind::comparison::experiment::Experiment;
+use truegrind::papers::experiment::Experiment;
 use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::Options as Bounds;
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::estimated::Estimated;
-use truegrind::kinematics::model::Joints;
-use truegrind::measurement::simulation::recipe::Recipe;
-use truegrind::program::rapid::task_list;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::Estimated;
+use truegrind::arm::model::Joints;
+use truegrind::calibration::measurement::simulation::recipe::Recipe;
+use truegrind::programs::rapid::task_list;
 use truegrind::robots;
-use truegrind::surface::mesh::{Mesh, MeshOptions};
+use truegrind::surfaces::mesh::{Mesh, MeshOptions};
 
-use truegrind::measurement::import::{self, Options};
-use truegrind::program::diff::unified;
-use truegrind::program::motion::{Mark, MotionKind, Role, TargetValue};
-use truegrind::program::nc::setup::Setup;
-use truegrind::program::reading::Program;
-use truegrind::program::rewrite::{Change, Extra, NewTarget, RewriteOptions};
-use truegrind::program::{nc, rapid};
-use truegrind::surface::SurfaceFile;
+use truegrind::calibration::measurement::import::{self, Options};
+use truegrind::programs::diff::unified;
+use truegrind::programs::motion::{Mark, MotionKind, Role, TargetValue};
+use truegrind::programs::nc::setup::Setup;
+use truegrind::programs::reading::Program;
+use truegrind::programs::rewrite::{Change, Extra, NewTarget, RewriteOptions};
+use truegrind::programs::{nc, rapid};
+use truegrind::surfaces::SurfaceFile;
 
 /// Every target that is known, moved and turned a little; every third stays. Every other circle becomes straight pieces.
 fn changes(program: &Program<'_>) -> Vec<Change> {

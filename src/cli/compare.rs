@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use truegrind::comparison::experiment::{Experiment, Kind};
-use truegrind::comparison::grinding::Actual;
-use truegrind::comparison::protocol::Options;
-use truegrind::comparison::views::{self as view, Origin};
-use truegrind::comparison::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
-use truegrind::kinematics::model::Model;
-use truegrind::measurement::dataset::Dataset;
+use truegrind::arm::model::Model;
+use truegrind::calibration::measurement::dataset::Dataset;
+use truegrind::papers::experiment::{Experiment, Kind};
+use truegrind::papers::grinding::Actual;
+use truegrind::papers::protocol::Options;
+use truegrind::papers::views::{self as view, Origin};
+use truegrind::papers::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
 use truegrind::report::format;
 
 use super::files::{self, Batch};

@@ -7,27 +7,26 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::Estimated;
+use truegrind::calibration::diagnosis;
+use truegrind::calibration::identification::identify::{Identification, Options};
+use truegrind::calibration::identification::solver::SOLVERS;
+use truegrind::calibration::measurement::import;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::rewrite::Options as RewriteBounds;
 use truegrind::compensation::verify::{Acting, Judged, judge};
-use truegrind::diagnosis;
-use truegrind::identification::identify::{Identification, Options};
-use truegrind::identification::solver::SOLVERS;
-use truegrind::identification::tolerance::Tolerance;
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::estimated::Estimated;
-use truegrind::measurement::import;
 use truegrind::planning::taught_cell::taught_cell;
 use truegrind::planning::toolpath::toolpath;
-use truegrind::program::motion::Mark;
-use truegrind::program::rapid::{Task, writer};
-use truegrind::program::reading::Program;
+use truegrind::programs::motion::Mark;
+use truegrind::programs::rapid::{Task, writer};
+use truegrind::programs::reading::Program;
 use truegrind::report::document::Document;
 use truegrind::report::{
     deviation as deviation_view, diagnosis as diagnosis_view, format, identification as identification_view,
 };
-use truegrind::surface::sample;
+use truegrind::surfaces::sample;
 
 use super::files::{self, Batch};
 use super::outputs::{say, width};
@@ -72,16 +71,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let simulation = simulate::simulation(RECIPE, "irb120-cable.toml", None)?;
     let mut found: Vec<Identification> = Vec::new();
     for solver in SOLVERS {
-        let options = Options {
-            tolerance: Tolerance::default(),
-            solver,
-            held_out: 0.2,
-            seed,
-            sharpen: true,
-            limit_rmse_mm: None,
-            limit_max_mm: None,
-            stated_frames: None,
-        };
+        let options = Options { solver, seed, ..Options::default() };
         found.push(identify::identified(&dataset, &robot.sheet.name, nominal, &options)?);
     }
 

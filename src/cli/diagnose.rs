@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use truegrind::diagnosis::diagnose::{Diagnosed, Options, diagnose};
-use truegrind::diagnosis::transfer::transfer;
-use truegrind::identification::register::starting_frames;
-use truegrind::kinematics::model::Model;
-use truegrind::measurement::dataset::Dataset;
+use truegrind::arm::model::Model;
+use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind::calibration::diagnosis::transfer::transfer;
+use truegrind::calibration::identification::register::starting_frames;
+use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
 
 use super::files::Batch;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use sha2::{Digest, Sha256};
-use truegrind::kinematics::estimated::{Estimated, Judgement};
-use truegrind::kinematics::model::Model;
+use truegrind::arm::estimated::{Estimated, Judgement};
+use truegrind::arm::model::Model;
 use truegrind::robots::{self, Robot};
 
 use super::files;

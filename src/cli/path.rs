@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::planning::toolpath::{Toolpath, toolpath};
-use truegrind::program::nc;
-use truegrind::program::nc::dialect::Dialect;
-use truegrind::program::nc::orientation::Angles;
-use truegrind::program::rapid::writer;
+use truegrind::programs::nc;
+use truegrind::programs::nc::dialect::Dialect;
+use truegrind::programs::nc::orientation::Angles;
+use truegrind::programs::rapid::writer;
 use truegrind::robots::Robot;
-use truegrind::surface::SurfaceFile;
+use truegrind::surfaces::SurfaceFile;
 
 use super::files::{self, Batch};
 use super::outputs::tell;

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
-use truegrind::measurement::dataset::Sensor;
+use truegrind::calibration::measurement::dataset::Sensor;
 use truegrind::planning::poses::candidate::Bounds;
 use truegrind::planning::poses::design::Index;
 use truegrind::planning::poses::drive::{Drive, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
 use truegrind::planning::poses::{Options, Wanted, plan, rival};
-use truegrind::program::rapid::writer;
+use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
 use super::files::{self, Batch};

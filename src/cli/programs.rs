@@ -6,11 +6,11 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use truegrind::compensation::cell::{Cell, CellFrame};
-use truegrind::program::motion::Frame;
-use truegrind::program::nc::orientation::Angles;
-use truegrind::program::nc::setup::Setup;
-use truegrind::program::rapid::task_list;
-use truegrind::program::reading::{Language, Program};
+use truegrind::programs::motion::Frame;
+use truegrind::programs::nc::orientation::Angles;
+use truegrind::programs::nc::setup::Setup;
+use truegrind::programs::rapid::task_list;
+use truegrind::programs::reading::{Language, Program};
 use truegrind::robots::sheet::Orientation;
 
 use super::outputs::tell;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use truegrind::kinematics::arm_file::ArmFile;
-use truegrind::kinematics::model::Model;
-use truegrind::measurement::simulation::Simulation;
-use truegrind::measurement::simulation::recipe::Recipe;
+use truegrind::arm::arm_file::ArmFile;
+use truegrind::arm::model::Model;
+use truegrind::calibration::measurement::simulation::Simulation;
+use truegrind::calibration::measurement::simulation::recipe::Recipe;
 
 use super::files::{self, Batch};
 use super::outputs::tell;

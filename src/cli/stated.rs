@@ -3,9 +3,9 @@
 use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use truegrind::identification::calibration::Frames;
+use truegrind::calibration::identification::calibration::Frames;
+use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind::math::se3::Pose;
-use truegrind::measurement::dataset::{Dataset, Sensor};
 
 /// Where the sensor stands, if that is known. An identification uses it for the raw error alone: the fit finds frames by
 /// itself.

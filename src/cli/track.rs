@@ -6,15 +6,15 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use truegrind::kinematics::estimated::Estimated;
-use truegrind::measurement::convention::AngleConvention;
-use truegrind::measurement::dataset::Dataset;
-use truegrind::measurement::import;
-use truegrind::measurement::plausibility::{Evidence, plausibility};
+use truegrind::arm::estimated::Estimated;
+use truegrind::calibration::measurement::convention::AngleConvention;
+use truegrind::calibration::measurement::dataset::Dataset;
+use truegrind::calibration::measurement::import;
+use truegrind::calibration::measurement::plausibility::{Evidence, plausibility};
+use truegrind::calibration::tracking::state::Consumed;
+use truegrind::calibration::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
-use truegrind::tracking::state::Consumed;
-use truegrind::tracking::{Alarm, Options, State, TrackError, Tracker, first_poses};
 
 use super::defect::isolated;
 use super::files::{self, Batch};

@@ -4,24 +4,24 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::Estimated;
+use truegrind::arm::model::{Joints, Model};
+use truegrind::calibration::diagnosis::diagnose::Diagnosed;
+use truegrind::calibration::identification::fit::{Start, errors_on, fit, frame_parameters};
+use truegrind::calibration::identification::identify::{Identification, Options, observe};
+use truegrind::calibration::identification::register::starting_frames;
+use truegrind::calibration::identification::solver::SOLVERS;
+use truegrind::calibration::identification::tolerance::Tolerance;
+use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use truegrind::compensation::verify::{Acting, Judged, judge};
-use truegrind::diagnosis::diagnose::Diagnosed;
-use truegrind::identification::fit::{Start, errors_on, fit, frame_parameters};
-use truegrind::identification::identify::{Identification, Options, observe};
-use truegrind::identification::register::starting_frames;
-use truegrind::identification::solver::SOLVERS;
-use truegrind::identification::tolerance::Tolerance;
-use truegrind::kinematics::condition::Condition;
-use truegrind::kinematics::estimated::Estimated;
-use truegrind::kinematics::model::{Joints, Model};
 use truegrind::math::se3::Pose;
-use truegrind::measurement::dataset::Dataset;
-use truegrind::program::motion::MotionKind;
-use truegrind::program::reading::Language;
-use truegrind::surface::SurfaceFile;
-use truegrind::visual::measured::Residuals;
-use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
+use truegrind::pictures::measured::Residuals;
+use truegrind::pictures::{self, MeasuredScene, PathScene, Recording, Workpiece};
+use truegrind::programs::motion::MotionKind;
+use truegrind::programs::reading::Language;
+use truegrind::surfaces::SurfaceFile;
 
 use super::compensate::{CellArguments, agreed};
 use super::files::{self, Batch};
@@ -75,7 +75,7 @@ fn kind(path: &Path) -> anyhow::Result<Kind> {
             let text = files::read_text(path)?;
             let table: toml::Table = text.parse().map_err(|e| anyhow!("{}: no TOML: {e}", path.display()))?;
             let schema = table.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
-            if schema != truegrind::kinematics::estimated::SCHEMA {
+            if schema != truegrind::arm::estimated::SCHEMA {
                 bail!(
                     "{}: no model file; of TOML files only those that `truegrind identify -o` wrote can be shown (a \
                      surface: make its program with `truegrind path`)",
@@ -179,7 +179,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     };
     let Some((name, arm)) = stated else {
         let found = identify::identified(&dataset, &robot.sheet.name, &robot.model, &options)?;
-        return Ok(visual::dataset_recording(&dataset, &found)?);
+        return Ok(pictures::dataset_recording(&dataset, &found)?);
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
     let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
@@ -198,7 +198,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         residuals.push(Residuals { stage, rows });
         registered = Some(fitted.frames);
     }
-    Ok(visual::measured_recording(&MeasuredScene {
+    Ok(pictures::measured_recording(&MeasuredScene {
         dataset: &dataset,
         arm: &arm.model,
         arm_is: &format!("{} as estimated in {name}", arm.robot),
@@ -263,7 +263,7 @@ fn model(file: &Path) -> anyhow::Result<Recording> {
         reports: std::slice::from_ref(&report),
         workpiece: None,
     };
-    Ok(visual::path_recording(&scene)?)
+    Ok(pictures::path_recording(&scene)?)
 }
 
 /// Programs of one task: where an estimated arm goes with them, or the nominal one.
@@ -330,15 +330,15 @@ fn recording(
         base_from_object: surface.work_object.base_from_work_object,
     });
     let scene = PathScene { title, arm, arm_is, condition, reports, workpiece };
-    Ok(visual::path_recording(&scene)?)
+    Ok(pictures::path_recording(&scene)?)
 }
 
 /// The recording of an identification.
 pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(visual::dataset_recording(dataset, found)?.rrd()?)
+    Ok(pictures::dataset_recording(dataset, found)?.rrd()?)
 }
 
 /// The recording of a diagnosis.
 pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(visual::diagnosis_recording(dataset, found)?.rrd()?)
+    Ok(pictures::diagnosis_recording(dataset, found)?.rrd()?)
 }

@@ -395,10 +395,9 @@ fn outliers_are_found_listed_and_do_no_harm() {
         let model = format!("{name}.toml");
         let (code, _, err) = truegrind(at, &["identify", name, "--robot", "abb-irb-120", "-o", &model]);
         assert_eq!(code, 0, "{err}");
-        let arm = truegrind::kinematics::estimated::Estimated::from_toml(
-            &fs::read_to_string(at.join(&model)).unwrap(),
-        )
-        .unwrap();
+        let arm =
+            truegrind::arm::estimated::Estimated::from_toml(&fs::read_to_string(at.join(&model)).unwrap())
+                .unwrap();
         (arm.geometry.held_out.rmse, arm.provenance.set_aside)
     };
     let (clean, none) = rmse("clean.csv", CABLE);
@@ -434,7 +433,7 @@ fn stated_frames_make_the_raw_error_a_number() {
         ["--outlet", "742.6,183.4,38.9", "--cable-zero", "17.35", "--touched-point", "11.8,-6.4,41.7"];
     let found = raw_rmse(at, "cable.csv", &stated);
     let nominal = truegrind::robots::load("abb-irb-120").unwrap().model;
-    let still = truegrind::kinematics::condition::Condition::default();
+    let still = truegrind::arm::condition::Condition::default();
     let number = |cell: &str| cell.parse::<f64>().unwrap();
     let header: Vec<&str> = CABLE.lines().next().unwrap().split(',').collect();
     let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
@@ -443,7 +442,7 @@ fn stated_frames_make_the_raw_error_a_number() {
         .skip(1)
         .map(|line| {
             let cells: Vec<&str> = line.split(',').collect();
-            let q = truegrind::kinematics::model::Joints::from_fn(|i, _| {
+            let q = truegrind::arm::model::Joints::from_fn(|i, _| {
                 number(cells[place(&format!("q{}", i + 1))]).to_radians()
             });
             let hook = nominal.forward(&q, &still) * nalgebra::Point3::new(11.8, -6.4, 41.7);

@@ -6,14 +6,14 @@
 //! others, so that a spelling mistake does not count as use.
 
 use toml::{Table, Value};
+use truegrind::arm::arm_file::ArmFile;
+use truegrind::calibration::measurement::simulation::recipe::Recipe;
 use truegrind::compensation::cell::Cell;
-use truegrind::kinematics::arm_file::ArmFile;
-use truegrind::measurement::simulation::recipe::Recipe;
 use truegrind::planning::toolpath::toolpath;
-use truegrind::program::rapid::writer;
+use truegrind::programs::rapid::writer;
 use truegrind::report::format::markdown;
 use truegrind::report::robots as view;
-use truegrind::surface::{SurfaceFile, sample};
+use truegrind::surfaces::{SurfaceFile, sample};
 use truegrind_testing::keys::unread;
 
 #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use nalgebra::Vector3;
 use tempfile::TempDir;
-use truegrind::kinematics::estimated::Estimated;
+use truegrind::arm::estimated::Estimated;
 
 const CABLE: &str = include_str!("../data/irb120-cable.csv");
 

@@ -224,7 +224,7 @@ fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
         follower.wait().unwrap();
         // Whatever is there is whole.
         if let Ok(state) = fs::read_to_string(at.join("out/model.track.toml")) {
-            assert!(truegrind::tracking::State::from_toml(&state).is_ok());
+            assert!(truegrind::calibration::tracking::State::from_toml(&state).is_ok());
         }
     }
     assert_eq!(written, 151);
@@ -239,7 +239,7 @@ fn a_track_that_is_killed_again_and_again_ends_in_the_same_bits() {
     assert_eq!(of("out", "model-20260505-000150.toml"), of("whole", "model-20260505-000150.toml"));
     // Every model that was written is a model.
     for name in names(&at.join("out")).iter().filter(|n| !n.starts_with('.') && n.starts_with("model-")) {
-        assert!(truegrind::kinematics::estimated::Estimated::from_toml(&of("out", name)).is_ok(), "{name}");
+        assert!(truegrind::arm::estimated::Estimated::from_toml(&of("out", name)).is_ok(), "{name}");
     }
 }
 

@@ -13,7 +13,7 @@ use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{
     AngleCovariance, NotSharpened, Sharpening, logged_covariance, sharpen,
 };
-use crate::identification::solver::{Family, Solver};
+use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::Hearing;
@@ -47,6 +47,22 @@ pub struct Options {
     pub limit_max_mm: Option<f64>,
     /// Frames that were measured by other means; then raw errors exist.
     pub stated_frames: Option<Frames>,
+}
+
+impl Default for Options {
+    /// Levenberg–Marquardt with ordinary tolerances; a fifth of the rows is held out.
+    fn default() -> Self {
+        Self {
+            tolerance: Tolerance::default(),
+            solver: &SOLVERS[0],
+            held_out: 0.2,
+            seed: 0,
+            sharpen: true,
+            limit_rmse_mm: None,
+            limit_max_mm: None,
+            stated_frames: None,
+        }
+    }
 }
 
 /// Why nothing could be fitted.
@@ -260,7 +276,7 @@ pub fn identify(
 impl Options {
     /// Frames are always registered soundly, so that methods differ in geometry alone.
     fn solver_for_frames(&self) -> &'static Solver {
-        &super::solver::SOLVERS[0]
+        &SOLVERS[0]
     }
 }
 

@@ -1,5 +1,7 @@
 //! NC programs: reading loses nothing, what holds in each block is followed, rewriting writes what is wanted.
 
+use std::path::Path;
+
 use proptest::prelude::*;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Origin, Reason, RobTarget, Role, TargetValue};
 use truegrind_programs::nc::dialect::Dialect;
@@ -51,7 +53,8 @@ fn every_sample_comes_back_and_is_listed_as_expected() {
         let task = read(name, bytes);
         assert_eq!(task.trees[0].print(), *bytes, "{name}");
         let found = format!("{}\n{}", task.dialects[0].text(), told(&task.listing, &task.names));
-        let path = root().join("tests/it/program/listings").join(format!("{name}.txt"));
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/listings").join(format!("{name}.txt"));
         if update {
             std::fs::write(&path, &found).unwrap();
         }

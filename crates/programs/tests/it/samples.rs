@@ -1,5 +1,5 @@
 //! Every sample of `programs/`: it comes back byte for byte, and its motions are listed as
-//! `tests/it/program/listings/` says. With `TRUEGRIND_UPDATE_LISTINGS=1` the listings are written anew.
+//! `listings/` says. With `TRUEGRIND_UPDATE_LISTINGS=1` the listings are written anew.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -128,7 +128,8 @@ fn every_sample_comes_back_and_is_listed_as_expected() {
             assert_eq!(tree.print(), *bytes, "{name}");
         }
         let found = told(&task.listing, &task.names);
-        let path = root().join("tests/it/program/listings").join(format!("{name}.txt"));
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/listings").join(format!("{name}.txt"));
         if update {
             std::fs::write(&path, &found).unwrap();
         }
