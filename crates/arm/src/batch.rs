@@ -6,7 +6,8 @@
 //! Checked against: [`Posed::forward`], row by row.
 
 use super::chain::{End, end};
-use super::model::{Joints, Posed};
+use super::model::Posed;
+use crate::joints::Joints;
 use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 

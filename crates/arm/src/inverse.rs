@@ -12,6 +12,7 @@ pub mod solution;
 pub mod configuration;
 pub mod newton;
 mod axes;
+mod seed;
 mod spherical;
 mod ur;
 mod structure;
@@ -29,7 +30,8 @@ use self::newton::{Goal, Outcome};
 use self::structure::Structure;
 use super::chain::End;
 use super::condition::Condition;
-use super::model::{Joints, Limits, Model, Posed};
+use super::model::{Model, Posed};
+use crate::joints::{Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 

@@ -10,8 +10,9 @@
 use nalgebra::{Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::chain::{Chain, cross, minus};
-use super::model::{Joints, Posed};
+use super::model::Posed;
 use super::parameter::{LinkCoordinate, Parameter};
+use crate::joints::Joints;
 use truegrind_math::se3::{Pose, left_jacobian, pose_from_vector};
 
 fn turning(axis: &[f64; 3], through: &[f64; 3], point: &[f64; 3]) -> Vector6<f64> {

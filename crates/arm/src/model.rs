@@ -1,7 +1,6 @@
 //! An arm: links, joint map, limits, masses, effects, and the forward map from logged joints to the flange.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Matrix6, Vector3};
 
 use super::chain::{self, Chain, LinkTable};
 use super::condition::Condition;
@@ -10,36 +9,8 @@ use super::link::Link;
 use truegrind_math::lanes::{Real, SinCos, sin_cos};
 use truegrind_math::se3::Pose;
 
-/// Joint angles of the controller (rad).
-pub type Joints = Vector6<f64>;
-
-/// Range and speed of the joints, in the controller's angles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
-    /// Lowest angle (rad).
-    pub min_rad: [f64; 6],
-    /// Highest angle (rad).
-    pub max_rad: [f64; 6],
-    /// Highest speed [rad/s], where published.
-    pub speed_rad_s: Option<[f64; 6]>,
-}
-
-impl Limits {
-    /// The first joint (0-based) outside its range, if any.
-    pub fn violated(&self, q: &Joints) -> Option<usize> {
-        (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
-    }
-}
-
-/// Mass of one link.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Body {
-    /// Mass (kg).
-    pub mass_kg: f64,
-    /// Centre of mass in the frame at the end of the link (mm).
-    pub centre_mm: [f64; 3],
-}
+pub use super::body::Body;
+pub use super::joints::{Joints, Limits};
 
 /// A six-axis arm. See the chapter page for the order of the parts.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,9 +43,15 @@ impl Model {
             model: self,
             condition: *condition,
             tables: chain::tables(&self.links_under(condition)),
-            statics: (!self.effects.is_empty()).then(|| Statics::of(self)),
+            statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
         }
+    }
+
+    /// Statics of the arm: its links as they are, without joint effects (their share in the torque is of second
+    /// order), massless where masses are unknown (only the payload then counts).
+    pub fn statics(&self) -> Statics {
+        Statics::new(&self.links, self.bodies, self.gravity)
     }
 
     /// The links under a condition: grown by whatever effect changes lengths.

@@ -10,10 +10,11 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, GRAVITY, Statics};
 use crate::chain::{Chain, cross, dot, minus};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::{GRAVITY, Statics};
+use crate::joints::Joints;
 use truegrind_math::lanes::{Real, SinCos};
 
 /// One lump.

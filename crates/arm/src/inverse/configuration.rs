@@ -28,7 +28,8 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::{Branch, Structure};
 use crate::condition::Condition;
-use crate::model::{Joints, Model};
+use crate::joints::Joints;
+use crate::model::Model;
 
 /// RAPID's `confdata`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]

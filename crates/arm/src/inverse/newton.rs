@@ -12,7 +12,8 @@ use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
 use crate::chain::Chain;
 use crate::jacobian::{joint_jacobian, link_twist};
-use crate::model::{Joints, Posed};
+use crate::joints::Joints;
+use crate::model::Posed;
 use crate::parameter::LinkCoordinate;
 use truegrind_math::se3::Pose;
 

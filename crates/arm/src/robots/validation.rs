@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::RobotError;
+use super::error::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
 use crate::bounds::{
     self, Bound, DIRECTION, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, SPEED_DEG_S, TWIST_DEG, Unfit,

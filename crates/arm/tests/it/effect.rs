@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Vector3};
 use truegrind_arm::chain::tables;
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::effect::{Effect, Statics};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::difference::jacobian;
 use truegrind_math::lanes::{Lanes, WIDTH};
@@ -31,7 +31,7 @@ fn assert_near(a: &Matrix6<f64>, b: &Matrix6<f64>, tolerance: f64, what: &str) {
 fn torque_is_the_negative_gradient_of_the_potential_energy() {
     for sheet in SHEETS {
         let model = heavy(sheet, 41);
-        let statics = Statics::of(&model);
+        let statics = model.statics();
         let condition = condition();
         let bodies = model.bodies.unwrap();
         // Height of every mass against gravity, summed up from the link poses: nothing of the torque's own code.
@@ -77,7 +77,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
 #[test]
 fn every_slope_has_a_numerical_twin() {
     let model = heavy(&SHEETS[0], 43);
-    let statics = Statics::of(&model);
+    let statics = model.statics();
     let condition = condition();
     let mut random = generator(44);
     for _ in 0..10 {
@@ -118,7 +118,7 @@ fn rotation_slopes_count_couplings_and_effects() {
 #[test]
 fn an_effect_is_the_sum_of_its_regressors() {
     let model = heavy(&SHEETS[3], 47);
-    let statics = Statics::of(&model);
+    let statics = model.statics();
     let condition = Condition { approach: [1, 0, -1, 0, 0, 1], ..condition() };
     let mut effects = model.effects.clone();
     effects.push(Effect::Backlash(Backlash { joint: 2, play_rad: 1e-3 }));

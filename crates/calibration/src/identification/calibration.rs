@@ -26,7 +26,6 @@ use rayon::prelude::*;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::effect::Statics;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
@@ -648,7 +647,7 @@ impl Columns {
 /// Torque about each joint of 1 kg at the flange, for every row (N m).
 pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
-    let statics = Statics::of(&bare);
+    let statics = bare.statics();
     let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
     dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
 }
