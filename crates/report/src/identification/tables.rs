@@ -1,6 +1,7 @@
 //! Tables of an identification.
 
-use super::{cell, handy, held_by_prior, is_of_arm, row_number, signed};
+use super::parameter::{handy, held_by_prior, is_of_arm};
+use super::row::{row_number, signed};
 use crate::status::Status;
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::estimated::EstimatedParameter;
@@ -300,4 +301,9 @@ pub fn observability_table(report: &Identifiability) -> Table {
         }
     ));
     table
+}
+
+/// A figure that has a meaning only for some sensors or counts.
+fn cell(value: f64, meaningful: bool) -> Cell {
+    if meaningful { value.into() } else { Cell::Missing }
 }
