@@ -6,9 +6,9 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Wanted;
-use super::rows;
+use super::blank::blank;
 use super::sight::clearance_mm;
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
@@ -153,7 +153,7 @@ pub(super) fn rows(candidates: &[Candidate]) -> Vec<Row> {
         .iter()
         .enumerate()
         .map(|(number, candidate)| {
-            let mut row = rows::blank(number, candidate.joints, Sensor::Cable);
+            let mut row = blank(number, candidate.joints, Sensor::Cable);
             row.anchor = candidate.anchor;
             row
         })

@@ -10,9 +10,10 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use super::options::Options;
 use super::rival::{Suspect, coupling, effects_of, harmonic, thermal};
-use super::rows::jacobian;
-use super::{Options, Wanted};
+use super::rows::{jacobian, rig};
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
@@ -232,7 +233,7 @@ fn of_sensor(
 
 /// What a relative error of the sensor's lengths adds to each whitened reading, and the longest reading (mm).
 fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options) -> (DMatrix<f64>, f64) {
-    let rig = super::rows::rig(wanted);
+    let rig = rig(wanted);
     let posed = wanted.nominal.under(&Condition::default());
     let mut column = DMatrix::zeros(per * rows.len(), 1);
     let mut longest = 0.0_f64;
