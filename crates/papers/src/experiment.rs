@@ -34,7 +34,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::degradation::Degradation;
+use crate::degradation::settings::Degradation;
 use truegrind_calibration::identification::solver::{self, Solver};
 
 /// An experiment.

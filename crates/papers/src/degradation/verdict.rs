@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::{Journey, Way};
+use super::journey::{Journey, Way};
 use crate::statistics::{holm, signed_rank};
 use crate::verdict::LEVEL;
 

@@ -1,9 +1,11 @@
 //! An arm that degrades: periodic against continuous calibration. Every table says that it is simulated.
 
 mod figures;
+mod series;
 
 use serde_json::{Value, json};
 
+use self::series::{SIMULATED, after_of, pose_counts};
 use super::words;
 use crate::degradation::{DegradationResult, Journey, Outcome, PaperStatement, Step, Way};
 use truegrind_math::statistics::mean_and_deviation;
@@ -11,8 +13,6 @@ use truegrind_report::document::{Block, Document, Verdict};
 use truegrind_report::number::Precision;
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
-
-const SIMULATED: &str = "simulated degradation";
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, result: &DegradationResult) {
@@ -45,17 +45,6 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: boo
         page.heading(2, "Time saved");
         page.push(times(result));
     }
-}
-
-/// Pose counts of the journeys, each once.
-fn pose_counts(result: &DegradationResult) -> Vec<usize> {
-    let mut counts: Vec<usize> = result.journeys.iter().map(|j| j.count).collect();
-    counts.dedup();
-    counts
-}
-
-fn after_of(step: &Step) -> f64 {
-    step.verification_after_mm
 }
 
 fn journey(result: &DegradationResult, way: Way, count: usize) -> Option<&Journey> {

@@ -1,6 +1,6 @@
 //! The pictures of an arm that degrades: the paper's Figs 4, 7 and 9 to 14, each with what it leaves out.
 
-use super::{SIMULATED, after_of};
+use super::series::{SIMULATED, after_of, pose_counts};
 use crate::degradation::{Count, DegradationResult, Journey, Step};
 use truegrind_report::document::{Block, Document, Figure};
 use truegrind_report::plot::{Axis, Graph, Reference, Series};
@@ -43,7 +43,7 @@ pub(super) fn counts(page: &mut Document, result: &DegradationResult) {
 
 /// All ways side by side, one picture for each count.
 pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
-    for count in super::pose_counts(result) {
+    for count in pose_counts(result) {
         let series = result
             .journeys
             .iter()
