@@ -21,11 +21,14 @@ use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::{Outputs, say, tell, tell_lines, width};
+use super::inputs;
+use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::StatedArguments;
-use super::{Common, Ending, inputs, on_threads};
+use super::terminal::{say, tell, tell_lines, width};
 
 /// Whether logged angles are the controller's or already hold the DH offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -132,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::view::identification(&found, &dataset)?);
+        batch.add(path, super::recording::identification(&found, &dataset)?);
     }
     if let Some(splits) = arguments.compare_methods {
         let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));

@@ -8,9 +8,10 @@ use truegrind::kinematics::model::Model;
 use truegrind::measurement::simulation::Simulation;
 use truegrind::measurement::simulation::recipe::Recipe;
 
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::tell;
-use super::{Ending, inputs};
+use super::inputs;
+use super::terminal::tell;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]

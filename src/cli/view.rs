@@ -1,4 +1,4 @@
-//! `truegrind view FILE…`: what any verb wrote, and measurements; and the recordings of the other verbs.
+//! `truegrind view FILE…`: what any verb wrote, and measurements.
 
 use std::path::{Path, PathBuf};
 
@@ -6,29 +6,29 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use truegrind::compensation::verify::{Acting, Judged, judge};
-use truegrind::diagnosis::diagnose::Diagnosed;
 use truegrind::identification::fit::{Start, errors_on, fit, frame_parameters};
-use truegrind::identification::identify::{Identification, Options, observe};
+use truegrind::identification::identify::{Options, observe};
 use truegrind::identification::register::starting_frames;
 use truegrind::identification::solver::SOLVERS;
 use truegrind::identification::tolerance::Tolerance;
 use truegrind::kinematics::condition::Condition;
 use truegrind::kinematics::estimated::Estimated;
-use truegrind::kinematics::model::{Joints, Model};
+use truegrind::kinematics::model::Joints;
 use truegrind::math::se3::Pose;
-use truegrind::measurement::dataset::Dataset;
 use truegrind::program::motion::MotionKind;
 use truegrind::program::reading::Language;
-use truegrind::surface::SurfaceFile;
 use truegrind::visual::measured::Residuals;
-use truegrind::visual::{self, MeasuredScene, PathScene, Recording, Workpiece};
+use truegrind::visual::{self, MeasuredScene, PathScene, Recording};
 
 use super::compensate::{CellArguments, agreed};
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::programs::Programs;
 use super::progress::Work;
-use super::{Common, Ending, identify, inputs, on_threads, programs};
+use super::recording::recording;
+use super::{identify, inputs, programs};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -302,43 +302,4 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
     recording(&program, acting.model, is, condition, std::slice::from_ref(&report), surface.as_ref())
-}
-
-/// The recording of a path.
-pub(super) fn path(
-    title: &str,
-    arm: &Model,
-    arm_is: &str,
-    condition: Condition,
-    reports: &[PathReport],
-    surface: Option<&SurfaceFile>,
-) -> anyhow::Result<Vec<u8>> {
-    Ok(recording(title, arm, arm_is, condition, reports, surface)?.rrd()?)
-}
-
-fn recording(
-    title: &str,
-    arm: &Model,
-    arm_is: &str,
-    condition: Condition,
-    reports: &[PathReport],
-    surface: Option<&SurfaceFile>,
-) -> anyhow::Result<Recording> {
-    let triangles = surface.map(|s| s.surface.tessellate(60));
-    let workpiece = triangles.as_ref().zip(surface).map(|(triangles, surface)| Workpiece {
-        triangles,
-        base_from_object: surface.work_object.base_from_work_object,
-    });
-    let scene = PathScene { title, arm, arm_is, condition, reports, workpiece };
-    Ok(visual::path_recording(&scene)?)
-}
-
-/// The recording of an identification.
-pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(visual::dataset_recording(dataset, found)?.rrd()?)
-}
-
-/// The recording of a diagnosis.
-pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(visual::diagnosis_recording(dataset, found)?.rrd()?)
 }
