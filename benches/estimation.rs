@@ -171,7 +171,7 @@ mod arm {
             solver: &SOLVERS[0],
             held_out: 0.2,
             seed: 0,
-            sharpen: false,
+            fuse_readout: false,
             limit_rmse_mm: None,
             limit_max_mm: None,
             stated_frames: None,

@@ -43,7 +43,7 @@ fn task(rows: usize) -> (Calibration, Vec<f64>) {
     }
     let outlet = Vector3::new(742.0, 183.0, 39.0);
     let still = Condition::default();
-    let posed = actual.under(&still);
+    let posed = actual.at_condition(&still);
     let rows: Vec<Row> = (0..rows)
         .map(|number| {
             let joints = Joints::from_fn(|_, _| random.random_range(-1.2..1.2));

@@ -108,14 +108,14 @@ fn arm(name: &str) -> Model {
 }
 
 fn targets(model: &Model) -> Vec<Pose> {
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     path().iter().map(|q| posed.forward(q)).collect()
 }
 
 #[divan::bench(args = ["links", "effects"])]
 fn forward_scalar(bencher: Bencher<'_, '_>, name: &str) {
     let (model, joints) = (arm(name), path());
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
         for q in &joints {
             black_box(posed.forward(black_box(q)));
@@ -126,7 +126,7 @@ fn forward_scalar(bencher: Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = ["links", "effects"])]
 fn forward_lanes(bencher: Bencher<'_, '_>, name: &str) {
     let (model, joints) = (arm(name), path().into_iter().collect::<JointColumns>());
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     let mut poses = PoseColumns::default();
     bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
         posed.forward_columns(black_box(&joints), &mut poses);

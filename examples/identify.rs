@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Where the sensor stands and what it touches; then the arm itself, judged on rows that the fit never saw.
     let options = IdentifyOptions::default();
-    let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), options.sharpen)?;
+    let frames = starting_frames(&rows, &robot.model, &Tolerance::default(), options.fuse_readout)?;
     let share = |rows: &truegrind::Dataset| split::random(rows, options.held_out, options.seed);
     let found = identify(&rows, &robot.sheet.name, &robot.model, &frames, &share, &options)?;
 

@@ -3,11 +3,16 @@
 //! Results go to stdout, talk and progress to stderr. Exit code 0: done; 1: done, but something was refused or
 //! flagged; 2: nothing done.
 
+mod computation;
+mod ending;
 mod defect;
+mod terminal;
 mod files;
 mod inputs;
 mod outputs;
 mod progress;
+#[cfg(feature = "visual")]
+mod recording;
 mod robots;
 mod simulate;
 mod identify;
@@ -26,7 +31,9 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
+
+use self::ending::Ending;
 
 /// Learns the real robot arm from measured poses and rewrites programs so that it follows them.
 #[derive(Debug, Parser)]
@@ -65,26 +72,6 @@ enum Verb {
     View(view::Arguments),
 }
 
-/// What every verb that computes takes.
-#[derive(Debug, Clone, Args)]
-struct Common {
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-    /// Threads; the result is the same for any number.
-    #[arg(long)]
-    threads: Option<usize>,
-}
-
-/// How a verb ended, short of an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ending {
-    /// Everything done.
-    Done,
-    /// Done, but something was refused or flagged.
-    Flagged,
-}
-
 /// Runs the command line.
 pub(crate) fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -94,7 +81,7 @@ pub(crate) fn run() -> ExitCode {
             let code = if error.use_stderr() { 2 } else { 0 };
             if error.use_stderr() {
                 // What was typed stands in it, names of files that a pattern found among them.
-                outputs::tell_lines(&error.render().to_string());
+                terminal::tell_lines(&error.render().to_string());
             } else {
                 let _ = error.print();
             }
@@ -106,7 +93,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Flagged) => ExitCode::from(1),
         Err(error) => {
-            outputs::tell(format!("error: {error:#}"));
+            terminal::tell(format!("error: {error:#}"));
             ExitCode::from(2)
         }
     }
@@ -127,19 +114,5 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Deviation(arguments) => deviation::run(&arguments),
         #[cfg(feature = "visual")]
         Verb::View(arguments) => view::run(&arguments),
-    }
-}
-
-/// More threads than any machine has processors only cost memory.
-const MOST_THREADS: usize = 1024;
-
-/// Runs `work` on the stated number of threads.
-fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
-    match threads {
-        None => Ok(work()),
-        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
-            anyhow::bail!("--threads {n}: expected 1 to {MOST_THREADS}")
-        }
-        Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
     }
 }

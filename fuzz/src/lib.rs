@@ -177,7 +177,7 @@ pub fn model(bytes: &[u8]) {
     let Ok(arm) = Estimated::from_toml(&text(bytes)) else { return };
     let again = arm.to_toml().expect("what was read can be written");
     Estimated::from_toml(&again).expect("what was written can be read");
-    let posed = arm.model.under(&Condition::default());
+    let posed = arm.model.at_condition(&Condition::default());
     assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
     let program = Program::Rapid(rapid::Task::read(&[("fuzz.mod", LINES.as_bytes())]));
     job(&program, &[LINES.as_bytes()], &Cell::default(), &arm);
@@ -186,7 +186,7 @@ pub fn model(bytes: &[u8]) {
 /// A robot file that is taken reaches its own published pose, so loading checks all.
 pub fn robot(bytes: &[u8]) {
     if let Ok(robot) = robots::parse(&text(bytes), "fuzz.toml") {
-        let posed = robot.model.under(&Condition::default());
+        let posed = robot.model.at_condition(&Condition::default());
         assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
     }
 }

@@ -13,11 +13,14 @@ use truegrind::papers::views::{self as view, Origin};
 use truegrind::papers::{Results, degradation, grinding, protocol, signed_rank, simulated, uniformity};
 use truegrind::report::format;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
 use super::identify::{Angles, DataArguments};
-use super::outputs::{Outputs, say, tell, tell_lines, width};
+use super::outputs::Outputs;
 use super::progress::Work;
-use super::{Common, Ending, identify, inputs, on_threads};
+use super::terminal::{say, tell, tell_lines, width};
+use super::{identify, inputs};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]

@@ -29,13 +29,16 @@ use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::status::Status as Judged;
 use truegrind::surfaces::SurfaceFile;
 
+use super::computation::{Common, on_threads};
 use super::defect::isolated;
+use super::ending::Ending;
 use super::files::{self, Batch};
+use super::inputs;
 use super::inputs::NamedModel;
-use super::outputs::{Outputs, say, tell, tell_lines};
+use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
-use super::{Common, Ending, inputs, on_threads};
+use super::terminal::{say, tell, tell_lines};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -334,7 +337,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         )?;
         #[cfg(feature = "visual")]
         if let (Some(path), Some(corrector)) = (&outputs.rrd, shop.corrector) {
-            let bytes = super::view::path(
+            let bytes = super::recording::path(
                 &report.program,
                 &corrector.arm.model,
                 "estimated arm",

@@ -28,10 +28,12 @@ use truegrind::report::{
 };
 use truegrind::surfaces::sample;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::{say, width};
 use super::progress::Work;
-use super::{Common, Ending, diagnose, identify, inputs, on_threads, simulate};
+use super::terminal::{say, width};
+use super::{diagnose, identify, inputs, simulate};
 
 /// The shipped measurements and the recipe that made them.
 const DATA: &[u8] = include_bytes!("../../tests/data/irb120-cable.csv");
@@ -147,7 +149,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     #[cfg(feature = "visual")]
     batch.add(
         place("demo.rrd"),
-        super::view::path(
+        super::recording::path(
             "truegrind demo",
             &simulation.actual,
             "simulated actual arm",

@@ -18,12 +18,15 @@ use truegrind::report::document::Document;
 use truegrind::surfaces::SurfaceFile;
 
 use super::compensate::{CellArguments, agreed};
+use super::computation::{Common, on_threads};
 use super::defect::isolated;
+use super::ending::Ending;
 use super::files::{self, Batch};
+use super::inputs;
 use super::inputs::NamedModel;
-use super::outputs::{Outputs, tell};
+use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
-use super::{Common, Ending, inputs, on_threads};
+use super::terminal::tell;
 
 /// Arguments of `deviation`.
 #[derive(Debug, Args)]
@@ -125,7 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
         let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
-        let bytes = super::view::path(&name, &first.model, is, condition, &reports, surface.as_ref())?;
+        let bytes = super::recording::path(&name, &first.model, is, condition, &reports, surface.as_ref())?;
         batch.add(path, bytes);
     }
     batch.write()?;

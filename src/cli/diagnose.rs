@@ -11,11 +11,13 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::Batch;
 use super::identify::{DataArguments, read, write_model};
-use super::outputs::{Outputs, tell};
+use super::outputs::Outputs;
 use super::progress::Work;
-use super::{Common, Ending, on_threads};
+use super::terminal::tell;
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
@@ -108,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::view::diagnosis(&found, &dataset)?);
+        batch.add(path, super::recording::diagnosis(&found, &dataset)?);
     }
     let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;

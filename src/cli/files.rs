@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::outputs::hand_over;
+use super::terminal::hand_over;
 use in_place::InPlace;
 use pending::Pending;
 use place::{Kind, Place, parent};

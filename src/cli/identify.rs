@@ -21,11 +21,14 @@ use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::{Outputs, say, tell, tell_lines, width};
+use super::inputs;
+use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::StatedArguments;
-use super::{Common, Ending, inputs, on_threads};
+use super::terminal::{say, tell, tell_lines, width};
 
 /// Whether logged angles are the controller's or already hold the DH offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -75,7 +78,7 @@ pub(super) struct Arguments {
     /// Compare all methods over this many splits (seeds 0, 1, …).
     #[arg(long, value_name = "SPLITS")]
     compare_methods: Option<u64>,
-    /// Do not sharpen rounded angles by the controller's read-out.
+    /// Do not fuse_readout rounded angles by the controller's read-out.
     #[arg(long)]
     raw_columns: bool,
     /// The fit passes only with a held-out RMSE up to this (mm).
@@ -132,12 +135,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::view::identification(&found, &dataset)?);
+        batch.add(path, super::recording::identification(&found, &dataset)?);
     }
     if let Some(splits) = arguments.compare_methods {
         let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));
         let rows = on_threads(arguments.common.threads, || {
-            let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
+            let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
             let share = arguments.held_out;
             let split = |d: &Dataset, seed: u64| split_of(d, share, seed);
             Ok::<_, anyhow::Error>(study(&dataset, &name, &robot.model, &frames, &split, &options, splits)?)
@@ -195,7 +198,7 @@ fn options(arguments: &Arguments) -> anyhow::Result<Options> {
         solver: by_name(&arguments.method).map_err(anyhow::Error::msg)?,
         held_out: arguments.held_out,
         seed: arguments.common.seed,
-        sharpen: !arguments.raw_columns,
+        fuse_readout: !arguments.raw_columns,
         limit_rmse_mm: arguments.limit_rmse,
         limit_max_mm: arguments.limit_max,
         stated_frames: None,
@@ -240,7 +243,7 @@ pub(super) fn identified(
     nominal: &Model,
     options: &Options,
 ) -> anyhow::Result<Identification> {
-    let frames = starting_frames(dataset, nominal, &options.tolerance, options.sharpen)?;
+    let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
     let share = options.held_out;
     let split = |d: &Dataset| split_of(d, share, options.seed);
     Ok(identify(dataset, robot, nominal, &frames, &split, options)?)

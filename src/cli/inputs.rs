@@ -9,7 +9,7 @@ use truegrind::arm::model::Model;
 use truegrind::robots::{self, Robot};
 
 use super::files;
-use super::outputs::tell;
+use super::terminal::tell;
 
 /// A robot by catalogue name or from a TOML file.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {

@@ -12,10 +12,11 @@ use truegrind::programs::rapid::writer;
 use truegrind::robots::Robot;
 use truegrind::surfaces::SurfaceFile;
 
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::tell;
+use super::inputs;
 use super::programs::angles;
-use super::{Ending, inputs};
+use super::terminal::tell;
 
 /// Arguments of `path`.
 #[derive(Debug, Args)]

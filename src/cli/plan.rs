@@ -14,11 +14,14 @@ use truegrind::planning::poses::{Options, Wanted, plan, rival};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
 
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::{Outputs, tell};
+use super::inputs;
+use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::{StatedArguments, numbers};
-use super::{Common, Ending, inputs, on_threads};
+use super::terminal::tell;
 
 /// The sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

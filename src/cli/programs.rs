@@ -13,7 +13,7 @@ use truegrind::programs::rapid::task_list;
 use truegrind::programs::reading::{Language, Program};
 use truegrind::robots::sheet::Orientation;
 
-use super::outputs::tell;
+use super::terminal::tell;
 use super::{files, inputs};
 
 /// Files that are read and rewritten together.

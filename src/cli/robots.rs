@@ -5,8 +5,9 @@ use truegrind::report::format;
 use truegrind::report::robots as view;
 use truegrind::robots;
 
-use super::outputs::{say, width};
-use super::{Ending, inputs};
+use super::ending::Ending;
+use super::inputs;
+use super::terminal::{say, width};
 
 /// Arguments of `robots`.
 #[derive(Debug, Args)]

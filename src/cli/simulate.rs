@@ -8,9 +8,10 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::measurement::simulation::Simulation;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 
+use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::tell;
-use super::{Ending, inputs};
+use super::inputs;
+use super::terminal::tell;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]

@@ -16,12 +16,15 @@ use truegrind::calibration::tracking::{Alarm, Options, State, TrackError, Tracke
 use truegrind::report::tracking as view;
 use truegrind::robots::sheet;
 
+use super::computation::{Common, on_threads};
 use super::defect::isolated;
+use super::ending::Ending;
 use super::files::{self, Batch};
 use super::identify::Angles;
+use super::inputs;
 use super::inputs::NamedModel;
-use super::outputs::{Outputs, tell};
-use super::{Common, Ending, inputs, on_threads};
+use super::outputs::Outputs;
+use super::terminal::tell;
 
 /// Arguments of `track`.
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! `truegrind view FILE…`: what any verb wrote, and measurements; and the recordings of the other verbs.
+//! `truegrind view FILE…`: what any verb wrote, and measurements.
 
 use std::path::{Path, PathBuf};
 
@@ -6,29 +6,29 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
-use truegrind::arm::model::{Joints, Model};
-use truegrind::calibration::diagnosis::diagnose::Diagnosed;
+use truegrind::arm::model::Joints;
 use truegrind::calibration::identification::fit::{Start, errors_on, fit, frame_parameters};
-use truegrind::calibration::identification::identify::{Identification, Options, observe};
+use truegrind::calibration::identification::identify::{Options, observe};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::math::se3::Pose;
 use truegrind::pictures::measured::Residuals;
-use truegrind::pictures::{self, MeasuredScene, PathScene, Recording, Workpiece};
+use truegrind::pictures::{self, MeasuredScene, PathScene, Recording};
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::reading::Language;
-use truegrind::surfaces::SurfaceFile;
 
 use super::compensate::{CellArguments, agreed};
+use super::computation::{Common, on_threads};
+use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::programs::Programs;
 use super::progress::Work;
-use super::{Common, Ending, identify, inputs, on_threads, programs};
+use super::recording::recording;
+use super::{identify, inputs, programs};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -172,7 +172,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         solver: &SOLVERS[0],
         held_out: 0.2,
         seed: arguments.common.seed,
-        sharpen: true,
+        fuse_readout: true,
         limit_rmse_mm: None,
         limit_max_mm: None,
         stated_frames: None,
@@ -182,7 +182,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         return Ok(pictures::dataset_recording(&dataset, &found)?);
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
-    let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.sharpen)?;
+    let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
     let (observed, _) = observe(&dataset, &robot.model, true);
     let sensing = frame_parameters(&dataset);
     let mut registered = None;
@@ -216,8 +216,8 @@ fn model(file: &Path) -> anyhow::Result<Recording> {
     let NamedModel::Estimated { name, arm, .. } = inputs::model(&file.display().to_string())? else {
         bail!("{}: expected a model file", file.display());
     };
-    let nominal = arm.nominal.under(&Condition::default());
-    let estimated = arm.model.under(&arm.condition);
+    let nominal = arm.nominal.at_condition(&Condition::default());
+    let estimated = arm.model.at_condition(&arm.condition);
     let points: Vec<PathPoint> = arm
         .region
         .samples_deg
@@ -302,43 +302,4 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
     recording(&program, acting.model, is, condition, std::slice::from_ref(&report), surface.as_ref())
-}
-
-/// The recording of a path.
-pub(super) fn path(
-    title: &str,
-    arm: &Model,
-    arm_is: &str,
-    condition: Condition,
-    reports: &[PathReport],
-    surface: Option<&SurfaceFile>,
-) -> anyhow::Result<Vec<u8>> {
-    Ok(recording(title, arm, arm_is, condition, reports, surface)?.rrd()?)
-}
-
-fn recording(
-    title: &str,
-    arm: &Model,
-    arm_is: &str,
-    condition: Condition,
-    reports: &[PathReport],
-    surface: Option<&SurfaceFile>,
-) -> anyhow::Result<Recording> {
-    let triangles = surface.map(|s| s.surface.tessellate(60));
-    let workpiece = triangles.as_ref().zip(surface).map(|(triangles, surface)| Workpiece {
-        triangles,
-        base_from_object: surface.work_object.base_from_work_object,
-    });
-    let scene = PathScene { title, arm, arm_is, condition, reports, workpiece };
-    Ok(pictures::path_recording(&scene)?)
-}
-
-/// The recording of an identification.
-pub(super) fn identification(found: &Identification, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(pictures::dataset_recording(dataset, found)?.rrd()?)
-}
-
-/// The recording of a diagnosis.
-pub(super) fn diagnosis(found: &Diagnosed, dataset: &Dataset) -> anyhow::Result<Vec<u8>> {
-    Ok(pictures::diagnosis_recording(dataset, found)?.rrd()?)
 }

@@ -7,7 +7,9 @@ use super::bounds::{self, LENGTH_MM, SPEED_DEG_S, TWIST_DEG, Unfit, shown};
 use super::effect::Effect;
 use super::effect::bounds::effects;
 use super::link::{Link, LinkModel};
-use super::model::{Body, Limits, Model};
+use super::model::Model;
+use crate::body::Body;
+use crate::joints::Limits;
 use truegrind_math::se3::Pose;
 
 /// One link in a file.

@@ -3,10 +3,11 @@
 //! Method: the kernels of [`chain`](super::chain) and of the effects on eight rows in lanes, compiled for the widest
 //! vector instructions that the machine has. No allocation once the buffers have their size.
 //! Shapes: one column per joint in, twelve columns out (position and the three axes of the flange).
-//! Checked against: [`Posed::forward`], row by row.
+//! Checked against: [`PreparedModel::forward`], row by row.
 
 use super::chain::{End, end};
-use super::model::{Joints, Posed};
+use super::model::PreparedModel;
+use crate::joints::Joints;
 use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
@@ -75,7 +76,7 @@ impl PoseColumns {
     }
 }
 
-impl Posed<'_> {
+impl PreparedModel<'_> {
     /// Poses of the flange for all rows of `joints`. `out` takes their number and keeps its buffers.
     pub fn forward_columns(&self, joints: &JointColumns, out: &mut PoseColumns) {
         let rows = joints.len();

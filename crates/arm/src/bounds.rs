@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Matrix6;
 
-use super::model::Body;
+use crate::body::Body;
 use truegrind_math::spectral;
 
 /// A number that no arm has.

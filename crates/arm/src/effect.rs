@@ -14,8 +14,10 @@ pub mod backlash;
 pub mod thermal;
 pub mod smooth;
 pub mod bounds;
+mod parameter;
+mod statics;
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
 use self::backlash::Backlash;
@@ -27,10 +29,12 @@ use self::map::JointMap;
 use self::ratio::Ratio;
 use self::smooth::Smooth;
 use self::thermal::Thermal;
-use super::chain::{self, Chain, LinkTable, cross, dot};
-use super::condition::Condition;
-use super::model::{Body, Joints, Model};
-use truegrind_math::lanes::{SinCos, sin_cos};
+use crate::condition::Condition;
+use crate::joints::Joints;
+use truegrind_math::lanes::SinCos;
+
+pub use self::parameter::EffectParameter;
+pub use self::statics::Statics;
 
 /// One effect with its parameters. The serialised names are those of the diagnosis contract.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,17 +62,6 @@ pub enum Effect {
     ThermalDrift(Thermal),
     /// What a network learned of errors without a physical name.
     SmoothCorrection(Smooth),
-}
-
-/// A parameter of an effect as the tables show it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EffectParameter {
-    /// Name within the effect.
-    pub name: &'static str,
-    /// Unit as printed.
-    pub unit: &'static str,
-    /// Present value.
-    pub value: f64,
 }
 
 macro_rules! each {
@@ -129,7 +122,7 @@ impl Effect {
 
     /// Adds [`Effect::rotation`] for one row or eight in lanes; `torque` from [`Statics::loads`].
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn turn<R: SinCos>(
+    pub fn add_offset<R: SinCos>(
         &self,
         statics: &Statics,
         u: &[R; 6],
@@ -138,14 +131,14 @@ impl Effect {
         out: &mut [R; 6],
     ) {
         match self {
-            Effect::LumpedCompliance(e) => e.turn(statics, u, out),
-            Effect::GearMap(e) => e.turn(u, out),
-            Effect::JointCompliance(e) => e.turn(torque, out),
-            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.turn(u, out),
-            Effect::GearRatio(e) => e.turn(u, out),
-            Effect::JointCoupling(e) => e.turn(u, out),
-            Effect::Backlash(e) => e.turn(condition, out),
-            Effect::SmoothCorrection(e) => e.turn(u, out),
+            Effect::LumpedCompliance(e) => e.add_offset(statics, u, out),
+            Effect::GearMap(e) => e.add_offset(u, out),
+            Effect::JointCompliance(e) => e.add_offset(torque, out),
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.add_offset(u, out),
+            Effect::GearRatio(e) => e.add_offset(u, out),
+            Effect::JointCoupling(e) => e.add_offset(u, out),
+            Effect::Backlash(e) => e.add_offset(condition, out),
+            Effect::SmoothCorrection(e) => e.add_offset(u, out),
             Effect::ThermalDrift(_) => {}
         }
     }
@@ -153,13 +146,13 @@ impl Effect {
     /// Adds the slope times a step of u, for one row or eight in lanes, where that is cheap: the slope of compliance,
     /// some 1e-3, is left out. For Newton's method, which forgives it.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+    pub fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         match self {
-            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.carry(u, step, out),
-            Effect::GearRatio(e) => e.carry(step, out),
-            Effect::JointCoupling(e) => e.carry(step, out),
-            Effect::SmoothCorrection(e) => e.carry(u, step, out),
-            Effect::GearMap(e) => e.carry(u, step, out),
+            Effect::GearEccentricity(e) | Effect::GearTransmission(e) => e.add_jacobian_product(u, step, out),
+            Effect::GearRatio(e) => e.add_jacobian_product(step, out),
+            Effect::JointCoupling(e) => e.add_jacobian_product(step, out),
+            Effect::SmoothCorrection(e) => e.add_jacobian_product(u, step, out),
+            Effect::GearMap(e) => e.add_jacobian_product(u, step, out),
             Effect::JointCompliance(_)
             | Effect::LumpedCompliance(_)
             | Effect::Backlash(_)
@@ -191,94 +184,5 @@ impl Effect {
             Effect::ThermalDrift(thermal) => thermal.growth_regressors(condition),
             _ => Vec::new(),
         }
-    }
-}
-
-/// The static torques of an arm, for effects that need them.
-#[derive(Debug, Clone)]
-pub struct Statics {
-    tables: [LinkTable; 6],
-    bodies: [Body; 6],
-    gravity: Vector3<f64>,
-}
-
-/// Standard gravity [m/s²].
-const GRAVITY: f64 = 9.806_65;
-
-impl Statics {
-    /// Statics of a model: its links as they are, without joint effects (their share in the torque is of second
-    /// order), massless where masses are unknown (only the payload then counts).
-    pub fn of(model: &Model) -> Self {
-        let bodies = model.bodies.unwrap_or([Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6]);
-        Self { tables: chain::tables(&model.links), bodies, gravity: model.gravity }
-    }
-
-    /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
-    /// symmetric because torque is the gradient of the potential energy.
-    pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
-        let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
-        let g = self.gravity_newton();
-        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
-        let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &levers[i]), &g));
-        let slope = Matrix6::from_fn(|j, i| dot(&frames.z[j.min(i)], &turned[j.max(i)]));
-        (torque, slope)
-    }
-
-    /// The torques alone, for one row or eight in lanes.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
-        let (frames, levers) = self.levers(u, condition);
-        let g = self.gravity_newton().map(R::splat);
-        let mut out = [R::splat(0.0); 6];
-        for j in 0..6 {
-            out[j] = dot(&frames.z[j], &cross(&levers[j], &g));
-        }
-        out
-    }
-
-    /// Weight of a kilogram, with metres for the millimetres of the levers.
-    #[inline(always)]
-    fn gravity_newton(&self) -> [f64; 3] {
-        [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3)
-    }
-
-    /// The frames at mapped angles `u`.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn frames<R: SinCos>(&self, u: &[R; 6]) -> Chain<R> {
-        let zero = R::splat(0.0);
-        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
-        for i in 0..6 {
-            (sin[i], cos[i]) = sin_cos(u[i]);
-        }
-        chain::chain(&self.tables, &sin, &cos)
-    }
-
-    /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
-        let zero = R::splat(0.0);
-        let frames = self.frames(u);
-        let mut levers = [[zero; 3]; 6];
-        let (mut sum, mut mass) = ([zero; 3], 0.0);
-        for k in (0..6).rev() {
-            let (y, z, o) = (&frames.y[k], &frames.z[k + 1], &frames.origin[k + 1]);
-            let x = cross(y, z);
-            let body = &self.bodies[k];
-            let payload = if k == 5 { condition.payload_kg.unwrap_or(0.0) } else { 0.0 };
-            // Σ m c of the body, and of the payload, which has its centre in the same frame.
-            let c = std::array::from_fn::<f64, 3, _>(|i| {
-                body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i]
-            });
-            let here = body.mass_kg + payload;
-            mass += here;
-            for i in 0..3 {
-                sum[i] += R::splat(here) * o[i]
-                    + R::splat(c[0]) * x[i]
-                    + R::splat(c[1]) * y[i]
-                    + R::splat(c[2]) * z[i];
-                levers[k][i] = sum[i] - R::splat(mass) * frames.origin[k][i];
-            }
-        }
-        (frames, levers)
     }
 }

@@ -12,6 +12,7 @@ pub mod solution;
 pub mod configuration;
 pub mod newton;
 mod axes;
+mod seed;
 mod spherical;
 mod ur;
 mod structure;
@@ -29,7 +30,8 @@ use self::newton::{Goal, Outcome};
 use self::structure::Structure;
 use super::chain::End;
 use super::condition::Condition;
-use super::model::{Joints, Limits, Model, Posed};
+use super::model::{Model, PreparedModel};
+use crate::joints::{Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
@@ -47,7 +49,7 @@ const FARTHEST_WITHOUT_BRANCHES_RAD: f64 = 0.5;
 /// The inverse map of one estimated arm under one condition. Prepare once, use for many targets.
 #[derive(Debug, Clone)]
 pub struct Inverse<'a> {
-    arm: Posed<'a>,
+    arm: PreparedModel<'a>,
     map_inverse: Option<Matrix6<f64>>,
     flange_inverse: End<f64>,
     structure: Structure,
@@ -61,7 +63,7 @@ impl<'a> Inverse<'a> {
         let structure = Structure::of(nominal);
         let half: f64 = nominal.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>() * 0.5;
         Self {
-            arm: estimated.under(condition),
+            arm: estimated.at_condition(condition),
             map_inverse: estimated.joint_map.try_inverse(),
             flange_inverse: {
                 let inverse = estimated.flange.inverse();
@@ -81,7 +83,7 @@ impl<'a> Inverse<'a> {
     }
 
     /// The estimated arm under its condition.
-    pub fn arm(&self) -> &Posed<'a> {
+    pub fn arm(&self) -> &PreparedModel<'a> {
         &self.arm
     }
 

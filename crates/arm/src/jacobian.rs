@@ -10,8 +10,9 @@
 use nalgebra::{Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::chain::{Chain, cross, minus};
-use super::model::{Joints, Posed};
+use super::model::PreparedModel;
 use super::parameter::{LinkCoordinate, Parameter};
+use crate::joints::Joints;
 use truegrind_math::se3::{Pose, left_jacobian, pose_from_vector};
 
 fn turning(axis: &[f64; 3], through: &[f64; 3], point: &[f64; 3]) -> Vector6<f64> {
@@ -42,7 +43,12 @@ pub fn link_twist(
 
 /// 6 × 6 Jacobian of a point [mm, in the base] that rides on the flange with respect to the controller's joints
 /// [mm/rad over rad/rad], effects and couplings included.
-pub fn joint_jacobian(arm: &Posed<'_>, q: &Joints, frames: &Chain<f64>, point: &[f64; 3]) -> Matrix6<f64> {
+pub fn joint_jacobian(
+    arm: &PreparedModel<'_>,
+    q: &Joints,
+    frames: &Chain<f64>,
+    point: &[f64; 3],
+) -> Matrix6<f64> {
     let rotations = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|j| {
         link_twist(frames, j, LinkCoordinate::Theta, point)
     }));
@@ -60,7 +66,7 @@ pub struct Ends {
 
 impl Ends {
     /// Pose of the tool in the world.
-    pub fn forward(&self, arm: &Posed<'_>, q: &Joints) -> Pose {
+    pub fn forward(&self, arm: &PreparedModel<'_>, q: &Joints) -> Pose {
         pose_from_vector(&self.world_from_base) * arm.forward(q) * pose_from_vector(&self.flange_from_tool)
     }
 }
@@ -69,7 +75,7 @@ impl Ends {
 /// Parameters of a cable move no pose: their columns are zero.
 pub fn parameter_jacobian(
     ends: &Ends,
-    arm: &Posed<'_>,
+    arm: &PreparedModel<'_>,
     q: &Joints,
     parameters: &[Parameter],
 ) -> Matrix6xX<f64> {
@@ -94,8 +100,8 @@ pub fn parameter_jacobian(
     let columns: Vec<Vector6<f64>> = parameters
         .iter()
         .map(|parameter| match *parameter {
-            Parameter::Base(k) if k < 3 => Vector6::ith(k, 1.0),
-            Parameter::Base(k) => {
+            Parameter::SensorFrame(k) if k < 3 => Vector6::ith(k, 1.0),
+            Parameter::SensorFrame(k) => {
                 let w = rotation_column(&ends.world_from_base, k);
                 let v = w.cross(&(world_from_base.rotation * base_from_tool.translation.vector));
                 Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
@@ -107,7 +113,7 @@ pub fn parameter_jacobian(
             Parameter::Effect { index, parameter } => {
                 in_world(effect_twist(arm, q, &frames, index, parameter, &point))
             }
-            Parameter::Tool(k) => {
+            Parameter::Target(k) => {
                 let to_flange = base_from_flange.rotation;
                 if k < 3 {
                     let v = to_flange * Vector3::ith(k, 1.0);
@@ -127,7 +133,7 @@ pub fn parameter_jacobian(
 
 /// Twist of a point [mm, in the base] for one parameter of one effect.
 pub fn effect_twist(
-    arm: &Posed<'_>,
+    arm: &PreparedModel<'_>,
     q: &Joints,
     frames: &Chain<f64>,
     index: usize,

@@ -13,6 +13,8 @@
 pub mod bounds;
 pub mod link;
 pub mod condition;
+mod joints;
+mod body;
 pub mod effect;
 pub mod model;
 pub mod chain;

@@ -1,7 +1,6 @@
 //! An arm: links, joint map, limits, masses, effects, and the forward map from logged joints to the flange.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Matrix6, Vector3};
 
 use super::chain::{self, Chain, LinkTable};
 use super::condition::Condition;
@@ -10,36 +9,8 @@ use super::link::Link;
 use truegrind_math::lanes::{Real, SinCos, sin_cos};
 use truegrind_math::se3::Pose;
 
-/// Joint angles of the controller (rad).
-pub type Joints = Vector6<f64>;
-
-/// Range and speed of the joints, in the controller's angles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
-    /// Lowest angle (rad).
-    pub min_rad: [f64; 6],
-    /// Highest angle (rad).
-    pub max_rad: [f64; 6],
-    /// Highest speed [rad/s], where published.
-    pub speed_rad_s: Option<[f64; 6]>,
-}
-
-impl Limits {
-    /// The first joint (0-based) outside its range, if any.
-    pub fn violated(&self, q: &Joints) -> Option<usize> {
-        (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
-    }
-}
-
-/// Mass of one link.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Body {
-    /// Mass (kg).
-    pub mass_kg: f64,
-    /// Centre of mass in the frame at the end of the link (mm).
-    pub centre_mm: [f64; 3],
-}
+pub use super::body::Body;
+pub use super::joints::{Joints, Limits};
 
 /// A six-axis arm. See the chapter page for the order of the parts.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,20 +32,26 @@ pub struct Model {
 }
 
 impl Model {
-    /// Pose of the flange in the base. For many poses under one condition take [`Model::under`] once.
+    /// Pose of the flange in the base. For many poses under one condition take [`Model::at_condition`] once.
     pub fn forward(&self, q: &Joints, condition: &Condition) -> Pose {
-        self.under(condition).forward(q)
+        self.at_condition(condition).forward(q)
     }
 
     /// The model with everything worked out that does not depend on the joints.
-    pub fn under(&self, condition: &Condition) -> Posed<'_> {
-        Posed {
+    pub fn at_condition(&self, condition: &Condition) -> PreparedModel<'_> {
+        PreparedModel {
             model: self,
             condition: *condition,
             tables: chain::tables(&self.links_under(condition)),
-            statics: (!self.effects.is_empty()).then(|| Statics::of(self)),
+            statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
         }
+    }
+
+    /// Statics of the arm: its links as they are, without joint effects (their share in the torque is of second
+    /// order), massless where masses are unknown (only the payload then counts).
+    pub fn statics(&self) -> Statics {
+        Statics::new(&self.links, self.bodies, self.gravity)
     }
 
     /// The links under a condition: grown by whatever effect changes lengths.
@@ -93,7 +70,7 @@ impl Model {
 
 /// A model under one condition, ready for many poses.
 #[derive(Debug, Clone)]
-pub struct Posed<'a> {
+pub struct PreparedModel<'a> {
     /// The arm.
     pub model: &'a Model,
     /// The circumstances.
@@ -104,7 +81,7 @@ pub struct Posed<'a> {
     loaded: bool,
 }
 
-impl Posed<'_> {
+impl PreparedModel<'_> {
     /// Pose of the flange in the base.
     pub fn forward(&self, q: &Joints) -> Pose {
         self.frames(q).last() * self.model.flange
@@ -156,13 +133,13 @@ impl Posed<'_> {
                 false => [R::splat(0.0); 6],
             };
             for effect in &self.model.effects {
-                effect.turn(statics, mapped, &torque, &self.condition, &mut out);
+                effect.add_offset(statics, mapped, &torque, &self.condition, &mut out);
             }
         }
         out
     }
 
-    /// Derivative of [`Posed::rotations`] with respect to the controller's angles.
+    /// Derivative of [`PreparedModel::rotations`] with respect to the controller's angles.
     pub fn rotation_slopes(&self, q: &Joints) -> Matrix6<f64> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {

@@ -37,7 +37,7 @@ pub const FRAME_COORDINATES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Parameter {
     /// Pose of the arm's base in the world, or of the sensor's frame in the base: coordinate 0 to 5.
-    Base(usize),
+    SensorFrame(usize),
     /// A link.
     Link {
         /// Link, 0-based.
@@ -53,7 +53,7 @@ pub enum Parameter {
         parameter: usize,
     },
     /// The frame (or point) on the flange that the sensor touches: coordinate 0 to 5. It is not the TCP.
-    Tool(usize),
+    Target(usize),
     /// Outlet of a cable in the base: which cable, coordinate 0 to 2.
     Outlet {
         /// Cable.
@@ -79,7 +79,7 @@ impl Parameter {
     /// The unit in which the number is held.
     pub fn unit(&self) -> &'static str {
         match self {
-            Parameter::Base(k) | Parameter::Tool(k) => {
+            Parameter::SensorFrame(k) | Parameter::Target(k) => {
                 if *k < 3 {
                     "mm"
                 } else {
@@ -102,8 +102,8 @@ impl Parameter {
 impl fmt::Display for Parameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Parameter::Base(k) => write!(f, "base.{}", FRAME_COORDINATES[*k]),
-            Parameter::Tool(k) => write!(f, "tool.{}", FRAME_COORDINATES[*k]),
+            Parameter::SensorFrame(k) => write!(f, "sensor.{}", FRAME_COORDINATES[*k]),
+            Parameter::Target(k) => write!(f, "target.{}", FRAME_COORDINATES[*k]),
             Parameter::Link { joint, coordinate } => {
                 let name = match coordinate {
                     LinkCoordinate::A => "a",

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::model::Joints;
+use crate::joints::Joints;
 
 /// The measured region of an estimated arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,13 +11,14 @@
 //! # Ok::<(), crate::robots::RobotError>(())
 //! ```
 
+mod error;
 pub mod sheet;
 pub mod validation;
 
-use thiserror::Error;
-
 use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
+
+pub use error::RobotError;
 
 /// The files of the catalogue: name for messages, text.
 const FILES: [(&str, &str); 7] = [
@@ -142,57 +143,4 @@ fn read(text: &str, file: &str) -> Result<RobotFile, RobotError> {
             message: error.message().replace('\n', " "),
         }
     })
-}
-
-/// Why there is no robot.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum RobotError {
-    /// The name is not in the catalogue.
-    #[error("unknown robot \"{name}\", expected one of {known}; or give the path of a TOML file of your own")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The catalogue.
-        known: String,
-    },
-    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
-    #[error(
-        "{file}:{line}:{column}: found \"{found}\": {message}; a file of the catalogue is a complete example"
-    )]
-    Syntax {
-        /// File.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// The line itself.
-        found: String,
-        /// What the TOML reader expected.
-        message: String,
-    },
-    /// Not exactly one arm in a user's file.
-    #[error("{file}: found {found} robots, expected one [[robot]]; put each arm into a file of its own")]
-    Several {
-        /// File.
-        file: String,
-        /// How many.
-        found: usize,
-    },
-    /// A value that cannot be right.
-    #[error("{file}: robot \"{robot}\": {key}: found {found}, expected {expected}; {remedy}")]
-    Invalid {
-        /// File.
-        file: Box<str>,
-        /// Robot.
-        robot: Box<str>,
-        /// Key.
-        key: Box<str>,
-        /// The value.
-        found: Box<str>,
-        /// What it should be.
-        expected: &'static str,
-        /// What to do.
-        remedy: &'static str,
-    },
 }

@@ -12,7 +12,7 @@ use super::payload::Load;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::inverse::Inverse;
-use truegrind_arm::model::{Joints, Model, Posed};
+use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
 
 /// A load as a key: the bits of mass and centre.
@@ -80,7 +80,7 @@ impl<'a> Circumstances<'a> {
     }
 
     /// The arm under a condition.
-    pub(super) fn arm(&self, place: usize) -> &Posed<'a> {
+    pub(super) fn arm(&self, place: usize) -> &PreparedModel<'a> {
         self.list[place].arm()
     }
 

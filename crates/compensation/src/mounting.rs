@@ -6,7 +6,7 @@ use super::cell::FrameOrigin;
 use super::taught::{RealObject, RealTool, TaughtFrame, Teaching, taught_frame, taught_tcp};
 use truegrind_arm::estimated::{Carried, Estimated};
 use truegrind_arm::inverse::Inverse;
-use truegrind_arm::model::{Joints, Posed};
+use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::{Pose, difference};
 use truegrind_programs::motion::{Tool, ToolValue, WorkObject, WorkObjectValue};
 
@@ -154,7 +154,11 @@ fn object_note(
 
 /// How a frame through three taught points moves with each parameter of the arm: the points' velocities, carried
 /// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
-fn carried_frame(knowledge: &Estimated, estimated: &Posed<'_>, taught: &TaughtFrame) -> Option<Carried> {
+fn carried_frame(
+    knowledge: &Estimated,
+    estimated: &PreparedModel<'_>,
+    taught: &TaughtFrame,
+) -> Option<Carried> {
     const STEP: f64 = 1e-4;
     let TaughtFrame { pointer, joints, points, frame } = taught;
     let tip = Pose::translation(pointer.real.x, pointer.real.y, pointer.real.z);
@@ -181,7 +185,7 @@ const NOT_TOLD: &str = "how far it would move had it been taught cannot be told 
 fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
     let (nominal, estimated, usual) = (with.teaching.nominal, with.teaching.estimated, &with.usual);
     if told.holds_part {
-        let flange = |arm: &Posed<'_>| arm.forward(usual).translation.vector;
+        let flange = |arm: &PreparedModel<'_>| arm.forward(usual).translation.vector;
         let shift = (flange(estimated) - flange(nominal)).norm();
         return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
     }

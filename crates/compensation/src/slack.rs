@@ -11,7 +11,7 @@
 
 use super::circumstance::Circumstances;
 use super::segment::CHORD_MM;
-use truegrind_arm::model::{Joints, Posed};
+use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
 
 /// How often steps are halved.
@@ -21,7 +21,7 @@ const DOUBLINGS: usize = 6;
 #[derive(Clone, Copy)]
 pub(super) struct Slack<'a> {
     /// The arm in the middle of its play, with its load on this way.
-    arm: &'a Posed<'a>,
+    arm: &'a PreparedModel<'a>,
     play_rad: [f64; 6],
     motor: Joints,
     /// θ − q as the play operator has it; where a play was estimated below 0 the arm shows its opposite.

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
 use super::cell::{Cell, CellFrame, FrameOrigin, Teaches, stated_of};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::{Joints, Model, Posed};
+use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjectValue};
 
@@ -56,7 +56,7 @@ struct FixedPoint {
 
 /// By linear least squares (the n-point method). `None` for poses that do not fix it: too few, orientations too much
 /// alike, or no finite numbers.
-fn fixed_point(arm: &Posed<'_>, teaching: &[Joints]) -> Option<FixedPoint> {
+fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<FixedPoint> {
     // R_i t + p_i = c for all i: unknown t and c.
     let n = teaching.len();
     if n < 3 {
@@ -95,7 +95,7 @@ fn fixed_point(arm: &Posed<'_>, teaching: &[Joints]) -> Option<FixedPoint> {
 
 /// The TCP that stays at one point over all poses (mm, on the flange), by linear least squares (the n-point method).
 /// `None` for poses that do not fix it: fewer than three, or orientations too much alike.
-pub fn taught_tcp(arm: &Posed<'_>, teaching: &[Joints]) -> Option<Vector3<f64>> {
+pub fn taught_tcp(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<Vector3<f64>> {
     fixed_point(arm, teaching).map(|found| found.on_flange)
 }
 
@@ -151,8 +151,8 @@ pub(super) struct TaughtFrame {
 /// What teaching points are judged by: the two arms, the cell, and the tools that are known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Teaching<'a> {
-    pub(super) nominal: &'a Posed<'a>,
-    pub(super) estimated: &'a Posed<'a>,
+    pub(super) nominal: &'a PreparedModel<'a>,
+    pub(super) estimated: &'a PreparedModel<'a>,
     pub(super) cell: &'a Cell,
     pub(super) listing: &'a Listing,
 }
@@ -161,7 +161,7 @@ pub(super) struct Teaching<'a> {
 /// be corrected before it is put right. `nominal` is the arm that the controller computes with.
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
     let condition = Condition::default();
-    let arm = nominal.under(&condition);
+    let arm = nominal.at_condition(&condition);
     let teaching = Teaching { nominal: &arm, estimated: &arm, cell, listing };
     let mut seen = BTreeSet::new();
     let mut out: Vec<String> = Vec::new();
@@ -283,7 +283,7 @@ impl<'a> Teaching<'a> {
             }
             (Some(_), false) => {
                 let pointer = self.pointer("tool", stated, true)?;
-                let tip = |arm: &Posed<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
+                let tip = |arm: &PreparedModel<'_>, joints: &[Joints], tcp: &Vector3<f64>| {
                     let touched = joints.iter().map(|q| (arm.forward(q) * Point3::from(*tcp)).coords);
                     touched.sum::<Vector3<f64>>() / joints.len() as f64
                 };
@@ -569,14 +569,19 @@ impl Known<'_> {
 }
 
 /// Teaching points: touched by a tool that the robot holds, or on a part that it holds to a tool that stands.
-fn touched(arm: &Posed<'_>, joints: &[Joints; 3], tip: &Vector3<f64>, part: bool) -> [Point3<f64>; 3] {
+fn touched(
+    arm: &PreparedModel<'_>,
+    joints: &[Joints; 3],
+    tip: &Vector3<f64>,
+    part: bool,
+) -> [Point3<f64>; 3] {
     std::array::from_fn(|i| {
         let flange = arm.forward(&joints[i]);
         if part { flange.inverse() * Point3::from(*tip) } else { flange * Point3::from(*tip) }
     })
 }
 
-fn frame_of(arm: &Posed<'_>, joints: &[Joints], tip: &Vector3<f64>, part: bool) -> Option<Pose> {
+fn frame_of(arm: &PreparedModel<'_>, joints: &[Joints], tip: &Vector3<f64>, part: bool) -> Option<Pose> {
     taught_frame(&touched(arm, joints.try_into().ok()?, tip, part))
 }
 

@@ -29,7 +29,8 @@ pub enum Form {
     AsPrinted,
     /// The same idea with scaling, step control and proper stops.
     #[default]
-    Sound,
+    #[serde(rename = "sound")]
+    Robust,
 }
 
 /// How the linear system of one step is solved.

@@ -21,13 +21,13 @@
 //! between RLS and LM must have another cause, and the three LM variants show which: memory, weights, or the stop. The
 //! paper's own before-figures differ between its methods (0.571 and 0.743 mm), which no method can cause.
 
+pub(crate) mod settings;
 mod arm;
 mod journey;
 mod verdict;
 mod way;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use self::arm::{Arm, arm, group_error};
 use self::journey::{average, count_of, journey};
@@ -36,212 +36,9 @@ use crate::experiment::ExperimentError;
 use crate::simulated;
 use truegrind_arm::model::Model;
 
+pub use self::journey::{Count, Run, Step, Strategy};
+pub use self::settings::{Degradation, Heat, PaperCount, PaperStatement, Wear};
 pub use verdict::{AgainstRls, Outcome};
-
-/// The experiment's section.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Degradation {
-    /// Groups of poses.
-    pub groups: usize,
-    /// Time between two groups (h).
-    pub hours_apart: f64,
-    /// The first so many poses of a group identify; all others verify.
-    pub identification: usize,
-    /// Pose counts of the study of counts.
-    pub counts: Vec<usize>,
-    /// Pose counts of continuous calibration.
-    pub continuous: Vec<usize>,
-    /// Simulated arms, each with its own deviations, poses and noise.
-    pub arms: usize,
-    /// Forgetting factor of one pose.
-    pub forgetting: f64,
-    /// Steps of the stopped LM.
-    pub stopped_after: usize,
-    /// Links that warm up.
-    pub heat: Heat,
-    /// Joints that wear.
-    pub wear: Wear,
-    /// What the paper's prose states.
-    #[serde(default)]
-    pub paper: Vec<PaperStatement>,
-    /// What it states of the study of counts.
-    #[serde(default)]
-    pub paper_counts: Vec<PaperCount>,
-}
-
-/// Links warm up to a steady state and grow: length · growth · rise · (1 − e^(−t/T)).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Heat {
-    /// Relative growth per kelvin.
-    pub growth_per_k: f64,
-    /// By how much each link is warmer in the steady state than when the first group was measured (K).
-    pub rise_k: [f64; 6],
-    /// T (h).
-    pub time_constant_h: f64,
-}
-
-/// Zeros of the joints wander: rate · t.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Wear {
-    /// Of each joint (° per hour).
-    pub zero_deg_per_h: [f64; 6],
-}
-
-/// Figures that the paper's prose states.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PaperStatement {
-    /// Poses per group.
-    pub count: usize,
-    /// Name of the method: `RLS` or `LM`.
-    pub method: String,
-    /// Mean error before, poses that identify (mm).
-    pub identification_before_mm: Option<f64>,
-    /// The same after.
-    pub identification_after_mm: Option<f64>,
-    /// Mean error before, poses that verify (mm).
-    pub verification_before_mm: Option<f64>,
-    /// The same after.
-    pub verification_after_mm: Option<f64>,
-    /// Improvement of the verification poses as stated (%).
-    pub improvement_percent: Option<f64>,
-    /// The figure that shows it.
-    #[serde(default)]
-    pub figure: Option<String>,
-}
-
-/// What the paper's prose states of the study of counts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PaperCount {
-    /// Poses.
-    pub count: usize,
-    /// Improvement of the poses that identify (%).
-    pub identification_percent: f64,
-    /// Improvement of the poses that verify (%).
-    pub verification_percent: f64,
-}
-
-impl Degradation {
-    /// What in the section cannot be used: key, found, expected.
-    pub(super) fn fault(&self) -> Option<(&'static str, String, &'static str)> {
-        let most = self.counts.iter().chain(&self.continuous).max().copied().unwrap_or(0);
-        let least = self.counts.iter().chain(&self.continuous).min().copied().unwrap_or(0);
-        if self.groups == 0 || self.arms == 0 {
-            let found = format!("{} groups, {} arms", self.groups, self.arms);
-            return Some(("degradation.groups, .arms", found, "1 of each at least"));
-        }
-        if most > self.identification || least == 0 {
-            let found = format!("{least} to {most} poses");
-            return Some(("degradation.counts", found, "1 pose at least, and no more than identify"));
-        }
-        if !(self.forgetting > 0.0 && self.forgetting <= 1.0) {
-            return Some(("degradation.forgetting", self.forgetting.to_string(), "above 0, up to 1"));
-        }
-        None
-    }
-}
-
-/// How a method goes through the groups.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Way {
-    /// Recursive least squares that remembers everything.
-    Rls,
-    /// The same with a forgetting factor.
-    RlsForgetting,
-    /// Levenberg–Marquardt on the present group, converged.
-    Lm,
-    /// The same with the last group's covariance as prior.
-    LmMemory,
-    /// Levenberg–Marquardt with μ = 5 and unweighted rows, stopped.
-    LmStopped,
-}
-
-impl Way {
-    /// All of them.
-    pub const ALL: [Way; 5] = [Way::Rls, Way::RlsForgetting, Way::Lm, Way::LmMemory, Way::LmStopped];
-
-    /// Name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Way::Rls => "RLS",
-            Way::RlsForgetting => "RLS, forgetting",
-            Way::Lm => "LM",
-            Way::LmMemory => "LM, memory",
-            Way::LmStopped => "LM, stopped",
-        }
-    }
-
-    /// The paper's name for what it may have run.
-    pub fn paper_name(self) -> Option<&'static str> {
-        match self {
-            Way::Rls => Some("RLS"),
-            Way::LmStopped => Some("LM"),
-            _ => None,
-        }
-    }
-}
-
-/// Mean position errors of one method, count and group, over all arms (mm).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Step {
-    /// Group, from 0.
-    pub group: usize,
-    /// Poses that identify, with what was known before this group.
-    pub identification_before_mm: f64,
-    /// The same with what is known after it.
-    pub identification_after_mm: f64,
-    /// Poses that verify, before.
-    pub verification_before_mm: f64,
-    /// Poses that verify, after.
-    pub verification_after_mm: f64,
-}
-
-/// A method with one count through all groups.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Journey {
-    /// The method.
-    pub way: Way,
-    /// Poses of each group that it takes.
-    pub count: usize,
-    /// One step for each group.
-    pub steps: Vec<Step>,
-    /// Mean error of the poses that verify, after, over the groups: one for each arm (mm).
-    pub arms_mm: Vec<f64>,
-    /// Seconds for all groups of one arm, median over the arms. Not the same in every run.
-    #[serde(skip)]
-    pub seconds: f64,
-}
-
-impl Journey {
-    /// Mean over the groups.
-    pub fn mean(&self, figure: fn(&Step) -> f64) -> f64 {
-        self.steps.iter().map(figure).sum::<f64>() / self.steps.len().max(1) as f64
-    }
-}
-
-/// What so many poses can tell, with known frames.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Count {
-    /// Poses.
-    pub poses: usize,
-    /// Equations they give.
-    pub equations: usize,
-    /// Rank of the Jacobian, the smallest over the arms, of 24 parameters.
-    pub rank: usize,
-    /// Condition number in units of the priors, the largest over the arms; infinite without full rank.
-    pub condition: f64,
-    /// Mean error of the poses that identify after RLS, first group (mm).
-    pub identification_mm: f64,
-    /// Mean error of the poses that verify after RLS, first group (mm).
-    pub verification_mm: f64,
-    /// Mean error of the poses that verify after one-shot least squares without priors, eq. 9; absent where singular.
-    pub without_prior_mm: Option<f64>,
-}
 
 /// The result.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,7 +56,7 @@ pub struct DegradationResult {
     /// The study of counts: Fig. 7 and Table 2.
     pub counts: Vec<Count>,
     /// Periodic (all identification poses) and continuous calibration: Figs 9 to 14, Table 4.
-    pub journeys: Vec<Journey>,
+    pub journeys: Vec<Run>,
     /// Every way against RLS, over the arms.
     pub against_rls: Vec<AgainstRls>,
     /// What the sensor alone scatters by (mm).
@@ -284,18 +81,18 @@ pub fn run(
         .into_par_iter()
         .map(|k| arm(settings, &recipe, experiment, seed + k, &resolve))
         .collect::<Result<Vec<_>, ExperimentError>>()?;
-    let mut ways: Vec<(Way, usize)> = vec![];
+    let mut ways: Vec<(Strategy, usize)> = vec![];
     let mut counts = settings.continuous.clone();
     counts.push(settings.identification);
     counts.sort_unstable();
     counts.dedup();
     for count in counts {
-        ways.extend(Way::ALL.map(|way| (way, count)));
+        ways.extend(Strategy::ALL.map(|way| (way, count)));
     }
-    let journeys: Vec<Journey> = ways
+    let journeys: Vec<Run> = ways
         .par_iter()
         .map(|&(way, count)| {
-            let each: Vec<Journey> = arms.iter().map(|arm| journey(settings, arm, way, count)).collect();
+            let each: Vec<Run> = arms.iter().map(|arm| journey(settings, arm, way, count)).collect();
             average(way, count, &each)
         })
         .collect();

@@ -34,7 +34,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::degradation::Degradation;
+use crate::degradation::settings::Degradation;
 use truegrind_calibration::identification::solver::{self, Solver};
 
 /// An experiment.
@@ -130,7 +130,7 @@ pub struct Protocol {
     pub fixed_point_mm: [f64; 3],
     /// Whether rounded angles are sharpened by the controller's read-out. The papers do not.
     #[serde(default)]
-    pub sharpen: bool,
+    pub fuse_readout: bool,
 }
 
 /// How a method is set to work.

@@ -285,7 +285,7 @@ fn found(
         solver,
         held_out,
         seed,
-        sharpen: false,
+        fuse_readout: false,
         limit_rmse_mm: None,
         limit_max_mm: None,
         stated_frames: None,

@@ -17,13 +17,15 @@
 //! "STD" of the papers is the mean of the absolute errors (ltlm-2024 eq. 20, ukf-vslm-2023 eq. 28), and is called so.
 //! Results are the same for any number of threads; the seconds are not, and are kept apart.
 
+pub(crate) mod outcome;
+
 use std::time::Instant;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::experiment::{Experiment, ExperimentError, Method, Methods, ReadingUsed, Treatment, Units};
 use crate::parameters::{ParameterTable, parameter_table};
@@ -42,10 +44,12 @@ use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope,
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::split;
-use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
+use truegrind_estimation::estimate::Estimate;
 use truegrind_estimation::least_squares::{Factorisation, lm};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::ErrorSummary;
+
+pub use self::outcome::{CurvePoint, MethodResult, Outcome};
 
 /// How an experiment is run.
 #[derive(Debug, Clone, Copy, Default)]
@@ -113,62 +117,6 @@ pub struct Case {
     pub registered_errors_mm: Vec<f64>,
 }
 
-/// A method over all cases.
-#[derive(Debug, Clone)]
-pub struct MethodResult {
-    /// What the experiment says of it.
-    pub method: Method,
-    /// The solver.
-    pub solver: &'static Solver,
-    /// How it was set to work.
-    pub treatment: Treatment,
-    /// All its settings.
-    pub settings: toml::Table,
-    /// One outcome for each case, as the experiment limits it.
-    pub outcomes: Vec<Outcome>,
-    /// The same continued until it has converged, for least-squares methods; counted from where it was stopped.
-    pub converged: Option<Vec<Outcome>>,
-}
-
-/// One method on one case.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
-    /// Errors on held-out rows.
-    pub held_out: ErrorSummary,
-    /// Errors on the rows of the fit.
-    pub fitted: ErrorSummary,
-    /// How the search ended.
-    pub termination: Termination,
-    /// Whether the result is none: not finite, or ten times worse than registered frames alone.
-    pub diverged: bool,
-    /// Rows evaluated.
-    pub evaluations: Evaluations,
-    /// Iterations: steps, sweeps or generations.
-    pub iterations: usize,
-    /// Cost over the iterations.
-    pub curve: Vec<CurvePoint>,
-    /// Signed errors on held-out rows (mm).
-    pub errors_mm: Vec<f64>,
-    /// Deviations of the parameters from their start.
-    pub x: Vec<f64>,
-    /// How far the farthest link parameter went, in manufacturing tolerances.
-    pub farthest: f64,
-    /// Wall clock, while other threads worked too. Not the same in every run.
-    pub seconds: f64,
-}
-
-/// A point of a convergence curve.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CurvePoint {
-    /// Iteration, 0 for the start.
-    pub iteration: usize,
-    /// Passes over the rows so far, those with derivatives counted too.
-    pub passes: f64,
-    /// Root of the mean square of the fit's errors (mm), by the fit's weights: of a length, or of the distance between two
-    /// positions.
-    pub rmse: f64,
-}
-
 /// A case with everything that methods start from.
 pub(super) struct Prepared {
     train: Observed,
@@ -211,7 +159,7 @@ pub fn run(
         });
     }
     enough(experiment, methods, &dataset, rows, nominal)?;
-    let (observed, _) = observe(&dataset, nominal, protocol.sharpen);
+    let (observed, _) = observe(&dataset, nominal, protocol.fuse_readout);
     let any_sound = methods.method.iter().any(|m| treatment_of(m, methods) == Treatment::Sound);
     let seeds: Vec<u64> = (0..protocol.cases as u64).map(|k| options.seed + k).collect();
     let prepared = seeds

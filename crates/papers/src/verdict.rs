@@ -10,7 +10,7 @@
 
 use serde::Serialize;
 
-use crate::protocol::{MethodResult, Outcome};
+use crate::protocol::outcome::{MethodResult, Outcome};
 use crate::statistics::{SignedRank, holm, resampled_t, signed_rank};
 use truegrind_math::statistics::median;
 

@@ -3,8 +3,9 @@
 //! Nothing here changes from run to run but measured seconds: they have a table of their own ([`times`]), and a page shows
 //! them where it is asked to ([`Origin::timings`]).
 
-mod methods;
+mod study;
 mod words;
+mod methods;
 mod grinding;
 mod uniformity;
 mod signed_rank;
@@ -144,12 +145,7 @@ fn opening(experiment: &Experiment, results: &Results) -> Document {
     }
     // Methods over cases add what follows from the rows.
     if !matches!(results, Results::Methods(_)) && !experiment.caveats.is_empty() {
-        page.push(Block::List(caveats(experiment)));
+        page.push(Block::List(experiment.caveats.clone()));
     }
     page
-}
-
-/// The caveats of an experiment.
-pub(super) fn caveats(experiment: &Experiment) -> Vec<String> {
-    experiment.caveats.clone()
 }

@@ -13,7 +13,7 @@ use rerun::{Capsules3D, Cylinders3D, Points3D, Transform3D};
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::{Joints, Model, Posed};
+use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
 
 /// Radius of each link over the length of the arm.
@@ -67,7 +67,7 @@ pub(super) fn draw(
     (axis, stands): (&'static str, &[Stand]),
 ) -> Result<(), VisualError> {
     let Some(first) = stands.first() else { return Ok(()) };
-    let arm = model.under(condition);
+    let arm = model.at_condition(condition);
     let length = length_mm(model);
     foot(store, root, length, paint)?;
     let times: Vec<i64> = stands.iter().map(|s| s.time).collect();
@@ -103,7 +103,7 @@ pub(super) fn draw(
 }
 
 /// All frames of the arm in its base: 0 is the base itself, i the end of link i.
-pub(super) fn frames(arm: &Posed<'_>, joints: &Joints) -> [Pose; 7] {
+pub(super) fn frames(arm: &PreparedModel<'_>, joints: &Joints) -> [Pose; 7] {
     let chain = arm.frames(joints);
     std::array::from_fn(|i| {
         if i == 0 {
@@ -124,7 +124,7 @@ pub(super) fn length_mm(model: &Model) -> f64 {
 }
 
 /// Points that an arm at `joints` takes up, for placing the eye.
-pub(super) fn extent(arm: &Posed<'_>, joints: &Joints) -> Vec<Point3<f64>> {
+pub(super) fn extent(arm: &PreparedModel<'_>, joints: &Joints) -> Vec<Point3<f64>> {
     frames(arm, joints).iter().map(|f| Point3::from(f.translation.vector)).collect()
 }
 

@@ -11,6 +11,7 @@
 //! | `joints/…` | logged joint angles over the rows |
 //! | `summary`, `legend` | errors, verdict, parameters with their standard deviations; the colours |
 
+mod scene;
 mod words;
 
 use nalgebra::{Point3, Vector3};
@@ -26,13 +27,14 @@ use super::recording::{Recording, Store, VisualError};
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
-use truegrind_calibration::diagnosis::finding::Diagnosis;
 use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::identification::fit::{Observed, errors_on};
 use truegrind_calibration::identification::identify::{Identification, observe};
 use truegrind_calibration::identification::rounding::logged_covariance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row};
 use truegrind_math::se3::Pose;
+
+pub use self::scene::{MeasuredScene, Residuals};
 
 /// The time axis: [`Row::number`].
 pub const AXIS: &str = "data row";
@@ -46,45 +48,13 @@ const SENSOR_AXES: f64 = 0.12;
 /// The colour scale ends at this quantile of the residuals, so that one outlier does not make all others dark.
 const TOP_QUANTILE: f64 = 0.98;
 
-/// What one stage of a fit leaves.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Residuals {
-    /// The stage: "frames fitted", "geometry fitted".
-    pub stage: String,
-    /// Data row and error (mm): signed for a cable (model minus reading), the length of the difference otherwise.
-    pub rows: Vec<(usize, f64)>,
-}
-
-/// What is to be drawn of a measurement file.
-#[derive(Debug, Clone, Copy)]
-pub struct MeasuredScene<'a> {
-    /// The file.
-    pub dataset: &'a Dataset,
-    /// The arm that is drawn.
-    pub arm: &'a Model,
-    /// What that arm is, in words.
-    pub arm_is: &'a str,
-    /// How the sensor stands to the arm, where known.
-    pub frames: Option<&'a Frames>,
-    /// What each stage leaves, the best one last; may be empty.
-    pub residuals: &'a [Residuals],
-    /// Errors of rows that the last stage had not seen: data row, error (mm).
-    pub held_out: &'a [(usize, f64)],
-    /// Data rows that were set aside as outliers.
-    pub set_aside: &'a [usize],
-    /// What was identified, for the text.
-    pub identification: Option<&'a Identification>,
-    /// What a diagnosis found in it.
-    pub diagnosis: Option<&'a Diagnosis>,
-}
-
 /// Draws a measurement file with what was identified from it.
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
 pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Recording, VisualError> {
     let estimated: &Estimated = &found.estimated;
-    let observed = if found.sharpening.is_ok() {
+    let observed = if found.readout_fusion.is_ok() {
         observe(dataset, &estimated.nominal, true).0
     } else {
         Observed { dataset: dataset.clone(), angles: logged_covariance(dataset) }

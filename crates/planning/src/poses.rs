@@ -8,6 +8,9 @@
 //! - [`rival`]: what a diagnosis could not tell apart;
 //! - [`drive`]: the program that moves there.
 
+mod blank;
+mod options;
+mod wanted;
 pub mod candidate;
 pub mod sight;
 pub mod rows;
@@ -22,71 +25,19 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use self::candidate::{Bounds, Candidate, Passed};
+use self::blank::blank;
+use self::candidate::{Candidate, Passed};
 use self::design::{Design, Index};
 use self::power::Decidable;
-use self::rival::Question;
-use self::rows::{Noise, Told};
-use self::schedule::{Row, Visits};
+use self::rows::Told;
+use self::schedule::Row;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, arm_parameters};
-use truegrind_calibration::identification::calibration::Frames;
 use truegrind_calibration::identification::fit::frame_parameters;
-use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
 
-/// What shall be measured, with what.
-#[derive(Debug, Clone)]
-pub struct Wanted<'a> {
-    /// What the controller computes with.
-    pub nominal: &'a Model,
-    /// The sensor.
-    pub sensor: Sensor,
-    /// Where it stands and what it touches, about.
-    pub frames: &'a Frames,
-}
-
-/// How to plan.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Different poses.
-    pub poses: usize,
-    /// What makes a set of poses good.
-    pub index: Index,
-    /// What a reading is worth.
-    pub noise: Noise,
-    /// What is known before.
-    pub tolerance: Tolerance,
-    /// Poses to choose from.
-    pub candidates: usize,
-    /// Where they may be.
-    pub bounds: Bounds,
-    /// What is visited more than once.
-    pub visits: Visits,
-    /// What a diagnosis could not tell apart.
-    pub questions: Vec<Question>,
-    /// Non-centrality from which an effect counts as decided.
-    pub decisive: f64,
-    /// Seed of everything random.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            poses: 60,
-            index: Index::default(),
-            noise: Noise::default(),
-            tolerance: Tolerance::default(),
-            candidates: 2000,
-            bounds: Bounds::default(),
-            visits: Visits::default(),
-            questions: Vec::new(),
-            decisive: 25.0,
-            seed: 0,
-        }
-    }
-}
+pub use self::options::Options;
+pub use self::wanted::Wanted;
 
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -206,7 +157,7 @@ fn parameters(wanted: &Wanted<'_>) -> Vec<Parameter> {
     if wanted.sensor == Sensor::Cable {
         // One row of the last cable says how many there are.
         let anchor = wanted.frames.outlets_mm.len() - 1;
-        let mut row = rows::blank(0, nalgebra::Vector6::zeros(), wanted.sensor);
+        let mut row = blank(0, nalgebra::Vector6::zeros(), wanted.sensor);
         row.anchor = anchor;
         empty.rows.push(row);
     }

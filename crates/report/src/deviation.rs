@@ -4,12 +4,15 @@
 //! kinematics); it is labelled so everywhere and stands beside the predicted 1σ and the model's held-out error, which say
 //! how far the real arm will be off. Only a simulated actual arm or a measurement is called *achieved*.
 
+mod side;
+mod words;
 mod pictures;
 mod summary;
 
-use nalgebra::Point3;
 use serde_json::{Value, json};
 
+use self::side::{AFTER, BEFORE, Side, by_program, cut, has, intended, sigma_rms};
+use self::words::{decimals, meaning, named, notes, words};
 use super::document::{Block, Document, KeyFigure, Verdict};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -23,11 +26,6 @@ const ROWS_ON_PAGE: usize = 150;
 
 /// Models with a key figure of their own.
 const MODELS_IN_FIGURES: usize = 7;
-
-/// Which side of the correction.
-type Side = fn(&PathPoint) -> Option<Deviation>;
-const BEFORE: Side = |point| point.before;
-const AFTER: Side = |point| point.after;
 
 /// One row per path point of one program under one model, all columns. Positions and vectors in the work object.
 pub fn table(report: &PathReport) -> Table {
@@ -340,95 +338,10 @@ fn deviation_json(deviation: Deviation) -> Value {
     })
 }
 
-/// Reports by program, in the order in which programs first appear.
-fn by_program(reports: &[PathReport]) -> Vec<(&str, Vec<&PathReport>)> {
-    let mut out: Vec<(&str, Vec<&PathReport>)> = Vec::new();
-    for report in reports {
-        match out.iter_mut().find(|(program, _)| *program == report.program) {
-            Some((_, group)) => group.push(report),
-            None => out.push((&report.program, vec![report])),
-        }
-    }
-    out
-}
-
-/// Where the TCP shall be, in the work object.
-fn intended(point: &PathPoint) -> Point3<f64> {
-    point.base_from_object.inverse_transform_point(&Point3::from(point.intended.translation.vector))
-}
-
-/// The points that a summary is made of: the cut, or all where nothing cuts.
-fn cut(report: &PathReport) -> impl Iterator<Item = &PathPoint> {
-    let any = report.points.iter().any(|point| point.cutting);
-    report.points.iter().filter(move |point| point.cutting || !any)
-}
-
-fn has(report: &PathReport, side: Side) -> bool {
-    report.points.iter().any(|point| side(point).is_some())
-}
-
 /// Whether two reports say the same of every point.
 fn same_fates(a: &PathReport, b: &PathReport) -> bool {
     let fates = |r: &PathReport| r.points.iter().map(|p| (p.status, p.reason.clone())).collect::<Vec<_>>();
     fates(a) == fates(b)
-}
-
-/// Root mean square of the predicted 1σ over the cut (mm); `None` where no point has one.
-fn sigma_rms(report: &PathReport) -> Option<f64> {
-    let squares: Vec<f64> = cut(report).filter_map(|point| point.sigma_mm.map(|s| s * s)).collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
-}
-
-/// Short heading and key of the columns after the correction.
-fn words(after: After) -> (&'static str, &'static str) {
-    match after {
-        After::PredictedRemainder => ("remainder", "predicted_remainder"),
-        After::Achieved => ("achieved", "achieved"),
-    }
-}
-
-/// What the figures after the correction are.
-fn meaning(after: After) -> &'static str {
-    match after {
-        After::PredictedRemainder => "predicted remainder",
-        After::Achieved => "achieved",
-    }
-}
-
-/// A remainder is far smaller than a deviation.
-fn decimals(after: After) -> usize {
-    match after {
-        After::PredictedRemainder => 4,
-        After::Achieved => 3,
-    }
-}
-
-/// Model with its held-out error.
-fn named(report: &PathReport) -> String {
-    match report.held_out_mm {
-        Some(mm) => format!("{} (held-out error {mm:.3} mm RMSE)", report.model),
-        None => format!("{} (held-out error not known)", report.model),
-    }
-}
-
-const REMAINDER: &str = "A predicted remainder is what rounding, interpolation and inverse kinematics leave under the \
-    very model that made the correction. It does not say how far the real arm will be off: the predicted 1σ and the \
-    model's held-out error do.";
-
-fn notes(report: &PathReport) -> Vec<String> {
-    let mut notes = vec![
-        "Positions and vectors in the axes of the work object; d is reached minus intended.".to_owned(),
-        if report.points.iter().any(|point| point.normal.is_some()) {
-            "\"normal\" is signed along the outward surface normal: positive stands off the surface, negative digs in."
-                .to_owned()
-        } else {
-            "No surface is known, so nothing is stated along a normal.".to_owned()
-        },
-    ];
-    if report.after == After::PredictedRemainder && has(report, AFTER) {
-        notes.push(REMAINDER.to_owned());
-    }
-    notes
 }
 
 fn line(point: &PathPoint) -> Cell {

@@ -2,19 +2,22 @@
 //!
 //! Inside truegrind angles are radians; people read degrees here, and the keys of tables and JSON say so.
 
+mod parameter;
+mod row;
 mod pictures;
 mod tables;
 mod words;
 
 use serde_json::{Value, json};
 
+use self::parameter::{held_by_prior, in_unit, is_of_arm};
+use self::row::row_number;
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;
-use super::table::Cell;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
     frame_table, held_out_table, observability_table, outlier_table, parameter_table, stage_table,
@@ -185,35 +188,6 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
     })
 }
 
-/// Whether a parameter belongs to the arm and not to how it was measured.
-fn is_of_arm(parameter: &EstimatedParameter) -> bool {
-    parameter.name.starts_with("link") || parameter.name.starts_with("effect")
-}
-
-/// A parameter with all its numbers times `factor`.
-fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
-    EstimatedParameter {
-        name: parameter.name.clone(),
-        unit: unit.to_owned(),
-        nominal: parameter.nominal * factor,
-        value: parameter.value * factor,
-        sigma: parameter.sigma * factor,
-        prior_sigma: parameter.prior_sigma.map(|sigma| sigma * factor),
-        determined: parameter.determined,
-    }
-}
-
-/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
-fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
-    let (factor, unit) = match parameter.unit.as_str() {
-        "1" => (1e6, "ppm"),
-        "1/K" => (1e6, "ppm/K"),
-        "rad/(N m)" => (1e6, "µrad/(N m)"),
-        unit => super::number::handy(unit),
-    };
-    in_unit(parameter, factor, unit)
-}
-
 fn parameter_json(parameter: &EstimatedParameter) -> Value {
     let shown = match parameter.unit.as_str() {
         "rad" => in_unit(parameter, 1f64.to_degrees(), "deg"),
@@ -231,16 +205,6 @@ fn parameter_json(parameter: &EstimatedParameter) -> Value {
         "determined": shown.determined,
         "held_by_prior": held_by_prior(parameter),
     })
-}
-
-/// Whether the prior knew more of a parameter than the data did.
-fn held_by_prior(parameter: &EstimatedParameter) -> bool {
-    !(parameter.determined >= 0.5)
-}
-
-/// Number of a data row as files count them; the index itself where the data set is not the one that was used.
-fn row_number(dataset: &Dataset, index: usize) -> usize {
-    dataset.rows.get(index).map_or(index, |row| row.number)
 }
 
 fn verdict(found: &Identification) -> Verdict {
@@ -339,15 +303,4 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
         }],
         remarks,
     }
-}
-
-/// Whether a row has one error with a sign (a cable) or the length of a vector.
-fn signed(found: &Identification) -> bool {
-    found.estimated.provenance.sensor
-        == truegrind_calibration::identification::identify::sensor_name(Sensor::Cable)
-}
-
-/// A figure that has a meaning only for some sensors or counts.
-fn cell(value: f64, meaningful: bool) -> Cell {
-    if meaningful { value.into() } else { Cell::Missing }
 }

@@ -6,7 +6,8 @@
 
 use std::cell::Cell;
 
-use super::{Surface, SurfaceError};
+use crate::error::SurfaceError;
+use crate::surface::Surface;
 
 /// Terms of equations that are evaluated for one path: some seconds.
 const MOST_TERMS: f64 = 2e8;

@@ -19,21 +19,18 @@
 
 mod implicit;
 mod jet;
+mod survey;
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::expression::Expression;
-use super::{Contact, Domain, Foot, SurfaceError};
+use crate::contact::{Contact, Foot};
+use crate::domain::Domain;
+use crate::error::SurfaceError;
 use jet::Jet;
+use survey::{AROUND, LATTICE};
 
 pub use implicit::Implicit;
-
-/// How many intervals each side of the domain has where a surface is looked over: for values that are not finite,
-/// and for the starting points of Newton's method.
-const LATTICE: usize = 40;
-
-/// What a look costs beside the terms of the equation.
-const AROUND: f64 = 20.0;
 
 /// z as a function of x and y. Outward is up, +z.
 #[derive(Debug, Clone)]
@@ -181,9 +178,4 @@ fn looked_over(
             })
         })
         .collect()
-}
-
-/// A unit vector, unless the vector is so short or so far from finite that it has no direction.
-fn direction(vector: Vector3<f64>) -> Option<Unit<Vector3<f64>>> {
-    Unit::try_new(vector, f64::MIN_POSITIVE).filter(|unit| unit.iter().all(|c| c.is_finite()))
 }

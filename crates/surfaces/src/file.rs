@@ -63,8 +63,11 @@ use serde::Deserialize;
 
 use super::expression::ExpressionError;
 use super::mesh::{Mesh, MeshOptions};
-use super::path::{self, Along, PathOptions, PathPoint, Pattern, Spacing, ToolX, Traverse};
-use super::{Domain, Explicit, Implicit, Parametric, Surface, SurfaceError};
+use crate::domain::Domain;
+use crate::equation::{Explicit, Implicit, Parametric};
+use crate::error::SurfaceError;
+use crate::path::{self, Along, PathOptions, PathPoint, Pattern, Spacing, ToolX, Traverse};
+use crate::surface::Surface;
 use truegrind_math::se3::Pose;
 
 /// The zones that controllers know by name.

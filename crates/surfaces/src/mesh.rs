@@ -24,7 +24,10 @@ use nalgebra::{Point3, Unit, Vector3};
 use parry3d_f64::query::{PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags, TrianglePointLocation};
 
-use super::{Contact, Domain, Foot, SurfaceError, Tessellation};
+use crate::contact::{Contact, Foot};
+use crate::domain::Domain;
+use crate::error::SurfaceError;
+use crate::tessellation::Tessellation;
 
 /// Triangles that meet at a smaller angle than this share a smooth normal.
 const CREASE_RAD: f64 = std::f64::consts::FRAC_PI_6;

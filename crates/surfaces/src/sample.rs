@@ -1,6 +1,7 @@
 //! The surfaces that ship with truegrind, one of each kind.
 
-use super::{SurfaceError, SurfaceFile};
+use crate::error::SurfaceError;
+use crate::file::SurfaceFile;
 
 /// A surface file that ships, as its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -137,7 +137,7 @@ pub(super) fn note_put(place: &Place) {
 }
 
 /// A new round of a run that goes on: it writes its outputs again.
-pub(in crate::cli) fn new_round() {
+pub(crate) fn new_round() {
     ledger().written.clear();
 }
 

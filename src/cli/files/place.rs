@@ -75,7 +75,7 @@ pub(super) struct Place {
 }
 
 /// Names of the standard output.
-pub(in crate::cli) fn is_stdout(path: &Path) -> bool {
+pub(crate) fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 

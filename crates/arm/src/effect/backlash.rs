@@ -3,9 +3,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Play of one joint.
@@ -42,7 +43,7 @@ impl Backlash {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
         let side = f64::from(condition.approach[self.joint]);
         out[self.joint] += R::splat(self.play_rad * 0.5 * side);
     }

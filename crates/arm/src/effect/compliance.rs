@@ -6,9 +6,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Compliance of one joint.
@@ -45,7 +46,7 @@ impl Compliance {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += R::splat(self.compliance_rad_per_nm) * torque[self.joint];
     }
 

@@ -6,9 +6,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::{SinCos, sin_cos};
 
 /// One harmonic of one joint.
@@ -67,13 +68,13 @@ impl Harmonic {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
         let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
         out[self.joint] += R::splat(self.sine_rad) * sin + R::splat(self.cosine_rad) * cos;
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn carry<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
         let slope = R::splat(self.order * self.sine_rad) * cos - R::splat(self.order * self.cosine_rad) * sin;
         out[self.joint] += slope * step[self.joint];

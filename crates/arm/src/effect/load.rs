@@ -10,10 +10,11 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, GRAVITY, Statics};
 use crate::chain::{Chain, cross, dot, minus};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::{GRAVITY, Statics};
+use crate::joints::Joints;
 use truegrind_math::lanes::{Real, SinCos};
 
 /// One lump.
@@ -93,12 +94,12 @@ impl GravityLoad {
 
     pub(super) fn rotation(&self, statics: &Statics, u: &Joints, _: &Condition) -> Joints {
         let mut out = [0.0; 6];
-        self.turn(statics, &(*u).into(), &mut out);
+        self.add_offset(statics, &(*u).into(), &mut out);
         out.into()
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: SinCos>(&self, statics: &Statics, u: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: SinCos>(&self, statics: &Statics, u: &[R; 6], out: &mut [R; 6]) {
         let frames = statics.frames(u);
         for lump in &self.lump {
             out[self.joint] += R::splat(lump.factor) * self.torque(statics, &frames, lump);

@@ -11,9 +11,10 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Map of one joint.
@@ -93,7 +94,7 @@ impl JointMap {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += u[self.joint].each(|u| {
             let (first, weights, _) = self.near(u);
             self.sum(first, &weights)
@@ -101,7 +102,7 @@ impl JointMap {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn carry<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_jacobian_product<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let slope = u[self.joint].each(|u| {
             let (first, _, slopes) = self.near(u);
             self.sum(first, &slopes)

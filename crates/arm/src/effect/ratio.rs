@@ -3,9 +3,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Ratio error of one joint.
@@ -42,13 +43,13 @@ impl Ratio {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         out[self.joint] += R::splat(self.error) * u[self.joint];
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn carry<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
-        self.turn(step, out);
+    pub(super) fn add_jacobian_product<R: Real>(&self, step: &[R; 6], out: &mut [R; 6]) {
+        self.add_offset(step, out);
     }
 
     pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {

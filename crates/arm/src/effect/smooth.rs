@@ -12,9 +12,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 use truegrind_math::radial;
 
@@ -77,12 +78,12 @@ impl Smooth {
 
     pub(super) fn rotation(&self, _: &Statics, u: &Joints, _: &Condition) -> Joints {
         let mut out = [0.0; 6];
-        self.turn(&(*u).into(), &mut out);
+        self.add_offset(&(*u).into(), &mut out);
         out.into()
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn turn<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
         let v = [u[0], u[1], u[2]];
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
             let bump = radial::bump(&v, centre, self.reach_rad);
@@ -93,7 +94,7 @@ impl Smooth {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn carry<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
+    pub(super) fn add_jacobian_product<R: Real>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
         let (v, along) = ([u[0], u[1], u[2]], [step[0], step[1], step[2]]);
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
             let slope = radial::slope_along(&v, centre, self.reach_rad, &along);
@@ -108,7 +109,7 @@ impl Smooth {
         for column in 0..JOINTS {
             let (mut step, mut moved) = ([0.0; 6], [0.0; 6]);
             step[column] = 1.0;
-            self.carry(&(*u).into(), &step, &mut moved);
+            self.add_jacobian_product(&(*u).into(), &step, &mut moved);
             (0..JOINTS).for_each(|row| out[(row, column)] = moved[row]);
         }
         out

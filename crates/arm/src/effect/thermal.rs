@@ -5,9 +5,10 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use super::{EffectParameter, Statics};
 use crate::condition::Condition;
-use crate::model::Joints;
+use crate::effect::parameter::EffectParameter;
+use crate::effect::statics::Statics;
+use crate::joints::Joints;
 
 /// Growth of the links.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use nalgebra::UnitQuaternion;
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
-use crate::model::{Joints, Limits};
+use crate::joints::{Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 

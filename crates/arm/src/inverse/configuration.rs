@@ -28,7 +28,8 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::{Branch, Structure};
 use crate::condition::Condition;
-use crate::model::{Joints, Model};
+use crate::joints::Joints;
+use crate::model::Model;
 
 /// RAPID's `confdata`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -62,7 +63,7 @@ pub(super) const BRANCH_TOLERANCE: f64 = 0.02;
 /// Configuration of an arm at controller angles (rad); cfx is 0 for an arm without a closed form. For the nominal arm,
 /// or for an estimated one without its effects; [`Inverse::configuration`](super::Inverse::configuration) counts them in.
 pub fn configuration(model: &Model, joints: &Joints) -> Configuration {
-    let frames = model.under(&Condition::default()).frames(joints);
+    let frames = model.at_condition(&Condition::default()).frames(joints);
     let structure = Structure::of(model);
     of(structure.has_branches().then(|| Branch::of(&structure.margins_of(&frames))), joints)
 }

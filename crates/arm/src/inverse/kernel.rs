@@ -16,7 +16,7 @@
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
 use super::structure::Structure;
 use crate::chain::{Chain, End, chain, cross, dot, minus};
-use crate::model::Posed;
+use crate::model::PreparedModel;
 use truegrind_math::lanes::{SinCos, sin_cos};
 
 /// Most steps of a row.
@@ -176,7 +176,7 @@ impl Kernel {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn solve<R: SinCos>(
         &self,
-        arm: &Posed<'_>,
+        arm: &PreparedModel<'_>,
         structure: &Structure,
         goal: &End<R>,
         start: &[R; 6],
@@ -222,7 +222,7 @@ impl Kernel {
                 let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
                 let mut carried = [zero; 6];
                 for effect in &arm.model.effects {
-                    effect.carry(&mapped, &delta, &mut carried);
+                    effect.add_jacobian_product(&mapped, &delta, &mut carried);
                 }
                 for j in 0..6 {
                     delta[j] -= carried[j];
@@ -274,7 +274,7 @@ impl Kernel {
 
     /// Joint frames for mapped angles.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn frames<R: SinCos>(&self, arm: &Posed<'_>, mapped: &[R; 6]) -> Chain<R> {
+    fn frames<R: SinCos>(&self, arm: &PreparedModel<'_>, mapped: &[R; 6]) -> Chain<R> {
         let rotations = arm.affected(mapped);
         let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
         for i in 0..6 {

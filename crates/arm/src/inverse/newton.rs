@@ -12,7 +12,8 @@ use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
 use crate::chain::Chain;
 use crate::jacobian::{joint_jacobian, link_twist};
-use crate::model::{Joints, Posed};
+use crate::joints::Joints;
+use crate::model::PreparedModel;
 use crate::parameter::LinkCoordinate;
 use truegrind_math::se3::Pose;
 
@@ -71,7 +72,7 @@ struct State {
 }
 
 /// Jacobian of the flange with respect to the rotations of the joints, translation rows divided by `length_mm`.
-pub(super) fn scaled_jacobian(arm: &Posed<'_>, joints: &Joints, length_mm: f64) -> Matrix6<f64> {
+pub(super) fn scaled_jacobian(arm: &PreparedModel<'_>, joints: &Joints, length_mm: f64) -> Matrix6<f64> {
     let frames = arm.frames(joints);
     let point = Vector3::from(frames.origin[6]) + frame_matrix(&frames) * arm.model.flange.translation.vector;
     let mut jacobian = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|joint| {
@@ -85,7 +86,7 @@ fn frame_matrix(frames: &Chain<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[frames.x.into(), frames.y[5].into(), frames.z[6].into()])
 }
 
-fn state(arm: &Posed<'_>, goal: &Goal, joints: Joints, length_mm: f64) -> State {
+fn state(arm: &PreparedModel<'_>, goal: &Goal, joints: Joints, length_mm: f64) -> State {
     let frames = arm.frames(&joints);
     let axes = frame_matrix(&frames);
     let point = Vector3::from(frames.origin[6]) + axes * goal.flange_in_last_mm;
@@ -115,7 +116,7 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 /// Runs from `start`. NaN ends it at once, not converged.
-pub(super) fn solve(arm: &Posed<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
+pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
     let mut here = state(arm, goal, *start, length_mm);
     let mut damping = 0.0_f64;
     let mut iterations = 0;

@@ -6,7 +6,7 @@ use super::configuration::{self, Configuration};
 use super::kernel::{Asked, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::chain::End;
-use crate::model::Joints;
+use crate::joints::Joints;
 use truegrind_math::lanes::{Lanes, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
 

@@ -1,7 +1,7 @@
 //! What the inverse map hands back: a solution, or why there is none.
 
 use super::configuration::Configuration;
-use crate::model::Joints;
+use crate::joints::Joints;
 
 /// Joints that reach a target.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@
 use nalgebra::Vector3;
 
 use super::axes::{Axes, angle_between, projections};
-use super::structure::Seed;
+use super::seed::Seed;
 use truegrind_math::se3::Pose;
 
 /// The wrist centre with all rotations at zero, if the arm is of this family.

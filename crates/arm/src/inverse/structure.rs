@@ -3,20 +3,12 @@
 use nalgebra::{Point3, Vector3};
 
 use super::axes::Axes;
+use super::seed::Seed;
 use super::{spherical, ur};
 use crate::chain::{Chain, cross, dot, minus};
 use crate::model::Model;
 use truegrind_math::lanes::Real;
 use truegrind_math::se3::Pose;
-
-/// Where Newton's method starts.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Seed {
-    /// DH joint rotations (rad).
-    pub(super) rotations: [f64; 6],
-    /// How far the target lies beyond the nominal arm's reach on this branch (mm); 0 within.
-    pub(super) beyond_mm: f64,
-}
 
 /// The family of an arm.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,8 +11,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::axes::{Axes, angle_between, projections};
+use super::seed::Seed;
 use super::spherical::{about, two_links};
-use super::structure::Seed;
 use truegrind_math::se3::Pose;
 
 /// The meeting point of axes 5 and 6 with all rotations at zero, if the arm is of this family.

@@ -31,8 +31,10 @@
 use nalgebra::{Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::body::Body;
+use crate::joints::Limits;
 use crate::link::{Link, LinkModel};
-use crate::model::{Body, Limits, Model};
+use crate::model::Model;
 use truegrind_math::se3::Pose;
 
 /// Where no range is published, one turn either way (rad): how far a search may go, not a limit of the arm.

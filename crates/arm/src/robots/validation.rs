@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::RobotError;
+use super::error::RobotError;
 use super::sheet::{DataSheet, LinkSheet, Point, Published, unit_quaternion};
 use crate::bounds::{
     self, Bound, DIRECTION, JOINT_DEG, LENGTH_MM, MASS_KG, PLACE_MM, SPEED_DEG_S, TWIST_DEG, Unfit,
@@ -375,7 +375,7 @@ pub(super) fn difference(found: &Model, known: &Model) -> Option<String> {
 pub fn deviation(pose: &Published, model: &Model) -> (f64, Option<f64>) {
     let q = Vector6::from(pose.joints_deg.map(f64::to_radians));
     let condition = Default::default();
-    let posed = model.under(&condition);
+    let posed = model.at_condition(&condition);
     let flange = posed.forward(&q);
     let point = match pose.point {
         Point::Flange => flange.translation.vector,

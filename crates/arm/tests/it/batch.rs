@@ -18,7 +18,7 @@ fn columns_agree_with_rows_on_every_arm_and_length() {
         if k % 2 == 0 {
             model.flange = Pose::new(Vector3::new(1.0, -2.0, 50.0), Vector3::new(0.2, 0.3, -1.0));
         }
-        let posed = model.under(&condition);
+        let posed = model.at_condition(&condition);
         // Lengths with and without a remainder, buffers growing and shrinking.
         for rows in [0, 1, 7, 8, 41] {
             let joints: Vec<Joints> = (0..rows).map(|_| joints_within(&model, &mut random)).collect();
@@ -38,7 +38,7 @@ fn columns_agree_with_rows_on_every_arm_and_length() {
 #[test]
 fn a_lost_row_is_lost_alone() {
     let model = SHEETS[0].model();
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     let mut joints = vec![Joints::repeat(0.3); 8];
     joints[3][2] = f64::NAN;
     let mut out = PoseColumns::default();

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Vector3};
 use truegrind_arm::chain::tables;
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::effect::{Effect, Statics};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::difference::jacobian;
 use truegrind_math::lanes::{Lanes, WIDTH};
@@ -31,7 +31,7 @@ fn assert_near(a: &Matrix6<f64>, b: &Matrix6<f64>, tolerance: f64, what: &str) {
 fn torque_is_the_negative_gradient_of_the_potential_energy() {
     for sheet in SHEETS {
         let model = heavy(sheet, 41);
-        let statics = Statics::of(&model);
+        let statics = model.statics();
         let condition = condition();
         let bodies = model.bodies.unwrap();
         // Height of every mass against gravity, summed up from the link poses: nothing of the torque's own code.
@@ -77,7 +77,7 @@ fn torque_is_the_negative_gradient_of_the_potential_energy() {
 #[test]
 fn every_slope_has_a_numerical_twin() {
     let model = heavy(&SHEETS[0], 43);
-    let statics = Statics::of(&model);
+    let statics = model.statics();
     let condition = condition();
     let mut random = generator(44);
     for _ in 0..10 {
@@ -101,7 +101,7 @@ fn every_slope_has_a_numerical_twin() {
 #[test]
 fn rotation_slopes_count_couplings_and_effects() {
     let model = heavy(SHEETS.iter().find(|s| s.name == "fanuc-m-20ia").unwrap(), 45);
-    let posed = model.under(&condition());
+    let posed = model.at_condition(&condition());
     let mut random = generator(46);
     for _ in 0..10 {
         let q = joints_within(&model, &mut random);
@@ -118,7 +118,7 @@ fn rotation_slopes_count_couplings_and_effects() {
 #[test]
 fn an_effect_is_the_sum_of_its_regressors() {
     let model = heavy(&SHEETS[3], 47);
-    let statics = Statics::of(&model);
+    let statics = model.statics();
     let condition = Condition { approach: [1, 0, -1, 0, 0, 1], ..condition() };
     let mut effects = model.effects.clone();
     effects.push(Effect::Backlash(Backlash { joint: 2, play_rad: 1e-3 }));
@@ -136,7 +136,7 @@ fn an_effect_is_the_sum_of_its_regressors() {
         let rotation = effect.rotation(&statics, &u, &condition);
         assert!((rotation - sum).amax() < 1e-15, "{}", effect.name());
         let mut turned = [0.0; 6];
-        effect.turn(&statics, &u.into(), &torque, &condition, &mut turned);
+        effect.add_offset(&statics, &u.into(), &torque, &condition, &mut turned);
         assert!((rotation - Joints::from(turned)).amax() < 1e-15, "{}", effect.name());
         assert!(effect.joint().is_none_or(|joint| (0..6).all(|j| j == joint || rotation[j] == 0.0)));
     }
@@ -145,7 +145,7 @@ fn an_effect_is_the_sum_of_its_regressors() {
 #[test]
 fn effects_in_lanes_get_the_bits_of_one_row_alone() {
     let model = heavy(&SHEETS[0], 49);
-    let posed = model.under(&condition());
+    let posed = model.at_condition(&condition());
     let mut random = generator(50);
     let rows: [Joints; WIDTH] = std::array::from_fn(|_| joints_within(&model, &mut random));
     let eight = posed.affected(&std::array::from_fn(|j| Lanes(std::array::from_fn(|k| rows[k][j]))));
@@ -197,6 +197,7 @@ fn play_is_felt_between_the_two_sides() {
     model.effects.push(Effect::Backlash(Backlash { joint: 1, play_rad: 2e-3 }));
     let from = |side: i8| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
     let q = Joints::zeros();
-    let (above, below) = (model.under(&from(1)).rotations(&q), model.under(&from(-1)).rotations(&q));
+    let (above, below) =
+        (model.at_condition(&from(1)).rotations(&q), model.at_condition(&from(-1)).rotations(&q));
     assert!(((above - below)[1] - 2e-3).abs() < 1e-18);
 }

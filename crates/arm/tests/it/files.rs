@@ -162,7 +162,7 @@ fn a_model_with_any_number_wrong_is_refused_or_computes_finite_numbers() {
                 1
             }
             Ok(model) => {
-                let posed = model.model.under(&model.condition);
+                let posed = model.model.at_condition(&model.condition);
                 let joints = Joints::new(0.1, -0.2, 0.3, 0.4, 0.5, -0.6);
                 let point = RidingPoint { joints, flange_from_tool: Pose::identity(), carried: None };
                 let sigma = model.position_sigmas_mm(&posed, &[point])[0];

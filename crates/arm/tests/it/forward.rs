@@ -69,7 +69,7 @@ fn the_kernel_agrees_with_the_product_of_link_poses() {
     for sheet in SHEETS {
         let mut model = with_effects(&perturbed(&sheet.model(), &mut random, 2.0, 1.0), &mut random);
         model.flange = Pose::new(Vector3::new(10.0, -20.0, 30.0), Vector3::new(0.1, 0.2, -0.3));
-        let posed = model.under(&condition);
+        let posed = model.at_condition(&condition);
         for _ in 0..50 {
             let q = joints_within(&model, &mut random);
             let error = difference(&posed.forward(&q), &product(&model, &posed.rotations(&q)));
@@ -83,7 +83,7 @@ fn the_kernel_agrees_with_the_product_of_link_poses() {
 fn frames_hold_the_axes_of_the_links_on_the_way() {
     let mut random = generator(5);
     let model = perturbed(&Sheet::named("staubli-tx90"), &mut random, 2.0, 1.0);
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     let q = joints_within(&model, &mut random);
     let frames = posed.frames(&q);
     let mut pose = Pose::identity();

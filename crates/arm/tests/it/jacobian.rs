@@ -49,7 +49,7 @@ fn spoiled(sheet: usize, seed: u64) -> Model {
 fn joint_jacobian_has_a_numerical_twin_on_every_arm() {
     for (sheet, named) in SHEETS.iter().enumerate() {
         let model = spoiled(sheet, 31);
-        let posed = model.under(&condition());
+        let posed = model.at_condition(&condition());
         let mut random = generator(32);
         for _ in 0..5 {
             let q = joints_within(&model, &mut random);
@@ -80,7 +80,7 @@ struct Numbers {
 
 impl Numbers {
     fn of(model: &Model, ends: &Ends) -> Self {
-        let mut parameters: Vec<Parameter> = (0..6).map(Parameter::Base).collect();
+        let mut parameters: Vec<Parameter> = (0..6).map(Parameter::SensorFrame).collect();
         parameters.extend(link_parameters(model));
         // Every link has all five, whichever four are free.
         for joint in 0..6 {
@@ -96,10 +96,10 @@ impl Numbers {
                 (0..effect.parameters().len()).map(|parameter| Parameter::Effect { index, parameter }),
             );
         }
-        parameters.extend((0..6).map(Parameter::Tool));
+        parameters.extend((0..6).map(Parameter::Target));
         let value = |p: &Parameter| match *p {
-            Parameter::Base(k) => ends.world_from_base[k],
-            Parameter::Tool(k) => ends.flange_from_tool[k],
+            Parameter::SensorFrame(k) => ends.world_from_base[k],
+            Parameter::Target(k) => ends.flange_from_tool[k],
             Parameter::Link { joint, coordinate } => model.links[joint].get(coordinate),
             Parameter::Effect { index, parameter } => model.effects[index].parameters()[parameter].value,
             _ => unreachable!(),
@@ -128,14 +128,14 @@ impl Numbers {
         let (mut model, mut ends) = (model.clone(), *ends);
         for (parameter, &value) in self.parameters.iter().zip(x) {
             match *parameter {
-                Parameter::Base(k) => ends.world_from_base[k] = value,
-                Parameter::Tool(k) => ends.flange_from_tool[k] = value,
+                Parameter::SensorFrame(k) => ends.world_from_base[k] = value,
+                Parameter::Target(k) => ends.flange_from_tool[k] = value,
                 Parameter::Link { joint, coordinate } => model.links[joint].set(coordinate, value),
                 Parameter::Effect { index, parameter } => model.effects[index].set(parameter, value),
                 _ => unreachable!(),
             }
         }
-        ends.forward(&model.under(&condition()), q)
+        ends.forward(&model.at_condition(&condition()), q)
     }
 }
 
@@ -153,7 +153,7 @@ fn parameter_jacobian_has_a_numerical_twin_on_every_arm() {
         let ends = Ends { world_from_base: six(500.0, 1.0), flange_from_tool: six(200.0, 1.0) };
         let numbers = Numbers::of(&model, &ends);
         let q = joints_within(&model, &mut random);
-        let posed = model.under(&condition());
+        let posed = model.at_condition(&condition());
         let analytic = parameter_jacobian(&ends, &posed, &q, &numbers.parameters);
         let here = ends.forward(&posed, &q);
         let twin = jacobian(
@@ -184,7 +184,7 @@ fn compliance_has_a_numerical_twin_in_its_own_parameter() {
     let mut random = generator(36);
     for _ in 0..10 {
         let q = joints_within(&model, &mut random);
-        let posed = model.under(&condition());
+        let posed = model.at_condition(&condition());
         let analytic = parameter_jacobian(&ends, &posed, &q, &numbers.parameters);
         let here = ends.forward(&posed, &q);
         let twin = jacobian(
@@ -203,6 +203,6 @@ fn parameters_of_a_cable_move_no_pose() {
     let model = spoiled(0, 37);
     let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: [0.0; 6] };
     let cable = [Parameter::Zero { anchor: 0 }, Parameter::Outlet { anchor: 0, axis: 2 }];
-    let columns = parameter_jacobian(&ends, &model.under(&condition()), &Joints::zeros(), &cable);
+    let columns = parameter_jacobian(&ends, &model.at_condition(&condition()), &Joints::zeros(), &cable);
     assert_eq!(columns.amax(), 0.0);
 }

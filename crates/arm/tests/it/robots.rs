@@ -116,7 +116,7 @@ fn parallel_axes_are_hayati_and_no_others() {
 fn elbow_arms_have_a_spherical_wrist() {
     let q = Vector6::new(0.4, -0.3, 0.5, 1.1, -0.7, 0.2);
     for Robot { sheet, model, .. } in all() {
-        let frames = model.under(&Default::default()).frames(&q);
+        let frames = model.at_condition(&Default::default()).frames(&q);
         let wrist = Vector3::from(frames.origin[5]);
         let off = |axis: usize| {
             (wrist - Vector3::from(frames.origin[axis])).cross(&Vector3::from(frames.z[axis])).norm()
@@ -151,7 +151,8 @@ fn fanuc_j2_leaves_the_forearm_level_and_abb_does_not() {
         let model = load(name).unwrap().model;
         let z = |q2: f64| {
             Vector3::from(
-                model.under(&Default::default()).frames(&Vector6::new(0.0, q2, 0.0, 0.0, 0.0, 0.0)).z[3],
+                model.at_condition(&Default::default()).frames(&Vector6::new(0.0, q2, 0.0, 0.0, 0.0, 0.0)).z
+                    [3],
             )
         };
         z(0.0).angle(&z(0.3))
@@ -243,7 +244,7 @@ fn masses_fall_towards_the_flange() {
 fn centres_of_mass_are_in_the_dh_frames() {
     let model = load("abb-irb-120").unwrap().model;
     let bodies = model.bodies.unwrap();
-    let frames = model.under(&Default::default()).frames(&Vector6::zeros());
+    let frames = model.at_condition(&Default::default()).frames(&Vector6::zeros());
     let expected = [
         [0.0977, -0.12, 238.41],
         [0.78, -2.12, 290.0 + 101.24],

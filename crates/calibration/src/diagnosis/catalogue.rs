@@ -16,6 +16,7 @@ use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::split;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::compliance::Compliance;
 use truegrind_arm::effect::coupling::Coupling;
@@ -24,7 +25,6 @@ use truegrind_arm::effect::load::{GravityLoad, Lump};
 use truegrind_arm::effect::map::JointMap;
 use truegrind_arm::effect::ratio::Ratio;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::effect::{Effect, Statics};
 use truegrind_arm::model::Model;
 
 /// A cause with its regressors.
@@ -75,7 +75,7 @@ pub enum Along {
 impl Candidate {
     /// A candidate of the arm, its regressors taken at the nominal arm.
     pub fn arm(effect: Effect, dataset: &Dataset, nominal: &Model) -> Self {
-        let statics = Statics::of(nominal);
+        let statics = nominal.statics();
         let count = effect.parameters().len();
         let n = dataset.rows.len();
         let mut rotation: Vec<[Option<Vec<f64>>; 6]> = vec![Default::default(); count];

@@ -90,7 +90,7 @@ pub struct Linear {
 
 /// A whole design with what it takes to go on from it to smaller ones.
 #[derive(Debug, Clone)]
-pub struct Whole {
+pub struct FullDesign {
     /// Everything free.
     pub design: Design,
     /// L.
@@ -132,7 +132,7 @@ impl Linear {
         for coordinate in [LinkCoordinate::Theta, LinkCoordinate::A, LinkCoordinate::D] {
             probes.extend((0..6).map(|joint| Parameter::Link { joint, coordinate }));
         }
-        probes.extend((0..3).map(Parameter::Tool));
+        probes.extend((0..3).map(Parameter::Target));
         let first_frame = probes.len();
         if dataset.sensor == Sensor::Cable {
             for anchor in 0..anchors {
@@ -140,12 +140,12 @@ impl Linear {
                 probes.push(Parameter::Zero { anchor });
             }
         } else {
-            probes.extend((0..6).map(Parameter::Base));
+            probes.extend((0..6).map(Parameter::SensorFrame));
         }
         let weights: Vec<_> = fit
             .weights
             .iter()
-            .zip(&fit.trust)
+            .zip(&fit.robust_weight)
             .map(|(w, t)| crate::identification::calibration::Weight {
                 per_mm: w.per_mm * t.sqrt(),
                 per_rad: w.per_rad * t.sqrt(),
@@ -207,7 +207,7 @@ impl Linear {
     }
 
     /// The design of the whole fit, from which those of smaller models follow at little cost.
-    pub fn whole(&self) -> Whole {
+    pub fn whole(&self) -> FullDesign {
         let lower = lower_factor(self.normal.clone());
         let basis = solved(&lower, self.rows.clone());
         let x = DVector::from_column_slice(&self.x);
@@ -225,10 +225,10 @@ impl Linear {
             reduction: None,
             slopes: Arc::clone(&self.slopes),
         };
-        Whole { design, lower, x: x - step }
+        FullDesign { design, lower, x: x - step }
     }
 
-    /// The design of the model without the parameters at `dropped`, with a basis of its own: what [`Whole::without`] is
+    /// The design of the model without the parameters at `dropped`, with a basis of its own: what [`FullDesign::without`] is
     /// compared with.
     pub fn design(&self, dropped: &[usize]) -> Design {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
@@ -255,7 +255,7 @@ impl Linear {
     }
 }
 
-impl Whole {
+impl FullDesign {
     /// The design of the model without the parameters at `dropped`, by taking directions out of the whole basis.
     ///
     /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller

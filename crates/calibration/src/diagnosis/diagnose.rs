@@ -1,17 +1,17 @@
 //! The whole diagnosis of one data set.
 
-use super::account::{Context, told_short};
 use super::cause::Cause;
+use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
-use super::held::Held;
+use super::findings::{Context, told_short};
+use super::held::FoldErrors;
 use super::picture::Picture;
-use super::record::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::selection::{self, Accepted, BLOCKS, Selection};
-use super::silence::not_testable;
+use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
 use crate::identification::benefit::benefit;
 use crate::identification::calibration::Frames;
@@ -184,7 +184,7 @@ pub fn diagnose(
     ];
     let linear = Linear::of(&searched, &found);
     let whole = linear.whole();
-    let held = Held::of(&linear, &split::folds(&searched.observed.dataset, 5, options.selection.seed));
+    let held = FoldErrors::of(&linear, &split::folds(&searched.observed.dataset, 5, options.selection.seed));
     let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
     let context = Context {
         subject: &searched,
@@ -208,9 +208,9 @@ pub fn diagnose(
     let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
     let not_testable = not_testable(&searched.observed.dataset, &whole.design, &left, &names, &prepared);
     let remaining = told(&structure, &stages[2], smoothed, floor_mm, &mut findings);
-    if let Err(why) = &prepared.sharpening
+    if let Err(why) = &prepared.readout_fusion
         && dataset.angle_step_rad.is_some()
-        && let crate::identification::rounding::NotSharpened::Mismatch { found_mm, expected_mm } = why
+        && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
     {
         notes.push(format!(
             "the read-out is {found_mm:.2} mm off the angles where rounding allows {expected_mm:.2}: angles were not sharpened"
@@ -384,7 +384,7 @@ fn estimated(
             method: "diagnose".to_owned(),
             seed: options.selection.seed,
             held_out: 0.2,
-            sharpened: prepared.sharpening.is_ok(),
+            sharpened: prepared.readout_fusion.is_ok(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         },
         parameters: parameters

@@ -62,7 +62,7 @@ pub struct Extended {
     /// The frames with their disturbances.
     pub frames: Frames,
     /// Huber's weight of each row, 1 for a good one.
-    pub trust: Vec<f64>,
+    pub robust_weight: Vec<f64>,
     /// Size of each row's whitened residual.
     pub sizes: Vec<f64>,
     /// Weights of the rows, Huber's not included.
@@ -154,12 +154,12 @@ fn median_size(k: usize) -> f64 {
 /// Fits the nominal arm extended by `causes` robustly, from the sizes that the causes have. `near` gives starting values of
 /// links and frames, and of the noise.
 pub fn fit(subject: &Subject<'_>, causes: &[Cause], freedom: Freedom, near: Option<&Extended>) -> Extended {
-    approached(subject, causes, freedom, near).polished()
+    warm_fit(subject, causes, freedom, near).refine()
 }
 
 /// The same for a search: where `near` is near enough for Gauss and Newton, as close to the optimum as they stop, and without a
 /// covariance.
-pub(super) fn approached(
+pub(super) fn warm_fit(
     subject: &Subject<'_>,
     causes: &[Cause],
     freedom: Freedom,
@@ -175,7 +175,8 @@ pub(super) fn approached(
     let (lengths, angles) = components(dataset.sensor);
     let per = lengths + angles;
     let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
-    let mut trust = near.filter(|e| e.trust.len() == n).map_or_else(|| vec![1.0; n], |e| e.trust.clone());
+    let mut robust_weight =
+        near.filter(|e| e.robust_weight.len() == n).map_or_else(|| vec![1.0; n], |e| e.robust_weight.clone());
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
     let plain_task =
@@ -185,7 +186,7 @@ pub(super) fn approached(
     loop {
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
-        let task = plain_task.reweighted(&trusted(&base, &trust));
+        let task = plain_task.reweighted(&with_robust_weights(&base, &robust_weight));
         let step = if nearby { Step::taken(&task, &mut x) } else { None };
         let mut covariance = None;
         nearby = step.is_some();
@@ -229,7 +230,7 @@ pub(super) fn approached(
             })
             .collect();
         let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
-        let moved = next.iter().zip(&trust).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let moved = next.iter().zip(&robust_weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {
             // The scale under which the weighted squares have their degrees of freedom.
@@ -247,7 +248,7 @@ pub(super) fn approached(
                 let sum: f64 = (0..n)
                     .map(|i| {
                         let row: f64 = whitened(i).skip(range.start).take(range.len()).map(|v| v * v).sum();
-                        if row.is_finite() { trust[i] * row } else { 0.0 }
+                        if row.is_finite() { robust_weight[i] * row } else { 0.0 }
                     })
                     .sum();
                 let freedom = (n * range.len()) as f64 * ((rows - spent) / rows).max(0.05);
@@ -262,7 +263,7 @@ pub(super) fn approached(
                     per_rad: (w.per_rad / by_angle).min(FINEST.1.recip()),
                 })
                 .collect();
-            let task = plain_task.reweighted(&trusted(&weights, &trust));
+            let task = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
             let estimate = if nearby && newton::descend(&task, &mut x) {
                 Estimate {
                     covariance: None,
@@ -283,7 +284,7 @@ pub(super) fn approached(
                 x: estimate.x.clone(),
                 model,
                 frames,
-                trust,
+                robust_weight,
                 sizes,
                 weights,
                 sigma,
@@ -291,7 +292,7 @@ pub(super) fn approached(
                 task,
             };
         }
-        trust = next;
+        robust_weight = next;
         sigma = (narrowed(sigma.0, of_lengths, &base, true), narrowed(sigma.1, of_angles, &base, false));
     }
 }
@@ -305,10 +306,10 @@ fn narrowed(sigma: f64, spread: f64, base: &[Weight], lengths: bool) -> f64 {
     (total * spread * spread - share).max(0.01 * sigma * sigma).sqrt().max(smallest)
 }
 
-fn trusted(weights: &[Weight], trust: &[f64]) -> Vec<Weight> {
+fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> Vec<Weight> {
     weights
         .iter()
-        .zip(trust)
+        .zip(robust_weight)
         .map(|(w, t)| Weight { per_mm: w.per_mm * t.sqrt(), per_rad: w.per_rad * t.sqrt() })
         .collect()
 }
@@ -334,7 +335,7 @@ fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
 
 impl Extended {
     /// The fit with the solver's last word on it: at the optimum, with a covariance.
-    pub(super) fn polished(self) -> Self {
+    pub(super) fn refine(self) -> Self {
         if self.estimate.covariance.is_some() {
             return self;
         }

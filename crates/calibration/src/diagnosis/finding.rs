@@ -32,9 +32,9 @@ pub struct Stage {
     pub mean_mm: f64,
     /// Largest.
     pub max_mm: f64,
-    /// Held out, five random folds.
+    /// FoldErrors out, five random folds.
     pub cv_rmse_mm: f64,
-    /// Held out, contiguous blocks.
+    /// FoldErrors out, contiguous blocks.
     pub cv_blocks_rmse_mm: f64,
 }
 
@@ -72,7 +72,7 @@ pub struct FoundParameter {
     pub unit: String,
 }
 
-/// Held-out error without and with the finding, everything else in the model (mm).
+/// FoldErrors-out error without and with the finding, everything else in the model (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Without.
@@ -90,7 +90,7 @@ pub struct Alternative {
     pub joints: Option<Vec<usize>>,
     /// Its rows.
     pub rows: Option<[usize; 2]>,
-    /// Held-out error with it in the finding's place (mm).
+    /// FoldErrors-out error with it in the finding's place (mm).
     pub cv_rmse_mm: f64,
     /// Twice the log Bayes factor of the finding against it; large is well beaten.
     pub beaten_by: f64,
@@ -158,7 +158,7 @@ pub struct RangeNoise {
 pub struct Step {
     /// What was added.
     pub added: String,
-    /// Held-out error after it (mm), five random folds.
+    /// FoldErrors-out error after it (mm), five random folds.
     pub cv_rmse_mm: f64,
 }
 
@@ -193,7 +193,7 @@ pub struct Diagnosis {
     pub noise_floor_source: String,
     /// Errors of the stages.
     pub fits: Fits,
-    /// Held-out error after each step.
+    /// FoldErrors-out error after each step.
     pub steps: Vec<Step>,
     /// What is wrong.
     pub findings: Vec<Finding>,

@@ -1,4 +1,4 @@
-//! Held-out errors to first order: for every fold its rows are taken off the normal matrix, and what is left is solved anew.
+//! FoldErrors-out errors to first order: for every fold its rows are taken off the normal matrix, and what is left is solved anew.
 //!
 //! With J the whitened Jacobian, N = JᵀJ + Λ and g = Jᵀr + Λx, a fold with rows t leaves N − JₜᵀJₜ and g − Jₜᵀrₜ. A candidate
 //! with columns C and size precisions S borders that by X = L⁻¹(JᵀC − JₜᵀCₜ), L the factor of the fold's normal matrix, so each
@@ -30,7 +30,7 @@ struct Fold {
 
 /// The folds of a split, against one fit.
 #[derive(Debug, Clone)]
-pub struct Held<'a> {
+pub struct FoldErrors<'a> {
     linear: &'a Linear,
     folds: Vec<Fold>,
 }
@@ -41,7 +41,7 @@ type Factored = Option<(DMatrix<f64>, DVector<f64>)>;
 /// The model without some of its parameters, every fold of it solved.
 #[derive(Debug, Clone)]
 pub struct Reduced<'a> {
-    held: &'a Held<'a>,
+    held: &'a FoldErrors<'a>,
     kept: Vec<usize>,
     residual: DVector<f64>,
     solved: Vec<Factored>,
@@ -50,7 +50,7 @@ pub struct Reduced<'a> {
 /// Columns of a candidate with the standard deviations of its parameters.
 pub type Added<'a> = Option<(&'a DMatrix<f64>, &'a [f64])>;
 
-impl<'a> Held<'a> {
+impl<'a> FoldErrors<'a> {
     /// For the fit `linear`; `splits` in observations.
     pub fn of(linear: &'a Linear, splits: &[Split]) -> Self {
         let per = linear.per;

@@ -113,15 +113,15 @@ pub fn as_good(told: &Extended, before: &Extended) -> bool {
         let plain = fit.task.plain_residuals(&fit.x);
         let rows: f64 = plain
             .chunks(per)
-            .zip(before.weights.iter().zip(&before.trust))
-            .map(|(row, (w, trust))| {
+            .zip(before.weights.iter().zip(&before.robust_weight))
+            .map(|(row, (w, robust_weight))| {
                 let square: f64 = row
                     .iter()
                     .enumerate()
                     .map(|(c, r)| (r * if c < 3 { w.per_mm } else { w.per_rad }).powi(2))
                     .filter(|s| s.is_finite())
                     .sum();
-                trust * square
+                robust_weight * square
             })
             .sum();
         let n = (plain.len() / per.max(1)) as f64;

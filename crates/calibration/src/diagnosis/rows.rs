@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::identification::fit::Observed;
-use crate::identification::rounding::{NotSharpened, Sharpening, logged_covariance, sharpen};
+use crate::identification::rounding::{NotFused, ReadoutFusion, fuse_readout, logged_covariance};
 use crate::measurement::dataset::Dataset;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
@@ -30,7 +30,7 @@ const SHARE: f64 = 0.1;
 
 /// Finds rows whose read-out belongs to another pose.
 pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
-    let posed = nominal.under(&Condition::default());
+    let posed = nominal.at_condition(&Condition::default());
     let gaps: Vec<Option<(usize, Vector3<f64>)>> = dataset
         .rows
         .iter()
@@ -68,7 +68,7 @@ pub struct Prepared {
     /// The same without the use of the read-out.
     pub logged: Observed,
     /// What sharpening brought, or why it was not done.
-    pub sharpening: Result<Sharpening, NotSharpened>,
+    pub readout_fusion: Result<ReadoutFusion, NotFused>,
     /// Contradicting rows.
     pub mismatch: Mismatch,
     /// Whether the sides of approach were taken from the order of the rows.
@@ -92,7 +92,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
     let good: Vec<usize> =
         (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
     let mut kept = rows.subset(&good);
-    let (observed, sharpening) = match sharpen(&mut kept, nominal) {
+    let (observed, readout_fusion) = match fuse_readout(&mut kept, nominal) {
         Ok((report, covariances)) => {
             let mut observed = logged.clone();
             for ((&i, row), covariance) in good.iter().zip(&kept.rows).zip(covariances) {
@@ -103,5 +103,5 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
         }
         Err(why) => (logged.clone(), Err(why)),
     };
-    Prepared { observed, logged, sharpening, mismatch, sides_from_order: silent }
+    Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
 }

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::board::Board;
+use super::candidate_scores::CandidateScores;
 use super::candidates::{Catalogue, Scored};
 use super::catalogue::Candidate;
 use super::cause::Cause;
 use super::design::Design;
-use super::extension::{Extended, Freedom, Subject, approached, fit};
-use super::held::Held;
+use super::extension::{Extended, Freedom, Subject, fit, warm_fit};
+use super::held::FoldErrors;
 use super::levels;
 use super::score::{Score, score};
 use crate::measurement::split::{self, Split};
@@ -79,14 +79,15 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let blocks = split::blocks(dataset, BLOCKS);
     let mut current = Arc::new(geometric.clone());
     // The board of the current fit, where one was made already.
-    let mut known: Option<Board<'_>> = None;
+    let mut known: Option<CandidateScores<'_>> = None;
     let mut refused: Vec<Cause> = Vec::new();
     // Causes that were not far ahead of others when they came in, with those: they are looked at again when one of them
     // comes in too.
     let mut doubtful: Vec<(Cause, Vec<Cause>)> = Vec::new();
     let (mut told_again, mut ahead, mut turned_out) = (false, EXCHANGE, Vec::new());
     for _ in 0..4 * options.most.max(1) {
-        let board = known.take().unwrap_or_else(|| Board::of(&catalogue, subject, Arc::clone(&current)));
+        let board =
+            known.take().unwrap_or_else(|| CandidateScores::of(&catalogue, subject, Arc::clone(&current)));
         let left = board.scored(&board.whole.design, true);
         let taken = (current.causes.len() < options.most)
             .then(|| next(&board, &left, &refused, options, [&random, &blocks]))
@@ -107,7 +108,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                 Review::Settled(accepted) => {
                     if !told_again && let Some(causes) = levels::disjoint(&current.causes) {
                         told_again = true;
-                        let told = approached(subject, &causes, Freedom::All, Some(&current));
+                        let told = warm_fit(subject, &causes, Freedom::All, Some(&current));
                         if levels::as_good(&told, &current) {
                             current = Arc::new(told);
                             continue;
@@ -115,7 +116,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                     }
                     return Selection {
                         geometric,
-                        extended: Arc::unwrap_or_clone(current).polished(),
+                        extended: Arc::unwrap_or_clone(current).refine(),
                         accepted,
                         left,
                     };
@@ -132,7 +133,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
-        current = Arc::new(approached(subject, &causes, Freedom::All, Some(&current)));
+        current = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
         let asked: Vec<Cause> = doubtful
             .iter()
             .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(&cause)))
@@ -147,7 +148,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             if unsure.is_empty() {
                 break;
             }
-            let board = Board::of(&catalogue, subject, Arc::clone(&current));
+            let board = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
             match review(&board, options, &unsure, &How { quick: true, ahead: EXCHANGE }) {
                 Review::Changed(settled) => current = Arc::new(*settled),
                 Review::Settled(_) => {
@@ -162,15 +163,15 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         }
     }
     // Causes that take turns without end: the last state is judged as it stands.
-    let board = Board::of(&catalogue, subject, Arc::clone(&current));
+    let board = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    Selection { geometric, extended: Arc::unwrap_or_clone(current).polished(), accepted, left }
+    Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left }
 }
 
 /// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.
 fn next<'a>(
-    board: &Board<'_>,
+    board: &CandidateScores<'_>,
     left: &'a [Scored],
     refused: &[Cause],
     options: &Options,
@@ -184,7 +185,7 @@ fn next<'a>(
         .filter(|s| board.catalogue.significant(design, s, options.alpha))
         .peekable();
     significant.peek()?;
-    let held = Held::of(&board.linear, splits[0]);
+    let held = FoldErrors::of(&board.linear, splits[0]);
     let random = held.without(&[]);
     let before = random.squares(None);
     let (in_blocks, blocks) = (OnceCell::new(), OnceCell::new());
@@ -195,7 +196,7 @@ fn next<'a>(
         let local = scored.candidate.cause.rows().is_some();
         let on_blocks = || {
             let (blocks, before) = blocks.get_or_init(|| {
-                let blocks = in_blocks.get_or_init(|| Held::of(&board.linear, splits[1])).without(&[]);
+                let blocks = in_blocks.get_or_init(|| FoldErrors::of(&board.linear, splits[1])).without(&[]);
                 let before = blocks.squares(None);
                 (blocks, before)
             });
@@ -251,7 +252,7 @@ enum Review {
 
 /// Looks at causes against the model without them: drops one that no longer carries itself, or exchanges one that another
 /// explains better.
-fn review(board: &Board<'_>, options: &Options, which: &[usize], how: &How) -> Review {
+fn review(board: &CandidateScores<'_>, options: &Options, which: &[usize], how: &How) -> Review {
     let (subject, catalogue, current) = (board.subject, board.catalogue, &*board.fit);
     let mut accepted = Vec::new();
     for some in which.chunks(BESIDE) {
@@ -270,10 +271,10 @@ fn review(board: &Board<'_>, options: &Options, which: &[usize], how: &How) -> R
                 .filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
             let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !carries {
-                let reduced = approached(subject, &others, Freedom::All, Some(current));
+                let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
                 let Some(better) = better else { return Review::Changed(Box::new(reduced)) };
                 others.push(better.candidate.cause.clone());
-                let settled = approached(subject, &others, Freedom::All, Some(&reduced));
+                let settled = warm_fit(subject, &others, Freedom::All, Some(&reduced));
                 return Review::Changed(Box::new(settled));
             }
             accepted.push(judged);
@@ -311,7 +312,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
 }
 
 /// A cause against the model without it: the judgement, the design there, and every candidate's score in it.
-fn looked_at(board: &Board<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
+fn looked_at(board: &CandidateScores<'_>, index: usize, open: bool) -> (Accepted, Design, Vec<Scored>) {
     let current = &*board.fit;
     let cause = &current.causes[index];
     let design = board.whole.without(&current.places(index));

@@ -1,4 +1,4 @@
-//! Held-out errors of a stage: every fold is fitted anew, frames, links and causes, and judged on rows it never saw.
+//! FoldErrors-out errors of a stage: every fold is fitted anew, frames, links and causes, and judged on rows it never saw.
 //!
 //! Few rows and parameters are refitted in full. With many, the rows of a fold are taken off the normal equations of all
 //! rows at their optimum, and one Gauss–Newton step from there is the refit: links move by micrometres between folds, and
@@ -128,7 +128,7 @@ impl Validation {
             .kept
             .iter()
             .map(|&i| {
-                let (w, t) = (fit.weights[i], fit.trust[i].sqrt());
+                let (w, t) = (fit.weights[i], fit.robust_weight[i].sqrt());
                 Weight { per_mm: w.per_mm * t, per_rad: w.per_rad * t }
             })
             .collect();

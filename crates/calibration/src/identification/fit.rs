@@ -29,7 +29,7 @@ use truegrind_math::statistics::{ErrorSummary, median};
 /// Parameters of the measurement: frame, outlet, zero, touched point.
 pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
     let target = if dataset.sensor == Sensor::Pose { 6 } else { 3 };
-    let mut out: Vec<Parameter> = (0..target).map(Parameter::Tool).collect();
+    let mut out: Vec<Parameter> = (0..target).map(Parameter::Target).collect();
     match dataset.sensor {
         Sensor::Cable => {
             for anchor in 0..dataset.anchors() {
@@ -37,7 +37,7 @@ pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
                 out.push(Parameter::Zero { anchor });
             }
         }
-        Sensor::Position | Sensor::Pose => out.extend((0..6).map(Parameter::Base)),
+        Sensor::Position | Sensor::Pose => out.extend((0..6).map(Parameter::SensorFrame)),
     }
     out
 }

@@ -1,4 +1,4 @@
-//! The whole identification of one data set: sharpen, set outliers aside, split, fit, judge.
+//! The whole identification of one data set: fuse_readout, set outliers aside, split, fit, judge.
 
 use thiserror::Error;
 
@@ -11,7 +11,7 @@ use crate::identification::fit::{
 };
 use crate::identification::identifiability::Identifiability;
 use crate::identification::rounding::{
-    AngleCovariance, NotSharpened, Sharpening, logged_covariance, sharpen,
+    AngleCovariance, NotFused, ReadoutFusion, fuse_readout, logged_covariance,
 };
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::different_poses;
@@ -40,7 +40,7 @@ pub struct Options {
     /// Seed of the split.
     pub seed: u64,
     /// Whether rounded angles may be sharpened by the read-out.
-    pub sharpen: bool,
+    pub fuse_readout: bool,
     /// Largest held-out RMSE with which the fit passes (mm).
     pub limit_rmse_mm: Option<f64>,
     /// Largest held-out error with which the fit passes (mm).
@@ -57,7 +57,7 @@ impl Default for Options {
             solver: &SOLVERS[0],
             held_out: 0.2,
             seed: 0,
-            sharpen: true,
+            fuse_readout: true,
             limit_rmse_mm: None,
             limit_max_mm: None,
             stated_frames: None,
@@ -123,7 +123,7 @@ pub struct Identification {
     /// What the data could tell.
     pub identifiability: Option<Identifiability>,
     /// What the read-out brought, or why it was not used.
-    pub sharpening: Result<Sharpening, NotSharpened>,
+    pub readout_fusion: Result<ReadoutFusion, NotFused>,
     /// Rows set aside.
     pub outliers: Outliers,
     /// Data rows that were held out, with the error before (registered) and after (geometry) (mm).
@@ -149,7 +149,7 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let start = Start { model: nominal, frames };
-    let (observed, sharpening) = observe(dataset, nominal, options.sharpen);
+    let (observed, readout_fusion) = observe(dataset, nominal, options.fuse_readout);
     enough(&observed.dataset, nominal, options.held_out)?;
     // Every method sees the same rows.
     let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
@@ -219,7 +219,7 @@ pub fn identify(
             method: options.solver.name.to_owned(),
             seed: options.seed,
             held_out: options.held_out,
-            sharpened: sharpening.is_ok(),
+            sharpened: readout_fusion.is_ok(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         },
         parameters: parameters
@@ -266,7 +266,7 @@ pub fn identify(
         training,
         raw,
         identifiability,
-        sharpening,
+        readout_fusion,
         outliers,
         held_out,
         parameters,
@@ -294,9 +294,9 @@ pub fn observe(
     dataset: &Dataset,
     nominal: &Model,
     wanted: bool,
-) -> (Observed, Result<Sharpening, NotSharpened>) {
+) -> (Observed, Result<ReadoutFusion, NotFused>) {
     let mut rows = dataset.clone();
-    match if wanted { sharpen(&mut rows, nominal) } else { Err(NotSharpened::Nothing) } {
+    match if wanted { fuse_readout(&mut rows, nominal) } else { Err(NotFused::Nothing) } {
         Ok((report, angles)) => {
             (Observed { dataset: rows, angles: AngleCovariance::each(angles) }, Ok(report))
         }
@@ -378,12 +378,16 @@ pub(crate) fn parameter_table(fitted: &Fitted, nominal: &Model) -> Vec<Estimated
                 Parameter::Effect { index, parameter } => {
                     fitted.model.effects[index].parameters()[parameter].value
                 }
-                Parameter::Tool(axis) if axis < 3 => {
+                Parameter::Target(axis) if axis < 3 => {
                     fitted.frames.flange_from_target.translation.vector[axis]
                 }
-                Parameter::Base(axis) if axis < 3 => fitted.frames.base_from_sensor.translation.vector[axis],
-                Parameter::Tool(axis) => fitted.frames.flange_from_target.rotation.scaled_axis()[axis - 3],
-                Parameter::Base(axis) => fitted.frames.base_from_sensor.rotation.scaled_axis()[axis - 3],
+                Parameter::SensorFrame(axis) if axis < 3 => {
+                    fitted.frames.base_from_sensor.translation.vector[axis]
+                }
+                Parameter::Target(axis) => fitted.frames.flange_from_target.rotation.scaled_axis()[axis - 3],
+                Parameter::SensorFrame(axis) => {
+                    fitted.frames.base_from_sensor.rotation.scaled_axis()[axis - 3]
+                }
                 Parameter::Outlet { anchor, axis } => fitted.frames.outlets_mm[anchor][axis],
                 Parameter::Zero { anchor } => fitted.frames.zeros_mm[anchor],
                 Parameter::Disturbance { index, parameter } => {
@@ -458,7 +462,7 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
     let joints: Vec<Joints> = dataset.rows.iter().map(|r| r.joints).collect();
     let mut region = Region::of(&joints, 0.0);
     let condition = estimated.condition;
-    let posed = estimated.model.under(&condition);
+    let posed = estimated.model.at_condition(&condition);
     let target = fitted.frames.flange_from_target;
     let sigmas: Vec<f64> = region
         .samples_deg

@@ -67,7 +67,7 @@ pub fn logged_covariance(dataset: &Dataset) -> AngleCovariance {
 
 /// What sharpening did.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sharpening {
+pub struct ReadoutFusion {
     /// The point whose position the controller read out, on the flange (mm).
     pub readout_point_mm: Vector3<f64>,
     /// RMS difference of read-out and nominal forward map before (mm).
@@ -82,7 +82,7 @@ pub struct Sharpening {
 
 /// Why the read-out was not used.
 #[derive(Debug, Clone, PartialEq)]
-pub enum NotSharpened {
+pub enum NotFused {
     /// No row has a read-out, or angles are not rounded.
     Nothing,
     /// The read-out does not belong to these angles under the nominal model.
@@ -98,21 +98,21 @@ pub enum NotSharpened {
 ///
 /// # Errors
 /// Leaves the rows as they are when there is nothing to use or the read-out contradicts the angles.
-pub fn sharpen(
+pub fn fuse_readout(
     dataset: &mut Dataset,
     nominal: &Model,
-) -> Result<(Sharpening, Vec<Matrix6<f64>>), NotSharpened> {
+) -> Result<(ReadoutFusion, Vec<Matrix6<f64>>), NotFused> {
     let (Some(step), true) = (dataset.angle_step_rad, dataset.rows.iter().all(|r| r.readout_mm.is_some()))
     else {
-        return Err(NotSharpened::Nothing);
+        return Err(NotFused::Nothing);
     };
     if dataset.rows.is_empty() {
-        return Err(NotSharpened::Nothing);
+        return Err(NotFused::Nothing);
     }
     let angle_variance = step * step / 12.0;
     // A read-out without a step is taken as single precision would leave it.
     let readout_variance = dataset.readout_step_mm.map_or(1e-3_f64.powi(2), |h| h * h / 12.0);
-    let posed = nominal.under(&Condition::default());
+    let posed = nominal.at_condition(&Condition::default());
     let readout = |i: usize| dataset.rows[i].readout_mm.unwrap_or_default();
     // The tool point of the read-out: linear least squares of R t = x − p.
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -141,7 +141,7 @@ pub fn sharpen(
     }
     let (before_mm, expected_mm) = (before.sqrt(), expected.sqrt());
     if before_mm > 3.0 * expected_mm {
-        return Err(NotSharpened::Mismatch { found_mm: before_mm, expected_mm });
+        return Err(NotFused::Mismatch { found_mm: before_mm, expected_mm });
     }
     let mut covariances = Vec::with_capacity(dataset.rows.len());
     let (mut after, mut narrowed) = (0.0, 0.0);
@@ -163,7 +163,7 @@ pub fn sharpen(
         covariances.push(covariance);
     }
     let report =
-        Sharpening { readout_point_mm: point, before_mm, after_mm: after.sqrt(), expected_mm, narrowed };
+        ReadoutFusion { readout_point_mm: point, before_mm, after_mm: after.sqrt(), expected_mm, narrowed };
     Ok((report, covariances))
 }
 
@@ -203,7 +203,7 @@ pub fn angle_shares(
         return vec![(0.0, 0.0); dataset.rows.len()];
     }
     let still = Condition::default();
-    let posed = model.under(&still);
+    let posed = model.at_condition(&still);
     dataset
         .rows
         .iter()

@@ -52,7 +52,7 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart
     if different_poses(dataset, needed) < needed {
         return Err(none(what, needed));
     }
-    let posed = nominal.under(&Condition::default());
+    let posed = nominal.at_condition(&Condition::default());
     let flanges: Vec<Pose> = dataset.rows.iter().map(|r| posed.forward(&r.joints)).collect();
     let mut frames = Frames::at_origin(dataset.anchors());
     match dataset.sensor {

@@ -50,10 +50,10 @@ impl Tolerance {
         let sigma = match *parameter {
             Parameter::Link { coordinate, .. } if coordinate.is_length() => self.length_mm,
             Parameter::Link { .. } => self.angle_rad,
-            Parameter::Tool(k) if k < 3 => self.target_mm,
-            Parameter::Tool(_) => self.target_rad,
-            Parameter::Base(k) if k >= 3 => self.frame_rad,
-            Parameter::Base(_)
+            Parameter::Target(k) if k < 3 => self.target_mm,
+            Parameter::Target(_) => self.target_rad,
+            Parameter::SensorFrame(k) if k >= 3 => self.frame_rad,
+            Parameter::SensorFrame(_)
             | Parameter::Outlet { .. }
             | Parameter::Zero { .. }
             | Parameter::Disturbance { .. } => self.frame_mm,

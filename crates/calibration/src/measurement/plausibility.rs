@@ -194,7 +194,7 @@ fn suspicion(
 
 /// Error of the registered nominal arm under a meaning; `None` where too few rows are there to tell.
 fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) -> Option<MeaningError> {
-    let arm = model.under(&Condition::default());
+    let arm = model.at_condition(&Condition::default());
     let scale = meaning.lengths.millimetres();
     let (mut flanges, mut lengths, mut positions, mut poses) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());

@@ -159,8 +159,8 @@ impl Tracker {
         let mut groups: Vec<Group> = Vec::new();
         for (k, parameter) in self.parameters.iter().enumerate() {
             let name = match parameter {
-                Parameter::Base(_) => "the sensor against the arm's base".to_owned(),
-                Parameter::Tool(_) => "the touched point".to_owned(),
+                Parameter::SensorFrame(_) => "the sensor against the arm's base".to_owned(),
+                Parameter::Target(_) => "the touched point".to_owned(),
                 Parameter::Outlet { anchor: 0, .. } => "the outlet".to_owned(),
                 Parameter::Outlet { anchor, .. } => format!("outlet {}", anchor + 1),
                 _ => continue,

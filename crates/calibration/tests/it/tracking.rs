@@ -68,7 +68,7 @@ fn settings() -> identify::Options {
         solver: &SOLVERS[0],
         held_out: 0.2,
         seed: 0,
-        sharpen: false,
+        fuse_readout: false,
         limit_rmse_mm: None,
         limit_max_mm: None,
         stated_frames: None,
@@ -128,7 +128,7 @@ fn a_sensor_that_was_knocked_is_named_as_a_whole() {
     assert_eq!(alarm.parameter, "the sensor against the arm's base", "{alarm}");
     assert!(alarm.since_row.abs_diff(70) <= 1 && alarm.parts.len() == 6, "{alarm:#?}");
     assert!((alarm.shift - shift.norm()).abs() < 0.03, "{alarm}");
-    assert!(alarm.to_string().contains("base."), "{alarm}");
+    assert!(alarm.to_string().contains("sensor."), "{alarm}");
     // The arm's own parameters are what they would be without the knock: joints 2 to 5, since no sensor tells the first
     // from its frame, and the last from the touched point.
     let calm = measured(2, None);

@@ -275,7 +275,7 @@ fn a_taught_work_object_carries_its_frame_to_the_estimated_arm() {
 #[test]
 fn teaching_by_points_recovers_tool_and_frame() {
     let model = perturbed(4, 1.0);
-    let posed = model.under(&Condition::default());
+    let posed = model.at_condition(&Condition::default());
     let tcp = Vector3::new(12.0, -7.0, 130.0);
     let inverse = truegrind_arm::inverse::Inverse::new(&model, &Condition::default(), &nominal());
     let near = Joints::new(0.1, 0.3, 0.2, 0.2, 0.6, 0.1);
@@ -306,7 +306,7 @@ fn the_quick_sigma_equals_the_covariance() {
     let mut random = ChaCha8Rng::seed_from_u64(8);
     let factor = DMatrix::from_fn(n, n, |_, _| random.random_range(-1e-3..1e-3));
     known.covariance = &factor * factor.transpose();
-    let posed = known.model.under(&known.condition);
+    let posed = known.model.at_condition(&known.condition);
     let tool = Pose::new(Vector3::new(5.0, -3.0, 120.0), Vector3::new(0.1, 0.0, 0.2));
     for q in joints.iter().step_by(37) {
         let slow = known.position_covariance(&posed, q, &tool).trace().sqrt();

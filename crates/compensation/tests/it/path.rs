@@ -66,7 +66,7 @@ fn told(listing: &Listing) -> Vec<Pose> {
 fn gone(path: impl Iterator<Item = Pose>, start: &Joints, actual: &Model) -> Vec<Pose> {
     let sheet = nominal();
     let inverse = Inverse::new(&sheet, &Condition::default(), &sheet);
-    let posed = actual.under(&Condition::default());
+    let posed = actual.at_condition(&Condition::default());
     let mut near = *start;
     path.map(|pose| {
         near = inverse.solve_near(&pose, &near).unwrap().joints;
@@ -646,7 +646,7 @@ fn a_joint_motion_states_how_far_it_is_from_that_of_the_sheet() {
     let sheet = nominal();
     let joints = |listing: &Listing| told(listing).iter().map(start_joints).collect::<Vec<_>>();
     let (b, a) = (joints(&before.listing), joints(&after.listing));
-    let posed = (sheet.under(&Condition::default()), actual.under(&Condition::default()));
+    let posed = (sheet.at_condition(&Condition::default()), actual.at_condition(&Condition::default()));
     let most = (0..=50)
         .map(|k| {
             let s = f64::from(k) / 50.0;

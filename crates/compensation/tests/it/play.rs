@@ -91,7 +91,7 @@ fn run(listing: &Listing, arm: &Model, part_from: usize) -> Vec<Passed> {
     let sheet = nominal();
     let controller = Inverse::new(&sheet, &Condition::default(), &sheet);
     let stiff = without_play(arm);
-    let [light, heavy] = [0, 3].map(|lines| stiff.under(&carried(lines)).clone());
+    let [light, heavy] = [0, 3].map(|lines| stiff.at_condition(&carried(lines)).clone());
     let tool = Pose::translation(0.0, 0.0, 60.0);
     let half = PLAY_DEG.map(|play| 0.5 * play.to_radians());
     let mut out = Vec::new();

@@ -250,7 +250,7 @@ fn every_reason_there_is_shows_in_a_program() {
 fn singular() -> String {
     let at = |q_deg: [f64; 6], conf: [i32; 4]| {
         let q = Joints::from_fn(|j, _| q_deg[j].to_radians());
-        let pose = nominal().under(&Condition::default()).forward(&q);
+        let pose = nominal().at_condition(&Condition::default()).forward(&q);
         let (t, r) = (pose.translation.vector, pose.rotation.quaternion());
         let [cf1, cf4, cf6, cfx] = conf;
         format!(

@@ -46,7 +46,7 @@ fn known(robot: &str, seed: u64) -> Estimated {
 }
 
 fn forward(arm: &Model, joints: &Joints) -> Pose {
-    arm.under(&Condition::default()).forward(joints)
+    arm.at_condition(&Condition::default()).forward(joints)
 }
 
 /// From one pose to another: shift (mm) and turn (rad).

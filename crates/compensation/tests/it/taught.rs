@@ -65,7 +65,7 @@ fn joints(arm: &Model, flange: &Pose) -> Joints {
 }
 
 fn flange(arm: &Model, q: &Joints) -> Pose {
-    arm.under(&Condition::default()).forward(q)
+    arm.at_condition(&Condition::default()).forward(q)
 }
 
 /// Poses in which an actual arm touches a point with a tip, in several orientations.
@@ -276,7 +276,7 @@ fn a_pointer_that_was_taught_itself_is_re_evaluated_before_its_frame() {
         let mut scene = scene(seed);
         let tip = about(&scene.actual, &Point3::new(420.0, 60.0, 220.0), &scene.pointer);
         let sheet = nominal();
-        let told_tip = taught_tcp(&sheet.under(&Condition::default()), &tip).unwrap();
+        let told_tip = taught_tcp(&sheet.at_condition(&Condition::default()), &tip).unwrap();
         assert!((told_tip - scene.pointer).norm() > 0.1, "the arm's error shows in its TCP");
         scene.told = made_of(&scene.touching, &told_tip);
         let data = tool("tPointer", &translation(&told_tip), true)
@@ -313,7 +313,7 @@ fn a_standing_tool_and_a_held_part_that_were_taught_are_right() {
             true => tip(&sheet),
             false => {
                 // c of R t + p = c, by the mean over the t that fits best.
-                let pin = taught_tcp(&sheet.under(&Condition::default()), &found_by).unwrap();
+                let pin = taught_tcp(&sheet.at_condition(&Condition::default()), &found_by).unwrap();
                 let touched = found_by.iter().map(|q| (flange(&sheet, q) * Point3::from(pin)).coords);
                 touched.sum::<Vector3<f64>>() / found_by.len() as f64
             }
@@ -427,7 +427,7 @@ fn a_told_tcp_must_be_that_of_its_teaching_poses() {
     let scene = scene(40);
     let poses = about(&scene.actual, &Point3::new(420.0, 60.0, 220.0), &scene.grinder.translation.vector);
     let sheet = nominal();
-    let tcp = taught_tcp(&sheet.under(&Condition::default()), &poses).unwrap();
+    let tcp = taught_tcp(&sheet.at_condition(&Condition::default()), &poses).unwrap();
     let fault = |shift: f64, poses: &[Joints]| {
         let told = Pose::from_parts((tcp + Vector3::z() * shift).into(), scene.grinder.rotation);
         let source = module(&tool("tGrind", &told, true), &moves("tGrind", "wobj0", &scene.turn()));
@@ -506,7 +506,7 @@ fn plan_of(
 fn every_key_of_a_cell_file_is_read() {
     let mut scene = scene(50);
     let tip = about(&scene.actual, &Point3::new(420.0, 60.0, 220.0), &scene.pointer);
-    let told_tip = taught_tcp(&nominal().under(&Condition::default()), &tip).unwrap();
+    let told_tip = taught_tcp(&nominal().at_condition(&Condition::default()), &tip).unwrap();
     scene.told = made_of(&scene.touching, &told_tip);
     let data = tool("tPointer", &translation(&told_tip), true)
         + &tool("tGrind", &scene.grinder, true)

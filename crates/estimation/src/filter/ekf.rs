@@ -5,7 +5,7 @@
 //! `iterations` above 1 repeats the linearisation at the new state within one observation (iterated filter).
 //! - [`Form::AsPrinted`]: R = 1 in each of several sweeps over the same data, P carried on: every row is
 //!   counted as often as there are sweeps, and the covariance is too small by that factor.
-//! - [`Form::Sound`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep
+//! - [`Form::Robust`]: R = number of sweeps, so that all sweeps together weigh each row once, and a later sweep
 //!   only corrects the linearisation of the earlier ones. One sweep by default.
 //!
 //! **Shapes.** x has p entries, P is p × p, an observation has m = `rows_per_observation` rows.
@@ -52,7 +52,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             sweeps: 1,
             iterations: 1,
             process_sigma: Vec::new(),
@@ -141,7 +141,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let (x, covariance) = prior_state(problem, start, options.unknown_sigma);
     let mut filter = Filter { x, covariance };
     let mut trace: Vec<Iteration> = vec![entry(&mut objective, &filter.x, 0.0)];
-    let noise = if options.form == Form::Sound { options.sweeps.max(1) as f64 } else { 1.0 };
+    let noise = if options.form == Form::Robust { options.sweeps.max(1) as f64 } else { 1.0 };
     for _ in 0..options.sweeps {
         let before = filter.x.clone();
         for rows in observations(problem) {

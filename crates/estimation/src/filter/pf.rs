@@ -6,7 +6,7 @@
 //!   below N/2 they are resampled systematically. Nothing ever moves a particle, so that after some dozen
 //!   precise observations all of them are copies of the best of the first N draws: the filter searches no
 //!   better than N random guesses.
-//! - [`Form::Sound`]: each likelihood is brought in by as many fractional powers as it takes to keep half of
+//! - [`Form::Robust`]: each likelihood is brought in by as many fractional powers as it takes to keep half of
 //!   the particles effective (tempering); after each power they are resampled and moved by a kernel that keeps
 //!   their mean and covariance (Liu and West: x ← a x + (1 − a) x̄ + h L z, with a² + h² = 1 and LLᵀ the
 //!   weighted covariance).
@@ -56,7 +56,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { form: Form::Sound, particles: 1_000, kernel: 0.5, unknown_sigma: 1.0, seed: 0 }
+        Self { form: Form::Robust, particles: 1_000, kernel: 0.5, unknown_sigma: 1.0, seed: 0 }
     }
 }
 
@@ -167,7 +167,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 .collect();
             let power = match options.form {
                 Form::AsPrinted => left,
-                Form::Sound => tempered_power(&log_likelihoods, left),
+                Form::Robust => tempered_power(&log_likelihoods, left),
             };
             left -= power;
             cloud.log_weights.iter_mut().zip(&log_likelihoods).for_each(|(w, l)| *w += power * l);
@@ -176,7 +176,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 trace.push(entry(&mut objective, &x, 0.0));
                 return finish(&objective, &x, None, Termination::NotFinite, trace);
             };
-            if options.form == Form::Sound {
+            if options.form == Form::Robust {
                 let (mean, covariance) = cloud.moments(&weights);
                 cloud.resample(&weights);
                 cloud.shake(&mean, covariance, options.kernel);

@@ -1,6 +1,6 @@
 //! Unscented Kalman filter for constant or drifting parameters.
 //!
-//! **Method.** [`Form::Sound`]: for each observation P ← P + Q; with LLᵀ = P and c = α²(p + κ) the 2p + 1 sigma
+//! **Method.** [`Form::Robust`]: for each observation P ← P + Q; with LLᵀ = P and c = α²(p + κ) the 2p + 1 sigma
 //! points x, x ± √c·L_j; weights W₀ᵐ = 1 − p/c, W₀ᶜ = W₀ᵐ + 1 − α² + β, W = 1/(2c) for the others; mean ŷ and
 //! covariance S = Σ W(y − ŷ)(y − ŷ)ᵀ + R of the residuals there, cross covariance P_xy, K = P_xy S⁻¹, x ← x −
 //! Kŷ, P ← P − KSKᵀ. No derivatives are needed.
@@ -64,7 +64,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             sweeps: 1,
             alpha: 0.1,
             beta: 2.0,
@@ -166,7 +166,7 @@ impl Filter {
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     match options.form {
         Form::AsPrinted => printed(problem, start, options),
-        Form::Sound => sound(problem, start, options),
+        Form::Robust => sound(problem, start, options),
     }
 }
 

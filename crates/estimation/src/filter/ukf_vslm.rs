@@ -5,7 +5,7 @@
 //! - [`Form::AsPrinted`]: both parts to the letter (see [`ukf`] and [`vslm`]), with line 17, X₀ = x_ukf, inside
 //!   the loop: each iteration begins where the filter ended and undoes the one before it, while the step size
 //!   has decayed further. Its result is one sweep of tiny steps from the filter's result.
-//! - [`Form::Sound`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it
+//! - [`Form::Robust`]: one sweep of the scaled filter with Q and R, then the sound step-size method until it
 //!   converges.
 //!
 //! **Shapes, stops.** Those of the two parts; the termination is the second one's, or the first one's where it

@@ -2,7 +2,7 @@
 //!
 //! **Method.** x ← x − (JᵀJ)⁻¹ Jᵀr (rls-2025 eq. 9; ukf-vslm-2023 eq. 13).
 //! - [`Form::AsPrinted`]: one step from the start, nothing else.
-//! - [`Form::Sound`]: repeated, with scaled columns and priors, each step halved until it lowers the cost.
+//! - [`Form::Robust`]: repeated, with scaled columns and priors, each step halved until it lowers the cost.
 //!
 //! **Shapes.** As in [`lm`](crate::least_squares::lm).
 //!
@@ -50,7 +50,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             factorisation: Factorisation::Cholesky,
             priors: true,
             max_iterations: 50,

@@ -2,7 +2,7 @@
 //!
 //! **Method.** x ← x − (JᵀJ + μI)⁻¹ Jᵀr (ltlm-2024 eq. 10).
 //! - [`Form::AsPrinted`]: μ fixed (5 in the paper), parameters unscaled, every step taken.
-//! - [`Form::Sound`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
+//! - [`Form::Robust`]: the same step in parameters scaled by the largest column norms of J met so far, so that μ
 //!   is a pure number; μ follows the gain ratio ϱ = (actual reduction) / (predicted reduction) after Nielsen. A
 //!   step is accepted where it lowers the cost. An accepted step costs one pass over the rows, which brings
 //!   cost and normal equations together; after a refused step the next trial is first tried by its cost alone.
@@ -77,7 +77,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             factorisation: Factorisation::Cholesky,
             mu: 5.0,
             initial_damping: 1e-6,
@@ -107,7 +107,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let mut objective = Objective::new(problem, start, options.priors);
     match options.form {
         Form::AsPrinted => fixed_damping(&mut objective, start, options),
-        Form::Sound => gain_ratio(&mut objective, start, options),
+        Form::Robust => gain_ratio(&mut objective, start, options),
     }
 }
 

@@ -72,7 +72,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             factorisation: Factorisation::Cholesky,
             mu: 5.0,
             initial_damping: 1e-6,
@@ -216,7 +216,7 @@ fn best_candidate(
         consider(between(x1, x, 0.5 * n));
         consider(between(x1, x2, 0.5 * n));
     }
-    if options.form == Form::Sound && options.second_step {
+    if options.form == Form::Robust && options.second_step {
         consider(x2.to_vec());
     }
     best

@@ -2,7 +2,7 @@
 //!
 //! **Method.** x ← x − δ (JᵀJ + λI)⁻¹ Jᵀr with a step size δ that is adjusted as the search goes on.
 //! - [`Form::AsPrinted`]: δ decays once for each iteration, δ₀ = 0.8, factor 0.95 (ukf-vslm-2023 eq. 15).
-//! - [`Form::Sound`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0,
+//! - [`Form::Robust`]: small fixed damping of scaled columns; δ minimises the parabola through the cost at 0,
 //!   its slope there and the cost at 1, safeguarded to [0.1, 0.5] at each further trial until the cost falls
 //!   enough (Armijo).
 //!
@@ -59,7 +59,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             lambda: 5.0,
             step_size: 0.8,
             decay_factor: 0.95,

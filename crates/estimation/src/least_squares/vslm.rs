@@ -8,7 +8,7 @@
 //! - [`Form::AsPrinted`] with [`Decay::PerIteration`]: eq. 15 with all rows, δ decaying once for each pass. The
 //!   steps sum to a finite length: what is left of a linear error after all of them is about e^(−δ₀/(1 − μ)) =
 //!   e^(−16).
-//! - [`Form::Sound`]: scaled columns and Nielsen's damping as in [`lm`](crate::least_squares::lm);
+//! - [`Form::Robust`]: scaled columns and Nielsen's damping as in [`lm`](crate::least_squares::lm);
 //!   δ falls only where a step is refused (halved) and grows back (÷ μ, at most 1) where one is taken.
 //!
 //! **Shapes.** As in `lm`.
@@ -81,7 +81,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             decay: Decay::PerIteration,
             lambda: 5.0,
             step_size: 0.8,
@@ -121,7 +121,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     match (options.form, options.decay) {
         (Form::AsPrinted, Decay::PerSample) => per_sample(&mut objective, start, options),
         (Form::AsPrinted, Decay::PerIteration) => per_iteration(&mut objective, start, options),
-        (Form::Sound, _) => sound(&mut objective, start, options),
+        (Form::Robust, _) => sound(&mut objective, start, options),
     }
 }
 

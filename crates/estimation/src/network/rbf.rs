@@ -5,7 +5,7 @@
 //! its own factors mᵢ, residual rᵢ = mᵢ · y(uᵢ) − tᵢ. A cable that sees one direction of a displacement is such a row.
 //! - [`Form::AsPrinted`]: a centre on every point, Gaussian φ with ρ the mean distance between neighbours, weights of
 //!   next to no prior: the network interpolates its rows, noise included.
-//! - [`Form::Sound`]: few centres, spread out over the points; φ of compact support (see [`radial`]), ρ three fill
+//! - [`Form::Robust`]: few centres, spread out over the points; φ of compact support (see [`radial`]), ρ three fill
 //!   distances; a normal prior on the weights, whose standard deviation is the size that the function may have.
 //!
 //! **Shapes.** `D` inputs, m outputs, K centres: m·K weights, output by output for each centre.
@@ -49,7 +49,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { form: Form::Sound, centres: 24, reach: 3.0, weight_sigma: 1.0, seed: 0 }
+        Self { form: Form::Robust, centres: 24, reach: 3.0, weight_sigma: 1.0, seed: 0 }
     }
 }
 
@@ -95,7 +95,7 @@ impl<const D: usize> Layout<D> {
     /// Value of bump k at u.
     pub fn bump(&self, k: usize, u: &[f64; D]) -> f64 {
         match self.form {
-            Form::Sound => radial::bump(u, &self.centres[k], self.reach),
+            Form::Robust => radial::bump(u, &self.centres[k], self.reach),
             Form::AsPrinted => (-0.5 * (radial::distance(u, &self.centres[k]) / self.reach).powi(2)).exp(),
         }
     }

@@ -4,7 +4,7 @@
 //! d b), and it steps δ against the stronger smell: u ← u − δ b sign(f(u + d b) − f(u − d b)).
 //! - [`Form::AsPrinted`]: d ← 0.95 d + 0.01 and δ ← 0.95 δ at each iteration, whatever happened. As δ dies out
 //!   geometrically the beetle can travel at most δ₀/(1 − 0.95) = 20 δ₀ in all.
-//! - [`Form::Sound`]: the beetle moves only where that lowers the cost; δ shrinks after a failure and grows
+//! - [`Form::Robust`]: the beetle moves only where that lowers the cost; δ shrinks after a failure and grows
 //!   after a success, and d follows δ.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box. Three evaluations for each iteration.
@@ -61,7 +61,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             max_iterations: 1_000,
             step: 1.0,
             antennae: 0.5,
@@ -92,7 +92,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
 /// The beetle's walk, with or without the parabola of [`qibas`](crate::swarm::qibas).
 pub(super) fn walk(problem: &dyn Problem, start: &[f64], options: &Options, interpolate: bool) -> Estimate {
     let p = start.len();
-    let sound = options.form == Form::Sound;
+    let sound = options.form == Form::Robust;
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut u = vec![0.0; p];

@@ -3,7 +3,7 @@
 //! **Method.** For each member i a mutant from others of the population, crossed with i coordinate by
 //! coordinate (CR, one coordinate always from the mutant); the better of the two stays.
 //! - [`Form::AsPrinted`]: rand/1/bin, u_a + F(u_b − u_c), F = 0.5, CR = 0.9.
-//! - [`Form::Sound`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for
+//! - [`Form::Robust`]: current-to-best/1/bin, u_i + F(best − u_i) + F(u_a − u_b), F drawn anew in [0.5, 1) for
 //!   each member (dither), CR = 0.9; the start is a member.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ; a coordinate that leaves the box is put halfway between the wall and where it
@@ -53,7 +53,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             population: 0,
             max_iterations: 300,
             factor: 0.5,
@@ -83,7 +83,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut members: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();
-    if options.form == Form::Sound {
+    if options.form == Form::Robust {
         members[0].fill(0.0);
     }
     let mut costs = search.costs(&members);
@@ -96,7 +96,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         for (i, member) in members.iter().enumerate() {
             let [a, b, c] = three_others(&mut rng, n, i);
             let factor =
-                if options.form == Form::Sound { rng.random_range(0.5..1.0) } else { options.factor };
+                if options.form == Form::Robust { rng.random_range(0.5..1.0) } else { options.factor };
             let always = rng.random_range(0..p);
             let mut trial = member.clone();
             for k in 0..p {
@@ -105,7 +105,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
                 }
                 let mutant = match options.form {
                     Form::AsPrinted => members[a][k] + factor * (members[b][k] - members[c][k]),
-                    Form::Sound => {
+                    Form::Robust => {
                         member[k] + factor * (best[k] - member[k]) + factor * (members[a][k] - members[b][k])
                     }
                 };

@@ -3,7 +3,7 @@
 //! **Method.** v ← ωv + c₁ρ₁(own best − u) + c₂ρ₂(best of all − u), u ← u + v, ρ uniform in [0, 1) for each
 //! coordinate.
 //! - [`Form::AsPrinted`]: ω falls linearly from 0.9 to 0.4, c₁ = c₂ = 2, |v| at most 0.4 (a fifth of the box).
-//! - [`Form::Sound`]: Clerc's constriction (ω = 0.7298, c = 1.4962), for which a swarm is known to contract;
+//! - [`Form::Robust`]: Clerc's constriction (ω = 0.7298, c = 1.4962), for which a swarm is known to contract;
 //!   the start is one of the particles.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ; a particle that leaves the box is put on its wall and loses that part of its
@@ -49,7 +49,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             population: 40,
             max_iterations: 500,
             region: Region::default(),
@@ -77,7 +77,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut positions: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();
-    if options.form == Form::Sound {
+    if options.form == Form::Robust {
         positions[0].fill(0.0);
     }
     let mut velocities = vec![vec![0.0; p]; n];
@@ -87,7 +87,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         let share = iteration as f64 / options.max_iterations as f64;
         let (inertia, pull, limit) = match options.form {
             Form::AsPrinted => (0.9 - 0.5 * share, 2.0, 0.4),
-            Form::Sound => (0.7298, 1.4962, 2.0),
+            Form::Robust => (0.7298, 1.4962, 2.0),
         };
         let best = search.best.clone();
         for i in 0..n {

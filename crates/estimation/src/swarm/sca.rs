@@ -4,7 +4,7 @@
 //! position so far, r₂ uniform in [0, 2π), r₃ in [0, 2), and r₁ falls linearly from a = 2 to 0.
 //! - [`Form::AsPrinted`]: as above. |r₃ P − u| depends on where the origin is: the method is drawn to u = 0,
 //!   which here is the start. On deviations from a data sheet, most of which are small, that flatters it.
-//! - [`Form::Sound`]: r₃ = 1, so that only differences of positions count, and a member moves only where that
+//! - [`Form::Robust`]: r₃ = 1, so that only differences of positions count, and a member moves only where that
 //!   lowers its cost; the start is a member.
 //!
 //! **Shapes.** u in [−1, 1]ᵖ, clamped to the box.
@@ -52,7 +52,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            form: Form::Sound,
+            form: Form::Robust,
             population: 30,
             max_iterations: 500,
             amplitude: 2.0,
@@ -78,7 +78,7 @@ impl Options {
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
     let n = options.population.max(1);
-    let sound = options.form == Form::Sound;
+    let sound = options.form == Form::Robust;
     let mut search = Search::new(problem, start, &options.region, options.priors, options.small_cost);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let mut members: Vec<Vec<f64>> = (0..n).map(|_| uniform_position(&mut rng, p)).collect();

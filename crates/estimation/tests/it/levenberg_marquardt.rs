@@ -138,7 +138,7 @@ fn two_parameters_that_only_show_as_a_sum_do_not_run_away() {
 
 #[test]
 fn what_is_not_a_number_ends_in_a_termination() {
-    for form in [Form::AsPrinted, Form::Sound] {
+    for form in [Form::AsPrinted, Form::Robust] {
         for factorisation in [Factorisation::Cholesky, Factorisation::Qr] {
             let options = Options { form, factorisation, ..Options::default() };
             for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -168,7 +168,7 @@ fn a_wall_of_nan_is_backed_away_from() {
 #[test]
 fn no_rows_and_no_parameters_are_answered() {
     let none = rows(2, 0, |_: &[Dual], _| Dual::from(0.0));
-    for form in [Form::AsPrinted, Form::Sound] {
+    for form in [Form::AsPrinted, Form::Robust] {
         for factorisation in [Factorisation::Cholesky, Factorisation::Qr] {
             let options = Options { form, factorisation, ..Options::default() };
             let estimate = solve(&none, &[1.0, 2.0], &options);

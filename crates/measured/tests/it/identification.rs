@@ -16,7 +16,7 @@ fn robocali_meets_the_reference() {
     let dataset = data_set("RobotCali.xlsx", None);
     let robot = truegrind_arm::robots::load("abb-irb-120").unwrap();
     let frames = starts(&dataset, &robot.model).unwrap().remove(0);
-    for (sharpen, limit) in [(false, 0.46), (true, 0.36)] {
+    for (fuse_readout, limit) in [(false, 0.46), (true, 0.36)] {
         let (mut registered, mut geometry) = (0.0, 0.0);
         for seed in 0..3 {
             let options = Options {
@@ -24,14 +24,14 @@ fn robocali_meets_the_reference() {
                 solver: by_name("lm").unwrap(),
                 held_out: 0.2,
                 seed,
-                sharpen,
+                fuse_readout,
                 limit_rmse_mm: None,
                 limit_max_mm: None,
                 stated_frames: None,
             };
             let split = |d: &Dataset| split::random(d, 0.2, seed);
             let found = identify(&dataset, "abb-irb-120", &robot.model, &frames, &split, &options).unwrap();
-            assert_eq!(found.sharpening.is_ok(), sharpen);
+            assert_eq!(found.readout_fusion.is_ok(), fuse_readout);
             assert!(found.training.termination().is_converged());
             let report = found.identifiability.unwrap();
             // Base against link 1, touched point against link 6, and one combination through the arm.
@@ -39,7 +39,7 @@ fn robocali_meets_the_reference() {
             registered += found.estimated.registered.held_out.rmse / 3.0;
             geometry += found.estimated.geometry.held_out.rmse / 3.0;
         }
-        assert!(geometry <= limit, "sharpened {sharpen}: {geometry:.3} mm against {limit}");
+        assert!(geometry <= limit, "sharpened {fuse_readout}: {geometry:.3} mm against {limit}");
         assert!(geometry < registered, "geometry must help on rows it never saw");
     }
 }

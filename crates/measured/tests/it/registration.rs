@@ -25,7 +25,7 @@ fn real_arms_with_frames_alone() {
     let arm = |name: &str| truegrind_arm::robots::load(name).unwrap().model;
     let poses = |name: &str, data: &Dataset| -> Vec<Pose> {
         let model = arm(name);
-        let arm = model.under(&Condition::default());
+        let arm = model.at_condition(&Condition::default());
         data.rows.iter().map(|r| arm.forward(&r.joints)).collect()
     };
     let ur5 = data_set("ur5-jacobi/grid.csv", None);

@@ -1,6 +1,6 @@
 //! One simulated arm with its groups of poses, each measured as warm and worn as its hour has it.
 
-use super::Degradation;
+use super::settings::Degradation;
 use crate::experiment::ExperimentError;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};

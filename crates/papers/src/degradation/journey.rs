@@ -2,20 +2,121 @@
 
 use std::time::Instant;
 
+use serde::Serialize;
+
 use super::arm::{Arm, mean_error};
+use super::settings::Degradation;
 use super::way::State;
-use super::{Count, Degradation, Journey, Step, Way};
 use truegrind_calibration::identification::fit::Observed;
 use truegrind_calibration::identification::identifiability::identifiability;
 use truegrind_estimation::least_squares::lm;
 use truegrind_math::statistics::median;
+
+/// How a method goes through the groups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Strategy {
+    /// Recursive least squares that remembers everything.
+    Rls,
+    /// The same with a forgetting factor.
+    RlsForgetting,
+    /// Levenberg–Marquardt on the present group, converged.
+    Lm,
+    /// The same with the last group's covariance as prior.
+    LmMemory,
+    /// Levenberg–Marquardt with μ = 5 and unweighted rows, stopped.
+    LmStopped,
+}
+
+impl Strategy {
+    /// All of them.
+    pub const ALL: [Strategy; 5] =
+        [Strategy::Rls, Strategy::RlsForgetting, Strategy::Lm, Strategy::LmMemory, Strategy::LmStopped];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Strategy::Rls => "RLS",
+            Strategy::RlsForgetting => "RLS, forgetting",
+            Strategy::Lm => "LM",
+            Strategy::LmMemory => "LM, memory",
+            Strategy::LmStopped => "LM, stopped",
+        }
+    }
+
+    /// The paper's name for what it may have run.
+    pub fn paper_name(self) -> Option<&'static str> {
+        match self {
+            Strategy::Rls => Some("RLS"),
+            Strategy::LmStopped => Some("LM"),
+            _ => None,
+        }
+    }
+}
+
+/// Mean position errors of one method, count and group, over all arms (mm).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Step {
+    /// Group, from 0.
+    pub group: usize,
+    /// Poses that identify, with what was known before this group.
+    pub identification_before_mm: f64,
+    /// The same with what is known after it.
+    pub identification_after_mm: f64,
+    /// Poses that verify, before.
+    pub verification_before_mm: f64,
+    /// Poses that verify, after.
+    pub verification_after_mm: f64,
+}
+
+/// A method with one count through all groups.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Run {
+    /// The method.
+    pub way: Strategy,
+    /// Poses of each group that it takes.
+    pub count: usize,
+    /// One step for each group.
+    pub steps: Vec<Step>,
+    /// Mean error of the poses that verify, after, over the groups: one for each arm (mm).
+    pub arms_mm: Vec<f64>,
+    /// Seconds for all groups of one arm, median over the arms. Not the same in every run.
+    #[serde(skip)]
+    pub seconds: f64,
+}
+
+impl Run {
+    /// Mean over the groups.
+    pub fn mean(&self, figure: fn(&Step) -> f64) -> f64 {
+        self.steps.iter().map(figure).sum::<f64>() / self.steps.len().max(1) as f64
+    }
+}
+
+/// What so many poses can tell, with known frames.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Count {
+    /// Poses.
+    pub poses: usize,
+    /// Equations they give.
+    pub equations: usize,
+    /// Rank of the Jacobian, the smallest over the arms, of 24 parameters.
+    pub rank: usize,
+    /// Condition number in units of the priors, the largest over the arms; infinite without full rank.
+    pub condition: f64,
+    /// Mean error of the poses that identify after RLS, first group (mm).
+    pub identification_mm: f64,
+    /// Mean error of the poses that verify after RLS, first group (mm).
+    pub verification_mm: f64,
+    /// Mean error of the poses that verify after one-shot least squares without priors, eq. 9; absent where singular.
+    pub without_prior_mm: Option<f64>,
+}
 
 fn first_poses(rows: &Observed, count: usize) -> Observed {
     rows.subset(&(0..count.min(rows.dataset.rows.len())).collect::<Vec<_>>())
 }
 
 /// One arm through all groups.
-pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Way, count: usize) -> Journey {
+pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Strategy, count: usize) -> Run {
     let mut state = State::new(arm);
     let mut steps = Vec::with_capacity(settings.groups);
     let mut seconds = 0.0;
@@ -24,11 +125,11 @@ pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Way, count: usize)
         let before = state.model(arm);
         let begun = Instant::now();
         match way {
-            Way::Rls => state.rls(arm, &rows, 1.0),
-            Way::RlsForgetting => state.rls(arm, &rows, settings.forgetting),
-            Way::Lm => state.lm(arm, &rows, false),
-            Way::LmMemory => state.lm(arm, &rows, true),
-            Way::LmStopped => state.stopped(arm, &rows, settings.stopped_after),
+            Strategy::Rls => state.rls(arm, &rows, 1.0),
+            Strategy::RlsForgetting => state.rls(arm, &rows, settings.forgetting),
+            Strategy::Lm => state.lm(arm, &rows, false),
+            Strategy::LmMemory => state.lm(arm, &rows, true),
+            Strategy::LmStopped => state.stopped(arm, &rows, settings.stopped_after),
         }
         seconds += begun.elapsed().as_secs_f64();
         let after = state.model(arm);
@@ -41,11 +142,11 @@ pub(super) fn journey(settings: &Degradation, arm: &Arm, way: Way, count: usize)
         });
     }
     let mean = steps.iter().map(|s: &Step| s.verification_after_mm).sum::<f64>() / steps.len().max(1) as f64;
-    Journey { way, count, steps, arms_mm: vec![mean], seconds }
+    Run { way, count, steps, arms_mm: vec![mean], seconds }
 }
 
 /// Means over the arms.
-pub(super) fn average(way: Way, count: usize, each: &[Journey]) -> Journey {
+pub(super) fn average(way: Strategy, count: usize, each: &[Run]) -> Run {
     let n = each.len().max(1) as f64;
     let groups = each.first().map_or(0, |j| j.steps.len());
     let mean = |g: usize, figure: fn(&Step) -> f64| each.iter().map(|j| figure(&j.steps[g])).sum::<f64>() / n;
@@ -59,7 +160,7 @@ pub(super) fn average(way: Way, count: usize, each: &[Journey]) -> Journey {
         })
         .collect();
     let arms_mm = each.iter().flat_map(|j| j.arms_mm.iter().copied()).collect();
-    Journey {
+    Run {
         way,
         count,
         steps,

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::{Journey, Way};
+use super::journey::{Run, Strategy};
 use crate::statistics::{holm, signed_rank};
 use crate::verdict::LEVEL;
 
@@ -16,7 +16,7 @@ pub(super) const SAME: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgainstRls {
     /// The way.
-    pub way: Way,
+    pub way: Strategy,
     /// Poses of each group that both take.
     pub count: usize,
     /// Mean difference of the error after, way minus RLS (mm).
@@ -45,12 +45,12 @@ pub enum Outcome {
     NotSignificant,
 }
 
-pub(super) fn against_rls(journeys: &[Journey]) -> Vec<AgainstRls> {
+pub(super) fn against_rls(journeys: &[Run]) -> Vec<AgainstRls> {
     let mut out: Vec<AgainstRls> = journeys
         .iter()
-        .filter(|j| j.way != Way::Rls)
+        .filter(|j| j.way != Strategy::Rls)
         .filter_map(|j| {
-            let rls = journeys.iter().find(|r| r.way == Way::Rls && r.count == j.count)?;
+            let rls = journeys.iter().find(|r| r.way == Strategy::Rls && r.count == j.count)?;
             let differences: Vec<f64> = j.arms_mm.iter().zip(&rls.arms_mm).map(|(a, b)| a - b).collect();
             let arms = differences.len();
             let mean_mm = differences.iter().sum::<f64>() / arms.max(1) as f64;

@@ -1,18 +1,18 @@
 //! An arm that degrades: periodic against continuous calibration. Every table says that it is simulated.
 
 mod figures;
+mod series;
 
 use serde_json::{Value, json};
 
+use self::series::{SIMULATED, after_of, pose_counts};
 use super::words;
-use crate::degradation::{DegradationResult, Journey, Outcome, PaperStatement, Step, Way};
+use crate::degradation::{DegradationResult, Outcome, PaperStatement, Run, Step, Strategy};
 use truegrind_math::statistics::mean_and_deviation;
 use truegrind_report::document::{Block, Document, Verdict};
 use truegrind_report::number::Precision;
 use truegrind_report::status::Status;
 use truegrind_report::table::{Cell, Column, Table};
-
-const SIMULATED: &str = "simulated degradation";
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, result: &DegradationResult) {
@@ -47,22 +47,11 @@ pub(super) fn page(page: &mut Document, result: &DegradationResult, timings: boo
     }
 }
 
-/// Pose counts of the journeys, each once.
-fn pose_counts(result: &DegradationResult) -> Vec<usize> {
-    let mut counts: Vec<usize> = result.journeys.iter().map(|j| j.count).collect();
-    counts.dedup();
-    counts
-}
-
-fn after_of(step: &Step) -> f64 {
-    step.verification_after_mm
-}
-
-fn journey(result: &DegradationResult, way: Way, count: usize) -> Option<&Journey> {
+fn journey(result: &DegradationResult, way: Strategy, count: usize) -> Option<&Run> {
     result.journeys.iter().find(|j| j.way == way && j.count == count)
 }
 
-fn after(j: &Journey) -> f64 {
+fn after(j: &Run) -> f64 {
     j.mean(after_of)
 }
 
@@ -75,14 +64,14 @@ fn verdict(result: &DegradationResult) -> Verdict {
         reasons.push(format!(
             "{count} poses: RLS leaves {} mm, LM converged on the same group alone {}, LM with RLS's memory {}, LM stopped \
              and unweighted {}.",
-            mm(of(Way::Rls)),
-            mm(of(Way::Lm)),
-            mm(of(Way::LmMemory)),
-            mm(of(Way::LmStopped))
+            mm(of(Strategy::Rls)),
+            mm(of(Strategy::Lm)),
+            mm(of(Strategy::LmMemory)),
+            mm(of(Strategy::LmStopped))
         ));
     }
-    let gaps = result.journeys.iter().filter(|j| j.way == Way::Rls).filter_map(|rls| {
-        let lm = journey(result, Way::LmMemory, rls.count)?;
+    let gaps = result.journeys.iter().filter(|j| j.way == Strategy::Rls).filter_map(|rls| {
+        let lm = journey(result, Strategy::LmMemory, rls.count)?;
         Some((after(rls) - after(lm)).abs() / after(rls))
     });
     let widest = gaps.fold(0.0, f64::max);
@@ -97,19 +86,19 @@ fn verdict(result: &DegradationResult) -> Verdict {
     };
     if let (Some(rls), Some(lm)) = (stated("RLS"), stated("LM")) {
         let of = |way| journey(result, way, result.settings.identification).map_or(f64::NAN, after);
-        let ours = of(Way::Lm) / of(Way::Rls);
+        let ours = of(Strategy::Lm) / of(Strategy::Rls);
         reasons.push(format!(
             "The paper's LM leaves {:.1} times its RLS ({rls} mm). Here LM leaves {ours:.2} times RLS when it has converged \
              and {:.2} times when it is stopped after {} steps: {}.",
             lm / rls,
-            of(Way::LmStopped) / of(Way::Rls),
+            of(Strategy::LmStopped) / of(Strategy::Rls),
             result.settings.stopped_after,
             if ours > 0.5 * lm / rls { "a gap like it is there" } else { "a gap like the paper's is not found" }
         ));
     }
     if let (Some(rls), Some(forgetting)) = (
-        journey(result, Way::Rls, result.settings.identification),
-        journey(result, Way::RlsForgetting, result.settings.identification),
+        journey(result, Strategy::Rls, result.settings.identification),
+        journey(result, Strategy::RlsForgetting, result.settings.identification),
     ) {
         reasons.push(format!(
             "Memory without forgetting lags behind an arm that changes: in the last group RLS leaves {} mm, with forgetting {} mm.",
@@ -141,8 +130,8 @@ fn headline(result: &DegradationResult) -> String {
     let count = result.settings.identification;
     let of = |way| journey(result, way, count).map_or(f64::NAN, after);
     let mm = |v: f64| Precision::Decimals(3).format(v);
-    let (rls, lm) = (of(Way::Rls), of(Way::Lm));
-    let (less, more) = if rls < lm { (Way::Rls, Way::Lm) } else { (Way::Lm, Way::Rls) };
+    let (rls, lm) = (of(Strategy::Rls), of(Strategy::Lm));
+    let (less, more) = if rls < lm { (Strategy::Rls, Strategy::Lm) } else { (Strategy::Lm, Strategy::Rls) };
     format!(
         "with {count} poses of each group {} leaves {} mm and {} {} mm, and neither because of its algorithm",
         less.name(),

@@ -6,12 +6,9 @@ mod tables;
 
 use self::figures::{curves, error_bars, rows, time_bars};
 use self::tables::{convergence, cost, errors, parameter_table, verdict, verdict_table};
-use super::caveats;
-use crate::experiment::{Treatment, Units};
-use crate::protocol::{MethodResult, Outcome, Study};
-use truegrind_calibration::measurement::dataset::Sensor;
-use truegrind_estimation::estimate::Termination;
-use truegrind_math::statistics::{ErrorSummary, median};
+use super::study::{held_out, registered};
+use crate::protocol::Study;
+use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::document::{Block, Document, KeyFigure};
 use truegrind_report::repeated::spread;
 use truegrind_report::table::Cell;
@@ -102,7 +99,7 @@ fn head(page: &mut Document, study: &Study) {
             ),
         );
     }
-    notes.extend(caveats(&study.experiment));
+    notes.extend(study.experiment.caveats.iter().cloned());
     page.push(Block::List(notes));
     let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
     let best = study
@@ -127,82 +124,4 @@ fn head(page: &mut Document, study: &Study) {
         "repeated poses, else the rounding of angles"
     }));
     page.push(figures);
-}
-
-/// Held-out errors of all cases; nothing of a method that diverged in any, since a mean over such cases is no figure.
-fn held_out(result: &MethodResult) -> Option<Vec<ErrorSummary>> {
-    let all = result.outcomes.iter().map(|o| (!o.diverged).then_some(o.held_out));
-    all.collect()
-}
-
-/// The same of the start, with frames registered.
-fn registered(study: &Study) -> Vec<ErrorSummary> {
-    study.cases.iter().map(|c| c.registered).collect()
-}
-
-pub(super) fn name_of(study: &Study, id: &str) -> String {
-    let found = study.results.iter().find(|r| r.method.id == id);
-    found.map_or_else(|| id.to_owned(), |r| format!("{id} ({})", r.method.name))
-}
-
-fn title(study: &Study, what: &str) -> String {
-    let protocol = if study.reduced { "Reduced protocol: " } else { "" };
-    let simulated = if study.simulated { ", simulated" } else { "" };
-    format!("{protocol}{what}, {} cases of {} rows{simulated}", study.cases.len(), study.rows)
-}
-
-/// How the cases ended, in words.
-fn ended(outcomes: &[Outcome]) -> String {
-    let n = outcomes.len();
-    let diverged = outcomes.iter().filter(|o| o.diverged).count();
-    if diverged > 0 {
-        return format!("diverged in {diverged} of {n}");
-    }
-    let converged = outcomes.iter().filter(|o| o.termination.is_converged()).count();
-    if converged == n {
-        return "converged".to_owned();
-    }
-    let mut kinds: Vec<Termination> = Vec::new();
-    for outcome in outcomes {
-        if !kinds.contains(&outcome.termination) {
-            kinds.push(outcome.termination);
-        }
-    }
-    match kinds.as_slice() {
-        [one] => one.to_string(),
-        _ => format!("converged in {converged} of {n}"),
-    }
-}
-
-fn iterations(outcomes: &[Outcome]) -> f64 {
-    outcomes.iter().map(|o| o.iterations as f64).sum::<f64>() / outcomes.len().max(1) as f64
-}
-
-fn treatment(result: &MethodResult) -> &'static str {
-    match (result.treatment, result.method.units) {
-        (Treatment::Printed, Units::Rad) => "printed, rad",
-        (Treatment::Printed, Units::Deg) => "printed, deg",
-        (Treatment::Sound, _) => "sound",
-    }
-}
-
-/// Passes over the rows of the fit: residuals alone, and with derivatives.
-pub(super) fn passes(study: &Study, result: &MethodResult) -> (f64, f64) {
-    let per = match study.sensor {
-        Sensor::Cable => 1,
-        Sensor::Position => 3,
-        Sensor::Pose => 6,
-    };
-    let n = result.outcomes.len().max(1) as f64;
-    let (mut residuals, mut jacobians) = (0.0, 0.0);
-    for (outcome, case) in result.outcomes.iter().zip(&study.cases) {
-        let rows = (case.train * per).max(1) as f64;
-        residuals += outcome.evaluations.residuals as f64 / rows / n;
-        jacobians += outcome.evaluations.jacobians as f64 / rows / n;
-    }
-    (residuals, jacobians)
-}
-
-fn seconds(result: &MethodResult) -> f64 {
-    median(&result.outcomes.iter().map(|o| o.seconds).collect::<Vec<_>>()).unwrap_or(f64::NAN)
 }

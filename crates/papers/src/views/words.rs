@@ -1,6 +1,6 @@
 //! The verdict in sentences that a careful statistician would sign.
 
-use super::methods::{name_of, passes};
+use super::study::{name_of, passes};
 use crate::protocol::{MethodResult, Study};
 use crate::verdict::{Comparison, Conclusion, LEVEL, Test};
 use truegrind_report::number::Precision;

@@ -1,6 +1,6 @@
 //! An arm that degrades: RLS is least squares, and what it wins over LM has other names.
 
-use truegrind_papers::degradation::{Degradation, Way, run};
+use truegrind_papers::degradation::{Degradation, Strategy, run};
 use truegrind_papers::experiment::{Experiment, Kind};
 
 use super::experiment::nominal;
@@ -19,21 +19,21 @@ fn rls_and_lm_with_the_same_memory_agree_and_memory_is_what_helps_few_poses() {
     // The arm degrades, and neglect undoes the first calibration.
     assert!(result.nominal_mm[0] > 0.3 && result.nominal_mm[0] < 1.2, "{:?}", result.nominal_mm);
     assert!(result.neglected_mm[2] > 2.0 * result.neglected_mm[0], "{:?}", result.neglected_mm);
-    let after = |way: Way, count: usize| {
+    let after = |way: Strategy, count: usize| {
         let journey = result.journeys.iter().find(|j| j.way == way && j.count == count).unwrap();
         journey.mean(|s| s.verification_after_mm)
     };
     for count in [15, 20, 50] {
-        let (rls, memory) = (after(Way::Rls, count), after(Way::LmMemory, count));
+        let (rls, memory) = (after(Strategy::Rls, count), after(Strategy::LmMemory, count));
         assert!((rls - memory).abs() < 0.02 * rls, "{count} poses: {rls} {memory}");
         assert!(rls < 0.5 * result.nominal_mm[0]);
     }
     // Forgetting follows an arm that changes better than remembering everything.
-    let last = |way: Way| {
+    let last = |way: Strategy| {
         let journey = result.journeys.iter().find(|j| j.way == way && j.count == 50).unwrap();
         journey.steps.last().unwrap().verification_after_mm
     };
-    assert!(last(Way::RlsForgetting) < last(Way::Rls));
+    assert!(last(Strategy::RlsForgetting) < last(Strategy::Rls));
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn all_figures_of_the_paper_are_shown_and_every_table_says_that_it_is_simulated(
     let settings = Degradation { arms: 6, groups: 2, counts: vec![4, 15, 50], ..small() };
     let result = run(&settings, "test", "tx60-pose", 3, nominal).unwrap();
     // Two ways with the same memory are the same, and with six arms nothing small is called a difference.
-    let memory = result.against_rls.iter().find(|a| a.way == Way::LmMemory && a.count == 50).unwrap();
+    let memory = result.against_rls.iter().find(|a| a.way == Strategy::LmMemory && a.count == 50).unwrap();
     assert_eq!(memory.outcome, truegrind_papers::degradation::Outcome::Same);
     assert!(result.against_rls.iter().all(|a| a.arms == 6 && (0.0..=1.0).contains(&a.p)));
     let experiment = Experiment::by_name("rls-degradation").unwrap();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::MeasuredScene;
+use super::scene::MeasuredScene;
 use crate::markdown::{cell, line, number, with_sigma};
 use truegrind_arm::estimated::{EstimatedParameter, Judgement};
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};

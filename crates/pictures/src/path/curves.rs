@@ -2,7 +2,7 @@
 
 use rerun::components::MarkerShape;
 
-use super::{AXIS, PathScene, Plan};
+use super::scene::{AXIS, PathScene, Plan};
 use crate::colour::{BEFORE, FLAGGED, JOINTS, REFUSED, SIGMA, after};
 use crate::curve::{self, Pen, curve};
 use crate::page::{Pane, View};

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rerun::components::{Color, Radius};
 use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 
-use super::{PathScene, Plan, intended, reached};
+use super::scene::{PathScene, Plan, intended, reached};
 use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
 use crate::legend;
 use crate::recording::{Store, VisualError};

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::{PathScene, Plan};
+use super::scene::{PathScene, Plan};
 use crate::markdown::{cell, line, number};
 use crate::recording::{Store, VisualError};
 use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};

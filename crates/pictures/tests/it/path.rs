@@ -49,7 +49,8 @@ fn parts(count: usize) -> Parts {
         Pose::from_parts(Translation3::from(Vector3::from(FLANGE_FROM_TOOL)), UnitQuaternion::identity());
     let inverse = Inverse::new(&nominal, &Condition::default(), &nominal);
     let better = Inverse::new(&actual, &Condition::default(), &nominal);
-    let (real, told) = (actual.under(&Condition::default()), nominal.under(&Condition::default()));
+    let (real, told) =
+        (actual.at_condition(&Condition::default()), nominal.at_condition(&Condition::default()));
     let mut near: Option<Joints> = None;
     let mut points = Vec::new();
     for index in 0..count {
@@ -195,7 +196,7 @@ fn time_counts_points() {
 fn links_move_joint_by_joint_to_where_the_model_is() {
     let parts = scene_parts();
     let read = read(&parts);
-    let arm = parts.actual.under(&Condition::default());
+    let arm = parts.actual.at_condition(&Condition::default());
     let tool =
         Pose::from_parts(Translation3::from(Vector3::from(FLANGE_FROM_TOOL)), UnitQuaternion::identity());
     type Which = fn(&PathPoint) -> Option<Joints>;
@@ -238,7 +239,7 @@ fn links_move_joint_by_joint_to_where_the_model_is() {
 fn the_exaggerated_arm_follows_the_exaggerated_path() {
     let parts = scene_parts();
     let read = read(&parts);
-    let arm = parts.actual.under(&Condition::default());
+    let arm = parts.actual.at_condition(&Condition::default());
     let tool =
         Pose::from_parts(Translation3::from(Vector3::from(FLANGE_FROM_TOOL)), UnitQuaternion::identity());
     let times = factor(&read);

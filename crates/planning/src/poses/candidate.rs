@@ -6,9 +6,9 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Wanted;
-use super::rows;
+use super::blank::blank;
 use super::sight::clearance_mm;
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
@@ -92,7 +92,7 @@ pub(super) const FREE_MM: f64 = 120.0;
 pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (Vec<Candidate>, Passed) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let limits = &wanted.nominal.limits;
-    let posed = wanted.nominal.under(&Condition::default());
+    let posed = wanted.nominal.at_condition(&Condition::default());
     let inverse = Inverse::new(wanted.nominal, &Condition::default(), wanted.nominal);
     let mut out: Vec<Candidate> = Vec::with_capacity(count);
     let mut passed = Passed::default();
@@ -153,7 +153,7 @@ pub(super) fn rows(candidates: &[Candidate]) -> Vec<Row> {
         .iter()
         .enumerate()
         .map(|(number, candidate)| {
-            let mut row = rows::blank(number, candidate.joints, Sensor::Cable);
+            let mut row = blank(number, candidate.joints, Sensor::Cable);
             row.anchor = candidate.anchor;
             row
         })

@@ -20,16 +20,7 @@ use rayon::prelude::*;
 use super::rows::Told;
 use truegrind_math::spectral;
 
-/// What makes a set of poses good.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Index {
-    /// Determinant of the normal matrix with its priors: the volume of what stays unknown.
-    #[default]
-    D,
-    /// Observability index O1: the geometric mean of the singular values, without priors, over the combinations that
-    /// the candidates determine.
-    O1,
-}
+pub use super::options::Index;
 
 /// A choice to be made.
 #[derive(Debug, Clone, Copy)]

@@ -10,9 +10,10 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use super::options::Options;
 use super::rival::{Suspect, coupling, effects_of, harmonic, thermal};
-use super::rows::jacobian;
-use super::{Options, Wanted};
+use super::rows::{jacobian, rig};
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
@@ -164,7 +165,7 @@ fn largest_turn(model: &Model, rows: &[Row]) -> f64 {
     let mut largest = 0.0_f64;
     for row in rows {
         let condition = Condition { ..row.condition };
-        let turn = model.under(&condition).effect_regressors(0, &row.joints);
+        let turn = model.at_condition(&condition).effect_regressors(0, &row.joints);
         largest = turn.first().map_or(largest, |t| largest.max(t.amax()));
     }
     largest
@@ -211,10 +212,10 @@ fn of_sensor(
         step(
             "sensor-frame-shift",
             "in the middle of the run",
-            &|p| matches!(p, Parameter::Base(k) if *k < 3),
+            &|p| matches!(p, Parameter::SensorFrame(k) if *k < 3),
         );
     }
-    step("tool-shift", "in the middle of the run", &|p| matches!(p, Parameter::Tool(k) if *k < 3));
+    step("tool-shift", "in the middle of the run", &|p| matches!(p, Parameter::Target(k) if *k < 3));
     let (columns, longest) = scale_column(wanted, rows, per, options);
     out.push(Asked {
         effect: "sensor-scale",
@@ -232,8 +233,8 @@ fn of_sensor(
 
 /// What a relative error of the sensor's lengths adds to each whitened reading, and the longest reading (mm).
 fn scale_column(wanted: &Wanted<'_>, rows: &[Row], per: usize, options: &Options) -> (DMatrix<f64>, f64) {
-    let rig = super::rows::rig(wanted);
-    let posed = wanted.nominal.under(&Condition::default());
+    let rig = rig(wanted);
+    let posed = wanted.nominal.at_condition(&Condition::default());
     let mut column = DMatrix::zeros(per * rows.len(), 1);
     let mut longest = 0.0_f64;
     let weight = 1.0 / options.noise.reading_mm;

@@ -50,8 +50,8 @@ impl OfFrames {
     pub fn holds(self, parameter: &Parameter) -> bool {
         match parameter {
             Parameter::Zero { .. } => self == OfFrames::Zero,
-            Parameter::Base(_) | Parameter::Outlet { .. } => self == OfFrames::Sensor,
-            Parameter::Tool(_) => self == OfFrames::Touched,
+            Parameter::SensorFrame(_) | Parameter::Outlet { .. } => self == OfFrames::Sensor,
+            Parameter::Target(_) => self == OfFrames::Touched,
             _ => false,
         }
     }

@@ -6,31 +6,18 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use super::options::Options;
 use super::rival::{Question, columns_of};
-use super::{Options, Wanted};
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::calibration::{Calibration, Weight};
-use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Row, Sensor};
 use truegrind_calibration::measurement::sensor::Rig;
 use truegrind_estimation::problem::Problem;
-use truegrind_math::se3::Pose;
 
-/// Standard deviations of a reading, everything counted: sensor, hook, repeatability of the arm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Of a length or a coordinate (mm).
-    pub reading_mm: f64,
-    /// Of an orientation (rad).
-    pub reading_rad: f64,
-}
-
-impl Default for Noise {
-    fn default() -> Self {
-        Self { reading_mm: 0.03, reading_rad: 1e-4 }
-    }
-}
+pub use super::options::Noise;
 
 /// What a list of rows tells.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,16 +32,6 @@ pub struct Told {
     pub scale: Vec<f64>,
     /// Rows of `readings` that a diagnosis asks about; the rest is geometry.
     pub interest: Vec<usize>,
-}
-
-/// A row of joints alone, with a reading that says nothing.
-pub(super) fn blank(number: usize, joints: Joints, sensor: Sensor) -> Row {
-    let reading = match sensor {
-        Sensor::Cable => Reading::Cable(0.0),
-        Sensor::Position => Reading::Position(nalgebra::Vector3::zeros()),
-        Sensor::Pose => Reading::Pose(Pose::identity()),
-    };
-    Row::new(number, joints, reading)
 }
 
 /// The sensor as the simulator knows it.
@@ -87,7 +64,7 @@ pub(super) fn jacobian(
     options: &Options,
 ) -> (DMatrix<f64>, Vec<f64>) {
     let rig = rig(wanted);
-    let posed = wanted.nominal.under(&Condition::default());
+    let posed = wanted.nominal.at_condition(&Condition::default());
     let rows: Vec<Row> = rows
         .iter()
         .map(|row| {

@@ -13,10 +13,11 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::blank::blank;
 use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
 use super::rival::{Question, asks};
 use super::sight::clearance_mm;
-use super::{Wanted, rows};
+use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_calibration::measurement::dataset::{Row as MeasuredRow, Sensor};
@@ -198,7 +199,7 @@ fn clear(wanted: &Wanted<'_>, bounds: &Bounds, from: &Joints, to: &Joints, ancho
     if wanted.sensor != Sensor::Cable {
         return true;
     }
-    let posed = wanted.nominal.under(&Condition::default());
+    let posed = wanted.nominal.at_condition(&Condition::default());
     let origin = sensor_mm(wanted.sensor, wanted.frames, anchor);
     (0..=ON_THE_WAY).all(|k| {
         let joints = from.lerp(to, k as f64 / ON_THE_WAY as f64);
@@ -220,7 +221,7 @@ pub(super) fn data(planned: &[Row], poses: &[Candidate]) -> Vec<MeasuredRow> {
         .enumerate()
         .map(|(number, row)| {
             let pose = &poses[row.pose];
-            let mut out = rows::blank(number, pose.joints, Sensor::Cable);
+            let mut out = blank(number, pose.joints, Sensor::Cable);
             out.anchor = pose.anchor;
             out.condition =
                 Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };

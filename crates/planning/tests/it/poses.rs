@@ -130,7 +130,7 @@ fn every_row_is_within_its_bounds_and_the_cable_clears_the_arm() {
     options.bounds.clearance_mm = Some(80.0);
     let found = planned(Sensor::Cable, &frames, &options);
     let inverse = Inverse::new(&nominal, &Condition::default(), &nominal);
-    let posed = nominal.under(&Condition::default());
+    let posed = nominal.at_condition(&Condition::default());
     let outlet = frames.outlets_mm[0];
     for row in &found.rows {
         let pose = &found.poses[row.pose];

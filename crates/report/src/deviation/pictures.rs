@@ -1,6 +1,7 @@
 //! Pictures of a path: its deviation along the way, how often each size occurs, and where on the part.
 
-use super::{AFTER, BEFORE, Side, cut, has, intended, meaning};
+use super::side::{AFTER, BEFORE, Side, cut, has, intended};
+use super::words::meaning;
 use crate::document::Figure;
 use crate::plot::{
     Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,

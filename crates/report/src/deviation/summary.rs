@@ -1,6 +1,7 @@
 //! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
 
-use super::{AFTER, BEFORE, REMAINDER, Side, by_program, cut, has, meaning, sigma_rms};
+use super::side::{AFTER, BEFORE, Side, by_program, cut, has, sigma_rms};
+use super::words::{REMAINDER, meaning};
 use crate::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::{After, Block, PathReport};
 

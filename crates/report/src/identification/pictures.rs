@@ -1,6 +1,8 @@
 //! Pictures of an identification.
 
-use super::{handy, held_by_prior, is_of_arm, signed, tables};
+use super::parameter::{handy, held_by_prior, is_of_arm};
+use super::row::signed;
+use super::tables;
 use crate::plot::{Axis, Graph, Histogram, Ink, Interval, Intervals, Reference, Sample, Series};
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;

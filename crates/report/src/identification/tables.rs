@@ -1,6 +1,7 @@
 //! Tables of an identification.
 
-use super::{cell, handy, held_by_prior, is_of_arm, row_number, signed};
+use super::parameter::{handy, held_by_prior, is_of_arm};
+use super::row::{row_number, signed};
 use crate::status::Status;
 use crate::table::{Cell, Column, Table};
 use truegrind_arm::estimated::EstimatedParameter;
@@ -157,7 +158,8 @@ pub fn frame_table(found: &Identification) -> Table {
     if table.rows.is_empty() {
         let frames = &found.geometry.frames;
         let touched = frames.flange_from_target.translation.vector;
-        let fixed = [("tool.x", touched.x, "mm"), ("tool.y", touched.y, "mm"), ("tool.z", touched.z, "mm")];
+        let fixed =
+            [("target.x", touched.x, "mm"), ("target.y", touched.y, "mm"), ("target.z", touched.z, "mm")];
         for (name, value, unit) in fixed {
             table.push([name.into(), meaning(name).into(), value.into(), unit.into()]);
         }
@@ -300,4 +302,9 @@ pub fn observability_table(report: &Identifiability) -> Table {
         }
     ));
     table
+}
+
+/// A figure that has a meaning only for some sensors or counts.
+fn cell(value: f64, meaningful: bool) -> Cell {
+    if meaningful { value.into() } else { Cell::Missing }
 }

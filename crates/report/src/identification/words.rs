@@ -8,7 +8,7 @@ use crate::status::Status;
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::rounding::NotSharpened;
+use truegrind_calibration::identification::rounding::NotFused;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::split;
 
@@ -112,7 +112,7 @@ fn combination(found: &Identification, terms: &[(Parameter, f64)]) -> String {
 
 /// What the controller's read-out brought.
 pub(super) fn sharpening(found: &Identification) -> Block {
-    match &found.sharpening {
+    match &found.readout_fusion {
         Ok(report) => {
             let point = report.readout_point_mm;
             Verdict::new(
@@ -137,12 +137,12 @@ pub(super) fn sharpening(found: &Identification) -> Block {
             )
             .into()
         }
-        Err(NotSharpened::Nothing) => Block::Paragraph(
+        Err(NotFused::Nothing) => Block::Paragraph(
             "Angles are used as logged: they are not rounded, no read-out was logged with every row, or sharpening was \
              switched off."
                 .to_owned(),
         ),
-        Err(NotSharpened::Mismatch { found_mm, expected_mm }) => Verdict::new(
+        Err(NotFused::Mismatch { found_mm, expected_mm }) => Verdict::new(
             Status::Warning,
             format!(
                 "The read-out was not used: it is {found_mm:.3} mm RMS away from the logged angles under the nominal \
@@ -156,7 +156,7 @@ pub(super) fn sharpening(found: &Identification) -> Block {
 
 /// The same for programs.
 pub(super) fn sharpening_json(found: &Identification) -> Value {
-    match &found.sharpening {
+    match &found.readout_fusion {
         Ok(report) => json!({
             "used": true,
             "readout_point_mm": report.readout_point_mm.as_slice(),
@@ -165,8 +165,8 @@ pub(super) fn sharpening_json(found: &Identification) -> Value {
             "expected_mm": report.expected_mm,
             "narrowed": report.narrowed,
         }),
-        Err(NotSharpened::Nothing) => json!({ "used": false, "reason": "nothing to sharpen, or not wanted" }),
-        Err(NotSharpened::Mismatch { found_mm, expected_mm }) => json!({
+        Err(NotFused::Nothing) => json!({ "used": false, "reason": "nothing to sharpen, or not wanted" }),
+        Err(NotFused::Mismatch { found_mm, expected_mm }) => json!({
             "used": false, "reason": "mismatch", "found_mm": found_mm, "expected_mm": expected_mm,
         }),
     }

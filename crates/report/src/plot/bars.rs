@@ -1,6 +1,6 @@
 //! Bars: one figure per thing and group, with whiskers where a spread is known.
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
 use super::frame::{Entry, Frame, Glyph, picture};
 use super::ink::Ink;

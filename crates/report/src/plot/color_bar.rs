@@ -2,7 +2,7 @@
 
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
 use super::ink::ColorMap;
 use super::letters;

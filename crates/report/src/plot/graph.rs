@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
 use super::frame::{Entry, Frame, Glyph, Inside, picture};
 use super::ink::Ink;

@@ -1,6 +1,6 @@
 //! Histograms of one or several samples over common bins.
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::DrawingError;
 use super::frame::{Entry, Frame, Glyph, picture};
 use super::ink::Ink;

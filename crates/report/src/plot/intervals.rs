@@ -1,7 +1,7 @@
 //! Identified parameters with their uncertainty, each in units of its own prior σ so that lengths and angles share one
 //! axis, with the real value and unit beside it.
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
 use super::frame::{EDGE, Entry, Frame, Glyph, picture};
 use super::ink::Ink;

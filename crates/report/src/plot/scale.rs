@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use super::Axis;
+use super::axis::Axis;
 
 /// Canvas coordinates beyond this are cut off long before anyone sees them.
 const FAR: f64 = 1e6;

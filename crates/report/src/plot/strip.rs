@@ -1,6 +1,6 @@
 //! Heat strips: a value along a path or over rows, one strip per method, so that many are compared at a glance.
 
-use super::Axis;
+use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
 use super::color_bar::Colors;
 use super::frame::{EDGE, Frame, picture};

@@ -38,7 +38,7 @@ pub(super) fn identification() -> (&'static Identification, &'static Dataset) {
             solver: &SOLVERS[0],
             held_out: 0.2,
             seed: 7,
-            sharpen: true,
+            fuse_readout: true,
             limit_rmse_mm: Some(0.2),
             limit_max_mm: None,
             stated_frames: None,

@@ -5,7 +5,7 @@ use truegrind_arm::link::LinkModel;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
-use truegrind_calibration::identification::rounding::NotSharpened;
+use truegrind_calibration::identification::rounding::NotFused;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::format::{csv, markdown, terminal};
 use truegrind_report::identification as view;
@@ -40,8 +40,8 @@ fn by_hand() -> Identification {
         ),
         parameter("link6.alpha", "rad", 0.0, 0.0, 0.3_f64.to_radians(), 0.3_f64.to_radians()),
         parameter("effect1.1", "rad/(N m)", 0.0, 2.5e-6, 1e-7, 1e-4),
-        parameter("tool.x", "mm", 0.0, 12.5, 0.4, 50.0),
-        parameter("base.rx", "rad", 0.0, 10.0_f64.to_radians(), 0.1_f64.to_radians(), 3.0),
+        parameter("target.x", "mm", 0.0, 12.5, 0.4, 50.0),
+        parameter("sensor.rx", "rad", 0.0, 10.0_f64.to_radians(), 0.1_f64.to_radians(), 3.0),
         parameter("outlet2.z", "mm", 0.0, -100.0, 0.5, 2000.0),
     ];
     let summary = |count, rmse| ErrorSummary {
@@ -183,7 +183,7 @@ fn what_makes_up_for_an_unseen_link_is_named() {
     // the first joint turns the outlet about the base.
     let with = |name: &str| sentences.iter().find(|s| s.starts_with(name)).copied().unwrap_or_default();
     assert_eq!(with("link1.d"), "link1.d +1.0 mm goes unseen when outlet.z +1.0 mm follows", "{sentences:?}");
-    assert!(with("link6.d").contains("tool.z −1.0 mm"), "{sentences:?}");
+    assert!(with("link6.d").contains("target.z −1.0 mm"), "{sentences:?}");
     assert!(with("link1.theta").contains("outlet.y"), "{sentences:?}");
     assert!(json["identifiability"]["observability"]["o1"].as_f64().unwrap() > 0.0);
 }
@@ -246,11 +246,11 @@ fn outliers_are_listed_by_data_row_and_line_of_the_file() {
 #[test]
 fn a_contradicting_read_out_is_a_warning() {
     let mut found = by_hand();
-    found.sharpening = Err(NotSharpened::Mismatch { found_mm: 4.2, expected_mm: 0.6 });
+    found.readout_fusion = Err(NotFused::Mismatch { found_mm: 4.2, expected_mm: 0.6 });
     let text = terminal::document(&view::document(&found, identification().1), 200);
     assert!(text.contains("[warning] The read-out was not used: it is 4.200 mm RMS away"), "{text}");
     assert_eq!(view::json(&found, identification().1)["sharpening"]["found_mm"], 4.2);
-    found.sharpening = Err(NotSharpened::Nothing);
+    found.readout_fusion = Err(NotFused::Nothing);
     let text = terminal::document(&view::document(&found, identification().1), 200);
     assert!(text.contains("Angles are used as logged"), "{text}");
 }

@@ -2,9 +2,11 @@
 
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-use super::{AROUND, LATTICE, direction};
+use crate::contact::{Contact, Foot, direction};
+use crate::domain::Domain;
+use crate::equation::survey::{AROUND, LATTICE};
+use crate::error::SurfaceError;
 use crate::expression::Expression;
-use crate::{Contact, Domain, Foot, SurfaceError};
 
 /// The zero set of F(x, y, z), seen from above. Outside is the side on which the top of the z range lies, whatever
 /// the sign of F there.
@@ -29,7 +31,7 @@ impl Implicit {
     /// A text that cannot be read, an empty range, a value that is not finite, or no surface at all in the domain.
     pub fn new(f: &str, domain: Domain, z_mm: [f64; 2]) -> Result<Self, SurfaceError> {
         domain.check(["x", "y"])?;
-        crate::check_range("z", z_mm)?;
+        crate::domain::check_range("z", z_mm)?;
         let mut surface = Self {
             f: Expression::parse(f, &["x", "y", "z"])?,
             domain,

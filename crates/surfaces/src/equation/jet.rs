@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use super::direction;
-use crate::{Contact, Domain, Foot};
+use crate::contact::{Contact, Foot, direction};
+use crate::domain::Domain;
 
 /// A point of S(u, v) with its first and second derivatives.
 #[derive(Debug, Clone, Copy)]

@@ -6,8 +6,8 @@
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 
-use super::{PathOptions, ToolX};
-use crate::SurfaceError;
+use crate::error::SurfaceError;
+use crate::path::options::{PathOptions, ToolX};
 use truegrind_math::se3::rotation_from_matrix;
 
 /// Sine of the angle to the tool's axis below which a direction cannot say where the tool's x axis points.

@@ -3,7 +3,9 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::budget::Budget;
-use crate::{Contact, Surface, SurfaceError};
+use crate::contact::Contact;
+use crate::error::SurfaceError;
+use crate::surface::Surface;
 
 /// How often a link is halved, at most.
 const HALVINGS: usize = 6;

@@ -7,10 +7,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Along, PathOptions, Pattern, Spacing, Traverse};
 use crate::budget::Budget;
+use crate::contact::Contact;
+use crate::error::SurfaceError;
+use crate::path::options::{Along, PathOptions, Pattern, Spacing, Traverse};
 use crate::sampling::{self, interpolated};
-use crate::{Contact, Surface, SurfaceError};
+use crate::surface::Surface;
 
 /// How many curves, and how many places on each, the lattice has.
 const ACROSS: usize = 120;

@@ -6,7 +6,6 @@ use super::frames::{Frames, Weight};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::effect::Statics;
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::lanes::WIDTH;
@@ -211,10 +210,10 @@ impl Columns {
         let mut effects: Vec<EffectColumns> =
             free.iter().map(|&(place, ..)| EffectColumns { place, ..EffectColumns::default() }).collect();
         let still = Condition::default();
-        let mut posed = start.under(&still);
+        let mut posed = start.at_condition(&still);
         for (i, row) in dataset.rows.iter().enumerate() {
             if posed.condition != row.condition {
-                posed = start.under(&row.condition);
+                posed = start.at_condition(&row.condition);
             }
             let rotation = posed.rotations(&row.joints) - start.joint_map * row.joints;
             for j in 0..6 {
@@ -253,7 +252,7 @@ impl Columns {
 /// Torque about each joint of 1 kg at the flange, for every row (N m).
 pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
     let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
-    let statics = Statics::of(&bare);
+    let statics = bare.statics();
     let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
     dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
 }

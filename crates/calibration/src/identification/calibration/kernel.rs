@@ -98,8 +98,8 @@ impl State {
             }
             phi
         };
-        let sensor = turned(|p| if let Parameter::Base(k) = p { Some(*k) } else { None });
-        let target = turned(|p| if let Parameter::Tool(k) = p { Some(*k) } else { None });
+        let sensor = turned(|p| if let Parameter::SensorFrame(k) = p { Some(*k) } else { None });
+        let target = turned(|p| if let Parameter::Target(k) = p { Some(*k) } else { None });
         let flange = *model.flange.rotation.to_rotation_matrix().matrix();
         Self {
             tables: chain::tables(&model.links),
@@ -274,7 +274,7 @@ fn cable(
                 scale * link(joint, coordinate)
             }
             Parameter::Link { joint, coordinate } => link(joint, coordinate),
-            Parameter::Tool(axis) if axis < 3 => {
+            Parameter::Target(axis) if axis < 3 => {
                 dot(&in_base(&frames, &state.flange.column(axis).into()), &u)
             }
             Parameter::Outlet { axis, .. } if single => -u[axis],
@@ -316,7 +316,7 @@ fn cable(
                 }
                 sum
             }
-            Parameter::Base(_) | Parameter::Tool(_) => none,
+            Parameter::SensorFrame(_) | Parameter::Target(_) => none,
         };
         store(out, k * rows + place, value);
     }
@@ -467,13 +467,15 @@ fn space(
                 (v.map(|v| scale * v), w)
             }
             Parameter::Link { joint, coordinate } => link_twist(&frames, &p, joint, coordinate),
-            Parameter::Tool(axis) if axis < 3 => (in_base(&frames, &state.flange.column(axis).into()), none),
-            Parameter::Tool(axis) => (none, in_base(&frames, &state.target_axes.column(axis - 3).into())),
-            Parameter::Base(axis) if axis < 3 => {
+            Parameter::Target(axis) if axis < 3 => {
+                (in_base(&frames, &state.flange.column(axis).into()), none)
+            }
+            Parameter::Target(axis) => (none, in_base(&frames, &state.target_axes.column(axis - 3).into())),
+            Parameter::SensorFrame(axis) if axis < 3 => {
                 of_sensor = true;
                 (splat(&Vector3::ith(axis, 1.0)), none)
             }
-            Parameter::Base(axis) => {
+            Parameter::SensorFrame(axis) => {
                 of_sensor = true;
                 let w = splat(&state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
@@ -518,9 +520,10 @@ fn space(
             Parameter::Outlet { .. } | Parameter::Zero { .. } => (none, none),
         };
         // A shift of the sensor and everything of the arm are seen through the scale; a turn of the sensor is not.
-        let through_scale =
-            !matches!(*parameter, Parameter::Base(3..) | Parameter::Disturbance { parameter: 3.., .. })
-                || !of_sensor;
+        let through_scale = !matches!(
+            *parameter,
+            Parameter::SensorFrame(3..) | Parameter::Disturbance { parameter: 3.., .. }
+        ) || !of_sensor;
         let size = if through_scale { weight * scaled } else { weight };
         let sign = if of_sensor { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {

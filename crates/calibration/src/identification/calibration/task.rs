@@ -90,8 +90,8 @@ impl Calibration {
         let (mut sensor, mut tool) = (Vector6::zeros(), Vector6::zeros());
         for (parameter, &value) in self.parameters.iter().zip(x) {
             match *parameter {
-                Parameter::Base(k) => sensor[k] += value,
-                Parameter::Tool(k) => tool[k] += value,
+                Parameter::SensorFrame(k) => sensor[k] += value,
+                Parameter::Target(k) => tool[k] += value,
                 Parameter::Link { joint, coordinate } => {
                     let link = &mut model.links[joint];
                     link.set(coordinate, link.get(coordinate) + value);

@@ -70,7 +70,7 @@ fn set_circumstances(rows: &mut [Planned], circumstances: &Circumstances) {
 
 /// The different poses, and how often each is measured.
 fn distinct(recipe: &Recipe, nominal: &Model, rig: &Rig) -> Result<(Vec<Joints>, usize), RecipeError> {
-    let arm = nominal.under(&Condition::default());
+    let arm = nominal.at_condition(&Condition::default());
     let seen = |q: &Joints| {
         let flange = arm.forward(q);
         let at = flange * Point3::from(rig.touched_mm());

@@ -10,7 +10,7 @@ use truegrind_calibration::diagnosis::cause::Cause;
 use truegrind_calibration::diagnosis::design::{Design, Linear, Slopes};
 use truegrind_calibration::diagnosis::diagnose::Options;
 use truegrind_calibration::diagnosis::extension::{Extended, Freedom, Subject, fit};
-use truegrind_calibration::diagnosis::held::Held;
+use truegrind_calibration::diagnosis::held::FoldErrors;
 use truegrind_calibration::diagnosis::intervals::scan;
 use truegrind_calibration::diagnosis::levels::disjoint;
 use truegrind_calibration::diagnosis::newton::descend;
@@ -129,7 +129,7 @@ fn rows_whose_columns_contradict_each_other_are_named() {
     let rows: Vec<usize> = mismatches(&data, &nominal).rows.iter().map(|r| r.0).collect();
     assert_eq!(rows, [7, 31]);
     let prepared = prepare(&data, &nominal);
-    assert!(prepared.sharpening.is_ok(), "the other rows are sharpened without them");
+    assert!(prepared.readout_fusion.is_ok(), "the other rows are sharpened without them");
     assert_eq!(
         prepared.observed.dataset.rows[7].joints, data.rows[7].joints,
         "a contradicting row stays as logged"
@@ -171,7 +171,7 @@ fn a_refit_by_one_step_is_a_refit() {
         }
         let dataset = &subject.observed.dataset;
         let linear = Linear::of(subject, fitted);
-        let held = Held::of(&linear, &split::folds(dataset, 5, 0));
+        let held = FoldErrors::of(&linear, &split::folds(dataset, 5, 0));
         let whole = held.without(&[]).rmse_mm(None, &[]);
         assert!((whole / steps[0].rmse - 1.0).abs() < 2e-3, "{whole} against {}", steps[0].rmse);
         // What is taken out and added again as a candidate is where it was.

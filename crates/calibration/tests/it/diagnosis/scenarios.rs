@@ -158,7 +158,7 @@ pub struct Outcome {
     pub all: Vec<String>,
     /// Parameters that can be compared, and how many lie within three standard deviations.
     pub within: (usize, usize),
-    /// Held-out error over that of the true structure fitted to the same rows.
+    /// FoldErrors-out error over that of the true structure fitted to the same rows.
     pub over_truth: f64,
     /// The diagnosis.
     pub diagnosed: Diagnosed,
@@ -305,7 +305,7 @@ fn lambdas(subject: &Subject<'_>, found: &Diagnosed, run: &Run, setup: &Setup, c
     let n = setup.rows;
     let weight = Weight { per_mm: 1.0 / setup.sigma_mm, per_rad: 1.0 };
     still.weights = vec![weight; n];
-    still.trust = vec![1.0; n];
+    still.robust_weight = vec![1.0; n];
     still.task = Calibration::new(
         &subject.observed.dataset,
         subject.nominal,

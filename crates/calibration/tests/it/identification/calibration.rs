@@ -151,7 +151,7 @@ fn parameters(sensor: Sensor) -> Vec<Parameter> {
         out.extend((0..effect.parameters().len()).map(|parameter| Parameter::Effect { index, parameter }));
     }
     let tool = if sensor == Sensor::Pose { 6 } else { 3 };
-    out.extend((0..tool).map(Parameter::Tool));
+    out.extend((0..tool).map(Parameter::Target));
     match sensor {
         Sensor::Cable => {
             for anchor in 0..2 {
@@ -159,7 +159,7 @@ fn parameters(sensor: Sensor) -> Vec<Parameter> {
                 out.push(Parameter::Zero { anchor });
             }
         }
-        _ => out.extend((0..6).map(Parameter::Base)),
+        _ => out.extend((0..6).map(Parameter::SensorFrame)),
     }
     for (index, disturbance) in disturbances(sensor).iter().enumerate() {
         out.extend(
@@ -203,7 +203,7 @@ fn every_column_has_a_numerical_twin() {
         };
         // A small turn is written to second order and differentiated to first: its slope is right to that order.
         let loose = |p: &Parameter| {
-            let turning = matches!(p, Parameter::Disturbance { .. } | Parameter::Base(_));
+            let turning = matches!(p, Parameter::Disturbance { .. } | Parameter::SensorFrame(_));
             if disturbed && turning { 3e-3 } else { 2e-6 }
         };
         let x: Vec<f64> = list.iter().map(|p| scale(p) * random.random_range(-1.0..1.0)).collect();

@@ -142,7 +142,7 @@ fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identif
         solver: &SOLVERS[0],
         held_out: 0.2,
         seed: 0,
-        sharpen: true,
+        fuse_readout: true,
         limit_rmse_mm: None,
         limit_max_mm: None,
         stated_frames: None,
@@ -156,10 +156,11 @@ fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identif
 /// RMS distance between a point on two arms (mm) after base and point were placed as well as they can be.
 fn placed_rms_mm(actual: &Model, model: &Model, poses: &[Joints], target: &Pose) -> f64 {
     let still = Condition::default();
-    let (real, known) = (actual.under(&still), model.under(&still));
+    let (real, known) = (actual.at_condition(&still), model.at_condition(&still));
     let target = Pose::from_parts(target.translation, UnitQuaternion::identity());
     let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
-    let list: Vec<Parameter> = (0..6).map(Parameter::Base).chain((0..3).map(Parameter::Tool)).collect();
+    let list: Vec<Parameter> =
+        (0..6).map(Parameter::SensorFrame).chain((0..3).map(Parameter::Target)).collect();
     let (mut off, mut rigid) = (DVector::zeros(3 * poses.len()), DMatrix::zeros(3 * poses.len(), 9));
     for (k, q) in poses.iter().enumerate() {
         let twists = parameter_jacobian(&ends, &known, q, &list);

@@ -11,7 +11,7 @@ use truegrind_math::se3::{Pose, difference, pose_from_vector};
 use super::simulation::{CABLE, SIX, TRACKER, measure, random};
 
 fn flanges(simulation: &Simulation) -> Vec<Pose> {
-    let arm = simulation.nominal.under(&Condition::default());
+    let arm = simulation.nominal.at_condition(&Condition::default());
     simulation.rows.iter().map(|row| arm.forward(&row.joints)).collect()
 }
 

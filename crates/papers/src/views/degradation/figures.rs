@@ -1,7 +1,7 @@
 //! The pictures of an arm that degrades: the paper's Figs 4, 7 and 9 to 14, each with what it leaves out.
 
-use super::{SIMULATED, after_of};
-use crate::degradation::{Count, DegradationResult, Journey, Step};
+use super::series::{SIMULATED, after_of, pose_counts};
+use crate::degradation::{Count, DegradationResult, Run, Step};
 use truegrind_report::document::{Block, Document, Figure};
 use truegrind_report::plot::{Axis, Graph, Reference, Series};
 
@@ -43,7 +43,7 @@ pub(super) fn counts(page: &mut Document, result: &DegradationResult) {
 
 /// All ways side by side, one picture for each count.
 pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
-    for count in super::pose_counts(result) {
+    for count in pose_counts(result) {
         let series = result
             .journeys
             .iter()
@@ -66,7 +66,7 @@ pub(super) fn ways(page: &mut Document, result: &DegradationResult) {
 pub(super) fn of_the_paper(page: &mut Document, result: &DegradationResult) {
     for stated in &result.settings.paper {
         let Some(figure) = &stated.figure else { continue };
-        let of = |j: &&Journey| j.count == stated.count && j.way.paper_name() == Some(stated.method.as_str());
+        let of = |j: &&Run| j.count == stated.count && j.way.paper_name() == Some(stated.method.as_str());
         let Some(journey) = result.journeys.iter().find(of) else { continue };
         let panel = |part: &str, poses: &str, before: fn(&Step) -> f64, after: fn(&Step) -> f64| {
             let series = vec![
@@ -122,7 +122,7 @@ fn by_group(result: &DegradationResult, name: &str, values: &[f64]) -> Series {
     Series::line(name, points)
 }
 
-fn by_step(result: &DegradationResult, journey: &Journey, name: &str, figure: fn(&Step) -> f64) -> Series {
+fn by_step(result: &DegradationResult, journey: &Run, name: &str, figure: fn(&Step) -> f64) -> Series {
     let points: Vec<[f64; 2]> = journey.steps.iter().map(|s| [hours(result, s.group), figure(s)]).collect();
     Series::line(name, points)
 }

@@ -2,15 +2,15 @@
 
 use serde_json::{Value, json};
 
-use super::{title, treatment};
 use crate::experiment::PaperFigures;
 use crate::protocol::{Outcome, Study};
+use crate::views::study::{title, treatment};
 use crate::views::words;
 use truegrind_arm::parameter::Parameter;
 use truegrind_report::table::{Cell, Column, Table};
 
 /// The table for programs: one row for each method and case.
-pub(in crate::views) fn table(study: &Study) -> Table {
+pub(crate) fn table(study: &Study) -> Table {
     let mut table = Table::new(
         title(study, "Every case"),
         vec![
@@ -88,7 +88,7 @@ fn figures(paper: PaperFigures) -> [Cell; 3] {
 }
 
 /// Everything but seconds.
-pub(in crate::views) fn json(study: &Study) -> Value {
+pub(crate) fn json(study: &Study) -> Value {
     let outcome = |o: &Outcome| {
         json!({
             "held_out": o.held_out,

@@ -1,8 +1,8 @@
 //! The pictures of methods over cases: the papers' bars of errors and times, errors row by row, convergence.
 
-use super::{held_out, seconds};
 use crate::experiment::Treatment;
 use crate::protocol::{MethodResult, Study};
+use crate::views::study::{held_out, seconds};
 use truegrind_report::number::Precision;
 use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series};
 use truegrind_report::repeated;

@@ -1,10 +1,10 @@
 //! The tables of methods over cases: errors beside the paper's, which differences are real, budgets, parameters.
 
-use super::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
 use crate::experiment::PaperFigures;
 use crate::parameters::ParameterTable;
 use crate::protocol::{Outcome, Study};
 use crate::verdict::Conclusion;
+use crate::views::study::{ended, held_out, iterations, passes, registered, seconds, title, treatment};
 use crate::views::words;
 use truegrind_calibration::measurement::dataset::Sensor;
 use truegrind_report::document::Verdict;
@@ -190,7 +190,7 @@ pub(super) fn cost(study: &Study) -> Table {
 }
 
 /// Measured seconds.
-pub(in crate::views) fn times(study: &Study) -> Table {
+pub(crate) fn times(study: &Study) -> Table {
     let mut table = Table::new(
         "Time of one case, measured on this machine (not the same in every run)",
         vec![

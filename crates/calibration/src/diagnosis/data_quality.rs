@@ -33,7 +33,7 @@ pub(super) fn rounding_finding(
     if share < ROUNDING_SHARE * before * before {
         return None;
     }
-    let (gain, evidence) = match &prepared.sharpening {
+    let (gain, evidence) = match &prepared.readout_fusion {
         Ok(report) => (
             Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: stages[1].random.rmse },
             format!(
@@ -47,7 +47,7 @@ pub(super) fn rounding_finding(
         Err(_) => (
             Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
             format!(
-                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to sharpen them",
+                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to fuse_readout them",
                 step.to_degrees(),
                 share.sqrt()
             ),

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::candidates::{Catalogue, Scored};
 use super::catalogue::Candidate;
 use super::cause::Cause;
-use super::design::{Design, Linear, Projected, Whole};
+use super::design::{Design, FullDesign, Linear, Projected};
 use super::extension::{Extended, Subject};
 use super::intervals::{self, Strip};
 use super::lines;
@@ -46,7 +46,7 @@ struct Shift {
 }
 
 /// See the module page.
-pub struct Board<'a> {
+pub struct CandidateScores<'a> {
     /// What may be wrong.
     pub catalogue: &'a Catalogue,
     /// What is diagnosed.
@@ -56,7 +56,7 @@ pub struct Board<'a> {
     /// The fit linearised.
     pub linear: Linear,
     /// Everything free in it.
-    pub whole: Whole,
+    pub whole: FullDesign,
     listed: Vec<Entry>,
     shifts: Vec<Shift>,
     fine: Vec<Vec<OnceLock<Entry>>>,
@@ -65,7 +65,7 @@ pub struct Board<'a> {
 /// Merit that a closer description of an accepted cause has ahead of a new cause: odds of a hundred to one.
 const CLOSER: f64 = 10.0;
 
-impl<'a> Board<'a> {
+impl<'a> CandidateScores<'a> {
     /// All candidates of `catalogue` against `fit`.
     pub fn of(catalogue: &'a Catalogue, subject: &'a Subject<'a>, fit: Arc<Extended>) -> Self {
         let linear = Linear::of(subject, &fit);

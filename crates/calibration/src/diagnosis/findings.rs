@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::catalogue::{Candidate, Columns, MAP_KNOTS};
 use super::cause::Cause;
-use super::design::Whole;
+use super::design::FullDesign;
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Finding, Gain, Step};
-use super::held::Held;
+use super::held::FoldErrors;
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
 use super::score::{non_centrality, score};
@@ -40,9 +40,9 @@ pub(super) struct Context<'a> {
     /// The fit to all rows.
     pub(super) extended: &'a Extended,
     /// Linearised where causes were looked for.
-    pub(super) whole: &'a Whole,
+    pub(super) whole: &'a FullDesign,
     /// The same with its rows in folds.
-    pub(super) held: &'a Held<'a>,
+    pub(super) held: &'a FoldErrors<'a>,
     pub(super) set_aside: &'a [usize],
 }
 
@@ -128,7 +128,7 @@ impl Context<'_> {
             .collect();
         let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
         let mut clear = alternatives.iter().all(beaten);
-        // Held-out rows that are told better without the finding do not confirm it, however well it explains the others.
+        // FoldErrors-out rows that are told better without the finding do not confirm it, however well it explains the others.
         let unconfirmed = before_mm < BETTER * after_mm;
         if unconfirmed || own.beside_growth.is_some_and(|lambda| lambda < VISIBLE) {
             clear = false;

@@ -3,12 +3,12 @@
 
 use nalgebra::DVector;
 
-use super::account::pendant;
 use super::candidates::Scored;
 use super::catalogue::{Columns, Regressor, STILL_RAD};
 use super::cause::Cause;
 use super::design::Design;
 use super::finding::NotTestable;
+use super::findings::pendant;
 use super::rows::Prepared;
 use super::score::VISIBLE;
 use super::selection::scale_beside_growth;

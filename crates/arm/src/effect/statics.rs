@@ -1,0 +1,99 @@
+//! The static torques of an arm, for effects that need them.
+
+use nalgebra::{Matrix6, Vector3};
+
+use crate::body::Body;
+use crate::chain::{self, Chain, LinkTable, cross, dot};
+use crate::condition::Condition;
+use crate::joints::Joints;
+use crate::link::Link;
+use truegrind_math::lanes::{SinCos, sin_cos};
+
+/// The static torques of an arm, for effects that need them.
+#[derive(Debug, Clone)]
+pub struct Statics {
+    tables: [LinkTable; 6],
+    bodies: [Body; 6],
+    gravity: Vector3<f64>,
+}
+
+/// Standard gravity [m/s²].
+pub(super) const GRAVITY: f64 = 9.806_65;
+
+impl Statics {
+    /// Statics of links without joint effects (their share in the torque is of second order), massless where the masses
+    /// of the links are unknown (only the payload then counts). `gravity`: its direction in the base.
+    pub(crate) fn new(links: &[Link; 6], bodies: Option<[Body; 6]>, gravity: Vector3<f64>) -> Self {
+        let bodies = bodies.unwrap_or([Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6]);
+        Self { tables: chain::tables(links), bodies, gravity }
+    }
+
+    /// Torque of gravity about each joint axis (N m) at mapped angles `u`, and its derivative ∂τⱼ/∂uᵢ, which is
+    /// symmetric because torque is the gradient of the potential energy.
+    pub fn torques(&self, u: &Joints, condition: &Condition) -> (Joints, Matrix6<f64>) {
+        let (frames, levers) = self.levers::<f64>(&(*u).into(), condition);
+        let g = self.gravity_newton();
+        let torque = Joints::from_fn(|j, _| dot(&frames.z[j], &cross(&levers[j], &g)));
+        let turned: [[f64; 3]; 6] = std::array::from_fn(|i| cross(&cross(&frames.z[i], &levers[i]), &g));
+        let slope = Matrix6::from_fn(|j, i| dot(&frames.z[j.min(i)], &turned[j.max(i)]));
+        (torque, slope)
+    }
+
+    /// The torques alone, for one row or eight in lanes.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
+        let (frames, levers) = self.levers(u, condition);
+        let g = self.gravity_newton().map(R::splat);
+        let mut out = [R::splat(0.0); 6];
+        for j in 0..6 {
+            out[j] = dot(&frames.z[j], &cross(&levers[j], &g));
+        }
+        out
+    }
+
+    /// Weight of a kilogram, with metres for the millimetres of the levers.
+    #[inline(always)]
+    pub(super) fn gravity_newton(&self) -> [f64; 3] {
+        [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3)
+    }
+
+    /// The frames at mapped angles `u`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn frames<R: SinCos>(&self, u: &[R; 6]) -> Chain<R> {
+        let zero = R::splat(0.0);
+        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
+        for i in 0..6 {
+            (sin[i], cos[i]) = sin_cos(u[i]);
+        }
+        chain::chain(&self.tables, &sin, &cos)
+    }
+
+    /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
+        let zero = R::splat(0.0);
+        let frames = self.frames(u);
+        let mut levers = [[zero; 3]; 6];
+        let (mut sum, mut mass) = ([zero; 3], 0.0);
+        for k in (0..6).rev() {
+            let (y, z, o) = (&frames.y[k], &frames.z[k + 1], &frames.origin[k + 1]);
+            let x = cross(y, z);
+            let body = &self.bodies[k];
+            let payload = if k == 5 { condition.payload_kg.unwrap_or(0.0) } else { 0.0 };
+            // Σ m c of the body, and of the payload, which has its centre in the same frame.
+            let c = std::array::from_fn::<f64, 3, _>(|i| {
+                body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i]
+            });
+            let here = body.mass_kg + payload;
+            mass += here;
+            for i in 0..3 {
+                sum[i] += R::splat(here) * o[i]
+                    + R::splat(c[0]) * x[i]
+                    + R::splat(c[1]) * y[i]
+                    + R::splat(c[2]) * z[i];
+                levers[k][i] = sum[i] - R::splat(mass) * frames.origin[k][i];
+            }
+        }
+        (frames, levers)
+    }
+}

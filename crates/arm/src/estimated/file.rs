@@ -1,0 +1,133 @@
+//! The model file: an estimated arm as TOML.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::{Estimated, EstimatedParameter, Provenance, SCHEMA, StageErrors, Verdict, checks};
+use crate::arm_file::ArmFile;
+use crate::condition::Condition;
+use crate::parameter::{LinkCoordinate, Parameter};
+use crate::region::Region;
+
+impl Estimated {
+    /// The file.
+    ///
+    /// # Errors
+    /// A sentence, when a number cannot be written (not finite).
+    pub fn to_toml(&self) -> Result<String, String> {
+        let file = ModelFile {
+            schema: SCHEMA.to_owned(),
+            robot: self.robot.clone(),
+            provenance: self.provenance.clone(),
+            verdict: self.verdict.clone(),
+            registered: self.registered,
+            geometry: self.geometry,
+            noise_floor_mm: self.noise_floor_mm,
+            region: self.region.clone(),
+            condition: self.condition,
+            nominal: ArmFile::from(&self.nominal),
+            estimated: ArmFile::from(&self.model),
+            covariance: CovarianceFile {
+                order: self.order.iter().map(ToString::to_string).collect(),
+                lower: (0..self.order.len())
+                    .map(|i| (0..=i).map(|j| self.covariance[(i, j)]).collect())
+                    .collect(),
+            },
+            parameter: self.parameters.clone(),
+        };
+        let text = toml::to_string(&file).map_err(|e| format!("the model cannot be written: {e}"))?;
+        Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
+    }
+
+    /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
+    /// parameters are the arm's.
+    ///
+    /// # Errors
+    /// A sentence that says what in the file cannot be used: key, what was found, what was expected.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let file: ModelFile = toml::from_str(text).map_err(|e| format!("not a truegrind model: {e}"))?;
+        if file.schema != SCHEMA {
+            return Err(format!("`schema` is \"{}\", expected \"{SCHEMA}\"", file.schema));
+        }
+        let order = file
+            .covariance
+            .order
+            .iter()
+            .map(|name| {
+                parse_arm_parameter(name).ok_or_else(|| format!("`covariance.order`: unknown {name}"))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let n = order.len();
+        if file.covariance.lower.len() != n
+            || file.covariance.lower.iter().enumerate().any(|(i, r)| r.len() != i + 1)
+        {
+            return Err(format!("`covariance.lower`: expected {n} rows of 1 to {n} numbers"));
+        }
+        let covariance = DMatrix::from_fn(n, n, |i, j| file.covariance.lower[i.max(j)][i.min(j)]);
+        let model = Self {
+            robot: file.robot,
+            nominal: file.nominal.model().map_err(|e| format!("`nominal`: {e}"))?,
+            model: file.estimated.model().map_err(|e| format!("`estimated`: {e}"))?,
+            parameters: file.parameter,
+            order,
+            covariance,
+            provenance: file.provenance,
+            registered: file.registered,
+            geometry: file.geometry,
+            noise_floor_mm: file.noise_floor_mm,
+            verdict: file.verdict,
+            region: file.region,
+            condition: file.condition,
+        };
+        checks::check(&model).map_err(|unfit| unfit.to_string())?;
+        Ok(model)
+    }
+}
+
+/// Reads `link2.alpha` or `effect1.2`.
+fn parse_arm_parameter(name: &str) -> Option<Parameter> {
+    let (part, coordinate) = name.split_once('.')?;
+    if let Some(number) = part.strip_prefix("effect") {
+        let index = number.parse::<usize>().ok()?.checked_sub(1)?;
+        return Some(Parameter::Effect {
+            index,
+            parameter: coordinate.parse::<usize>().ok()?.checked_sub(1)?,
+        });
+    }
+    let joint = part.strip_prefix("link")?.parse::<usize>().ok()?.checked_sub(1).filter(|j| *j < 6)?;
+    let coordinate = match coordinate {
+        "a" => LinkCoordinate::A,
+        "d" => LinkCoordinate::D,
+        "alpha" => LinkCoordinate::Alpha,
+        "theta" => LinkCoordinate::Theta,
+        "beta" => LinkCoordinate::Beta,
+        _ => return None,
+    };
+    Some(Parameter::Link { joint, coordinate })
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ModelFile {
+    schema: String,
+    robot: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    noise_floor_mm: Option<f64>,
+    provenance: Provenance,
+    verdict: Verdict,
+    condition: Condition,
+    registered: StageErrors,
+    geometry: StageErrors,
+    region: Region,
+    nominal: ArmFile,
+    estimated: ArmFile,
+    covariance: CovarianceFile,
+    parameter: Vec<EstimatedParameter>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CovarianceFile {
+    order: Vec<String>,
+    lower: Vec<Vec<f64>>,
+}

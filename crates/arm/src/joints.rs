@@ -1,0 +1,24 @@
+//! Joint angles and their ranges.
+
+use nalgebra::Vector6;
+
+/// Joint angles of the controller (rad).
+pub type Joints = Vector6<f64>;
+
+/// Range and speed of the joints, in the controller's angles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Lowest angle (rad).
+    pub min_rad: [f64; 6],
+    /// Highest angle (rad).
+    pub max_rad: [f64; 6],
+    /// Highest speed [rad/s], where published.
+    pub speed_rad_s: Option<[f64; 6]>,
+}
+
+impl Limits {
+    /// The first joint (0-based) outside its range, if any.
+    pub fn violated(&self, q: &Joints) -> Option<usize> {
+        (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
+    }
+}

@@ -1,0 +1,16 @@
+//! What tables and pictures of a degrading arm share.
+
+use crate::degradation::{DegradationResult, Step};
+
+pub(super) const SIMULATED: &str = "simulated degradation";
+
+/// Pose counts of the journeys, each once.
+pub(super) fn pose_counts(result: &DegradationResult) -> Vec<usize> {
+    let mut counts: Vec<usize> = result.journeys.iter().map(|j| j.count).collect();
+    counts.dedup();
+    counts
+}
+
+pub(super) fn after_of(step: &Step) -> f64 {
+    step.verification_after_mm
+}

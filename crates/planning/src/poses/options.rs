@@ -1,0 +1,74 @@
+//! How to plan.
+
+use super::candidate::Bounds;
+use super::rival::Question;
+use super::schedule::Visits;
+use truegrind_calibration::identification::tolerance::Tolerance;
+
+/// How to plan.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Different poses.
+    pub poses: usize,
+    /// What makes a set of poses good.
+    pub index: Index,
+    /// What a reading is worth.
+    pub noise: Noise,
+    /// What is known before.
+    pub tolerance: Tolerance,
+    /// Poses to choose from.
+    pub candidates: usize,
+    /// Where they may be.
+    pub bounds: Bounds,
+    /// What is visited more than once.
+    pub visits: Visits,
+    /// What a diagnosis could not tell apart.
+    pub questions: Vec<Question>,
+    /// Non-centrality from which an effect counts as decided.
+    pub decisive: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            poses: 60,
+            index: Index::default(),
+            noise: Noise::default(),
+            tolerance: Tolerance::default(),
+            candidates: 2000,
+            bounds: Bounds::default(),
+            visits: Visits::default(),
+            questions: Vec::new(),
+            decisive: 25.0,
+            seed: 0,
+        }
+    }
+}
+
+/// Standard deviations of a reading, everything counted: sensor, hook, repeatability of the arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a length or a coordinate (mm).
+    pub reading_mm: f64,
+    /// Of an orientation (rad).
+    pub reading_rad: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self { reading_mm: 0.03, reading_rad: 1e-4 }
+    }
+}
+
+/// What makes a set of poses good.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Index {
+    /// Determinant of the normal matrix with its priors: the volume of what stays unknown.
+    #[default]
+    D,
+    /// Observability index O1: the geometric mean of the singular values, without priors, over the combinations that
+    /// the candidates determine.
+    O1,
+}

@@ -1,0 +1,37 @@
+//! One identified parameter as people read it.
+
+use truegrind_arm::estimated::EstimatedParameter;
+
+/// Whether a parameter belongs to the arm and not to how it was measured.
+pub(super) fn is_of_arm(parameter: &EstimatedParameter) -> bool {
+    parameter.name.starts_with("link") || parameter.name.starts_with("effect")
+}
+
+/// A parameter with all its numbers times `factor`.
+pub(super) fn in_unit(parameter: &EstimatedParameter, factor: f64, unit: &str) -> EstimatedParameter {
+    EstimatedParameter {
+        name: parameter.name.clone(),
+        unit: unit.to_owned(),
+        nominal: parameter.nominal * factor,
+        value: parameter.value * factor,
+        sigma: parameter.sigma * factor,
+        prior_sigma: parameter.prior_sigma.map(|sigma| sigma * factor),
+        determined: parameter.determined,
+    }
+}
+
+/// A parameter in a unit that people read: degrees for radians, millionths for the small numbers of effects.
+pub(super) fn handy(parameter: &EstimatedParameter) -> EstimatedParameter {
+    let (factor, unit) = match parameter.unit.as_str() {
+        "1" => (1e6, "ppm"),
+        "1/K" => (1e6, "ppm/K"),
+        "rad/(N m)" => (1e6, "µrad/(N m)"),
+        unit => crate::number::handy(unit),
+    };
+    in_unit(parameter, factor, unit)
+}
+
+/// Whether the prior knew more of a parameter than the data did.
+pub(super) fn held_by_prior(parameter: &EstimatedParameter) -> bool {
+    !(parameter.determined >= 0.5)
+}

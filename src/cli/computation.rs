@@ -1,0 +1,31 @@
+//! What every verb that computes takes, and the threads it computes on.
+
+use clap::Args;
+
+/// What every verb that computes takes.
+#[derive(Debug, Clone, Args)]
+pub(super) struct Common {
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 0)]
+    pub(super) seed: u64,
+    /// Threads; the result is the same for any number.
+    #[arg(long)]
+    pub(super) threads: Option<usize>,
+}
+
+/// More threads than any machine has processors only cost memory.
+const MOST_THREADS: usize = 1024;
+
+/// Runs `work` on the stated number of threads.
+pub(super) fn on_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send,
+) -> anyhow::Result<T> {
+    match threads {
+        None => Ok(work()),
+        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
+            anyhow::bail!("--threads {n}: expected 1 to {MOST_THREADS}")
+        }
+        Some(n) => Ok(rayon::ThreadPoolBuilder::new().num_threads(n).build()?.install(work)),
+    }
+}
