@@ -56,5 +56,7 @@ pub(super) fn tell_lines(text: &str) {
 
 /// Columns of the terminal, 100 where there is none.
 pub(super) fn width() -> usize {
-    std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok()).unwrap_or(100)
+    let stated = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let seen = || terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+    stated.or_else(seen).unwrap_or(100)
 }

@@ -22,6 +22,7 @@
 //! **Checked against** least squares that has the change as one parameter more.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
+use truegrind_math::distribution::ln_gamma;
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
 pub const ALTERNATIVE: f64 = 4.0;
@@ -83,11 +84,8 @@ pub struct Together {
 /// −2 ln of the probability that χ² with so many degrees of freedom is beyond `ratio`, far out: what makes changes of one
 /// parameter and of several comparable.
 pub fn surprise(freedom: usize, ratio: f64) -> f64 {
-    // ln Γ(k/2) for k = 0 to 6.
-    const LN_GAMMA: [f64; 7] =
-        [0.0, 0.572_364_942_9, 0.0, -0.120_782_237_6, 0.0, 0.284_682_870_5, std::f64::consts::LN_2];
     let half = (ratio / 2.0).max(1.0).ln();
-    ratio - (freedom as f64 - 2.0) * half + 2.0 * LN_GAMMA[freedom.min(6)]
+    ratio - (freedom as f64 - 2.0) * half + 2.0 * ln_gamma(0.5 * freedom.max(1) as f64)
 }
 
 /// The change that explains the history best, and what else would.

@@ -233,21 +233,5 @@ fn is_near(found: &str, expected: &str) -> bool {
         ["deg", "mm", "h", "c", "kg", "degree", "degrees"].iter().any(|unit| f == format!("{e}{unit}"));
     let joint_word = expected.starts_with('q')
         && ["j", "joint", "axis", "a", "theta"].iter().any(|word| f == format!("{word}{}", digits(&e)));
-    with_unit || joint_word || (e.len() > 1 && distance(&f, &e) == 1)
-}
-
-/// Levenshtein distance.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
+    with_unit || joint_word || (e.len() > 1 && strsim::levenshtein(&f, &e) == 1)
 }
