@@ -69,7 +69,7 @@ impl Outputs {
                 batch.add(path, format::csv::table(&table));
             }
             if let Some(path) = &self.parquet {
-                batch.add(path, format::parquet::table(&table));
+                batch.add(path, parquet(&table)?);
             }
         }
         if self.md.is_none() && self.html.is_none() {
@@ -99,4 +99,16 @@ impl Outputs {
         }
         say(&text)
     }
+}
+
+#[cfg(feature = "parquet")]
+fn parquet(table: &Table) -> anyhow::Result<Vec<u8>> {
+    Ok(format::parquet::table(table)?)
+}
+
+#[cfg(not(feature = "parquet"))]
+fn parquet(_: &Table) -> anyhow::Result<Vec<u8>> {
+    anyhow::bail!(
+        "--parquet: this build leaves Parquet out; build it with `--features parquet`, or take --csv"
+    )
 }

@@ -5,10 +5,10 @@
 //! before a model comes out of it: [`validation`].
 //!
 //! ```
-//! let robot = crate::robots::load("abb-irb-120")?;
+//! let robot = truegrind_arm::robots::load("abb-irb-120")?;
 //! let flange = robot.model.forward(&nalgebra::Vector6::zeros(), &Default::default());
 //! assert!((flange.translation.vector - nalgebra::Vector3::new(374.0, 0.0, 630.0)).norm() < 1e-9);
-//! # Ok::<(), crate::robots::RobotError>(())
+//! # Ok::<(), truegrind_arm::robots::RobotError>(())
 //! ```
 
 mod error;

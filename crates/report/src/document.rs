@@ -7,9 +7,9 @@ use super::table::{Cell, Table};
 /// A document, in no format yet.
 ///
 /// ```
-/// use crate::document::{Block, Document, Verdict};
-/// use crate::format::html;
-/// use crate::status::Status;
+/// use truegrind_report::document::{Block, Document, Verdict};
+/// use truegrind_report::format::html;
+/// use truegrind_report::status::Status;
 /// let mut page = Document::new("Identification of abb-irb-120");
 /// page.push(Verdict::new(Status::Good, "The model may be used", ["converged", "rank 27 of 27"]));
 /// page.heading(2, "Residuals");

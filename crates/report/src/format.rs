@@ -9,4 +9,5 @@ pub mod markdown;
 pub mod csv;
 pub mod json;
 pub mod html;
+#[cfg(feature = "parquet")]
 pub mod parquet;

@@ -6,8 +6,8 @@ use super::status::Status;
 /// A table, in no format yet.
 ///
 /// ```
-/// use crate::table::{Cell, Column, Table};
-/// use crate::format::terminal;
+/// use truegrind_report::table::{Cell, Column, Table};
+/// use truegrind_report::format::terminal;
 /// let mut table = Table::new(
 ///     "Deviation",
 ///     vec![Column::text("method", "method"), Column::number("rmse_mm", "RMSE", "mm", 2)],
@@ -43,10 +43,22 @@ pub struct Column {
     pub heading: String,
     /// Unit, where there is one.
     pub unit: Option<String>,
-    /// Side on which the cells stand.
-    pub alignment: Alignment,
+    /// What stands in it, whatever a single cell says.
+    pub kind: ColumnKind,
     /// Digits shown to people.
     pub precision: Precision,
+}
+
+/// What stands in a column. A single cell may say something else to people ("diverged 3/10" among errors); in a file with
+/// types, such a cell of a column of numbers is absent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Words.
+    Text,
+    /// Whole numbers.
+    Count,
+    /// Numbers.
+    Number,
 }
 
 /// Side on which the cells of a column stand.
@@ -164,14 +176,14 @@ impl Column {
             key: key.into(),
             heading: heading.into(),
             unit: None,
-            alignment: Alignment::Left,
+            kind: ColumnKind::Text,
             precision: Precision::Significant(4),
         }
     }
 
     /// A column of whole numbers.
     pub fn count(key: impl Into<String>, heading: impl Into<String>) -> Self {
-        Self { alignment: Alignment::Right, ..Self::text(key, heading) }
+        Self { kind: ColumnKind::Count, ..Self::text(key, heading) }
     }
 
     /// A column of numbers with fixed decimals. An empty unit is no unit.
@@ -182,7 +194,12 @@ impl Column {
         decimals: usize,
     ) -> Self {
         let unit = Some(unit.into()).filter(|unit| !unit.is_empty());
-        Self { unit, precision: Precision::Decimals(decimals), ..Self::count(key, heading) }
+        Self {
+            kind: ColumnKind::Number,
+            unit,
+            precision: Precision::Decimals(decimals),
+            ..Self::text(key, heading)
+        }
     }
 
     /// A column of numbers with so many significant digits; with σ in its cells, that many of σ.
@@ -193,6 +210,11 @@ impl Column {
         digits: usize,
     ) -> Self {
         Self { precision: Precision::Significant(digits), ..Self::number(key, heading, unit, 0) }
+    }
+
+    /// Side on which its cells stand.
+    pub fn alignment(&self) -> Alignment {
+        if self.kind == ColumnKind::Text { Alignment::Left } else { Alignment::Right }
     }
 
     /// Heading with its unit, `RMSE (mm)`.

@@ -53,7 +53,7 @@ pub fn table(table: &Table) -> String {
         let unit = column.unit.as_ref().map(|unit| format!(" <span class=\"unit\">{}</span>", escape(unit)));
         html.push_str(&format!(
             "<th scope=\"col\"{}>{}{}</th>",
-            side(column.alignment),
+            side(column.alignment()),
             escape(&column.heading),
             unit.unwrap_or_default()
         ));
@@ -68,7 +68,7 @@ pub fn table(table: &Table) -> String {
                 }
                 _ => escape(&table.shown(row, index)),
             };
-            html.push_str(&format!("<td{}>{shown}</td>", side(column.alignment)));
+            html.push_str(&format!("<td{}>{shown}</td>", side(column.alignment())));
         }
         html.push_str("</tr>\n");
     }

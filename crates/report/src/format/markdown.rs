@@ -27,7 +27,7 @@ pub fn table(table: &Table) -> String {
     for line in 0..=table.rows.len() {
         text.push('|');
         for ((column, cells), &width) in table.columns.iter().zip(&cells).zip(&widths) {
-            match column.alignment {
+            match column.alignment() {
                 Alignment::Left => text.push_str(&format!(" {:<width$} |", cells[line])),
                 Alignment::Right => text.push_str(&format!(" {:>width$} |", cells[line])),
             }
@@ -37,7 +37,7 @@ pub fn table(table: &Table) -> String {
             text.push('|');
             for (column, width) in table.columns.iter().zip(&widths) {
                 let rule = "-".repeat(width - 1);
-                match column.alignment {
+                match column.alignment() {
                     Alignment::Left => text.push_str(&format!(" :{rule} |")),
                     Alignment::Right => text.push_str(&format!(" {rule}: |")),
                 }

@@ -31,7 +31,10 @@ pub fn table(table: &Table, width: usize) -> String {
             text.push('\n');
         }
         for (index, line) in lines.iter().enumerate() {
-            push_line(&mut text, block.iter().map(|&c| fit(&line[c], widths[c], table.columns[c].alignment)));
+            push_line(
+                &mut text,
+                block.iter().map(|&c| fit(&line[c], widths[c], table.columns[c].alignment())),
+            );
             if index == 0 {
                 push_line(&mut text, block.iter().map(|&c| "─".repeat(widths[c])));
             }
@@ -135,7 +138,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
 fn shrink(table: &Table, widths: &mut [usize], width: usize) {
     while total(widths.iter().copied()) > width {
         let widest = (0..widths.len())
-            .filter(|&c| table.columns[c].alignment == Alignment::Left && widths[c] > NARROWEST_TEXT)
+            .filter(|&c| table.columns[c].alignment() == Alignment::Left && widths[c] > NARROWEST_TEXT)
             .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
         match widest {
             Some(column) => widths[column] -= 1,

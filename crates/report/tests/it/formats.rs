@@ -234,7 +234,7 @@ fn a_table_without_rows_or_columns() {
     assert_eq!((terminal::table(&table, 80), csv::table(&table)), (String::new(), "\r\n".to_owned()));
     let table = Table::new("", vec![Column::number("x_mm", "x", "mm", 1)]);
     assert_eq!(terminal::table(&table, 80), "x [mm]\n──────\n");
-    assert_eq!(table.columns[0].alignment, Alignment::Right);
+    assert_eq!(table.columns[0].alignment(), Alignment::Right);
     assert_eq!(csv::table(&table), "x_mm\r\n");
 }
 

@@ -10,6 +10,7 @@ mod formats;
 mod identification;
 mod numbers;
 mod page;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod plots;
 mod robots;

@@ -61,6 +61,8 @@ impl Reader<'_> {
     }
     fn value(&mut self, kind: u8) -> Thrift {
         match kind {
+            1 | 2 => Thrift::Int(i64::from(kind == 1)),
+            3 => Thrift::Int(i64::from(self.byte())),
             5 | 6 => Thrift::Int(self.zigzag()),
             8 => {
                 let length = self.varint() as usize;
@@ -137,10 +139,19 @@ fn page(reader: &mut Reader<'_>, physical: i64, out: &mut Vec<Value>) {
     let mut there = Vec::new();
     while reader.at < until {
         let run = reader.varint();
-        assert_eq!(run & 1, 0, "a run, not bits");
-        let state = reader.byte() == 1;
-        there.extend(std::iter::repeat_n(state, (run >> 1) as usize));
+        let length = (run >> 1) as usize;
+        if run & 1 == 0 {
+            let state = reader.byte() == 1;
+            there.extend(std::iter::repeat_n(state, length));
+        } else {
+            // Bits, eight to a byte, the lowest first.
+            for _ in 0..length {
+                let bits = reader.byte();
+                there.extend((0..8).map(|k| bits >> k & 1 == 1));
+            }
+        }
     }
+    there.truncate(count);
     assert_eq!(there.len(), count);
     for there in there {
         let mut take = |count: usize| {
@@ -190,7 +201,7 @@ fn sample(rows: usize) -> Table {
 fn every_bit_comes_back_and_absent_cells_are_null() {
     // More rows than one page holds.
     for rows in [1, 7, 70_000] {
-        let columns = read(&parquet::table(&sample(rows)));
+        let columns = read(&parquet::table(&sample(rows)).unwrap());
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["file", "status", "motions", "before_mm", "value_mm", "sigma_mm", "note"]);
         for row in 0..rows {
@@ -211,7 +222,21 @@ fn every_bit_comes_back_and_absent_cells_are_null() {
 
 #[test]
 fn a_table_without_rows_is_a_file_with_columns() {
-    let columns = read(&parquet::table(&sample(0)));
+    let columns = read(&parquet::table(&sample(0)).unwrap());
     assert_eq!(columns.len(), 6);
     assert!(columns.iter().all(|(_, cells)| cells.is_empty()));
+}
+
+/// The type of a column is what it is for: a single cell in words ("diverged 3/10" among errors) is absent, and the other
+/// cells stay numbers.
+#[test]
+fn one_cell_in_words_does_not_turn_a_column_of_numbers_into_words() {
+    let mut table =
+        Table::new("", vec![Column::number("rmse_mm", "RMSE", "mm", 3), Column::count("rows", "Rows")]);
+    table.push([0.25.into(), Cell::Count(3)]);
+    table.push(["diverged 3/10".into(), 4.0.into()]);
+    table.push([Cell::Missing, 4.5.into()]);
+    let columns = read(&parquet::table(&table).unwrap());
+    assert_eq!(columns[0].1, [Value::Double(0.25_f64.to_bits()), Value::Null, Value::Null]);
+    assert_eq!(columns[1].1, [Value::Int(3), Value::Int(4), Value::Null]);
 }
