@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
-use truegrind::compensation::cell::Cell;
+use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::compensate::{Compensated, compensate};
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::{After, PathReport};
@@ -111,6 +111,22 @@ impl CellArguments {
             condition.payload_centre_mm = in_last.coords.into();
         }
         Ok((cell, surface, condition))
+    }
+}
+
+/// Says which entries of the cell file no program uses, where every program could be asked.
+pub(super) fn say_unused<'u>(
+    used: impl IntoIterator<Item = &'u Option<Used>>,
+    cell: &Cell,
+    surface: Option<&SurfaceFile>,
+) {
+    let mut all = Used::default();
+    for used in used {
+        let Some(used) = used else { return };
+        all.join(used);
+    }
+    for note in all.notes(cell, surface) {
+        tell(format_args!("note: {note}"));
     }
 }
 
@@ -233,6 +249,8 @@ struct Done {
     undeclared: usize,
     /// Entries of the contract.
     json: Vec<serde_json::Value>,
+    /// What it uses of the cell file; absent where it was not looked at.
+    used: Option<Used>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
@@ -246,6 +264,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     checked.extend(arguments.diff.as_deref());
     let inputs_of: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     Batch::check(&inputs_of, &checked)?;
+    if !dry {
+        refuse_report_over_program(&jobs, arguments.output.as_deref(), &checked)?;
+    }
     for (value, name) in
         [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")]
     {
@@ -356,6 +377,7 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     for note in &done.notes {
         tell(format_args!("note: {note}"));
     }
+    say_unused([&done.used], &shop.cell, shop.surface.as_ref());
     if done.row.ended == Ended::Already {
         say(format!("{}: already compensated with this model; nothing written\n", done.row.file))?;
         return Ok(Ending::Flagged);
@@ -401,6 +423,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
             tell(format_args!("note: {}: {note}", done.row.file));
         }
     }
+    say_unused(done.iter().map(|done| &done.used), &shop.cell, shop.surface.as_ref());
     let undeclared: usize = done.iter().map(|done| done.undeclared).sum();
     if undeclared > 0 && jobs.iter().any(|job| job.under.is_some() && job.paths.len() == 1) {
         tell(format_args!(
@@ -444,6 +467,7 @@ fn failed(job: &Job, error: &str) -> Done {
         changed: false,
         undeclared: 0,
         json: Vec::new(),
+        used: None,
     }
 }
 
@@ -522,11 +546,13 @@ fn rewritten(
         changed: false,
         undeclared: 0,
         json: Vec::new(),
+        used: None,
     };
     let marked = already(shop, &program, programs, &mut notes)?;
     if marked.iter().all(|marked| *marked) {
         return Ok(nothing_left(notes));
     }
+    let used = Some(Used::by(listing, &shop.cell));
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
     let Compensated { plan: mut planned, rewritten } = match shop.corrector {
         Some(corrector) => {
@@ -604,7 +630,7 @@ fn rewritten(
         // To take a million pieces apart just before all memory goes back takes a tenth of the time of the whole.
         std::mem::forget((program, planned, rewritten));
     }
-    Ok(Done { row, written, diff, notes, clean, changed, undeclared, json: Vec::new() })
+    Ok(Done { row, written, diff, notes, clean, changed, undeclared, json: Vec::new(), used })
 }
 
 /// Where each file of a program goes.
@@ -650,6 +676,30 @@ fn refuse_one_place_for_two(jobs: &[Job]) -> anyhow::Result<()> {
                 ),
                 None => taken.insert(place, path),
             };
+        }
+    }
+    Ok(())
+}
+
+/// No report may go where a program of the folder of outputs will be: refused before the first is written.
+fn refuse_report_over_program(jobs: &[Job], output: Option<&Path>, reports: &[&Path]) -> anyhow::Result<()> {
+    let Some(folder) = output.filter(|output| jobs.len() > 1 || output.is_dir()) else { return Ok(()) };
+    let reports: Vec<(&Path, PathBuf)> =
+        reports.iter().filter_map(|report| Some((*report, files::whole_path(report)?))).collect();
+    if reports.is_empty() {
+        return Ok(());
+    }
+    for job in jobs {
+        for path in job.files() {
+            let place = folder.join(job.place(&path));
+            let there = files::whole_path(&place);
+            if let Some((report, _)) = reports.iter().find(|(_, whole)| Some(whole) == there.as_ref()) {
+                bail!(
+                    "{} is where {} will be written: name another file for the report",
+                    report.display(),
+                    path.display()
+                );
+            }
         }
     }
     Ok(())

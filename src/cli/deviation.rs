@@ -9,7 +9,7 @@ use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
-use truegrind::compensation::cell::Cell;
+use truegrind::compensation::cell::{Cell, Used};
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::programs::nc::setup::Setup;
@@ -17,7 +17,7 @@ use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
 use truegrind::surfaces::SurfaceFile;
 
-use super::compensate::{CellArguments, agreed};
+use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
 use super::defect::isolated;
 use super::ending::Ending;
@@ -95,21 +95,26 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         condition,
         arguments: &arguments.cell,
     };
-    let found: Vec<anyhow::Result<Vec<PathReport>>> = on_threads(arguments.common.threads, || {
+    let found: Vec<anyhow::Result<(Vec<PathReport>, Used)>> = on_threads(arguments.common.threads, || {
         jobs.par_iter().map(|job| isolated(|| shop.reports(job, surface.as_ref()))).collect()
     })?;
-    let (mut reports, mut failed) = (Vec::new(), 0);
+    let (mut reports, mut used, mut failed) = (Vec::new(), Vec::new(), 0);
     for (found, job) in found.into_iter().zip(&jobs) {
         match found {
-            Ok(found) => reports.extend(found),
+            Ok((found, uses)) => {
+                reports.extend(found);
+                used.push(Some(uses));
+            }
             // A bad one among many is listed, and the others go on.
             Err(error) if several => {
                 failed += 1;
+                used.push(None);
                 tell(format_args!("failed: {}: {error:#}", job.name()));
             }
             Err(error) => return Err(error),
         }
     }
+    say_unused(&used, &cell, surface.as_ref());
     if reports.is_empty() {
         bail!("none of {} programs has a motion whose target is known from the text", jobs.len());
     }
@@ -147,7 +152,7 @@ struct Shop<'a> {
 
 impl Shop<'_> {
     /// The reports of one program, one per arm.
-    fn reports(&self, job: &Job, surface: Option<&SurfaceFile>) -> anyhow::Result<Vec<PathReport>> {
+    fn reports(&self, job: &Job, surface: Option<&SurfaceFile>) -> anyhow::Result<(Vec<PathReport>, Used)> {
         let programs = Programs::read(&job.paths)?;
         let task = programs.task(self.setup);
         let original = self.originals.map(|original| original.task(self.setup));
@@ -192,7 +197,11 @@ impl Shop<'_> {
         if reports.iter().all(|report| report.points.is_empty()) {
             bail!("{name}: no motion has a target that is known from the text");
         }
-        Ok(reports)
+        let mut used = Used::by(task.listing(), self.cell);
+        if let Some(original) = &original {
+            used.join(&Used::by(original.listing(), self.cell));
+        }
+        Ok((reports, used))
     }
 }
 
@@ -210,6 +219,7 @@ fn runners(arguments: &Arguments) -> anyhow::Result<Vec<Runner>> {
         let robot = Some(robot);
         return Ok(vec![Runner { name, robot, nominal, model, knowledge: None, after: After::Achieved }]);
     }
+    models.iter().for_each(inputs::say_doubtful);
     models
         .into_iter()
         .map(|model| {

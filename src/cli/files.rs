@@ -131,6 +131,24 @@ fn as_text(bytes: Vec<u8>, path: &Path) -> anyhow::Result<String> {
     }
 }
 
+/// Where a path leads, whether or not something is there yet: as much of it as is there with links followed, the rest as it
+/// is written. `None` for the standard output, and for a path that goes up from where nothing is.
+pub(super) fn whole_path(path: &Path) -> Option<PathBuf> {
+    if is_stdout(path) {
+        return None;
+    }
+    let mut rest = Vec::new();
+    let mut at = std::path::absolute(path).ok()?;
+    loop {
+        if let Ok(mut whole) = fs::canonicalize(&at) {
+            whole.extend(rest.iter().rev());
+            return Some(whole);
+        }
+        rest.push(at.file_name()?.to_owned());
+        at = at.parent()?.to_path_buf();
+    }
+}
+
 /// The name of a file as reports print it.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
@@ -188,19 +206,39 @@ impl Batch {
                     .with_context(|| format!("{named}: cannot be written; nothing was changed"));
             }
         }
+        let mut done: Vec<&Place> = over.iter().map(|(place, ..)| *place).collect();
         for (place, file) in ready {
-            file.put().with_context(|| format!("{}: cannot be put in place", place.named.display()))?;
+            file.put().with_context(|| incomplete(place, "put in place", &done, &places))?;
             ledger::note_put(place);
+            done.push(place);
         }
         for (place, bytes) in last {
             match place.kind {
                 Kind::Stdout => hand_over(bytes)?,
                 _ => through(&place.path, bytes)
-                    .with_context(|| format!("{}: cannot be written", place.named.display()))?,
+                    .with_context(|| incomplete(place, "written", &done, &places))?,
             }
+            done.push(place);
         }
         Ok(())
     }
+}
+
+/// What is said where one of several outputs fails after others are there already: which are and which are not.
+fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> String {
+    let names = |of: &mut dyn Iterator<Item = &Place>| {
+        of.map(|place| place.named.display().to_string()).collect::<Vec<_>>().join(", ")
+    };
+    let here = format!("{}: cannot be {what}", failed.named.display());
+    if done.is_empty() {
+        return format!("{here}; nothing was changed");
+    }
+    let open = |place: &&Place| !done.iter().any(|other| std::ptr::eq(*other, *place));
+    format!(
+        "{here}; new are already: {}; still as before: {}",
+        names(&mut done.iter().copied()),
+        names(&mut all.iter().filter(open))
+    )
 }
 
 /// The file beside its place, on the disk; `None` where it is sent, printed, or written where it stands.

@@ -62,17 +62,22 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
 /// A doubtful model corrects programs only where that is asked for, and is called what it is where it does.
 pub(super) fn refuse_doubtful(model: &NamedModel, allowed: bool) -> anyhow::Result<()> {
     let NamedModel::Estimated { name, arm, .. } = model else { return Ok(()) };
-    if arm.verdict.status != Judgement::Doubtful {
-        return Ok(());
-    }
-    let reasons = arm.verdict.reasons.join("; ");
-    if !allowed {
+    if arm.verdict.status == Judgement::Doubtful && !allowed {
         bail!(
-            "{name}: this model is doubtful, programs are corrected with it only with --allow-doubtful: {reasons}"
+            "{name}: this model is doubtful, programs are corrected with it only with --allow-doubtful: {}",
+            arm.verdict.reasons.join("; ")
         );
     }
-    tell(format_args!("note: {name}: this model is doubtful: {reasons}"));
+    say_doubtful(model);
     Ok(())
+}
+
+/// Says of a doubtful model that it is one, where it is only looked at.
+pub(super) fn say_doubtful(model: &NamedModel) {
+    let NamedModel::Estimated { name, arm, .. } = model else { return };
+    if arm.verdict.status == Judgement::Doubtful {
+        tell(format_args!("note: {name}: this model is doubtful: {}", arm.verdict.reasons.join("; ")));
+    }
 }
 
 /// First twelve hex digits of the SHA-256.

@@ -79,7 +79,9 @@ impl Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let name = arguments.model.display().to_string();
-    let NamedModel::Estimated { arm, hash, .. } = inputs::model(&name)? else {
+    let named = inputs::model(&name)?;
+    inputs::say_doubtful(&named);
+    let NamedModel::Estimated { arm, hash, .. } = named else {
         bail!("--model {name}: expected a model file, since the nominal arm has nothing to keep accurate");
     };
     inputs::nominal(
@@ -154,7 +156,7 @@ impl Track<'_> {
         let (arguments, arm) = (self.arguments, self.arm);
         let mut tracker = self.state()?;
         let known = tracker.as_ref().map(|t| t.state().consumed.clone()).unwrap_or_default();
-        let (datasets, failed) = self.datasets(&known, said)?;
+        let (datasets, mut failed) = self.datasets(&known, said)?;
         if tracker.is_none()
             && let Some(first) = first_poses(&datasets, self.options.first_poses)
         {
@@ -174,7 +176,17 @@ impl Track<'_> {
         if let Some(tracker) = &mut tracker {
             for dataset in &datasets {
                 let begun = Instant::now();
-                alarms.extend(tracker.take(dataset)?);
+                // A defect that one file brings to light leaves the track as it was before that file.
+                let before = tracker.clone();
+                match isolated(|| Ok(tracker.take(dataset))) {
+                    Ok(raised) => alarms.extend(raised?),
+                    Err(defect) if self.arguments.data.is_dir() || arguments.follow.is_some() => {
+                        *tracker = before;
+                        failed = true;
+                        say_once(said, format!("failed: {}: {defect:#}", dataset.file));
+                    }
+                    Err(defect) => return Err(defect),
+                }
                 taking += begun.elapsed();
             }
         }

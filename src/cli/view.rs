@@ -12,6 +12,7 @@ use truegrind::calibration::identification::identify::{Options, observe};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::identification::tolerance::Tolerance;
+use truegrind::compensation::cell::Used;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::math::se3::Pose;
@@ -20,7 +21,7 @@ use truegrind::pictures::{self, MeasuredScene, PathScene, Recording};
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::reading::Language;
 
-use super::compensate::{CellArguments, agreed};
+use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
 use super::ending::Ending;
 use super::files::{self, Batch};
@@ -145,6 +146,7 @@ fn stated_model(arguments: &Arguments) -> anyhow::Result<Option<(String, Box<Est
         NamedModel::Nominal => Ok(None),
         model @ NamedModel::Estimated { .. } => {
             inputs::nominal(&model, arguments.robot.as_deref())?;
+            inputs::say_doubtful(&model);
             let NamedModel::Estimated { name, arm, .. } = model else { return Ok(None) };
             Ok(Some((name, arm)))
         }
@@ -213,7 +215,9 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
 
 /// A model: the arm at the poses that it was measured in, coloured by how far it stands from the nominal one there.
 fn model(file: &Path) -> anyhow::Result<Recording> {
-    let NamedModel::Estimated { name, arm, .. } = inputs::model(&file.display().to_string())? else {
+    let named = inputs::model(&file.display().to_string())?;
+    inputs::say_doubtful(&named);
+    let NamedModel::Estimated { name, arm, .. } = named else {
         bail!("{}: expected a model file", file.display());
     };
     let nominal = arm.nominal.at_condition(&Condition::default());
@@ -280,6 +284,7 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
     let task = programs.task(&programs::setup(&cell, robot));
     agreed(task.listing(), &cell, &nominal)?;
+    say_unused([&Some(Used::by(task.listing(), &cell))], &cell, surface.as_ref());
     let program = programs.name();
     let acting =
         Acting { nominal: &nominal, model: knowledge.map_or(&nominal, |k| &k.model), knowledge, condition };

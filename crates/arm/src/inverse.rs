@@ -11,6 +11,7 @@
 pub mod solution;
 pub mod configuration;
 pub mod newton;
+pub mod effort;
 mod axes;
 mod seed;
 mod spherical;
@@ -30,6 +31,7 @@ use self::newton::{Goal, Outcome};
 use self::structure::Structure;
 use super::chain::End;
 use super::condition::Condition;
+use super::link::Link;
 use super::model::{Model, PreparedModel};
 use crate::joints::{Joints, Limits};
 use truegrind_math::se3::Pose;
@@ -54,6 +56,9 @@ pub struct Inverse<'a> {
     flange_inverse: End<f64>,
     structure: Structure,
     kernel: Kernel,
+    /// How far a point of the estimated arm and the same one of the nominal arm may be from each other, all joints turned
+    /// alike, at the most (mm).
+    apart_mm: f64,
 }
 
 impl<'a> Inverse<'a> {
@@ -78,6 +83,7 @@ impl<'a> Inverse<'a> {
                 flange_mm: estimated.flange.translation.vector.into(),
                 length_mm: half.max(1.0),
             },
+            apart_mm: apart_mm(estimated, condition, nominal, structure.extent_mm()),
             structure,
         }
     }
@@ -142,14 +148,23 @@ impl<'a> Inverse<'a> {
         if !seed.iter().all(|q| q.is_finite()) {
             return Err(InverseError::NotFinite);
         }
+        if effort::refuses_step() {
+            return Err(InverseError::Abandoned);
+        }
         let solved = self.solve_fast(target, seed);
         match self.accepted(&solved, seed) {
-            Some(solution) => {
-                self.check_limits(&solution.joints)?;
-                Ok(solution)
-            }
+            Some(solution) => self.check_limits(&solution.joints).map(|()| solution),
             None => self.solve_carefully(&goal, seed, &solved.margins[0]),
         }
+    }
+
+    /// [`Inverse::solve_near`] where no search of all branches is needed for the answer.
+    fn solve_easily(&self, target: &Pose, seed: &Joints) -> Option<Result<Solution, InverseError>> {
+        if self.goal(target).is_err() || !seed.iter().all(|q| q.is_finite()) {
+            return Some(Err(InverseError::NotFinite));
+        }
+        let solution = self.accepted(&self.solve_fast(target, seed), seed)?;
+        Some(self.check_limits(&solution.joints).map(|()| solution))
     }
 
     /// The solution in a requested configuration.
@@ -234,6 +249,18 @@ impl<'a> Inverse<'a> {
             singularity: self.singularity(&outcome.joints),
         }
     }
+}
+
+/// See [`Inverse::apart_mm`]. Effects turn joints and do no more, but for the growth of the links. A link that is longer
+/// moves what follows by as much; one that is turned moves it, and turns the last frame under a target, by no more than the
+/// angle times the length of the whole arm.
+fn apart_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm: f64) -> f64 {
+    let links = estimated.links_under(condition);
+    let of = |(a, b): (&Link, &Link)| {
+        let turned = (a.alpha_rad - b.alpha_rad).abs() + (a.beta_rad - b.beta_rad).abs();
+        (a.a_mm - b.a_mm).abs() + (a.d_mm - b.d_mm).abs() + 2.0 * extent_mm * turned
+    };
+    links.iter().zip(&nominal.links).map(of).sum()
 }
 
 /// Whether margins belong to one branch; a border near which either stands does not count.

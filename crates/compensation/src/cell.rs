@@ -23,6 +23,8 @@
 //! carries = "base"               # base | other
 //! ```
 
+use std::collections::{BTreeSet, HashMap};
+
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -129,6 +131,9 @@ impl CellFrame {
 /// Joint angles beyond this are none (°).
 const MOST_DEG: f64 = 3600.0;
 
+/// Teaching points of tools, squared and added: 500 of one tool, ten of each of 2,500.
+const MOST_TEACHING: usize = 250_000;
+
 impl CellFrame {
     /// Whether its keys go together and its numbers can be.
     fn check(&self, kind: &str) -> Result<(), String> {
@@ -231,17 +236,26 @@ impl Cell {
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let cell: Self = toml::from_str(text).map_err(|e| format!("not a cell file: {e}"))?;
         for (kind, frames) in [("tool", &cell.tool), ("wobj", &cell.wobj)] {
-            for (index, frame) in frames.iter().enumerate() {
+            let mut stated: HashMap<String, &CellFrame> = HashMap::new();
+            for frame in frames {
                 frame.check(kind)?;
-                if let Some(other) =
-                    frames[..index].iter().find(|other| setup::same(&other.name, &frame.name))
-                {
+                if let Some(other) = stated.insert(setup::plain(&frame.name), frame) {
                     return Err(format!(
                         "{kind} \"{}\" is stated twice (as \"{}\" before): keep one of the two",
                         frame.name, other.name
                     ));
                 }
             }
+        }
+        // A frame is worked out anew for each angle of its points, to tell what their rounding explains.
+        let work: usize = cell.tool.iter().map(|tool| tool.teaching_deg.len().saturating_pow(2)).sum();
+        if work > MOST_TEACHING {
+            let most = cell.tool.iter().max_by_key(|tool| tool.teaching_deg.len());
+            let (name, points) = most.map_or(("", 0), |tool| (tool.name.as_str(), tool.teaching_deg.len()));
+            return Err(format!(
+                "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all tools together, \
+                 expected at most {MOST_TEACHING}: four to ten points tell a TCP, keep those that differ most"
+            ));
         }
         if let Some(wrong) = cell.external.iter().find(|axis| axis.index().is_none()) {
             return Err(format!("external axis '{}': expected one of a, b, c, d, e, f", wrong.axis));
@@ -285,34 +299,167 @@ impl Cell {
     pub fn carries(&self, index: usize) -> Option<Carries> {
         self.external.iter().find(|axis| axis.index() == Some(index)).map(|axis| axis.carries)
     }
+}
 
-    /// What is known of a tool of a program.
-    pub fn tool_of(&self, tool: &Tool, listing: &Listing) -> Option<&CellFrame> {
-        stated_of(&self.tool, &tool.name, tool.place.is_some(), listing).next()
+/// A cell file beside a program, by names: which of its frames mean one of the program.
+#[derive(Debug)]
+pub(super) struct Stated<'a> {
+    pub(super) cell: &'a Cell,
+    tools: Names<'a>,
+    objects: Names<'a>,
+    /// How comments of an NC program call a tool or frame, by its plain name.
+    labels: HashMap<String, Vec<&'a str>>,
+}
+
+/// Frames of a cell file by their names.
+#[derive(Debug)]
+struct Names<'a> {
+    frames: &'a [CellFrame],
+    /// By name in lower case.
+    lower: HashMap<String, Vec<usize>>,
+    /// By plain name, in which T08 is T8.
+    plain: HashMap<String, Vec<usize>>,
+}
+
+impl<'a> Names<'a> {
+    fn of(frames: &'a [CellFrame]) -> Self {
+        let (mut lower, mut plain) = (HashMap::new(), HashMap::new());
+        for (place, frame) in frames.iter().enumerate() {
+            lower.entry(frame.name.to_ascii_lowercase()).or_insert_with(Vec::new).push(place);
+            plain.entry(setup::plain(&frame.name)).or_insert_with(Vec::new).push(place);
+        }
+        Self { frames, lower, plain }
     }
 
-    /// What is known of a work object of a program.
-    pub fn wobj_of(&self, object: &WorkObject, listing: &Listing) -> Option<&CellFrame> {
-        stated_of(&self.wobj, &object.name, object.place.is_some(), listing).next()
+    /// Those that mean one of the program: by its name first, then by how a comment calls it.
+    fn meaning(&self, name: &str, in_text: bool, labels: &[&str]) -> Vec<&'a CellFrame> {
+        let by = |index: &HashMap<String, Vec<usize>>, key: &str| index.get(key).cloned().unwrap_or_default();
+        let mut named = by(&self.lower, &name.to_ascii_lowercase());
+        if !in_text {
+            named.extend(by(&self.plain, &setup::plain(name)));
+        }
+        named.sort_unstable();
+        named.dedup();
+        let mut called: Vec<usize> =
+            labels.iter().flat_map(|label| by(&self.lower, &label.to_ascii_lowercase())).collect();
+        called.sort_unstable();
+        called.dedup();
+        called.retain(|place| named.binary_search(place).is_err());
+        named.into_iter().chain(called).map(|place| &self.frames[place]).collect()
     }
 }
 
-/// The frames of a cell file that mean one of a program: by its name first, then, in NC programs, by how a comment calls
-/// it. `in_text`: the program's text declares it.
-pub(super) fn stated_of<'c>(
-    frames: &'c [CellFrame],
-    name: &str,
-    in_text: bool,
-    listing: &Listing,
-) -> impl Iterator<Item = &'c CellFrame> {
-    let labels: Vec<&str> = listing.labels_of(name).filter(|_| !in_text).collect();
-    let named = frames.iter().filter(move |frame| same_name(name, &frame.name, in_text));
-    let called =
-        frames.iter().filter(move |frame| labels.iter().any(|label| label.eq_ignore_ascii_case(&frame.name)));
-    let named: Vec<&CellFrame> = named.collect();
-    let called: Vec<&CellFrame> =
-        called.filter(|frame| !named.iter().any(|one| std::ptr::eq(*one, *frame))).collect();
-    named.into_iter().chain(called)
+impl<'a> Stated<'a> {
+    pub(super) fn of(cell: &'a Cell, listing: &'a Listing) -> Self {
+        let mut labels: HashMap<String, Vec<&str>> = HashMap::new();
+        for (number, label) in &listing.labels {
+            labels.entry(setup::plain(number)).or_default().push(label);
+        }
+        Self { cell, tools: Names::of(&cell.tool), objects: Names::of(&cell.wobj), labels }
+    }
+
+    /// How comments call what the program's text does not declare.
+    pub(super) fn labels_of(&self, name: &str) -> &[&'a str] {
+        if self.labels.is_empty() {
+            return &[];
+        }
+        self.labels.get(&setup::plain(name)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The frames that mean a tool of the program.
+    pub(super) fn tools(&self, tool: &Tool) -> Vec<&'a CellFrame> {
+        let in_text = tool.place.is_some();
+        self.tools.meaning(&tool.name, in_text, if in_text { &[] } else { self.labels_of(&tool.name) })
+    }
+
+    /// The frames that mean a work object of the program.
+    pub(super) fn objects(&self, object: &WorkObject) -> Vec<&'a CellFrame> {
+        let in_text = object.place.is_some();
+        self.objects.meaning(&object.name, in_text, if in_text { &[] } else { self.labels_of(&object.name) })
+    }
+
+    /// What is known of a tool of the program.
+    pub(super) fn tool(&self, tool: &Tool) -> Option<&'a CellFrame> {
+        self.tools(tool).first().copied()
+    }
+
+    /// What is known of a work object of the program.
+    pub(super) fn object(&self, object: &WorkObject) -> Option<&'a CellFrame> {
+        self.objects(object).first().copied()
+    }
+}
+
+/// Which entries of a cell file programs use.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Used {
+    tool: BTreeSet<usize>,
+    wobj: BTreeSet<usize>,
+    external: BTreeSet<usize>,
+}
+
+impl Used {
+    /// By one program: what stands for a tool or work object of it, the tools that touched its teaching points (any, where
+    /// that is not said), and the external axes that its targets state.
+    pub fn by(listing: &Listing, cell: &Cell) -> Self {
+        let stated = Stated::of(cell, listing);
+        let place =
+            |list: &[CellFrame], found: &CellFrame| list.iter().position(|one| std::ptr::eq(one, found));
+        let mut out = Self::default();
+        for tool in listing.tools.iter().chain(&listing.declared_tools) {
+            out.tool.extend(stated.tools(tool).iter().filter_map(|found| place(&cell.tool, found)));
+        }
+        for object in &listing.work_objects {
+            out.wobj.extend(stated.objects(object).iter().filter_map(|found| place(&cell.wobj, found)));
+        }
+        let taught = out.wobj.iter().map(|&k| &cell.wobj[k]).chain(out.tool.iter().map(|&k| &cell.tool[k]));
+        let taught: Vec<&CellFrame> = taught.filter(|frame| !frame.teaching_deg.is_empty()).collect();
+        for frame in taught {
+            let pointer = frame.taught_with.as_deref();
+            let touched = |tool: &CellFrame| pointer.is_none_or(|name| setup::same(name, &tool.name));
+            out.tool.extend((0..cell.tool.len()).filter(|&k| touched(&cell.tool[k])));
+        }
+        let targets = listing.motions.iter().flat_map(|motion| &motion.targets);
+        let mut moved = [false; 6];
+        for value in targets.filter_map(|target| target.value.as_ref().ok()) {
+            (0..6).for_each(|axis| moved[axis] |= value.external()[axis].is_some());
+        }
+        let axes = cell.external.iter().enumerate();
+        out.external
+            .extend(axes.filter(|(_, a)| a.index().is_some_and(|k| moved[k])).map(|(place, _)| place));
+        out
+    }
+
+    /// By another program too.
+    pub fn join(&mut self, other: &Self) {
+        self.tool.extend(&other.tool);
+        self.wobj.extend(&other.wobj);
+        self.external.extend(&other.external);
+    }
+
+    /// A sentence for each entry that no program uses: a name that is misspelt says nothing, and is not asked for. What the
+    /// surface file put there is its own.
+    pub fn notes(&self, cell: &Cell, surface: Option<&SurfaceFile>) -> Vec<String> {
+        let own = |frame: &CellFrame| {
+            surface.is_none_or(|s| frame.name != s.tool.name && frame.name != s.work_object.name)
+        };
+        let frames = |kind: &str, list: &[CellFrame], used: &BTreeSet<usize>| {
+            let unused = list.iter().enumerate().filter(|(place, frame)| !used.contains(place) && own(frame));
+            let say = |(_, frame): (usize, &CellFrame)| {
+                format!(
+                    "cell file: {kind} \"{}\" is used by no program: is its name as the program writes it?",
+                    frame.name
+                )
+            };
+            unused.map(say).collect::<Vec<_>>()
+        };
+        let mut out = frames("tool", &cell.tool, &self.tool);
+        out.extend(frames("wobj", &cell.wobj, &self.wobj));
+        let unused = cell.external.iter().enumerate().filter(|(place, _)| !self.external.contains(place));
+        out.extend(unused.map(|(_, axis)| {
+            format!("cell file: external axis '{}' is stated in no target of any program", axis.axis)
+        }));
+        out
+    }
 }
 
 /// Whether a name of a program is one of the cell file. NC programs declare no names: there T08 is T8.

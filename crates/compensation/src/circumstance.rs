@@ -112,12 +112,10 @@ impl<'a> Circumstances<'a> {
             return work(first, None);
         }
         let mut out: Vec<Option<T>> = places.iter().map(|_| None).collect();
-        for place in 0..self.list.len() {
-            let items: Vec<usize> = (0..places.len()).filter(|&i| places[i] == place).collect();
-            if items.is_empty() {
-                continue;
-            }
-            for (i, found) in items.iter().zip(work(place, Some(&items))) {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&i| places[i]);
+        for items in order.chunk_by(|&a, &b| places[a] == places[b]) {
+            for (i, found) in items.iter().zip(work(places[items[0]], Some(items))) {
                 out[*i] = Some(found);
             }
         }

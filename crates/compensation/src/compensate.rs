@@ -12,7 +12,7 @@ use super::cell::Cell;
 use super::cut::Cuts;
 use super::deviation::Status;
 use super::precision::single_precision;
-use super::rewrite::{Options, Plan, plan_without};
+use super::rewrite::{Options, Plan, Targets};
 use super::taught::contradictions;
 use super::undeclared;
 use super::why::Why;
@@ -68,10 +68,11 @@ pub fn compensate(
     let partial = options.cuts == Cuts::Partial;
     let mark = mark.map(|mark| Mark { partial, ..mark });
     let rewrite = RewriteOptions { mark, ..RewriteOptions::default() };
+    let mut targets = Targets::of(listing, arm, cell, options);
     let mut refused: BTreeMap<u32, Why> = BTreeMap::new();
     let mut round = 0;
     loop {
-        let mut planned = plan_without(listing, arm, cell, options, &refused);
+        let mut planned = targets.plan(&refused);
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
         // What is judged motion by motion needs no second plan; nor does a program of which nothing else could change.

@@ -10,6 +10,7 @@
 //! a joint turned.
 
 use super::curve::{Arc, between};
+use super::effort;
 use super::mounting::Mounting;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Joints;
@@ -119,7 +120,7 @@ pub(super) fn courses(
         let from = before.and_then(|m| stops.get(m as usize));
         samples.of(from, stop, mounting);
     }
-    let joints = nominal.solve_seeded(&samples.flanges, &samples.seeds);
+    let joints = nominal.solve_seeded_within(&samples.flanges, &samples.seeds, effort::SIDES);
     let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {

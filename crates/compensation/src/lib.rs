@@ -22,6 +22,7 @@ pub mod cut;
 pub mod compensate;
 pub mod untouched;
 pub mod undeclared;
+mod effort;
 mod circumstance;
 mod course;
 mod solve;

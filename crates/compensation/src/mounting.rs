@@ -66,8 +66,10 @@ pub struct Mounted {
 
 /// What a mounting is worked out from.
 pub(super) struct Mounts<'a> {
-    pub(super) teaching: Teaching<'a>,
+    pub(super) teaching: &'a Teaching<'a>,
     pub(super) knowledge: Option<&'a Estimated>,
+    /// The inverse of the nominal arm.
+    pub(super) inverse: &'a Inverse<'a>,
     /// A typical joint vector, at which the effect of an unknown origin is estimated.
     pub(super) usual: Joints,
 }
@@ -86,7 +88,7 @@ pub(super) fn mount(
         object: object_value.user_frame.pose() * object_value.object_frame.pose(),
         holds_part: object_value.robhold,
     };
-    let teaching = &with.teaching;
+    let teaching = with.teaching;
     let real_tool = teaching.tool(tool, tool_value)?;
     let real_object = teaching.object(object, object_value)?;
     let real = Mounting { tool: real_tool.pose, object: real_object.pose, ..told };
@@ -105,7 +107,7 @@ fn built_in(name: &str) -> bool {
 /// What was assumed of a tool.
 fn tool_note(tool: &Tool, real: &RealTool, told: &Mounting, with: &Mounts<'_>) -> Option<String> {
     let name = &tool.name;
-    match with.teaching.cell.tool_of(tool, with.teaching.listing) {
+    match with.teaching.stated.tool(tool) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
         Some(_) => Some(match real.moved_mm {
             Some(shift) => format!("tool {name} was taught: re-evaluated, its TCP moves by {shift:.3} mm"),
@@ -131,7 +133,7 @@ fn object_note(
     with: &Mounts<'_>,
 ) -> Option<String> {
     let name = &object.name;
-    match with.teaching.cell.wobj_of(object, with.teaching.listing) {
+    match with.teaching.stated.object(object) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
         Some(_) if found.taught.is_some() => {
             let shift = (real.object.translation.vector - told.object.translation.vector).norm();
@@ -183,14 +185,15 @@ const NOT_TOLD: &str = "how far it would move had it been taught cannot be told 
 /// How far a taught TCP would move: four orientations about a typical pose, TCP fixed under the nominal model. A tool that
 /// stands is touched once with the middle of the flange.
 fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
-    let (nominal, estimated, usual) = (with.teaching.nominal, with.teaching.estimated, &with.usual);
+    let Teaching { nominal, estimated, .. } = with.teaching;
+    let usual = &with.usual;
     if told.holds_part {
         let flange = |arm: &PreparedModel<'_>| arm.forward(usual).translation.vector;
         let shift = (flange(estimated) - flange(nominal)).norm();
         return format!("had it been taught with this arm, its TCP would move by about {shift:.2} mm");
     }
     let turns = [[0.0, 0.0, 0.0], [0.5, 0.3, 0.0], [-0.5, 0.3, 0.6], [0.0, -0.5, -0.6]];
-    let inverse = Inverse::new(nominal.model, &nominal.condition, nominal.model);
+    let inverse = with.inverse;
     let at = nominal.forward(usual) * told.tool;
     let teaching: Vec<Joints> = turns
         .iter()
@@ -210,8 +213,9 @@ fn tool_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
 
 /// How far a taught work object would move: its origin and 100 mm along x and y, touched near a typical pose.
 fn object_estimate(told: &Mounting, with: &Mounts<'_>) -> String {
-    let (nominal, estimated, usual) = (with.teaching.nominal, with.teaching.estimated, &with.usual);
-    let inverse = Inverse::new(nominal.model, &nominal.condition, nominal.model);
+    let Teaching { nominal, estimated, .. } = with.teaching;
+    let usual = &with.usual;
+    let inverse = with.inverse;
     let orientation = told.target_of(&nominal.forward(usual)).rotation;
     let touched: Vec<Point3<f64>> = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]]
         .iter()

@@ -1,12 +1,14 @@
 //! The mountings that a program uses: every pair of tool and work object once, and what external axes carry.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::cell::{Carries, Cell};
+use super::effort;
 use super::mounting::{Mounted, Mounting, Mounts, mount};
 use super::rewrite::{Arms, configured};
 use super::taught::Teaching;
 use super::why::Why;
+use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, Reason, RobTarget, Switch, WorkObjectValue};
@@ -26,6 +28,9 @@ impl Mountings {
     pub(super) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
         let mut out =
             Self { places: HashMap::new(), list: Vec::new(), base: [false; 6], assumed: Vec::new() };
+        let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
+        let typical = typical(listing);
+        let mut allowance = Allowance::of(effort::FRAMES);
         let mut last = None;
         for motion in &listing.motions {
             let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
@@ -41,11 +46,13 @@ impl Mountings {
                 out.places.insert((tool, object), Err(Why::Program(reason)));
                 continue;
             };
-            let usual = usual_joints(listing, motion, tv.frame.pose(), ov, arms);
-            let teaching =
-                Teaching { nominal: arms.nominal.arm(), estimated: arms.estimated.arm(), cell, listing };
-            let found = match mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, usual })
-            {
+            let here = typical.get(&(tool, object)).map_or(&[][..], Vec::as_slice);
+            let found = within(&mut allowance, || {
+                let usual = usual_joints(here, tv.frame.pose(), ov, arms);
+                let (teaching, inverse) = (&teaching, &arms.nominal);
+                mount((t, tv), (o, ov), &Mounts { teaching, knowledge: arms.knowledge, inverse, usual })
+            });
+            let found = match found {
                 Ok(mounted) => {
                     out.list.push(mounted);
                     Ok(out.list.len() - 1)
@@ -115,39 +122,39 @@ impl Mountings {
     }
 
     pub(super) fn notes(&self) -> Vec<String> {
-        let mut out: Vec<String> = Vec::new();
-        for note in self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes)) {
-            if !out.contains(note) {
-                out.push(note.clone());
-            }
-        }
-        out
+        let mut said = HashSet::new();
+        let all = self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes));
+        all.filter(|note| said.insert(note.as_str())).cloned().collect()
     }
 }
 
-/// Joints of the first target of a motion with this mounting, at which the effect of unknown origins is estimated.
-fn usual_joints(
-    listing: &Listing,
-    motion: &Motion,
-    tool: Pose,
-    object: &WorkObjectValue,
-    arms: &Arms<'_>,
-) -> Joints {
+/// Motions of each pair of tool and work object: the first of them, which are asked for typical joints.
+fn typical(listing: &Listing) -> HashMap<(u32, u32), Vec<&Motion>> {
+    const ASKED: usize = 50;
+    let mut out: HashMap<(u32, u32), Vec<&Motion>> = HashMap::new();
+    for motion in &listing.motions {
+        let (Some(tool), Some(object)) = (motion.tool, motion.work_object) else { continue };
+        let here = out.entry((tool, object)).or_default();
+        if here.len() < ASKED {
+            here.push(motion);
+        }
+    }
+    out
+}
+
+/// Joints of the first target of these motions that is reached, at which the effect of unknown origins is estimated.
+fn usual_joints(motions: &[&Motion], tool: Pose, object: &WorkObjectValue, arms: &Arms<'_>) -> Joints {
     let mounting = Mounting {
         tool,
         object: object.user_frame.pose() * object.object_frame.pose(),
         holds_part: object.robhold,
     };
-    let same = |m: &&Motion| m.tool == motion.tool && m.work_object == motion.work_object;
     let middle = Joints::from_fn(|i, _| {
         let limits = &arms.nominal.arm().model.limits;
         0.5 * (limits.min_rad[i] + limits.max_rad[i])
     });
-    listing
-        .motions
+    motions
         .iter()
-        .filter(same)
-        .take(50)
         .filter_map(|m| m.to())
         .filter_map(|t| t.value.ok().and_then(|v| v.cartesian().copied()))
         .find_map(|t| {

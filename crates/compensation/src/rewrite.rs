@@ -10,13 +10,12 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
 use super::cut::Cuts;
 use super::deviation::{PathPoint, Status};
+use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::notes::{load_notes, open_notes, play_note};
@@ -31,6 +30,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::region::Outside;
@@ -193,33 +193,54 @@ impl<'a> Arms<'a> {
 /// Motions are independent but for those without monitored configuration (ConfL\Off), which go from the motion
 /// before; the result does not depend on the number of threads.
 pub fn plan(listing: &Listing, estimated: &Estimated, cell: &Cell, options: &Options) -> Plan {
-    plan_without(listing, estimated, cell, options, &BTreeMap::new())
+    Targets::of(listing, estimated, cell, options).plan(&BTreeMap::new())
 }
 
-/// [`plan`], where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the cuts
-/// that they are part of.
-pub(super) fn plan_without(
-    listing: &Listing,
-    estimated: &Estimated,
-    cell: &Cell,
-    options: &Options,
-    refused: &BTreeMap<u32, Why>,
-) -> Plan {
-    let mut arms = Arms::of(estimated, &options.condition);
-    let mountings = Mountings::of(listing, &arms, cell);
-    let mut solved = solve_all(listing, &mut arms, &mountings, options);
-    let stays = staying(listing, &mut solved, &mountings, &arms, options, refused);
-    let job = Job { listing, solved: &solved, stays: &stays, mountings: &mountings, arms: &arms, options };
-    let portions: Vec<Portion> = (0..listing.motions.len())
-        .into_par_iter()
-        .step_by(PORTION)
-        .map(|first| job.portion(first..(first + PORTION).min(listing.motions.len())))
-        .collect();
+/// The targets of a program, worked out once for any number of plans.
+pub(super) struct Targets<'a> {
+    listing: &'a Listing,
+    options: &'a Options,
+    arms: Arms<'a>,
+    mountings: Mountings,
+    solved: SolvedTargets,
+}
+
+impl<'a> Targets<'a> {
+    pub(super) fn of(
+        listing: &'a Listing,
+        estimated: &'a Estimated,
+        cell: &Cell,
+        options: &'a Options,
+    ) -> Self {
+        let mut arms = Arms::of(estimated, &options.condition);
+        let mountings = Mountings::of(listing, &arms, cell);
+        let solved = solve_all(listing, &mut arms, &mountings, options);
+        Self { listing, options, arms, mountings, solved }
+    }
+
+    /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
+    /// cuts that they are part of.
+    pub(super) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
+        self.solved.allow_again();
+        let Self { listing, options, arms, mountings, solved } = self;
+        let stays = staying(listing, solved, mountings, arms, options, refused);
+        planned(&Job { listing, solved, stays: &stays, mountings, arms, options })
+    }
+}
+
+fn planned(job: &Job<'_>) -> Plan {
+    let Job { listing, solved, mountings, arms, options, .. } = *job;
+    let count = listing.motions.len();
+    let whole = Allowance::of(effort::PATHS).with_steps(effort::path_steps(count));
+    let portions: Vec<Portion> = effort::shared_out(whole, count.div_ceil(PORTION), |portion, allowance| {
+        let first = portion * PORTION;
+        job.portion(first..(first + PORTION).min(count), allowance)
+    });
     let mut notes = mountings.notes();
-    notes.extend(play_note(&arms, &solved));
-    notes.extend(load_notes(listing, &arms, options));
+    notes.extend(play_note(arms, solved));
+    notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
-    notes.extend(open_notes(listing, &solved, &unchecked));
+    notes.extend(open_notes(listing, solved, &unchecked));
     let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
     plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
     plan.outcomes.reserve_exact(listing.motions.len());
@@ -337,8 +358,18 @@ struct Worked {
     passage: Option<Passage>,
 }
 
+impl Worked {
+    /// Flags a motion that is written.
+    fn flag(&mut self, why: Why) {
+        (self.outcome.status, self.outcome.reason) = (Status::Flagged, Some(why));
+        if let Some(point) = &mut self.point {
+            (point.status, point.reason) = (Status::Flagged, Some(why.to_string()));
+        }
+    }
+}
+
 impl<'a> Job<'a> {
-    fn portion(&self, motions: std::ops::Range<usize>) -> Portion {
+    fn portion(&self, motions: std::ops::Range<usize>, allowance: &mut Allowance) -> Portion {
         take_room();
         let count = motions.len();
         let paths: Vec<Option<Path<'a>>> = motions.clone().map(|index| self.path(index)).collect();
@@ -350,7 +381,8 @@ impl<'a> Job<'a> {
             .filter(|(i, _)| straight(*i))
             .filter_map(|(_, p)| p.as_ref())
             .collect();
-        let mut middles = middles_off(&lines, self.arms, self.options.emit).into_iter();
+        let middles = within(allowance, || middles_off(&lines, self.arms, self.options.emit));
+        let mut middles = middles.into_iter();
         // The way of the motion before, which a corner asks for.
         let mut last: Option<(u32, Passage)> = None;
         let mut out = Portion {
@@ -361,7 +393,11 @@ impl<'a> Job<'a> {
         };
         for (index, path) in motions.zip(&paths) {
             let middle = if straight(index) && path.is_some() { middles.next() } else { None };
-            let worked = self.work(index, path.as_ref(), middle.unwrap_or(f64::INFINITY), last.as_ref());
+            let middle = middle.unwrap_or(f64::INFINITY);
+            let mut worked = within(allowance, || self.work(index, path.as_ref(), middle, last.as_ref()));
+            if allowance.ran_out && worked.change.is_some() {
+                worked.flag(Why::Inverse(InverseError::Abandoned));
+            }
             last = worked.passage.map(|passage| (index as u32, passage));
             let motion = &self.listing.motions[index];
             let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);

@@ -18,12 +18,14 @@ use std::collections::{BTreeMap, HashSet};
 use rayon::prelude::*;
 
 use super::curve::Curve;
+use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
 use super::solve::{Solved, SolvedTargets, as_joints};
 use super::why::Why;
-use truegrind_arm::inverse::Inverse;
+use truegrind_arm::inverse::effort::{Allowance, within};
+use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, RobTarget, Switch};
@@ -139,6 +141,7 @@ pub(super) fn forbid_ways(
     arms: &Arms<'_>,
     options: &Options,
     stays: Option<&BTreeMap<u32, Why>>,
+    allowance: &mut Allowance,
 ) -> bool {
     let none = BTreeMap::new();
     let mut ways = Ways { listing, solved, left: stays.unwrap_or(&none), mountings, arms, options };
@@ -146,11 +149,16 @@ pub(super) fn forbid_ways(
         None => ways.forbid_each(),
         Some(stays) => stays.keys().map(|motion| *motion as usize).collect(),
     };
-    ways.forbid_behind(&found) || (stays.is_none() && !found.is_empty())
+    ways.forbid_behind(&found, allowance) || (stays.is_none() && !found.is_empty())
 }
 
-/// Motions that one thread takes at a time.
-const PORTION: usize = 256;
+/// Suspect motions that one thread takes at a time.
+const PORTION: usize = 64;
+
+/// Samples for all ways of a program, so many at least, and so many for each motion.
+const SAMPLES: usize = 300_000;
+/// See [`SAMPLES`].
+const SAMPLES_EACH: usize = 2;
 
 /// The ways between the targets of a program.
 struct Ways<'a> {
@@ -196,12 +204,15 @@ impl Ways<'_> {
         let count = self.listing.motions.len();
         let found: Vec<(usize, Why)> = {
             let here = &*self;
-            let judged = |motion| here.judge(motion).map(|why| (motion, why));
-            (0..count)
-                .into_par_iter()
-                .step_by(PORTION)
-                .flat_map_iter(|first| (first..(first + PORTION).min(count)).filter_map(judged))
-                .collect()
+            let suspects: Vec<usize> = (0..count).into_par_iter().filter(|m| here.suspect(*m)).collect();
+            let samples = here.samples(suspects.len());
+            let whole = Allowance::of(effort::WAYS);
+            let found = effort::shared_out(whole, suspects.len().div_ceil(PORTION), |portion, allowance| {
+                let judge = |motion: &usize| Some((*motion, here.judge(*motion, samples, allowance)?));
+                let mine = suspects.iter().skip(portion * PORTION).take(PORTION);
+                mine.filter_map(judge).collect::<Vec<_>>()
+            });
+            found.into_iter().flatten().collect()
         };
         for (motion, why) in &found {
             self.solved.forbid(*motion, *why);
@@ -209,14 +220,21 @@ impl Ways<'_> {
         found.into_iter().map(|(motion, _)| motion).collect()
     }
 
+    /// Samples of each way, where so many have to be looked at.
+    fn samples(&self, suspects: usize) -> usize {
+        let all = SAMPLES.max(SAMPLES_EACH * self.listing.motions.len());
+        (all / suspects.max(1)).clamp(1, MOST_SAMPLES)
+    }
+
     /// In order, those that start where another one stays; whether any is forbidden.
-    fn forbid_behind(&mut self, staying: &HashSet<usize>) -> bool {
+    fn forbid_behind(&mut self, staying: &HashSet<usize>, allowance: &mut Allowance) -> bool {
         let mut stay = staying.clone();
+        let samples = self.samples(staying.len());
         for motion in 0..if stay.is_empty() { 0 } else { self.listing.motions.len() } {
             let previous = self.listing.motions[motion].previous.map(|previous| previous as usize);
             if previous.is_some_and(|previous| stay.contains(&previous))
                 && !self.left.contains_key(&(motion as u32))
-                && let Some(why) = self.judge(motion)
+                && let Some(why) = self.judge(motion, samples, allowance)
             {
                 self.solved.forbid(motion, why);
                 stay.insert(motion);
@@ -276,11 +294,19 @@ impl Ways<'_> {
         }
     }
 
-    /// Why a motion must not be corrected for its way, or for the choice of its configuration.
-    fn judge(&self, index: usize) -> Option<Why> {
+    /// Why a motion must not be corrected for its way, or for the choice of its configuration; also where that could not be
+    /// looked at to the end.
+    fn judge(&self, index: usize, samples: usize, allowance: &mut Allowance) -> Option<Why> {
         if !self.suspect(index) {
             return None;
         }
+        let left = Cell::new(samples);
+        let found = within(allowance, || self.judged(index, &left));
+        let unfinished = allowance.ran_out || (left.get() == 0 && samples < MOST_SAMPLES);
+        if unfinished { Some(Why::Inverse(InverseError::Abandoned)) } else { found }
+    }
+
+    fn judged(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
         let (motion, to) = self.corrected(index)?;
         let open = self.written(motion) && monitored(motion) != Switch::On;
         let Some(from) = self.from(motion) else {
@@ -304,7 +330,6 @@ impl Ways<'_> {
             _ => return None,
         };
         let cost = cost(&curves[1], &told, &self.arms.nominal);
-        let samples = Cell::new(MOST_SAMPLES);
         let walk = Walk { nominal: &self.arms.nominal, told, curves, cost, samples, options: self.options };
         let begin = walk.reached(0.0, from.joints()[1]);
         let end = walk.reached(1.0, to.after);
@@ -363,7 +388,7 @@ struct Walk<'a> {
     /// See [`cost`].
     cost: f64,
     /// Samples that may still be taken.
-    samples: Cell<usize>,
+    samples: &'a Cell<usize>,
     options: &'a Options,
 }
 

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::circumstance::picked;
 use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
+use super::effort;
 use super::mountings::Mountings;
 use super::payload::Load;
 use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
@@ -23,6 +24,7 @@ use super::singular::{Replay, at_target};
 use super::why::Why;
 use truegrind_arm::estimated::RidingPoint;
 use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
 use truegrind_arm::region::{Nearest, Outside};
 use truegrind_math::se3::Pose;
@@ -80,6 +82,8 @@ impl Solved {
 
 /// The targets of all motions.
 pub(super) struct SolvedTargets {
+    /// What [`SolvedTargets::forbid`] did: portion and place in it, and what was forbidden there before.
+    forbade: Vec<(usize, usize, Option<Why>)>,
     /// Where the targets of each motion begin, and the end of the last.
     first: Vec<usize>,
     /// The targets of so many motions each: one list of all would be copied together once more.
@@ -98,7 +102,17 @@ impl SolvedTargets {
         if end > 0
             && let Some(Ok(solved)) = self.portions[portion].get_mut(end - 1)
         {
+            self.forbade.push((portion, end - 1, solved.forbidden));
             solved.forbidden = Some(why);
+        }
+    }
+
+    /// Takes back all that [`SolvedTargets::forbid`] did: what was worked out serves another round.
+    pub(super) fn allow_again(&mut self) {
+        for (portion, place, before) in self.forbade.drain(..).rev() {
+            if let Ok(solved) = &mut self.portions[portion][place] {
+                solved.forbidden = before;
+            }
         }
     }
 
@@ -190,7 +204,13 @@ impl Work<'_> {
             };
             let portions = self.portions(arms, &places, &places, None);
             let guessed = self.guessed();
-            return SolvedTargets { first: self.first, portions, ways: Vec::new(), guessed };
+            return SolvedTargets {
+                forbade: Vec::new(),
+                first: self.first,
+                portions,
+                ways: Vec::new(),
+                guessed,
+            };
         }
         let as_is = self.sides(arms, None);
         let before = self.places(arms, &as_is, &load);
@@ -234,7 +254,7 @@ impl Work<'_> {
         });
         let ways = ways.collect();
         let guessed = self.guessed();
-        SolvedTargets { first: self.first, portions, ways, guessed }
+        SolvedTargets { forbade: Vec::new(), first: self.first, portions, ways, guessed }
     }
 
     /// Motions of which a target was reached by guess.
@@ -258,20 +278,17 @@ impl Work<'_> {
         places: &[usize],
         stale: Option<&[bool]>,
     ) -> Vec<Vec<Result<Solved, Why>>> {
-        (0..self.listing.motions.len())
-            .into_par_iter()
-            .step_by(PORTION)
-            .map(|begin| {
-                if stale.is_some_and(|stale| !stale[begin / PORTION]) {
-                    return Vec::new();
-                }
-                take_room();
-                let targets = self.targets(begin);
-                let places = [&before[targets.clone()], &places[targets.clone()]];
-                let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
-                finish(asked, starts, places, arms, self.mountings, self.options)
-            })
-            .collect()
+        let whole = Allowance::of(effort::TARGETS);
+        effort::shared_out(whole, self.listing.motions.len().div_ceil(PORTION), |portion, allowance| {
+            if stale.is_some_and(|stale| !stale[portion]) {
+                return Vec::new();
+            }
+            take_room();
+            let targets = self.targets(portion * PORTION);
+            let places = [&before[targets.clone()], &places[targets.clone()]];
+            let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
+            within(allowance, || finish(asked, starts, places, arms, self.mountings, self.options))
+        })
     }
 
     /// The sides along the program: as it is, or as rewritten.
@@ -348,17 +365,21 @@ fn starts(
     let depends = |asked: &Asked<'_>| monitored(asked.motion) == Switch::Off;
     // A place holder for those that depend on the motion before.
     let mut out: Starts = asked.par_iter().map(|_| Err(Why::JointTarget)).collect();
-    out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).for_each(|(mut out, asked)| {
+    let stretches = asked.len().div_ceil(STRETCH);
+    let each = out.par_chunks_mut(STRETCH).zip(asked.par_chunks(STRETCH)).enumerate();
+    each.for_each(|(stretch, (mut out, asked))| {
         let mut near = None;
+        let mut allowance = Allowance::of(effort::STARTS).part(stretch, stretches);
         for run in asked.chunk_by(|a, b| depends(a) == depends(b)) {
             let (here, rest) = out.split_at_mut(run.len());
             out = rest;
             if !depends(&run[0]) {
-                along(run, &mut near, arms, mountings, here);
+                along(run, &mut near, arms, mountings, &mut allowance, here);
             }
         }
     });
     // Now those that depend on the motion before, in order: a run is what follows each other in the listing.
+    let mut allowance = Allowance::of(effort::STARTS);
     let mut motion = 0;
     while motion < listing.motions.len() {
         let chained =
@@ -381,7 +402,7 @@ fn starts(
             reached.last().and_then(|start| start.as_ref().ok().map(|s| s.joints))
         });
         let run = first[motion]..first[end];
-        along(&asked[run.clone()], &mut near, arms, mountings, &mut out[run]);
+        along(&asked[run.clone()], &mut near, arms, mountings, &mut allowance, &mut out[run]);
         motion = end;
     }
     out
@@ -391,12 +412,13 @@ fn starts(
 const RUNS: [usize; 2] = [8, 64];
 
 /// The starts of targets that follow each other. `near`: the joints from which the first one is reached, if known; left
-/// at the joints of the last.
+/// at the joints of the last. `allowance`: for those that have to be searched for.
 fn along(
     asked: &[Asked<'_>],
     near: &mut Option<Joints>,
     arms: &Arms<'_>,
     mountings: &Mountings,
+    allowance: &mut Allowance,
     out: &mut [Result<Start, Why>],
 ) {
     let mut at = 0;
@@ -419,7 +441,7 @@ fn along(
         }
         run = RUNS[0];
         if at < asked.len() {
-            let start = start(&asked[at], near.as_ref(), arms, mountings);
+            let start = within(allowance, || start(&asked[at], near.as_ref(), arms, mountings));
             if let Ok(start) = &start {
                 *near = Some(start.joints);
             }
@@ -464,8 +486,8 @@ fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Re
     }
     let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
     let mut taken = 0;
-    for (told, reached) in told.iter().zip(arms.nominal.reach_path(&flanges, last)) {
-        let Ok(reached) = reached else { break };
+    // One that has to be searched for is started by itself.
+    for (told, reached) in told.iter().zip(arms.nominal.reach_path_easily(&flanges, last)) {
         if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
             break;
         }

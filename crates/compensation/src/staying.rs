@@ -4,12 +4,15 @@ use std::collections::BTreeMap;
 
 use super::cut::{self, Cuts};
 use super::deviation::Status;
+use super::effort;
 use super::mountings::Mountings;
 use super::rewrite::{Arms, Options};
 use super::singular::forbid_ways;
 use super::solve::{Solved, SolvedTargets};
 use super::strayed::strayed;
 use super::why::Why;
+use truegrind_arm::inverse::InverseError;
+use truegrind_arm::inverse::effort::Allowance;
 use truegrind_programs::motion::{Listing, MotionKind, Reason};
 
 /// The motions whose targets could be corrected and that stay all the same, with the reason: what the writer refused,
@@ -25,7 +28,10 @@ pub(super) fn staying(
 ) -> BTreeMap<u32, Why> {
     let mut stays = refused.clone();
     let cuts = cut::of(listing);
-    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None);
+    // For ways that start where another motion stays, over all rounds.
+    let mut allowance = Allowance::of(effort::WAYS);
+    let mut forbidden = forbid_ways(listing, solved, mountings, arms, options, None, &mut allowance);
+    let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     loop {
         let before = stays.len();
         for motion in strayed(listing, solved, mountings, options, &stays) {
@@ -48,9 +54,24 @@ pub(super) fn staying(
         if stays.len() == before && !forbidden {
             return stays;
         }
-        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays));
+        rounds -= 1;
+        if rounds == 0 {
+            // A program of which every round takes away another piece is left as it is.
+            let all = 0..listing.motions.len() as u32;
+            stays.extend(all.filter(|m| !stays.contains_key(m)).map(|m| (m, ABANDONED)).collect::<Vec<_>>());
+            return stays;
+        }
+        forbidden = forbid_ways(listing, solved, mountings, arms, options, Some(&stays), &mut allowance);
     }
 }
+
+/// Motions that are looked at again, over all rounds, for what stays because another one does.
+const MOST_VISITS: usize = 4_000_000;
+/// So many rounds are always made.
+const FEWEST_ROUNDS: usize = 16;
+/// More are never made: cut after cut would stay, each for the one before it.
+const MOST_ROUNDS: usize = 1000;
+const ABANDONED: Why = Why::Inverse(InverseError::Abandoned);
 
 /// Why a motion stays as it is, first what the text does not tell, then what no arm reaches; `None` where it is corrected.
 pub(super) fn obstacle(

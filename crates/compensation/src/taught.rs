@@ -6,15 +6,17 @@
 //! frame moves by what the better arm E makes of the same joints: F* = F_E F_N⁻¹ F. What rounding leaves between F_N and
 //! the told F is kept, so that angles of two decimals do as well as those of ten.
 
-use std::collections::BTreeSet;
+use std::cell::OnceCell;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
-use super::cell::{Cell, CellFrame, FrameOrigin, Teaches, stated_of};
+use super::cell::{Cell, CellFrame, FrameOrigin, Stated, Teaches};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjectValue};
+use truegrind_programs::nc::setup;
 
 /// What programs round away when they write a frame, and constructions of the same frame may differ by (mm, rad).
 const WRITTEN: Apart = Apart { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
@@ -149,12 +151,14 @@ pub(super) struct TaughtFrame {
 }
 
 /// What teaching points are judged by: the two arms, the cell, and the tools that are known.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(super) struct Teaching<'a> {
     pub(super) nominal: &'a PreparedModel<'a>,
     pub(super) estimated: &'a PreparedModel<'a>,
-    pub(super) cell: &'a Cell,
-    pub(super) listing: &'a Listing,
+    pub(super) stated: Stated<'a>,
+    listing: &'a Listing,
+    /// [`Teaching::tools`], once they were asked for.
+    known: OnceCell<Tools<'a>>,
 }
 
 /// What the cell file says of tools and work objects and this program does not bear out, one sentence each; nothing may
@@ -162,8 +166,8 @@ pub(super) struct Teaching<'a> {
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
     let condition = Condition::default();
     let arm = nominal.at_condition(&condition);
-    let teaching = Teaching { nominal: &arm, estimated: &arm, cell, listing };
-    let mut seen = BTreeSet::new();
+    let teaching = Teaching::of(&arm, &arm, cell, listing);
+    let (mut seen, mut said) = (HashSet::new(), HashSet::new());
     let mut out: Vec<String> = Vec::new();
     for motion in &listing.motions {
         let (Some(tool), Some(object)) = (listing.tool(motion), listing.work_object(motion)) else {
@@ -174,13 +178,13 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
         }
         let (Ok(value), Ok(place)) = (&tool.value, &object.value) else { continue };
         let found = [
-            twice("tool", &cell.tool, &tool.name, tool.place.is_some(), listing),
-            twice("wobj", &cell.wobj, &object.name, object.place.is_some(), listing),
+            twice("tool", &teaching.stated.tools(tool), &tool.name),
+            twice("wobj", &teaching.stated.objects(object), &object.name),
             teaching.tool(tool, value).err(),
             teaching.object(object, place).err(),
         ];
         for fault in found.into_iter().flatten() {
-            if !out.contains(&fault) {
+            if said.insert(fault.clone()) {
                 out.push(fault);
             }
         }
@@ -189,8 +193,8 @@ pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<St
 }
 
 /// Two entries of the cell file that mean one frame of the program.
-fn twice(kind: &str, frames: &[CellFrame], name: &str, in_text: bool, listing: &Listing) -> Option<String> {
-    let mut found = stated_of(frames, name, in_text, listing);
+fn twice(kind: &str, found: &[&CellFrame], name: &str) -> Option<String> {
+    let mut found = found.iter().copied();
     let first = found.next()?;
     // Saying the same again contradicts nothing.
     let second = found.find(|other| **other != CellFrame::of(&other.name, first.origin))?;
@@ -251,6 +255,15 @@ fn at(position: &Vector3<f64>) -> Pose {
 }
 
 impl<'a> Teaching<'a> {
+    pub(super) fn of(
+        nominal: &'a PreparedModel<'a>,
+        estimated: &'a PreparedModel<'a>,
+        cell: &'a Cell,
+        listing: &'a Listing,
+    ) -> Self {
+        Self { nominal, estimated, stated: Stated::of(cell, listing), listing, known: OnceCell::new() }
+    }
+
     /// A tool as it is.
     ///
     /// # Errors
@@ -258,7 +271,7 @@ impl<'a> Teaching<'a> {
     pub(super) fn tool(&self, tool: &Tool, value: &ToolValue) -> Result<RealTool, String> {
         let told = value.frame.pose();
         let stands = RealTool { pose: told, moved_mm: None };
-        let Some(stated) = self.cell.tool_of(tool, self.listing) else { return Ok(stands) };
+        let Some(stated) = self.stated.tool(tool) else { return Ok(stands) };
         if tool.place.is_some() {
             agrees("tool", stated, &told)?;
         }
@@ -345,7 +358,7 @@ impl<'a> Teaching<'a> {
         let user = value.user_frame.pose();
         let within = value.object_frame.pose();
         let as_told = RealObject { pose: user * within, taught: None };
-        let Some(stated) = self.cell.wobj_of(object, self.listing) else { return Ok(as_told) };
+        let Some(stated) = self.stated.object(object) else { return Ok(as_told) };
         // A displacement was not taught: it is on top of what was.
         let displaced = object.displacement.map_or_else(Pose::identity, |frame| frame.pose());
         let undisplaced = user * within * displaced.inverse();
@@ -413,7 +426,7 @@ impl<'a> Teaching<'a> {
                 && frame_of(self.nominal, joints, &known.frame.translation.vector, part)
                     .is_some_and(|found| Apart::of(&found, told).within(bound))
         };
-        let known = self.known();
+        let known = &self.tools().list;
         let cause = if Apart::of(nominal, other).within(bound) {
             let place =
                 if instead == "oframe" { "with its object frame" } else { "without its object frame" };
@@ -444,11 +457,11 @@ impl<'a> Teaching<'a> {
     /// The tool that touched the teaching points of `stated`; `held`: the robot must have held it.
     fn pointer(&self, kind: &str, stated: &CellFrame, held: bool) -> Result<Pointer, String> {
         let here = format!("cell file: {kind} \"{}\"", stated.name);
-        let known = self.known();
+        let known = self.tools();
         let holds = if held { "that the robot holds" } else { "that stands" };
         let found = match &stated.taught_with {
             Some(name) => {
-                let mut same = known.iter().filter(|known| known.is(name));
+                let mut same = known.called(name);
                 let Some(found) = same.next() else {
                     return Err(format!(
                         "{here}: taught_with = \"{name}\": no such tool has a known value, neither in the program nor in the \
@@ -471,7 +484,7 @@ impl<'a> Teaching<'a> {
             }
             None => {
                 let fit = |known: &&Known| known.held == held && !known.name.eq_ignore_ascii_case("tool0");
-                let mut fitting: Vec<&Known> = known.iter().filter(fit).collect();
+                let mut fitting: Vec<&Known> = known.list.iter().filter(fit).collect();
                 fitting.dedup_by(|a, b| a.is(&b.name));
                 match fitting[..] {
                     [only] => only,
@@ -482,11 +495,15 @@ impl<'a> Teaching<'a> {
                         ));
                     }
                     _ => {
-                        let names: Vec<&str> = fitting.iter().map(|known| known.name.as_str()).collect();
+                        let names = fitting.iter().map(|known| known.name.as_str()).take(MOST_NAMES);
+                        let more = match fitting.len().saturating_sub(MOST_NAMES) {
+                            0 => String::new(),
+                            more => format!(" and {more} more"),
+                        };
                         return Err(format!(
-                            "{here}: which tool touched its teaching points is not said, and it may have been any of {}: write \
-                             taught_with = \"NAME\"",
-                            names.join(", ")
+                            "{here}: which tool touched its teaching points is not said, and it may have been any of {}{more}: \
+                             write taught_with = \"NAME\"",
+                            names.collect::<Vec<_>>().join(", ")
                         ));
                     }
                 }
@@ -506,26 +523,30 @@ impl<'a> Teaching<'a> {
 
     /// Every tool whose value is known, in the order of names: those of the program, those that the cell file places,
     /// and tool0.
+    fn tools(&self) -> &Tools<'a> {
+        self.known.get_or_init(|| Tools::of(self.known()))
+    }
+
     fn known(&self) -> Vec<Known<'a>> {
         let mut out: Vec<Known<'a>> = Vec::new();
+        let mut seen = HashSet::new();
         let tools = self.listing.declared_tools.iter().chain(&self.listing.tools);
         for tool in tools {
             let Ok(value) = &tool.value else { continue };
-            let known = Known {
-                name: tool.name.clone(),
-                in_text: tool.place.is_some(),
-                frame: value.frame.pose(),
-                held: value.robhold,
-                labels: self.listing.labels_of(&tool.name).collect(),
-                stated: self.cell.tool_of(tool, self.listing),
-            };
-            if !out.contains(&known) {
-                out.push(known);
+            let (in_text, held, frame) = (tool.place.is_some(), value.robhold, value.frame.pose());
+            let place = frame.translation.vector.iter().chain(frame.rotation.coords.iter());
+            // Adding 0 makes −0 and 0 one.
+            let bits: Vec<u64> = place.map(|v| (v + 0.0).to_bits()).collect();
+            if seen.insert((tool.name.as_str(), in_text, held, bits)) {
+                let labels = self.stated.labels_of(&tool.name).to_vec();
+                let stated = self.stated.tool(tool);
+                out.push(Known { name: tool.name.clone(), in_text, frame, held, labels, stated });
             }
         }
-        for stated in &self.cell.tool {
+        let declared = Tools::of(std::mem::take(&mut out));
+        for stated in &self.stated.cell.tool {
             if let Some(frame) = stated.pose()
-                && !out.iter().any(|known| known.is(&stated.name))
+                && declared.called(&stated.name).next().is_none()
             {
                 let name = stated.name.clone();
                 out.push(Known {
@@ -538,6 +559,7 @@ impl<'a> Teaching<'a> {
                 });
             }
         }
+        out.splice(..0, declared.list);
         if !out.iter().any(|known| known.is("tool0")) {
             let (name, frame) = ("tool0".to_owned(), Pose::identity());
             out.push(Known { name, in_text: true, frame, held: true, labels: Vec::new(), stated: None });
@@ -559,6 +581,47 @@ struct Known<'a> {
     labels: Vec<&'a str>,
     stated: Option<&'a CellFrame>,
 }
+
+/// The tools whose value is known, by every name that they go by.
+#[derive(Debug)]
+struct Tools<'a> {
+    list: Vec<Known<'a>>,
+    /// Places in the list, by names in lower case.
+    lower: HashMap<String, Vec<usize>>,
+    /// The same by plain names, where the program's text does not declare the tool.
+    plain: HashMap<String, Vec<usize>>,
+}
+
+impl<'a> Tools<'a> {
+    fn of(list: Vec<Known<'a>>) -> Self {
+        let mut lower: HashMap<String, Vec<usize>> = HashMap::new();
+        let mut plain: HashMap<String, Vec<usize>> = HashMap::new();
+        for (place, known) in list.iter().enumerate() {
+            let labels = known.labels.iter().copied().filter(|_| !known.in_text);
+            let stated = known.stated.map(|stated| stated.name.as_str());
+            for name in std::iter::once(known.name.as_str()).chain(stated).chain(labels) {
+                lower.entry(name.to_ascii_lowercase()).or_default().push(place);
+            }
+            if !known.in_text {
+                plain.entry(setup::plain(&known.name)).or_default().push(place);
+            }
+        }
+        Self { list, lower, plain }
+    }
+
+    /// Those of a name, in the order of the list.
+    fn called(&self, name: &str) -> impl Iterator<Item = &Known<'a>> {
+        let lower = self.lower.get(&name.to_ascii_lowercase()).into_iter().flatten();
+        let plain = self.plain.get(&setup::plain(name)).into_iter().flatten();
+        let mut places: Vec<usize> = lower.chain(plain).copied().collect();
+        places.sort_unstable();
+        places.dedup();
+        places.into_iter().map(|place| &self.list[place])
+    }
+}
+
+/// So many names are listed in a sentence.
+const MOST_NAMES: usize = 12;
 
 impl Known<'_> {
     fn is(&self, name: &str) -> bool {

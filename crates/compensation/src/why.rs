@@ -137,6 +137,7 @@ impl Why {
             Why::Inverse(InverseError::OtherConfiguration { .. } | InverseError::OtherBranch { .. }) => {
                 "not reachable in its configuration"
             }
+            Why::Inverse(InverseError::Abandoned) => "too many targets had to be searched for",
             Why::Inverse(_) => "no joints were found",
             Why::OutsideLimits { .. } => "a joint would leave its range",
             Why::TooFar { .. } => "correction exceeds the bound (--max-correction)",

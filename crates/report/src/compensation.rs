@@ -440,6 +440,9 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
         Why::Inverse(InverseError::OtherBranch { .. }) => {
             plain("target is reachable only in another configuration")
         }
+        Why::Inverse(InverseError::Abandoned) => {
+            plain("its joints were not sought to the end: too many targets had to be searched for")
+        }
         Why::Inverse(InverseError::NotConverged { .. }) => plain("no joints were found"),
         Why::TooFar { mm } => sized("correction exceeds the bound (--max-correction)".to_owned(), mm, "mm"),
         Why::TooMuchTurn { deg } => {

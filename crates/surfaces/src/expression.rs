@@ -154,9 +154,15 @@ impl Expression {
         &self.text
     }
 
-    /// Terms of the value and of all first derivatives together, as the rules of differentiation write them.
+    /// Terms of the value and of all first derivatives together, as the rules of differentiation write them; each counts
+    /// for more where the expression has functions, which take as long as several sums and products.
     pub(crate) fn terms(&self) -> [f64; 2] {
-        [self.terms.value, self.terms.first * self.used.len() as f64]
+        let weight = match &self.text {
+            text if text.contains("tan") => 4.0,
+            text if FUNCTIONS.iter().any(|name| text.contains(name)) => 2.5,
+            _ => 1.0,
+        };
+        [self.terms.value * weight, self.terms.first * self.used.len() as f64 * weight]
     }
 
     /// Value at `at`, one number per variable; NaN or infinite where the expression has no value.

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::UnitQuaternion;
 
 use super::configuration::{BRANCH_TOLERANCE, Configuration, QUARTER_AXES};
+use super::effort;
 use super::newton::{self, Goal, Outcome};
 use super::{Inverse, InverseError, Solution, same_branch};
 use crate::joints::{Joints, Limits};
@@ -118,6 +119,9 @@ impl Inverse<'_> {
                 best = Some((rank, outcome));
             }
         }
+        if effort::ran_out() {
+            return Err(InverseError::Abandoned);
+        }
         match (best, outside, nearest) {
             (Some((_, outcome)), _, _) => Ok(self.solution(&outcome)),
             (None, Some(error), _) => Err(error),
@@ -163,9 +167,15 @@ impl Inverse<'_> {
         margins: &[f64; 3],
         spread: usize,
     ) -> Result<Vec<Outcome>, InverseError> {
+        if effort::refuses() {
+            return Err(InverseError::Abandoned);
+        }
         let around = near.copied().unwrap_or_else(|| Joints::from_fn(|axis, _| self.middle(axis)));
         let seeds = self.structure.seeds(&goal.last, &(self.arm.model.joint_map * around).into());
         let beyond_mm = seeds.iter().map(|s| s.beyond_mm).fold(f64::INFINITY, f64::min);
+        if self.structure.surely_beyond(&goal.last, beyond_mm, self.apart_mm) {
+            return Err(InverseError::Unreachable { beyond_mm });
+        }
         let mut search =
             Search { inverse: self, goal, around, found: Vec::with_capacity(8), stuck: Vec::new() };
         if let Some(near) = near {
@@ -195,6 +205,9 @@ impl Inverse<'_> {
         };
         for k in 0..spread {
             search.attempt(&self.spread_seed(k));
+        }
+        if effort::ran_out() {
+            return Err(InverseError::Abandoned);
         }
         if !search.found.is_empty() {
             return Ok(search.found);

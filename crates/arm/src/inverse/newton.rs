@@ -10,6 +10,8 @@
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
+use super::effort;
+
 use crate::chain::Chain;
 use crate::jacobian::{joint_jacobian, link_twist};
 use crate::joints::Joints;
@@ -115,8 +117,12 @@ fn rotation_vector(m: &Matrix3<f64>) -> Vector3<f64> {
     Rotation3::from_matrix_unchecked(*m).scaled_axis()
 }
 
-/// Runs from `start`. NaN ends it at once, not converged.
+/// Runs from `start`. NaN ends it at once, not converged; so does an allowance that is used up.
 pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length_mm: f64) -> Outcome {
+    if effort::refuses() {
+        let far = f64::INFINITY;
+        return Outcome { joints: *start, residual_mm: far, residual_rad: far, iterations: 0 };
+    }
     let mut here = state(arm, goal, *start, length_mm);
     let mut damping = 0.0_f64;
     let mut iterations = 0;
@@ -137,6 +143,7 @@ pub(super) fn solve(arm: &PreparedModel<'_>, goal: &Goal, start: &Joints, length
             None => damping = (damping * 10.0).max(1e-6),
         }
     }
+    effort::spend(iterations as u64 + 1);
     Outcome {
         joints: here.joints,
         residual_mm: here.residual_mm,

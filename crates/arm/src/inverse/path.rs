@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::configuration::{self, Configuration};
+use super::effort::{Allowance, within};
 use super::kernel::{Asked, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::chain::End;
@@ -52,24 +53,34 @@ impl Inverse<'_> {
     ///
     /// One thread; the same input gives the same bits.
     pub fn solve_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Solution, InverseError>> {
-        self.along(targets, start, Asked::Everything, |solution, _| solution)
+        self.along(targets, start, Asked::Everything, false, |solution, _| solution)
     }
 
     /// The joints of [`Inverse::solve_path`], without residuals and distances to singularity: half the work. They may
     /// differ by 1e-12 rad.
     pub fn reach_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Reached, InverseError>> {
-        self.along(targets, start, Asked::Joints, |Solution { joints, .. }, margins| Reached {
+        self.along(targets, start, Asked::Joints, false, |Solution { joints, .. }, margins| Reached {
             joints,
             configuration: self.configuration_of(&joints, &margins),
             margins,
         })
     }
 
+    /// The first of [`Inverse::reach_path`], up to a target for which all branches would have to be searched.
+    pub fn reach_path_easily(&self, targets: &[Pose], start: &Joints) -> Vec<Reached> {
+        let reached = self.along(targets, start, Asked::Joints, true, |Solution { joints, .. }, margins| {
+            Reached { joints, configuration: self.configuration_of(&joints, &margins), margins }
+        });
+        reached.into_iter().map_while(Result::ok).collect()
+    }
+
+    /// `easily`: up to a target that is not reached without a search, which ends the list.
     fn along<T>(
         &self,
         targets: &[Pose],
         start: &Joints,
         asked: Asked,
+        easily: bool,
         keep: impl Fn(Solution, [f64; 3]) -> T,
     ) -> Vec<Result<T, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
@@ -93,6 +104,13 @@ impl Inverse<'_> {
                         margins = row.margins[1];
                         Ok(solution)
                     }
+                    None if easily => match self.solve_easily(target, &last) {
+                        Some(Ok(solution)) => {
+                            margins = self.margins(&solution.joints);
+                            Ok(solution)
+                        }
+                        Some(Err(_)) | None => return out,
+                    },
                     None => self.solve_near(target, &last).inspect(|s| margins = self.margins(&s.joints)),
                 };
                 if let Ok(solution) = &result {
@@ -111,15 +129,33 @@ impl Inverse<'_> {
     /// [`Inverse::solve_near`] for many targets, each with its own seed, on all threads of the current pool; the same
     /// bits as one by one. Targets without a seed are left out.
     pub fn solve_seeded(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Solution, InverseError>> {
+        self.solve_seeded_within(targets, seeds, u64::MAX)
+    }
+
+    /// The same with so many evaluations at most for those that have to be searched for (see [`effort`](super::effort)),
+    /// shared out by their number.
+    pub fn solve_seeded_within(
+        &self,
+        targets: &[Pose],
+        seeds: &[Joints],
+        evaluations: u64,
+    ) -> Vec<Result<Solution, InverseError>> {
         let count = targets.len().min(seeds.len());
+        let portions = count.div_ceil(PORTION);
         targets[..count]
             .par_chunks(PORTION)
             .zip(seeds[..count].par_chunks(PORTION))
-            .flat_map_iter(|(targets, seeds)| {
-                let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
-                blocks.flat_map(|(targets, seeds)| {
-                    let solved = self.solve_lanes(targets, &padded(seeds), Asked::Everything);
-                    (0..targets.len()).map(move |k| self.judged(&lane(&solved, k), &targets[k], &seeds[k]))
+            .enumerate()
+            .flat_map_iter(|(portion, (targets, seeds))| {
+                let mut allowance = Allowance::of(evaluations).part(portion, portions);
+                within(&mut allowance, || {
+                    let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
+                    let solved = blocks.flat_map(|(targets, seeds)| {
+                        let solved = self.solve_lanes(targets, &padded(seeds), Asked::Everything);
+                        (0..targets.len())
+                            .map(move |k| self.judged(&lane(&solved, k), &targets[k], &seeds[k]))
+                    });
+                    solved.collect::<Vec<_>>()
                 })
             })
             .collect()

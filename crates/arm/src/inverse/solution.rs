@@ -137,6 +137,12 @@ pub enum InverseError {
         /// Remaining angle (rad).
         residual_rad: f64,
     },
+    /// The search was given up: see [`effort`](super::effort).
+    #[error(
+        "its joints were not sought to the end: too many targets of this program are out of reach or beside a singularity, and \
+         the work on those is bounded; correct them first, or divide the program"
+    )]
+    Abandoned,
     /// The target or the seed holds NaN or an infinity.
     #[error("target or seed is not a finite number")]
     NotFinite,

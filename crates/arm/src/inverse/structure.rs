@@ -61,6 +61,42 @@ impl Structure {
         }
     }
 
+    /// Sum of the link lengths (mm).
+    pub(super) fn extent_mm(&self) -> f64 {
+        self.axes.extent_mm
+    }
+
+    /// Whether no arm whose points are within `apart_mm` of this one's, all joints turned alike, reaches a pose of the last
+    /// frame that the closed form has beyond reach by `beyond_mm`.
+    ///
+    /// For a spherical wrist: the wrist centre is told by the pose, and the places that it reaches are a ring about axis 1.
+    /// Seen in a plane through that axis, a shift of the wrist centre moves its place by no more than as much, but for an
+    /// arm with an offset to the side, of which the plane turns: more the nearer to the axis. Any arm: what lies farther
+    /// from the base than all links in line are long.
+    pub(super) fn surely_beyond(&self, last: &Pose, beyond_mm: f64, apart_mm: f64) -> bool {
+        if !(beyond_mm > 0.0 && beyond_mm.is_finite()) {
+            return false;
+        }
+        let axes = &self.axes;
+        if last.translation.vector.norm() > axes.extent_mm + apart_mm {
+            return true;
+        }
+        let Family::Spherical(centre) = self.family else { return false };
+        let there = (last * axes.home_inverse * Point3::from(centre)).coords - axes.point[0];
+        let from_axis = there.cross(&axes.direction[0]).norm();
+        let to_side = axes.direction[1].dot(&(centre - axes.point[0])).abs();
+        // What the closed form itself takes for meeting and for parallel.
+        let loose = axes.meeting(3, 4).map_or(f64::INFINITY, |(_, gap)| gap)
+            + axes.distance(5, &centre)
+            + axes.extent_mm * axes.direction[1].cross(&axes.direction[2]).norm();
+        let shift = 2.0 * (apart_mm + loose) + 1e-3;
+        let nearest = from_axis - shift;
+        if !(nearest > 1.1 * to_side) {
+            return to_side < 1e-6 && beyond_mm > shift;
+        }
+        beyond_mm > shift * nearest / (nearest.powi(2) - to_side.powi(2)).sqrt()
+    }
+
     /// The point that joints 4 to 6 move least, in the last frame (mm): where the twist is taken.
     pub(super) fn wrist_in_last(&self) -> [f64; 3] {
         match self.family {

@@ -391,6 +391,8 @@ pub fn lack(training: &Fitted, held: &Observed) -> f64 {
     if x.is_empty() || held.dataset.rows.is_empty() {
         return 1.0;
     }
+    let few = held.few();
+    let held = few.as_ref().unwrap_or(held);
     let (sigma_mm, sigma_rad) = (training.sigma_mm, training.sigma_rad);
     let weights = rounding::weights(
         &held.dataset,
@@ -434,7 +436,7 @@ fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
         let n = (to - from) * per;
         let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);
         task.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
-        for (i, row) in dataset.rows[from..to].iter().enumerate() {
+        for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
             let weight = task.weight(from + i).per_mm;
             let seen = Vector3::from(placed(&row.reading)) - Vector3::from(middle);
             match dataset.sensor {

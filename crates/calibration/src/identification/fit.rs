@@ -56,7 +56,31 @@ impl Observed {
     pub fn subset(&self, indices: &[usize]) -> Self {
         Self { dataset: self.dataset.subset(indices), angles: self.angles.subset(indices) }
     }
+
+    /// Some of very many rows, one from each of equal stretches; `None` where there are not so many.
+    ///
+    /// Weights, the sensor's standard deviation and what is an outlier are as well told by them, at a fraction of the cost.
+    pub(crate) fn few(&self) -> Option<Self> {
+        let rows = self.dataset.rows.len();
+        if rows <= MANY_ROWS {
+            return None;
+        }
+        let place = |stretch: usize| {
+            let [begin, end] = [stretch, stretch + 1].map(|k| k * rows / FEW_ROWS);
+            // Without order, so that no rhythm of the measurement is met (the finaliser of splitmix64).
+            let mut bits = (stretch as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+            bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            begin + ((bits ^ (bits >> 31)) % (end - begin) as u64) as usize
+        };
+        Some(self.subset(&(0..FEW_ROWS).map(place).collect::<Vec<_>>()))
+    }
 }
+
+/// Rows from which some stand for all where only weights are to be told.
+const MANY_ROWS: usize = 50_000;
+/// How many stand for them.
+const FEW_ROWS: usize = 20_000;
 
 /// A fitted stage.
 #[derive(Debug, Clone)]
@@ -114,9 +138,15 @@ pub fn fit(
     let mut frames = start.frames.clone();
     let mut evaluations = Evaluations::default();
     let (mut last, mut rounds): (Option<(Calibration, Estimate)>, _) = (None, Vec::with_capacity(ROUNDS));
-    for _ in 0..ROUNDS {
-        let weights =
-            rounding::weights(&observed.dataset, &model, &frames, &observed.angles, sigma_mm, sigma_rad);
+    // Of very many rows some settle the weights, and all of them are fitted once.
+    let few = observed.few();
+    for round in 1..=ROUNDS {
+        let observed = few.as_ref().filter(|_| round < ROUNDS).unwrap_or(observed);
+        if few.is_some() && round == ROUNDS {
+            last = None;
+        }
+        let before = rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles);
+        let weights = rounding::weights_of(&before, sigma_mm, sigma_rad);
         // Only the weights change from round to round.
         let task = match last.take() {
             Some((task, _)) => task.weighted(&weights),
@@ -124,12 +154,17 @@ pub fn fit(
                 Calibration::new(&observed.dataset, start.model, start.frames, parameters, &priors, &weights)
             }
         };
+        drop(weights);
         let estimate = solver.solve(&task, &x, seed);
         evaluations.residuals += estimate.evaluations.residuals;
         evaluations.jacobians += estimate.evaluations.jacobians;
         x.clone_from(&estimate.x);
         (model, frames) = task.apply(&x);
-        let shares = rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles);
+        let shares = match &few {
+            // Where they were told from is near enough: the arm moved by a share of its tolerance.
+            Some(_) => before,
+            None => rounding::angle_shares(&observed.dataset, &model, &frames, &observed.angles),
+        };
         let spent = spent_freedom(&task, &estimate);
         (sigma_mm, sigma_rad) = spreads(&task, &x, &shares, spent);
         rounds.push(estimate.trace.clone());
@@ -215,12 +250,17 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
     let parameters: Vec<Parameter> =
         arm_parameters(start.model).into_iter().chain(frame_parameters(dataset)).collect();
     let priors = tolerance.priors_within(&parameters, start.model, start.frames);
-    let n = dataset.rows.len();
-    let mut factor = vec![1.0; n];
+    let (all, few) = (observed, observed.few());
+    let observed = few.as_ref().unwrap_or(all);
+    let n = all.dataset.rows.len();
+    let dataset = &observed.dataset;
+    let mut factor = vec![1.0; dataset.rows.len()];
     let mut x = vec![0.0; parameters.len()];
     let (mut model, mut frames) = (start.model.clone(), start.frames.clone());
-    let mut scaled = vec![0.0; n];
+    let mut scaled = vec![0.0; dataset.rows.len()];
     let mut sigma = 0.1;
+    // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
+    let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
     let mut before: Option<Calibration> = None;
     for _ in 0..ROBUST_ROUNDS {
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
@@ -245,8 +285,6 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
         (model, frames) = task.apply(&x);
         let errors = task.errors_mm(&x);
         let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
-        // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
-        let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
         let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
         scaled = sizes.iter().map(|s| s / spread).collect();
         sigma = (sigma * spread).max(SMALLEST_SIGMA_MM);
@@ -257,6 +295,15 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
         if moved < 1e-3 {
             break;
         }
+    }
+    drop(before);
+    if few.is_some() {
+        // Found on some, applied to all.
+        let base = rounding::weights(&all.dataset, &model, &frames, &all.angles, sigma, 1e-3);
+        let errors = errors_on(all, &model, &frames);
+        let sizes: Vec<f64> = errors.iter().zip(&base).map(|(e, w)| e.abs() * w.per_mm).collect();
+        let spread = (median(&sizes).unwrap_or(1.0) * consistency).max(1e-9);
+        scaled = sizes.iter().map(|s| s / spread).collect();
     }
     let mut rows: Vec<(usize, f64)> =
         scaled.iter().copied().enumerate().filter(|(_, s)| !(*s <= OUTLIER_CUT)).collect();

@@ -177,9 +177,13 @@ pub fn identify(
     if !(rmse_mm < WRONG_ARM_MM) {
         return Err(IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm });
     }
-    let on = |fitted: &Fitted| StageErrors {
-        fitted: summary_on(&fitted_rows, &fitted.model, &fitted.frames),
-        held_out: summary_on(&held_rows, &fitted.model, &fitted.frames),
+    let on = |fitted: &Fitted| {
+        let held = errors_on(&held_rows, &fitted.model, &fitted.frames);
+        let errors = StageErrors {
+            fitted: summary_on(&fitted_rows, &fitted.model, &fitted.frames),
+            held_out: ErrorSummary::of(held.iter().copied()),
+        };
+        (errors, held)
     };
     let geometry_of = |rows: &Observed, registered: &Fitted| {
         if options.solver.literal {
@@ -191,11 +195,11 @@ pub fn identify(
         }
     };
     let training = geometry_of(&fitted_rows, &registered);
-    let (registered_errors, geometry_errors) = (on(&registered), on(&training));
+    let ((registered_errors, before), (geometry_errors, after)) = (on(&registered), on(&training));
     let held_out = test
         .iter()
-        .zip(errors_on(&held_rows, &registered.model, &registered.frames))
-        .zip(errors_on(&held_rows, &training.model, &training.frames))
+        .zip(before)
+        .zip(after)
         .map(|((&i, before), after)| (observed.dataset.rows[i].number, before, after))
         .collect();
     // The model itself: all rows.

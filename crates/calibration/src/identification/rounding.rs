@@ -182,7 +182,11 @@ pub fn weights(
     if angles.silent() {
         return vec![Weight { per_mm: 1.0 / sigma_mm, per_rad: 1.0 / sigma_rad }; dataset.rows.len()];
     }
-    let shares = angle_shares(dataset, model, frames, angles);
+    weights_of(&angle_shares(dataset, model, frames, angles), sigma_mm, sigma_rad)
+}
+
+/// The same from the shares of the angles.
+pub(crate) fn weights_of(shares: &[(f64, f64)], sigma_mm: f64, sigma_rad: f64) -> Vec<Weight> {
     shares
         .iter()
         .map(|(mm, rad)| Weight {

@@ -1,11 +1,15 @@
 //! Measured rows as the rest of truegrind sees them: units converted, columns resolved.
 
+mod rows;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
+
+pub use self::rows::{Iter, Rows};
 
 /// What the sensor tells of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,7 +53,7 @@ pub struct Row {
     pub anchor: usize,
     /// Session label, where logged.
     pub session: Option<String>,
-    /// Cells of [`Dataset::other_columns`], as text.
+    /// Cells of [`Dataset::other_columns`], as text, up to the last one that holds something.
     pub other: Vec<String>,
 }
 
@@ -65,7 +69,7 @@ pub struct Dataset {
     /// The one sensor of the file.
     pub sensor: Sensor,
     /// The rows.
-    pub rows: Vec<Row>,
+    pub rows: Rows,
     /// Headers of columns that are kept but not used.
     pub other_columns: Vec<String>,
     /// What a reader should know: columns skipped, blank rows dropped.
@@ -97,13 +101,13 @@ impl Row {
 
 impl Dataset {
     /// Rows that come from no file.
-    pub fn new(file: &str, sensor: Sensor, rows: Vec<Row>) -> Self {
+    pub fn new(file: &str, sensor: Sensor, rows: impl Into<Rows>) -> Self {
         Self {
             file: file.into(),
             sheet: None,
             sha256: String::new(),
             sensor,
-            rows,
+            rows: rows.into(),
             other_columns: Vec::new(),
             notes: Vec::new(),
             angle_step_rad: None,
@@ -114,7 +118,7 @@ impl Dataset {
 
     /// The same file with only the rows at `indices` of [`Dataset::rows`].
     pub fn subset(&self, indices: &[usize]) -> Self {
-        Self { rows: indices.iter().map(|&i| self.rows[i].clone()).collect(), ..self.clone() }
+        Self { rows: self.rows.part(indices), ..self.clone() }
     }
 
     /// Number of cable outlets.

@@ -34,8 +34,7 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
         if let Some(sheet) = &options.sheet {
             return Err(ImportError::NoSheets { file: file.into(), sheet: sheet.clone() });
         }
-        let table = csv::table(file, bytes)?;
-        from_table(file, &table, options)?
+        from_text(file, &csv::Text::of(file, bytes)?, options)?
     };
     dataset.sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
     Ok(dataset)
@@ -43,7 +42,20 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
 
 fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, ImportError> {
     let columns = Columns::find(file, table)?;
-    rows::dataset(file, table, &columns, options)
+    rows::dataset(file, table, &columns, options, std::iter::empty())
+}
+
+/// A text table: as many lines as it takes to find the header, and the rest one by one.
+fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Dataset, ImportError> {
+    let mut table = text.empty();
+    let mut lines = text.lines(file);
+    while !columns::shows_header(&table.rows)
+        && let Some(line) = lines.next()
+    {
+        table.rows.push(line?);
+    }
+    let columns = Columns::find(file, &table)?;
+    rows::dataset(file, &table, &columns, options, lines)
 }
 
 fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Dataset, ImportError> {

@@ -3,14 +3,15 @@
 //! A pose that was measured several times stays on one side of every split: a fit that has seen a pose has seen its
 //! repetitions. All functions return indices of [`Dataset::rows`] in ascending order.
 
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use super::dataset::{Dataset, Reading};
+use super::dataset::{Dataset, Reading, Row};
 
 /// Rows to fit and rows to judge the fit by.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,26 +45,52 @@ pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
     let reach = same * WEIGHTS.iter().sum::<f64>();
     let place: Vec<f64> =
         data.rows.iter().map(|row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum()).collect();
-    let mut order: Vec<usize> = (0..data.rows.len()).collect();
-    order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
+    // Rows that are one to the last bit stand behind the first of them, so that a pose measured a thousand times is not
+    // compared a million times.
     let mut group: Vec<usize> = (0..data.rows.len()).collect();
+    let mut first: HashMap<[u64; 10], usize> = HashMap::new();
+    let mut order: Vec<usize> = Vec::with_capacity(data.rows.len());
+    for (i, row) in data.rows.iter().enumerate() {
+        match first.entry(bits(row)) {
+            Entry::Occupied(known) => group[i] = *known.get(),
+            Entry::Vacant(new) => {
+                new.insert(i);
+                order.push(i);
+            }
+        }
+    }
+    order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
     for (k, &i) in order.iter().enumerate() {
         for &j in order[k + 1..].iter().take_while(|&&j| place[j] - place[i] <= reach) {
-            if (data.rows[i].joints - data.rows[j].joints).amax() <= same && !told_apart(data, i, j) {
-                let (a, b) = (root(&group, i), root(&group, j));
+            let (a, b) = (root(&mut group, i), root(&mut group, j));
+            if a != b && (data.rows[i].joints - data.rows[j].joints).amax() <= same && !told_apart(data, i, j)
+            {
                 group[a.max(b)] = a.min(b);
             }
         }
     }
     let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for i in 0..data.rows.len() {
-        out.entry(root(&group, i)).or_default().push(i);
+        out.entry(root(&mut group, i)).or_default().push(i);
     }
     out.into_values().collect()
 }
 
-fn root(group: &[usize], mut i: usize) -> usize {
+/// Joints and read-out of a row, by their bits; −0 and 0 are one.
+fn bits(row: &Row) -> [u64; 10] {
+    let mut out = [0; 10];
+    let readout = row.readout_mm;
+    for (bits, value) in out.iter_mut().zip(row.joints.iter().chain(readout.iter().flatten())) {
+        *bits = (value + 0.0).to_bits();
+    }
+    out[9] = u64::from(readout.is_some());
+    out
+}
+
+/// The first row of a group; the way to it is halved as it is walked.
+fn root(group: &mut [usize], mut i: usize) -> usize {
     while group[i] != i {
+        group[i] = group[group[i]];
         i = group[i];
     }
     i

@@ -166,7 +166,7 @@ impl State {
 }
 
 /// A short hash of rows, by their bits.
-pub(super) fn digest(rows: &[Row]) -> String {
+pub(super) fn digest<'r>(rows: impl Iterator<Item = &'r Row>) -> String {
     use sha2::{Digest, Sha256};
     let mut hash = Sha256::new();
     for row in rows {

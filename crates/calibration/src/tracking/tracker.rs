@@ -209,7 +209,8 @@ impl Tracker {
         let from = done.map_or(0, |at| self.state.consumed[at].rows);
         if let Some(at) = done {
             let known = &self.state.consumed[at];
-            if dataset.rows.len() < known.rows || digest(&dataset.rows[..known.rows]) != known.digest {
+            if dataset.rows.len() < known.rows || digest(dataset.rows.iter().take(known.rows)) != known.digest
+            {
                 return Err(TrackError::State {
                     file: dataset.file.clone(),
                     why: format!(
@@ -231,8 +232,11 @@ impl Tracker {
             self.condition = row.condition;
             alarms.extend(self.pose(&task, at, seen));
         }
-        let consumed =
-            Consumed { file: dataset.file.clone(), rows: dataset.rows.len(), digest: digest(&dataset.rows) };
+        let consumed = Consumed {
+            file: dataset.file.clone(),
+            rows: dataset.rows.len(),
+            digest: digest(dataset.rows.iter()),
+        };
         match done {
             Some(at) => self.state.consumed[at] = consumed,
             None => self.state.consumed.push(consumed),
@@ -296,7 +300,7 @@ impl Tracker {
     }
 
     pub(super) fn task(&self, poses: &[Seen]) -> Calibration {
-        let rows = poses.iter().map(|seen| seen.row_of(&self.state.sensor)).collect();
+        let rows: Vec<Row> = poses.iter().map(|seen| seen.row_of(&self.state.sensor)).collect();
         let sensor = match self.state.sensor.as_str() {
             "cable" => Sensor::Cable,
             "position" => Sensor::Position,

@@ -49,7 +49,7 @@ pub fn same(one: &str, other: &str) -> bool {
 }
 
 /// A name in upper case without blanks, and its number without leading zeros.
-pub(super) fn plain(name: &str) -> String {
+pub fn plain(name: &str) -> String {
     let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
     match name.strip_prefix('T') {
         Some(digits) if !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()) => {

@@ -445,8 +445,11 @@ impl<'t, 's> Lister<'t, 's> {
         self.tools = self.stated(&tools);
         self.frames = self.stated(&frames);
         let told = tools.iter().map(|(_, stated)| (stated.number.clone(), stated.frame));
+        let beforehand: HashSet<String> =
+            self.setup.tools.iter().map(|(name, _)| setup::plain(name)).collect();
         let kept = told.filter(|(name, _)| {
-            self.tools.contains_key(&setup::plain(name)) && self.setup.tool(name).is_none()
+            let name = setup::plain(name);
+            self.tools.contains_key(&name) && !beforehand.contains(&name)
         });
         let declared: Vec<Tool> =
             self.setup.tools.iter().cloned().chain(kept).map(|one| tool(&one)).collect();

@@ -129,11 +129,20 @@ impl Columns {
     }
 }
 
+/// Whether no further row could become the header.
+pub(super) fn shows_header(rows: &[Line]) -> bool {
+    let used = |line: &Line| line.cells.iter().any(|cell| !cell.is_empty());
+    rows.len() >= TITLES && (rows[..TITLES].iter().any(used) || rows.last().is_some_and(used))
+}
+
+/// A title of so many rows may stand above the header.
+const TITLES: usize = 20;
+
 /// The first row with a joint's name in it (a title may stand above), else the first row with anything in it.
 fn header_row(rows: &[Line]) -> Option<usize> {
     let names_a_joint = |line: &Line| line.cells.iter().any(|c| joint_number(&c.to_string()).is_some());
     rows.iter()
-        .take(20)
+        .take(TITLES)
         .position(names_a_joint)
         .or_else(|| rows.iter().position(|line| line.cells.iter().any(|c| !c.is_empty())))
 }

@@ -7,32 +7,55 @@ use ::csv::{ByteRecord, ReaderBuilder};
 use super::cell::{Cell, Line, Table};
 use super::error::{ImportError, Place};
 
-/// The cells of a text table.
-pub fn table(file: &str, bytes: &[u8]) -> Result<Table, ImportError> {
-    let text = text(bytes);
-    if text.contains('\0') {
-        return Err(ImportError::NotATable { place: Place::file(file) });
+/// A text table that is read line by line: its cells together would take several times the memory of its numbers.
+pub(super) struct Text<'a> {
+    text: Cow<'a, str>,
+    delimiter: u8,
+}
+
+impl<'a> Text<'a> {
+    pub(super) fn of(file: &str, bytes: &'a [u8]) -> Result<Self, ImportError> {
+        let text = text(bytes);
+        if text.contains('\0') {
+            return Err(ImportError::NotATable { place: Place::file(file) });
+        }
+        let delimiter = delimiter(&text);
+        Ok(Self { text, delimiter })
     }
-    let delimiter = delimiter(&text);
-    let decimal_comma = delimiter != b',';
-    let mut reader = ReaderBuilder::new()
-        .delimiter(delimiter)
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(text.as_bytes());
-    let mut record = ByteRecord::new();
-    let mut rows = Vec::new();
-    let mut lines = LineCounter { bytes: text.as_bytes(), byte: 0, line: 1 };
-    while reader
-        .read_byte_record(&mut record)
-        .map_err(|e| ImportError::Format { place: Place::file(file), message: e.to_string() })?
-    {
-        let number = record.position().map_or(0, |p| lines.at(p.byte() as usize));
-        let cells = record.iter().map(|field| cell(&String::from_utf8_lossy(field), decimal_comma)).collect();
-        rows.push(Line { number, cells });
+
+    /// What is known of the table before its rows.
+    pub(super) fn empty(&self) -> Table {
+        let blank_lines = self.text.lines().filter(|l| l.trim().is_empty()).count();
+        Table { blank_lines, decimal_comma: self.decimal_comma(), ..Table::default() }
     }
-    let blank_lines = text.lines().filter(|l| l.trim().is_empty()).count();
-    Ok(Table { sheet: None, rows, width: 0, blank_lines, blank_columns: 0, decimal_comma })
+
+    fn decimal_comma(&self) -> bool {
+        self.delimiter != b','
+    }
+
+    /// The lines, blank ones left out.
+    pub(super) fn lines(&self, file: &str) -> impl Iterator<Item = Result<Line, ImportError>> {
+        let mut reader = ReaderBuilder::new()
+            .delimiter(self.delimiter)
+            .has_headers(false)
+            .flexible(true)
+            .from_reader(self.text.as_bytes());
+        let mut record = ByteRecord::new();
+        let mut lines = LineCounter { bytes: self.text.as_bytes(), byte: 0, line: 1 };
+        let decimal_comma = self.decimal_comma();
+        std::iter::from_fn(move || match reader.read_byte_record(&mut record) {
+            Ok(false) => None,
+            Ok(true) => {
+                let number = record.position().map_or(0, |p| lines.at(p.byte() as usize));
+                let cells =
+                    record.iter().map(|field| cell(&String::from_utf8_lossy(field), decimal_comma)).collect();
+                Some(Ok(Line { number, cells }))
+            }
+            Err(error) => {
+                Some(Err(ImportError::Format { place: Place::file(file), message: error.to_string() }))
+            }
+        })
+    }
 }
 
 /// Line numbers as an editor counts them; the reader of the format does not count blank lines it skips.
@@ -106,7 +129,7 @@ fn cell(field: &str, decimal_comma: bool) -> Cell {
 /// nobody's number for certain and stay text.
 pub(super) fn number(text: &str, decimal_comma: bool) -> Option<f64> {
     // Spreadsheets write a typographic minus now and then.
-    let text = text.replace('\u{2212}', "-");
+    let text = if text.is_ascii() { Cow::Borrowed(text) } else { Cow::Owned(text.replace('\u{2212}', "-")) };
     if decimal_comma && text.matches(',').count() == 1 && !text.contains('.') {
         return text.replace(',', ".").parse().ok();
     }

@@ -1,5 +1,7 @@
 //! Rows of a table as measured rows: every cell checked, units converted.
 
+use std::borrow::Cow;
+
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::cell::{Cell, Line, Table};
@@ -15,17 +17,21 @@ use truegrind_math::se3::Pose;
 /// Largest difference of a quaternion's length from 1: four decimals still pass.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
+/// The rows below the header: those of the table, and `further` ones of a text that is read line by line.
 pub(super) fn dataset(
     file: &str,
     table: &Table,
     columns: &Columns,
     options: &Options,
+    further: impl Iterator<Item = Result<Line, ImportError>>,
 ) -> Result<Dataset, ImportError> {
     let mut notes = columns.notes.clone();
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
-    let lines = &table.rows[columns.header + 1..];
-    for (number, line) in lines.iter().enumerate() {
+    let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
+    for (number, line) in lines.chain(further.map(|line| line.map(Cow::Owned))).enumerate() {
+        let line: Cow<'_, Line> = line?;
+        let line = line.as_ref();
         let extra = line.cells.iter().skip(columns.width).filter(|c| !c.is_empty()).count();
         if extra > 0 && table.sheet.is_none() {
             let place = Place { row: Some(line.number), ..reader.place() };
@@ -45,6 +51,7 @@ pub(super) fn dataset(
     if rows.is_empty() {
         return Err(ImportError::Empty { place: reader.place() });
     }
+    rows.shrink_to_fit();
     let headed = reader.header.cells.iter().filter(|c| !c.is_empty()).count();
     let width = reader.header.cells.len().max(table.width);
     let nameless = (width - headed).max(unnamed) + table.blank_columns;
@@ -60,31 +67,38 @@ pub(super) fn dataset(
     if let Some(note) = number_anchors(&mut rows) {
         notes.push(note);
     }
+    let outlets = rows.iter().map(|row| row.anchor + 1).max().unwrap_or(1);
+    if outlets > MOST_OUTLETS {
+        return Err(ImportError::Cell {
+            place: Place { column: Some("anchor".into()), ..reader.place() },
+            found: format!("{outlets} different cable outlets").into(),
+            expected: "at most 64 in one file",
+            remedy: "each is sought with four parameters of its own: keep the rows of others in other files",
+        });
+    }
     if !options.allow_odd_units {
         check_units(&reader, &rows, columns.sensor)?;
     }
-    let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>());
+    let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()));
     let angle_step_rad = rounding::step(degrees).map(f64::to_radians);
-    let readouts: Vec<f64> = rows.iter().filter_map(|r| r.readout_mm).flat_map(|v| [v.x, v.y, v.z]).collect();
-    let readings: Vec<f64> = rows
-        .iter()
-        .flat_map(|r| match r.reading {
-            Reading::Cable(l) => vec![l],
-            Reading::Position(v) => vec![v.x, v.y, v.z],
-            Reading::Pose(p) => p.translation.vector.as_slice().to_vec(),
-        })
-        .collect();
+    let readouts = rows.iter().filter_map(|r| r.readout_mm).flat_map(|v| [v.x, v.y, v.z]);
+    let readings = rows.iter().flat_map(|r| {
+        let count = if columns.sensor == Sensor::Cable { 1 } else { 3 };
+        let at: [f64; 3] = coordinates(&r.reading).into();
+        at.into_iter().take(count)
+    });
+    let steps = [rounding::step(readouts), rounding::step(readings)];
     Ok(Dataset {
         file: file.into(),
         sheet: table.sheet.clone(),
         sha256: String::new(),
         sensor: columns.sensor,
-        rows,
+        rows: rows.into(),
         other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
         notes,
         angle_step_rad,
-        readout_step_mm: rounding::step(readouts.iter().copied()),
-        reading_step_mm: rounding::step(readings.iter().copied()),
+        readout_step_mm: steps[0],
+        reading_step_mm: steps[1],
     })
 }
 
@@ -93,6 +107,8 @@ const LARGEST_DEG: f64 = 3600.0;
 /// No reading is larger: a kilometre.
 const LARGEST_MM: f64 = 1e6;
 const LENGTH: &str = "a length in mm, below a kilometre";
+/// No cell has more cables; what their outlets cost grows with the cube of their number.
+const MOST_OUTLETS: usize = 64;
 /// No arm carries more.
 const LARGEST_KG: f64 = 1e4;
 
@@ -228,6 +244,8 @@ impl Reader<'_> {
                 value as usize
             }
         };
+        let kept = columns.other.iter().rposition(|(_, i)| line.cells.get(*i).is_some_and(|c| !c.is_empty()));
+        let kept = kept.map_or(0, |last| last + 1);
         let text = |i: usize| line.cells.get(i).map(Cell::to_string).unwrap_or_default();
         Ok(Row {
             number,
@@ -238,7 +256,7 @@ impl Reader<'_> {
             condition,
             anchor,
             session: columns.session.map(text).filter(|s| !s.is_empty()),
-            other: columns.other.iter().map(|(_, i)| text(*i)).collect(),
+            other: columns.other[..kept].iter().map(|(_, i)| text(*i)).collect(),
         })
     }
 

@@ -127,7 +127,7 @@ fn circumstances_are_logged_and_felt() {
     assert_eq!((last.time_h, last.payload_kg), (Some(4.0), Some(2.0)));
     assert!((last.temperature_c.unwrap() - (32.0 - 12.0 * (-4f64).exp())).abs() < 1e-3);
     let mut widest = 0f64;
-    for pair in data.rows.chunks(2) {
+    for pair in data.rows.iter().collect::<Vec<_>>().chunks(2) {
         assert_eq!((pair[0].condition.approach, pair[1].condition.approach), ([-1; 6], [1; 6]));
         let [Reading::Position(a), Reading::Position(b)] = [pair[0].reading, pair[1].reading] else {
             panic!()
