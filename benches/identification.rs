@@ -67,7 +67,7 @@ fn task(rows: usize) -> (Calibration, Vec<f64>) {
         sha256: String::new(),
         sheet: None,
         sensor: Sensor::Cable,
-        rows.into(),
+        rows: rows.into(),
         other_columns: Vec::new(),
         notes: Vec::new(),
         angle_step_rad: None,

@@ -1,8 +1,8 @@
 //! The arm of the test: what the controller believes (the data sheet) and what stands in the cell (the actual arm).
 //!
 //! Both are chains of links Rot_z(θ) Trans(a, 0, d) Rot_x(α) Rot_y(β). The actual arm has other numbers, joints that
-//! yield under the torque of gravity on links and payload, and joints with play that rest on the flank against which
-//! they moved last. The controller's inverse is the closed form of an arm with a spherical wrist.
+//! yield under the torque of gravity on links and payload, and joints with play, whose links stay where they are until a
+//! flank takes them along ([`play`](crate::play)). The controller's inverse is the closed form of an arm with a spherical wrist.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -40,8 +40,8 @@ pub struct Mass {
 /// What beside the joint angles decides where the actual arm stands.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Circumstance {
-    /// The side from which each joint came to rest: −1 from below, +1 from above, 0 in the middle of its play.
-    pub approach: [i8; 6],
+    /// How far each link stands before its motor (rad): the negative half of its play where it was pushed from below.
+    pub behind: [f64; 6],
     /// Mass at the flange (kg).
     pub payload_kg: f64,
     /// Its centre on the flange (mm).
@@ -95,9 +95,7 @@ impl Arm {
     pub fn actual_forward(&self, q: &[f64; 6], circumstance: &Circumstance) -> Pose {
         let yields = self.compliance.iter().any(|c| *c != 0.0);
         let torque = if yields { self.torques(q, circumstance) } else { [0.0; 6] };
-        let angles = std::array::from_fn(|j| {
-            q[j] + self.compliance[j] * torque[j] + 0.5 * self.play[j] * f64::from(circumstance.approach[j])
-        });
+        let angles = std::array::from_fn(|j| q[j] + self.compliance[j] * torque[j] + circumstance.behind[j]);
         frames(&self.actual, &angles)[6]
     }
 
@@ -133,6 +131,31 @@ impl Arm {
             out.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
         out
+    }
+
+    /// The one of them that is nearest to `near`, by the joint that goes farthest.
+    pub fn nominal_nearest(&self, flange: &Pose, near: &[f64; 6]) -> Option<[f64; 6]> {
+        let mut best: Option<(f64, [f64; 6])> = None;
+        for branch in self.branches(flange) {
+            let nearest = |j: usize| {
+                let fits = |angle: &f64| *angle >= self.min[j] - 1e-9 && *angle <= self.max[j] + 1e-9;
+                let all = (-2..=2).map(|turn| branch[j] + TAU * f64::from(turn)).filter(fits);
+                all.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))
+            };
+            let mut q = [0.0; 6];
+            let mut far = 0.0_f64;
+            let mut reached = true;
+            for j in 0..6 {
+                match nearest(j) {
+                    Some(angle) => (q[j], far) = (angle, far.max((angle - near[j]).abs())),
+                    None => reached = false,
+                }
+            }
+            if reached && best.is_none_or(|(least, _)| far < least) {
+                best = Some((far, q));
+            }
+        }
+        best.map(|best| best.1)
     }
 
     fn turns(&self, branch: &[f64; 6], joint: usize, here: &mut [f64; 6], out: &mut Vec<[f64; 6]>) {

@@ -16,6 +16,8 @@ pub mod arm;
 pub mod model;
 pub mod nc;
 pub mod outcome;
+pub mod play;
 pub mod rapid;
 pub mod report;
+pub mod stated;
 pub mod under_test;

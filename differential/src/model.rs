@@ -255,7 +255,7 @@ mod tests {
     fn actual_inverse_leads_back() {
         let case = with(5, true, true);
         let at = Circumstance {
-            approach: [1, -1, 0, 1, -1, 1],
+            behind: [1.0, -1.0, 0.0, 0.5, -1.0, 1.0].map(|share| share * 4e-4),
             payload_kg: 2.0,
             payload_centre_mm: [0.0, 10.0, 50.0],
         };

@@ -73,6 +73,8 @@ pub struct Tally {
     pub unreachable: usize,
     /// Executed motions that could not be judged, because what the arm does there hangs on less than can be told.
     pub open: usize,
+    /// Corrected executions that are off by more than numbers are written to, and by no more than the report states for them.
+    pub stated: usize,
     /// What is wrong.
     pub disagreements: Vec<Disagreement>,
 }
@@ -87,6 +89,7 @@ impl Tally {
         self.refused += other.refused;
         self.unreachable += other.unreachable;
         self.open += other.open;
+        self.stated += other.stated;
         self.disagreements.extend(other.disagreements);
     }
 }

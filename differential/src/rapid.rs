@@ -11,4 +11,4 @@ pub mod run;
 mod tests;
 pub mod value;
 
-pub use check::{Features, Shown, play, run, shown};
+pub use check::{Features, Shown, run, shown};

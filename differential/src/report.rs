@@ -46,14 +46,6 @@ pub fn run(dialect: Dialect, seed: u64, features: Features) -> Tally {
     }
 }
 
-/// Whether the arm of a seed has play.
-pub fn play(dialect: Dialect, seed: u64, features: Features) -> bool {
-    match dialect {
-        Dialect::Rapid => rapid::play(seed, features),
-        _ => crate::model::random(seed).play,
-    }
-}
-
 /// Both programs of a seed with what was found, as text.
 pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
     let mut out = String::new();
@@ -92,7 +84,8 @@ pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
 /// Counts in a line.
 pub fn line(name: &str, tally: &Tally, seconds: f64) -> String {
     format!(
-        "{name}: {} programs, {} motions run, {} corrected, {} left, {} refused, {} out of reach, {} open, {} disagreements, \
+        "{name}: {} programs, {} motions run, {} corrected, {} left, {} refused, {} out of reach, {} open, {} within what is stated, {} \
+         disagreements, \
          {seconds:.1} s",
         tally.programs,
         tally.executed,
@@ -101,6 +94,7 @@ pub fn line(name: &str, tally: &Tally, seconds: f64) -> String {
         tally.refused,
         tally.unreachable,
         tally.open,
+        tally.stated,
         tally.disagreements.len()
     )
 }

@@ -67,6 +67,8 @@ pub struct Row {
     pub after_mm: Option<f64>,
     /// Stated standard deviation (mm).
     pub sigma_mm: Option<f64>,
+    /// Stated distance of the path from the intended one (mm); none where it is not checked.
+    pub bend_mm: Option<f64>,
 }
 
 /// Bytes that were replaced.
@@ -179,6 +181,7 @@ pub fn corrected_task(
             reason: outcome.reason.map(|why| why.to_string()),
             after_mm: outcome.after_mm,
             sigma_mm: outcome.sigma_mm,
+            bend_mm: outcome.bend_mm,
         });
     }
     Ok(out)
@@ -194,6 +197,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
         reason: Some(reason.to_owned()),
         after_mm: None,
         sigma_mm: None,
+        bend_mm: None,
     });
     let same = |(_, bytes): &(&str, &[u8])| CorrectedFile { bytes: bytes.to_vec(), edits: Vec::new() };
     CorrectedTask { files: files.iter().map(same).collect(), rows: rows.collect() }

@@ -84,6 +84,12 @@ impl<'a> Circumstances<'a> {
         self.list[place].arm()
     }
 
+    /// Where the links stand under a condition with the motors at `joints`, load apart.
+    pub(super) fn links(&self, place: usize, joints: &Joints) -> Joints {
+        let sides = self.arm(place).condition.approach;
+        Joints::from_fn(|j, _| joints[j] + 0.5 * self.play_rad[j] * f64::from(sides[j]))
+    }
+
     /// How far a point on the flange stands from where the flanks would have it, where the sides of joints with play are
     /// not known: half the play of each, as independent displacements (mm).
     pub(super) fn in_play_mm(&self, place: usize, joints: &Joints, flange_from_tool: &Pose) -> f64 {

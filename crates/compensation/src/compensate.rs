@@ -16,6 +16,7 @@ use super::rewrite::{Options, Plan, Targets};
 use super::taught::contradictions;
 use super::undeclared;
 use super::why::Why;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
 use truegrind_programs::edit::EditError;
 use truegrind_programs::motion::{Listing, Mark, MotionKind, Reason};
@@ -71,12 +72,14 @@ pub fn compensate(
     let mut targets = Targets::of(listing, arm, cell, options);
     let mut refused: BTreeMap<u32, Why> = BTreeMap::new();
     let mut round = 0;
+    let play = arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)));
     loop {
         let mut planned = targets.plan(&refused);
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;
         let found = refusals(&planned, &rewritten, listing);
-        // What is judged motion by motion needs no second plan; nor does a program of which nothing else could change.
-        if found.is_empty() || options.cuts == Cuts::Single {
+        // What is judged motion by motion needs no second plan, unless what stays changes from which sides joints with play
+        // come to what follows; nor does a program of which nothing else could change.
+        if found.is_empty() || options.cuts == Cuts::Single && !play {
             reconcile(&mut planned, &rewritten, &found);
             planned.notes.extend(undeclared::notes(listing, program.language()));
             if program.language() == Language::Rapid

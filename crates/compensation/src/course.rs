@@ -1,50 +1,61 @@
 //! From which side each joint comes to rest, from the program's own motion.
 //!
-//! A joint with play rests on the flank against which it moved last, so the side at a target follows from the joints on
-//! the way to it. Every joint has a turning point: the farthest it went in the direction in which it moves. Once it has
-//! come back from there by more than [`DEAD_BAND_RAD`] it moves the other way, and did so from the turning point on. A
-//! joint that does not move keeps its side. Nothing is known at the start of a program and after a motion that the text
-//! does not tell; side 0 then stands for the middle of the play.
+//! A link with play stays where it is until one of its flanks takes it along, so where it can be follows from the joints on
+//! the way: a range, as wide as the play where nothing is known (the start of a program, a motion that the text does not
+//! tell), a point from there on where its motor has moved by more than that. A target that is corrected says where the link
+//! shall stand. The motor pushes it there from below if it is above all places where the link can be before, from above if
+//! it is below all of them, and comes by the whole play farther where it turns; where it is between, no side is known, and
+//! side 0 stands for the middle of the play. So a target whose link turns by less than its play is told from one whose
+//! motor alone turns. What stays as it was told leaves a link that turns by less than its play between its flanks.
 //!
 //! Lines and arcs are sampled between their ends, and a parabola through neighbouring samples tells where between them
-//! a joint turned.
+//! a joint turned. Where the text leaves open how the joints go (rapid motions of NC; lines of which the wrist goes joint
+//! by joint; lines written as joints or cut by targets that are put in), each way is followed, and a side is known where
+//! they agree.
 
-use super::curve::{Arc, between};
+use super::curve::Curve;
 use super::effort;
 use super::mounting::Mounting;
 use truegrind_arm::inverse::Inverse;
+use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::MotionKind;
+use truegrind_programs::motion::{Motion, MotionKind, Switch};
 
 /// The side from which each joint came: −1 from below, +1 from above, 0 not known.
 pub(super) type Sides = [i8; 6];
 
-/// A joint that comes back by less has not turned (rad): what a drive at rest may stray by, 0.005 mm at half a metre.
-pub(super) const DEAD_BAND_RAD: f64 = 1e-5;
+/// A link that would have to turn by less stays where it is (rad): 0.003 mm on the largest arms.
+const STILL_RAD: f64 = 1e-6;
+
+/// A motor that comes back by less on a way has not turned (rad): what a drive at rest may stray by.
+const DEAD_BAND_RAD: f64 = 1e-5;
 
 /// Samples on a path are no farther apart than this (mm, rad).
 const SAMPLE_MM: f64 = 25.0;
 const SAMPLE_RAD: f64 = 0.1;
 /// No path has more samples.
-const MOST_SAMPLES: usize = 24;
+const MOST_SAMPLES: usize = 64;
+
+/// A joint that goes farther between neighbouring samples comes past a singularity (rad).
+const MOST_STEP_RAD: f64 = 0.6;
 
 /// Where a motion ends.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Stop {
+pub(super) enum Stop<'a> {
     /// The arm does not move (external axes alone).
     Stays,
     /// The text does not tell where the arm is afterwards.
     Lost,
     /// At joints that are known.
-    At(Reached),
+    At(Reached<'a>),
 }
 
 /// The end of a motion with what is known of the way to it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reached {
-    /// How the arm goes there.
-    pub(super) kind: MotionKind,
+pub(super) struct Reached<'a> {
+    /// The motion.
+    pub(super) motion: &'a Motion,
     /// Index of the mounting.
     pub(super) mounted: usize,
     /// What the controller is told, in the work object.
@@ -53,15 +64,35 @@ pub(super) struct Reached {
     pub(super) joints: Joints,
     /// The point on the arc of a circular motion.
     pub(super) via: Option<Pose>,
+    /// Where the links shall stand, if the end is corrected.
+    pub(super) links: Option<Joints>,
+    /// Whether it is written as joints.
+    pub(super) as_joints: bool,
+    /// Whether targets may be put in before it.
+    pub(super) may_cut: bool,
+}
+
+impl Reached<'_> {
+    /// Whether its joints may go along a path, and whether they may go in proportion.
+    fn ways(&self) -> (bool, bool) {
+        let wrist = self.motion.modal.wrist_interpolation != Switch::Off;
+        match self.motion.kind {
+            MotionKind::Linear | MotionKind::Circular => (true, wrist || self.as_joints),
+            MotionKind::Joint => (self.motion.rapid, true),
+            _ => (false, true),
+        }
+    }
 }
 
 /// The sides on the way to the end of a motion.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Course {
     /// At the share 0 of the way, and from each share on at which a joint turns.
     pub(super) turns: Vec<(f64, Sides)>,
     /// At the end.
     pub(super) end: Sides,
+    /// At which share of the way the circle point is passed.
+    pub(super) passes: f64,
 }
 
 impl Course {
@@ -70,63 +101,129 @@ impl Course {
         self.turns.iter().rev().find(|(from, _)| *from <= s).map_or(self.end, |turn| turn.1)
     }
 
-    /// Calls every side unknown in which the course ends otherwise than `other`.
-    pub(super) fn agree(&mut self, other: &Self) {
-        for joint in 0..6 {
-            if self.end[joint] != other.end[joint] {
-                self.end[joint] = 0;
-                self.turns.iter_mut().for_each(|(_, sides)| sides[joint] = 0);
-            }
-        }
+    /// The side of a joint is not known.
+    fn forget(&mut self, joint: usize) {
+        self.end[joint] = 0;
+        self.turns.iter_mut().for_each(|(_, sides)| sides[joint] = 0);
     }
 }
 
 /// What one joint did last.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Track {
+    /// The flank on which the link lies, 0 where that is not known, or on neither.
     side: i8,
-    /// The turning point, or where the joint stood when nothing was known of it (rad).
+    /// The turning point of the motor (rad).
     farthest: f64,
     /// At which share of the present motion that was.
     since: f64,
+    /// Where the link can be (rad).
+    low: f64,
+    high: f64,
+    /// Half of its play (rad).
+    half: f64,
 }
 
 impl Track {
-    /// The joint goes on to `angle`; hands back where it turned, if it did.
-    fn go(&mut self, angle: f64, share: f64) -> Option<f64> {
-        let gone = angle - self.farthest;
+    /// A link of which nothing is known but where its motor stands.
+    fn unknown(motor: f64, half: f64) -> Self {
+        Self { side: 0, farthest: motor, since: 0.0, low: motor - half, high: motor + half, half }
+    }
+
+    /// The link is taken along by its flanks.
+    fn take(&mut self, motor: f64) {
+        let (low, high) = (motor - self.half, motor + self.half);
+        (self.low, self.high) = (self.low.clamp(low, high), self.high.clamp(low, high));
+    }
+
+    /// The flank on which the link certainly lies, its motor being there.
+    fn flank(&self, motor: f64) -> i8 {
+        let near = DEAD_BAND_RAD.min(0.1 * self.half);
+        if self.high - (motor - self.half) <= near {
+            -1
+        } else if motor + self.half - self.low <= near {
+            1
+        } else {
+            0
+        }
+    }
+
+    /// The motor goes on; hands back where the side changed, if it did.
+    fn go(&mut self, motor: f64, share: f64) -> Option<f64> {
+        self.take(motor);
+        if self.side == 0 {
+            self.side = self.flank(motor);
+            (self.farthest, self.since) = (motor, share);
+            return (self.side != 0).then_some(share);
+        }
+        let gone = motor - self.farthest;
         // A joint that moves up came from below.
         let side = if gone > 0.0 { -1 } else { 1 };
         if self.side == side {
-            (self.farthest, self.since) = (angle, share);
+            (self.farthest, self.since) = (motor, share);
         } else if gone.abs() > DEAD_BAND_RAD {
             let turned = self.since;
-            *self = Self { side, farthest: angle, since: share };
+            (self.side, self.farthest, self.since) = (side, motor, share);
             return Some(turned);
         }
         None
     }
+
+    /// The motor comes to rest as told; hands back whether the side is another.
+    fn rest(&mut self, motor: f64) -> bool {
+        let before = self.side;
+        (self.side, self.farthest) = (self.flank(motor), motor);
+        self.side != before
+    }
+
+    /// The motor brings the link to where it shall stand; hands back whether the side is another than on the way.
+    fn arrive(&mut self, motor: f64, link: f64) -> bool {
+        let before = self.side;
+        let (low, high) = (self.low - STILL_RAD, self.high + STILL_RAD);
+        self.side = if link > high {
+            -1
+        } else if link < low {
+            1
+        } else if self.high - self.low <= STILL_RAD {
+            self.side
+        } else {
+            0
+        };
+        self.take(link - f64::from(self.side) * self.half);
+        self.farthest = motor;
+        self.side != before
+    }
+
+    /// The side is not known after all.
+    fn forget(&mut self, link: Option<f64>, motor: f64) {
+        let middle = link.unwrap_or(motor);
+        *self = Self { farthest: motor, ..Self::unknown(middle, self.half) };
+    }
 }
 
-/// The sides along all motions. `before[m]`: the motion that ended where motion m starts.
+/// The sides along all motions. `before[m]`: the motion that ended where motion m starts. `doubted[m]`: the joints of which
+/// no side is to be known at the end of motion m; all others where it is empty.
 pub(super) fn courses(
-    stops: &[Stop],
+    stops: &[Stop<'_>],
     before: &[Option<u32>],
     nominal: &Inverse<'_>,
+    play_rad: &[f64; 6],
     mounting: &dyn Fn(usize) -> Mounting,
+    doubted: &[[bool; 6]],
 ) -> Vec<Course> {
     let mut samples = Samples::default();
     for (stop, before) in stops.iter().zip(before) {
         let from = before.and_then(|m| stops.get(m as usize));
         samples.of(from, stop, mounting);
     }
-    let joints = nominal.solve_seeded_within(&samples.flanges, &samples.seeds, effort::SIDES);
+    let passed = samples.passed(nominal);
+    let half = play_rad.map(|play| 0.5 * play.abs());
     let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
         let from = before[m].map(|b| b as usize).filter(|b| *b < m);
         let mut track = from.and_then(|b| tracks[b]);
-        let mut course = Course::default();
+        let mut course = Course { turns: Vec::new(), end: [0; 6], passes: samples.passes[m] };
         match stop {
             Stop::Lost => track = None,
             Stop::Stays => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
@@ -137,18 +234,29 @@ pub(super) fn courses(
                 });
                 let mut here = track.unwrap_or_else(|| {
                     let at = start.unwrap_or(reached.joints);
-                    std::array::from_fn(|j| Track { side: 0, farthest: at[j], since: 0.0 })
+                    std::array::from_fn(|j| Track::unknown(at[j], half[j]))
                 });
                 here.iter_mut().for_each(|t| t.since = 0.0);
                 let mut way: Vec<(f64, Joints)> = Vec::new();
                 way.extend(start.map(|joints| (0.0, joints)));
-                for k in samples.range(m) {
-                    if let Ok(solution) = &joints[k] {
-                        way.push((samples.shares[k], solution.joints));
+                match &passed[m] {
+                    Some(joints) => {
+                        way.extend(samples.range(m).map(|k| samples.shares[k]).zip(joints.clone()))
+                    }
+                    // The arm cannot go along the path: how it comes to the end is not known.
+                    None => {
+                        here = std::array::from_fn(|j| Track::unknown(reached.joints[j], half[j]));
+                        way.clear();
                     }
                 }
-                way.push((1.0, reached.joints));
-                course = follow(&mut here, &way);
+                (course.turns, here) = arrive(here, reached, &way);
+                course.end = here.map(|t| t.side);
+                for joint in (0..6).filter(|&joint| doubted.get(m).is_some_and(|doubted| doubted[joint])) {
+                    course.forget(joint);
+                    here[joint].forget(reached.links.map(|links| links[joint]), reached.joints[joint]);
+                }
+                let open = course.end.map(|side| side == 0);
+                (0..6).filter(|&joint| open[joint]).for_each(|joint| course.forget(joint));
                 track = Some(here);
             }
         }
@@ -158,26 +266,117 @@ pub(super) fn courses(
     out
 }
 
-/// Takes all joints along a way.
-fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)]) -> Course {
+/// From each share of the way on, from which side each joint comes.
+type Turns = Vec<(f64, Sides)>;
+
+/// Takes all joints to the end of a motion, by every way that it may go. `way`: its start and the samples between.
+fn arrive(start: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)]) -> (Turns, [Track; 6]) {
+    let (path, straight) = reached.ways();
+    let path = path && way.len() > 1;
+    let mut found: Option<(Turns, [Track; 6])> = None;
+    let mut add = |turns: Turns, end: [Track; 6]| match &mut found {
+        None => found = Some((turns, end)),
+        Some((_, first)) => {
+            for (j, (one, other)) in first.iter_mut().zip(&end).enumerate() {
+                if one.side != other.side {
+                    one.forget(reached.links.map(|links| links[j]), reached.joints[j]);
+                }
+                (one.low, one.high) = (one.low.min(other.low), one.high.max(other.high));
+            }
+        }
+    };
+    let mut once = |way: &[(f64, Joints)]| {
+        let mut tracks = start;
+        let turns = follow(&mut tracks, way, reached);
+        add(turns, tracks);
+    };
+    if path {
+        once(way);
+    }
+    if straight || !path {
+        once(&way[..way.len().min(1)]);
+    }
+    let (turns, mut end) = found.unwrap_or((Vec::new(), start));
+    // Targets that are put in make the link go as was meant: it may turn near the end by less than its play.
+    if path
+        && reached.may_cut
+        && let Some(links) = reached.links
+    {
+        for (joint, (track, begin)) in end.iter_mut().zip(&start).enumerate() {
+            let side = side_of_link(begin, way, joint, reached.joints[joint], links[joint]);
+            if side.is_some_and(|side| side != track.side) {
+                track.forget(Some(links[joint]), reached.joints[joint]);
+            }
+        }
+    }
+    (turns, end)
+}
+
+/// From which side a link comes to its end that goes along a way as was meant; `None` where it does not turn on the way.
+fn side_of_link(begin: &Track, way: &[(f64, Joints)], joint: usize, motor: f64, link: f64) -> Option<i8> {
+    if begin.half == 0.0 || way.is_empty() {
+        return None;
+    }
+    let behind = [0.5 * (begin.low + begin.high) - way[0].1[joint], link - motor];
+    let links: Vec<(f64, f64)> = way
+        .iter()
+        .map(|(s, q)| (*s, q[joint] + behind[0] * (1.0 - s) + behind[1] * s))
+        .chain([(1.0, link)])
+        .collect();
+    let mut track = Track { half: 0.0, low: links[0].1, high: links[0].1, farthest: links[0].1, ..*begin };
+    track.side = 0;
+    let mut turned = false;
+    for k in 1..links.len() {
+        for (share, angle) in turning_point(&links, k).into_iter().chain([links[k]]) {
+            let gone = angle - track.farthest;
+            let side = if gone > 0.0 { -1 } else { 1 };
+            if track.side == side {
+                track.farthest = angle;
+            } else if gone.abs() > STILL_RAD {
+                turned |= track.side != 0;
+                (track.side, track.farthest, track.since) = (side, angle, share);
+            }
+        }
+    }
+    turned.then_some(track.side)
+}
+
+/// Takes all joints along a way and to its end; hands back where sides changed.
+fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)], reached: &Reached<'_>) -> Turns {
     let mut sides = tracks.map(|t| t.side);
     let mut turned: Vec<(f64, usize, i8)> = Vec::new();
     for (joint, track) in tracks.iter_mut().enumerate() {
-        let mut go = |share: f64, angle: f64| {
+        let end = reached.joints[joint];
+        let angles: Vec<(f64, f64)> =
+            way.iter().map(|(share, joints)| (*share, joints[joint])).chain([(1.0, end)]).collect();
+        let mut go = |track: &mut Track, share: f64, angle: f64| {
             if let Some(at) = track.go(angle, share) {
                 turned.push((at, joint, track.side));
             }
         };
-        for (k, (share, joints)) in way.iter().enumerate() {
+        for (k, &(share, angle)) in angles.iter().enumerate() {
             if k > 0
-                && let Some((share, angle)) = turning_point(way, k, joint)
+                && let Some((share, angle)) = turning_point(&angles, k)
             {
-                go(share, angle);
+                go(track, share, angle);
             }
-            go(*share, joints[joint]);
+            if k + 1 < angles.len() {
+                go(track, share, angle);
+            }
+        }
+        let since = track.since;
+        let other = match reached.links {
+            Some(links) => track.arrive(end, links[joint]),
+            None => {
+                go(track, 1.0, end);
+                track.rest(end)
+            }
+        };
+        if other {
+            turned.push((since, joint, track.side));
         }
     }
-    turned.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    turned.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut turns = vec![(0.0, sides)];
     for (share, joint, side) in turned {
         sides[joint] = side;
@@ -186,17 +385,17 @@ fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)]) -> Course {
             _ => turns.push((share, sides)),
         }
     }
-    Course { turns, end: sides }
+    turns
 }
 
 /// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
-fn turning_point(way: &[(f64, Joints)], k: usize, joint: usize) -> Option<(f64, f64)> {
+fn turning_point(way: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
     let first = match k {
         _ if way.len() < 3 => return None,
         1 => 0,
         _ => k - 2,
     };
-    let [a, b, c] = [0, 1, 2].map(|i| (way[first + i].0, way[first + i].1[joint]));
+    let [a, b, c] = [way[first], way[first + 1], way[first + 2]];
     // Newton's form: f(s) = f(a) + d1 (s − a) + d2 (s − a)(s − b).
     let d1 = (b.1 - a.1) / (b.0 - a.0);
     let d2 = ((c.1 - b.1) / (c.0 - b.0) - d1) / (c.0 - a.0);
@@ -205,6 +404,9 @@ fn turning_point(way: &[(f64, Joints)], k: usize, joint: usize) -> Option<(f64, 
     within.then_some((vertex, a.1 + d1 * (vertex - a.0) + d2 * (vertex - a.0) * (vertex - b.0)))
 }
 
+/// Motions that one thread takes at a time.
+const PORTION: usize = 64;
+
 /// Points between the ends of all motions.
 #[derive(Default)]
 struct Samples {
@@ -212,7 +414,10 @@ struct Samples {
     ends: Vec<usize>,
     shares: Vec<f64>,
     flanges: Vec<Pose>,
-    seeds: Vec<Joints>,
+    /// The joints at the start of each motion, and at its end.
+    ends_rad: Vec<[Joints; 2]>,
+    /// At which share of each motion its circle point is passed.
+    passes: Vec<f64>,
 }
 
 impl Samples {
@@ -221,51 +426,71 @@ impl Samples {
         begin..self.ends[motion]
     }
 
-    fn of(&mut self, from: Option<&Stop>, stop: &Stop, mounting: &dyn Fn(usize) -> Mounting) {
-        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop) {
+    fn of(&mut self, from: Option<&Stop<'_>>, stop: &Stop<'_>, mounting: &dyn Fn(usize) -> Mounting) {
+        let mut passes = 0.5;
+        if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
+            && to.ways().0
+        {
             // The path is one of the tool and in the object of the motion, also where it begins under others.
             let within = mounting(to.mounted);
-            let mut from = *from;
+            let mut begin = from.told;
             if from.mounted != to.mounted {
-                from.told = within.target_of(&mounting(from.mounted).flange_for(&from.told));
+                begin = within.target_of(&mounting(from.mounted).flange_for(&from.told));
             }
-            match to.kind {
-                MotionKind::Linear => self.line(&from, to, &within),
-                MotionKind::Circular => self.arc(&from, to, &within),
-                // Joints in proportion: none turns on the way.
-                _ => {}
+            let curve = match (to.motion.kind, to.via) {
+                (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.told, to.motion),
+                (MotionKind::Circular, None) => None,
+                _ => Some(Curve::line(begin, to.told)),
+            };
+            if let Some(curve) = curve {
+                passes = to.via.map_or(passes, |via| curve.passes(&via));
+                let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
+                let pieces = pieces(curve.length_mm(), turn);
+                for k in 1..pieces {
+                    let s = k as f64 / pieces as f64;
+                    self.shares.push(s);
+                    self.flanges.push(within.flange_for(&curve.at(s)));
+                }
             }
         }
-        self.ends.push(self.shares.len());
-    }
-
-    fn line(&mut self, from: &Reached, to: &Reached, mounting: &Mounting) {
-        let length = (to.told.translation.vector - from.told.translation.vector).norm();
-        let pieces = pieces(length, from.told.rotation.angle_to(&to.told.rotation));
-        for k in 1..pieces {
-            let s = k as f64 / pieces as f64;
-            self.push(s, mounting.flange_for(&between(&from.told, &to.told, s)), from, to);
-        }
-    }
-
-    fn arc(&mut self, from: &Reached, to: &Reached, mounting: &Mounting) {
-        let point = |pose: &Pose| nalgebra::Point3::from(pose.translation.vector);
-        let Some(via) = to.via else { return };
-        let Some(arc) = Arc::through(&point(&from.told), &point(&via), &point(&to.told), None) else {
-            return;
+        let joints = |stop: Option<&Stop<'_>>| match stop {
+            Some(Stop::At(reached)) => reached.joints,
+            _ => Joints::zeros(),
         };
-        let pieces = pieces(arc.length_mm(), arc.sweep.max(from.told.rotation.angle_to(&to.told.rotation)));
-        for k in 1..pieces {
-            let s = k as f64 / pieces as f64;
-            let rotation = between(&from.told, &to.told, s).rotation;
-            self.push(s, mounting.flange_for(&Pose::from_parts(arc.at(s).coords.into(), rotation)), from, to);
-        }
+        self.ends_rad.push([joints(from), joints(Some(stop))]);
+        self.ends.push(self.shares.len());
+        self.passes.push(passes);
     }
 
-    fn push(&mut self, s: f64, flange: Pose, from: &Reached, to: &Reached) {
-        self.shares.push(s);
-        self.flanges.push(flange);
-        self.seeds.push(from.joints.lerp(&to.joints, s));
+    /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along.
+    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Vec<Joints>>> {
+        let of = |motion: usize| {
+            let [start, end] = &self.ends_rad[motion];
+            let flanges = &self.flanges[self.range(motion)];
+            if flanges.is_empty() {
+                return Some(Vec::new());
+            }
+            let mut out = Vec::with_capacity(flanges.len());
+            let mut last = *start;
+            for reached in nominal.reach_path(flanges, start) {
+                let joints = reached.ok()?.joints;
+                let steady = (joints - last).amax() < MOST_STEP_RAD;
+                last = joints;
+                steady.then(|| out.push(joints))?;
+            }
+            ((end - last).amax() < MOST_STEP_RAD).then_some(out)
+        };
+        let motions = self.ends.len();
+        let portions = effort::shared_out(
+            Allowance::of(effort::SIDES),
+            motions.div_ceil(PORTION),
+            |portion, allowance| {
+                let first = portion * PORTION;
+                let here = first..(first + PORTION).min(motions);
+                within(allowance, || here.map(of).collect::<Vec<_>>())
+            },
+        );
+        portions.into_iter().flatten().collect()
     }
 }
 

@@ -171,6 +171,12 @@ impl Curve {
         self.arc.as_ref().map(|(arc, _)| arc)
     }
 
+    /// At which share of an arc a point on it is passed; half way on a line.
+    pub(super) fn passes(&self, via: &Pose) -> f64 {
+        let point = Point3::from(via.translation.vector);
+        self.arc().map_or(0.5, |arc| arc.share(&point, 0.5).clamp(0.0, 1.0))
+    }
+
     /// The pose at a share of the way.
     pub fn at(&self, s: f64) -> Pose {
         let Some((arc, turning)) = &self.arc else { return between(&self.from, &self.to, s) };

@@ -203,6 +203,8 @@ pub(super) struct Targets<'a> {
     arms: Arms<'a>,
     mountings: Mountings,
     solved: SolvedTargets,
+    /// The motions that stay as they are in `solved`.
+    solved_without: BTreeMap<u32, Why>,
 }
 
 impl<'a> Targets<'a> {
@@ -214,19 +216,59 @@ impl<'a> Targets<'a> {
     ) -> Self {
         let mut arms = Arms::of(estimated, &options.condition);
         let mountings = Mountings::of(listing, &arms, cell);
-        let solved = solve_all(listing, &mut arms, &mountings, options);
-        Self { listing, options, arms, mountings, solved }
+        let solved_without = BTreeMap::new();
+        let solved = solve_all(listing, &mut arms, &mountings, options, &solved_without);
+        Self { listing, options, arms, mountings, solved, solved_without }
     }
 
     /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
     /// cuts that they are part of.
     pub(super) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
-        self.solved.allow_again();
-        let Self { listing, options, arms, mountings, solved } = self;
-        let stays = staying(listing, solved, mountings, arms, options, refused);
+        let stays = self.settled(refused);
+        let Self { listing, options, arms, mountings, solved, .. } = self;
         planned(&Job { listing, solved, stays: &stays, mountings, arms, options })
     }
+
+    /// The motions that stay. Where joints have play, what stays changes the sides from which the joints come to what
+    /// follows: then all targets are worked out again.
+    fn settled(&mut self, refused: &BTreeMap<u32, Why>) -> BTreeMap<u32, Why> {
+        let Self { listing, options, arms, mountings, solved, solved_without } = self;
+        let mut refused = refused.clone();
+        for _ in 0..MOST_SETTLING {
+            if arms.acting.has_play() && refused != *solved_without {
+                *solved = solve_all(listing, arms, mountings, options, &refused);
+                solved_without.clone_from(&refused);
+            } else {
+                solved.allow_again();
+            }
+            let stays = staying(listing, solved, mountings, arms, options, &refused);
+            if !arms.acting.has_play() {
+                return stays;
+            }
+            let more: Vec<(u32, Why)> = (0..listing.motions.len() as u32)
+                .filter(|motion| !refused.contains_key(motion))
+                .filter(|motion| !solved.of(*motion as usize).is_empty())
+                .filter(|motion| solved.of(*motion as usize).iter().all(Result::is_ok))
+                .filter_map(|motion| match obstacle(motion, listing, solved, options, &stays) {
+                    Some((Status::Refused, why)) => Some((motion, why)),
+                    _ => None,
+                })
+                .collect();
+            if more.is_empty() {
+                return stays;
+            }
+            refused.extend(more);
+        }
+        // A program of which every round takes away another piece is left as it is.
+        for motion in 0..listing.motions.len() as u32 {
+            refused.entry(motion).or_insert(Why::Inverse(InverseError::Abandoned));
+        }
+        refused
+    }
 }
+
+/// Rounds in which what stays changes the sides of what follows; more are never made.
+const MOST_SETTLING: usize = 64;
 
 fn planned(job: &Job<'_>) -> Plan {
     let Job { listing, solved, mountings, arms, options, .. } = *job;

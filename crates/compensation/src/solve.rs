@@ -8,7 +8,9 @@
 //!
 //! Where joints have play, the sides from which they come follow from the motion, and the corrected motion depends on the
 //! sides: both are worked out in turn, from the sides of the program as it is, until the sides stay as they are. A side
-//! that does not settle counts as not known.
+//! that does not settle counts as not known, and what follows is worked out with that.
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
@@ -18,7 +20,7 @@ use super::deviation::Deviation;
 use super::effort;
 use super::mountings::Mountings;
 use super::payload::Load;
-use super::rewrite::{Arms, Emit, Options, configured, forbidden, may_change, monitored};
+use super::rewrite::{Arms, Circles, Emit, Options, configured, forbidden, may_change, monitored};
 use super::segment::Way;
 use super::singular::{Replay, at_target};
 use super::why::Why;
@@ -90,7 +92,7 @@ pub(super) struct SolvedTargets {
     portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     ways: Vec<Way>,
-    /// Motions of which the configuration is not checked and the start not known.
+    /// Motions of languages without configurations whose start is not known.
     pub(super) guessed: Vec<u32>,
 }
 
@@ -155,12 +157,13 @@ struct Start {
     guessed: bool,
 }
 
-/// Works out all targets.
+/// Works out all targets. `stays`: motions that stay as they are though their targets could be corrected.
 pub(super) fn solve_all(
     listing: &Listing,
     arms: &mut Arms<'_>,
     mountings: &Mountings,
     options: &Options,
+    stays: &BTreeMap<u32, Why>,
 ) -> SolvedTargets {
     let mut first = Vec::with_capacity(listing.motions.len() + 1);
     let mut asked: Vec<Asked<'_>> = Vec::with_capacity(listing.motions.len());
@@ -172,7 +175,7 @@ pub(super) fn solve_all(
     }
     first.push(asked.len());
     let starts = starts(listing, &first, &asked, arms, mountings);
-    let work = Work { listing, first, asked, starts, mountings, options };
+    let work = Work { listing, first, asked, starts, mountings, options, stays };
     work.solve(arms)
 }
 
@@ -184,10 +187,14 @@ struct Work<'a> {
     starts: Starts,
     mountings: &'a Mountings,
     options: &'a Options,
+    stays: &'a BTreeMap<u32, Why>,
 }
 
-/// How often sides and motion are worked out in turn.
+/// How often sides and motion are worked out in turn before a side that still changes is called unknown.
 const ROUNDS: usize = 4;
+
+/// How often they are worked out at most.
+const MOST_ROUNDS: usize = 24;
 
 impl Work<'_> {
     fn solve(self, arms: &mut Arms<'_>) -> SolvedTargets {
@@ -212,20 +219,21 @@ impl Work<'_> {
                 guessed,
             };
         }
-        let as_is = self.sides(arms, None);
+        let mut doubted: Vec<[bool; 6]> = vec![[false; 6]; count];
+        let as_is = self.sides(arms, None, &doubted);
         let before = self.places(arms, &as_is, &load);
         let mut sides = as_is;
         let mut places = before.clone();
         let mut portions = self.portions(arms, &before, &places, None);
-        for round in 1..=ROUNDS {
-            let mut next = self.sides(arms, Some(&portions));
-            if round == ROUNDS {
+        for round in 1..=MOST_ROUNDS {
+            let next = self.sides(arms, Some(&portions), &doubted);
+            if round > ROUNDS {
                 // What still goes to and fro is not known.
-                for (next, last) in next.iter_mut().zip(&sides) {
-                    next.agree(last);
+                for (doubted, (next, last)) in doubted.iter_mut().zip(next.iter().zip(&sides)) {
+                    (0..6).for_each(|j| doubted[j] |= next.end[j] != last.end[j]);
                 }
             }
-            sides = next;
+            sides = if round > ROUNDS { self.sides(arms, Some(&portions), &doubted) } else { next };
             let new = self.places(arms, &sides, &load);
             if new == places {
                 break;
@@ -292,39 +300,52 @@ impl Work<'_> {
     }
 
     /// The sides along the program: as it is, or as rewritten.
-    fn sides(&self, arms: &Arms<'_>, solved: Option<&[Vec<Result<Solved, Why>>]>) -> Vec<Course> {
+    fn sides(
+        &self,
+        arms: &Arms<'_>,
+        solved: Option<&[Vec<Result<Solved, Why>>]>,
+        doubted: &[[bool; 6]],
+    ) -> Vec<Course> {
         let motions = &self.listing.motions;
         let stop = |m: usize| {
             let motion = &motions[m];
             if motion.kind == MotionKind::External {
                 return Stop::Stays;
             }
-            let rewritten = solved.filter(|_| may_change(motion, self.options));
+            let stays = self.stays.contains_key(&(m as u32));
+            let rewritten = solved.filter(|_| may_change(motion, self.options) && !stays);
             let begin = self.first[m / PORTION * PORTION];
-            // What the controller is told, and the joints there.
-            let at = |target: usize| match rewritten {
-                Some(portions) => match portions[m / PORTION].get(target - begin)? {
-                    Ok(solved) if solved.forbidden.is_none() => {
-                        Some((solved.mounted, solved.told, solved.after))
-                    }
-                    // A target that is refused stays as it is.
-                    _ => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
-                },
-                None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints)),
-            };
             let targets = self.first[m]..self.first[m + 1];
+            let solved = |target: usize| match rewritten?[m / PORTION].get(target - begin)? {
+                Ok(solved) if solved.forbidden.is_none() => Some(solved),
+                _ => None,
+            };
+            // A motion of which a target is refused stays as it is.
+            let changes = targets.clone().all(|target| solved(target).is_some());
+            // What the controller is told, and the joints there.
+            let at = |target: usize| match solved(target).filter(|_| changes) {
+                Some(solved) => {
+                    let links = arms.acting.links(solved.place, &solved.after);
+                    Some((solved.mounted, solved.told, solved.after, Some(links)))
+                }
+                None => self.starts[target].as_ref().ok().map(|s| (s.mounted, s.meant, s.joints, None)),
+            };
             let role = |target: &usize| self.asked[*target].target.role;
-            let Some((mounted, told, joints)) =
+            let Some((mounted, told, joints, links)) =
                 targets.clone().rev().find(|t| role(t) == Role::To).and_then(at)
             else {
                 return Stop::Lost;
             };
             let via = targets.clone().find(|t| role(t) == Role::Via).and_then(at).map(|via| via.1);
-            Stop::At(Reached { kind: motion.kind, mounted, told, joints, via })
+            let straightens = motion.straightens && self.options.circles == Circles::Segments;
+            let as_joints = changes && motion.to().is_some_and(|to| as_joints(motion, to, self.options.emit));
+            let may_cut = motion.insertable || straightens;
+            Stop::At(Reached { motion, mounted, told, joints, via, links, as_joints, may_cut })
         };
-        let stops: Vec<Stop> = (0..motions.len()).map(stop).collect();
+        let stops: Vec<Stop<'_>> = (0..motions.len()).map(stop).collect();
         let before: Vec<Option<u32>> = motions.iter().map(|m| m.previous).collect();
-        courses(&stops, &before, &arms.nominal, &|mounted| self.mountings.list[mounted].told)
+        let told = |mounted: usize| self.mountings.list[mounted].told;
+        courses(&stops, &before, &arms.nominal, &arms.acting.play_rad, &told, doubted)
     }
 
     /// The condition of each target.
@@ -338,8 +359,7 @@ impl Work<'_> {
         for (m, course) in sides.iter().enumerate() {
             for target in self.first[m]..self.first[m + 1] {
                 let sides: Sides = match self.asked[target].target.role {
-                    // Somewhere on the arc: half way is near enough for a point that is passed, not reached.
-                    Role::Via => course.at(0.5),
+                    Role::Via => course.at(course.passes),
                     Role::To => course.end,
                 };
                 out.push(arms.acting.place(sides, load(m)));
@@ -442,8 +462,11 @@ fn along(
         run = RUNS[0];
         if at < asked.len() {
             let start = within(allowance, || start(&asked[at], near.as_ref(), arms, mountings));
-            if let Ok(start) = &start {
-                *near = Some(start.joints);
+            match &start {
+                Ok(start) => *near = Some(start.joints),
+                // What goes on from there does not go on from the one before.
+                Err(_) if monitored(asked[at].motion) == Switch::Off => *near = None,
+                Err(_) => {}
             }
             out[at] = start;
             at += 1;
@@ -521,6 +544,10 @@ fn start(
             let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
             let conf = arms.nominal.configuration(&joints);
             let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
+            // Where no language states a configuration, the nearest to that of all axes at 0 is meant, and it is said.
+            if guessed && asked.motion.configures {
+                return Err(Why::OpenStart);
+            }
             let margins = arms.nominal.branch_margins(&joints);
             Ok(Start { mounted, meant, joints, conf, margins, guessed })
         }

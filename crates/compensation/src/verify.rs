@@ -187,7 +187,7 @@ fn places(
     if !arms.acting.has_play() {
         return sent.iter().map(|s| arms.acting.place([0; 6], load(s.motion))).collect();
     }
-    let mut stops: Vec<Stop> = listing
+    let mut stops: Vec<Stop<'_>> = listing
         .motions
         .iter()
         .map(|m| if m.kind == MotionKind::External { Stop::Stays } else { Stop::Lost })
@@ -196,15 +196,19 @@ fn places(
         let motion = &listing.motions[there.motion];
         let via = motion.targets.iter().find(|target| target.role == Role::Via);
         stops[there.motion] = Stop::At(Reached {
-            kind: motion.kind,
+            motion,
             mounted: there.mounted,
             told: there.told,
             joints: there.joints,
             via: via.and_then(|via| via.value.ok()?.cartesian().map(|t| t.pose())),
+            links: None,
+            as_joints: false,
+            may_cut: false,
         });
     }
     let before: Vec<Option<u32>> = listing.motions.iter().map(|m| m.previous).collect();
-    let courses = courses(&stops, &before, &arms.nominal, &|mounted| mountings.list[mounted].told);
+    let told = |mounted: usize| mountings.list[mounted].told;
+    let courses = courses(&stops, &before, &arms.nominal, &arms.acting.play_rad, &told, &[]);
     sent.iter().map(|s| arms.acting.place(courses[s.motion].end, load(s.motion))).collect()
 }
 

@@ -334,7 +334,9 @@ impl Run<'_> {
             Way::Joint => self.state.monitor_joints,
             _ => self.state.monitor_lines,
         };
+        let wrist = self.state.others.get("singarea").is_some_and(|words| words.contains("wrist"));
         let motion = Motion {
+            wrist,
             at,
             way,
             goals,

@@ -1,16 +1,17 @@
-//! What the arm does in a run: the joints of every motion as the controller chooses them, and from which side each joint
-//! comes.
+//! What the arm does in a run: the joints of every motion as the controller chooses them, and where the links are, which
+//! follow with play.
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::run::{Goal, Motion, Way};
 use crate::arm::{Arm, Pose, difference};
+use crate::play::Links;
 
-/// A joint that comes back by less has not turned (rad).
-const DEAD_BAND: f64 = 1e-5;
+/// Pieces in which a path is followed.
+const PIECES: usize = 64;
 
-/// A joint that moves by less at the end of a path may as well have turned (rad).
-const LITTLE: f64 = 1e-3;
+/// A joint that would have to go farther from one piece to the next has no way there (rad).
+const FARTHEST: f64 = 0.6;
 
 /// What the controller was told at one goal, and what follows.
 #[derive(Debug, Clone)]
@@ -19,10 +20,12 @@ pub struct Point {
     pub flange: Pose,
     /// The controller's joints; none where it cannot go there.
     pub joints: Option<[f64; 6]>,
-    /// The side from which each joint comes.
-    pub approach: [i8; 6],
-    /// Whether that hangs on less than can be told.
-    pub doubt: [bool; 6],
+    /// How far each link is before its motor (rad).
+    pub behind: [f64; 6],
+    /// On which flanks the links lie, in words.
+    pub flanks: String,
+    /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
+    pub adrift: bool,
 }
 
 /// Where the flange must be for a goal.
@@ -40,31 +43,17 @@ pub fn flange(motion: &Motion, in_object: &Pose, displaced: &Pose) -> Pose {
 /// Follows an arm through a program.
 pub struct Course<'a> {
     arm: &'a Arm,
-    play: bool,
     joints: Option<[f64; 6]>,
     /// Where the flange was told to be last, with the tool and object frames it was told in.
     last: Option<Pose>,
-    sides: [i8; 6],
-    farthest: [f64; 6],
-    /// Where each joint turned last.
-    turned_at: [f64; 6],
-    doubt: [bool; 6],
+    links: Links,
+    adrift: bool,
 }
 
 impl<'a> Course<'a> {
-    /// A start of which nothing is known but the sides.
-    pub fn new(arm: &'a Arm, sides: [i8; 6]) -> Self {
-        let play = arm.play.iter().any(|p| *p != 0.0);
-        Self {
-            arm,
-            play,
-            joints: None,
-            last: None,
-            sides,
-            farthest: [f64::NAN; 6],
-            turned_at: [f64::NAN; 6],
-            doubt: [false; 6],
-        }
+    /// A start of which nothing is known. `rest`: where in its play each link lies then, from −1 to 1.
+    pub fn new(arm: &'a Arm, rest: [f64; 6]) -> Self {
+        Self { arm, joints: None, last: None, links: Links::new(&arm.play, rest), adrift: false }
     }
 
     /// Goes through one motion; a point for each goal.
@@ -75,15 +64,22 @@ impl<'a> Course<'a> {
                 Goal::Joints(q) => (self.arm.nominal_forward(q), Some(*q)),
                 Goal::Pose { in_object, displaced, conf } => {
                     let flange = flange(motion, in_object, displaced);
-                    (flange, self.choose(&flange, conf, motion.monitored))
+                    let along = !motion.monitored && motion.way != Way::Joint && !motion.wrist;
+                    let joints = if along { None } else { self.choose(&flange, conf, motion.monitored) };
+                    (flange, joints)
                 }
             };
-            out.push(Point { flange, joints, approach: self.sides, doubt: self.doubt });
+            let (behind, flanks, adrift) = ([0.0; 6], String::new(), self.adrift);
+            out.push(Point { flange, joints, behind, flanks, adrift });
         }
-        if self.play {
+        if !motion.monitored && motion.way != Way::Joint && !motion.wrist {
+            self.along(motion, &mut out);
+        }
+        if self.links.have_play() {
             self.follow(motion, &mut out);
         }
         let end = &out[out.len() - 1];
+        self.adrift |= end.joints.is_none();
         self.joints = end.joints;
         self.last = Some(end.flange);
         out
@@ -91,11 +87,10 @@ impl<'a> Course<'a> {
 
     /// The joints that the controller takes: those of the configuration, or without it those nearest to where it is.
     fn choose(&self, flange: &Pose, conf: &[i32; 4], monitored: bool) -> Option<[f64; 6]> {
-        let all = self.arm.nominal_inverse(flange, self.joints.as_ref());
         if !monitored {
-            self.joints?;
-            return all.first().copied();
+            return self.arm.nominal_nearest(flange, self.joints.as_ref()?);
         }
+        let all = self.arm.nominal_inverse(flange, self.joints.as_ref());
         let outside = |q: &[f64; 6]| {
             let quarter = std::f64::consts::FRAC_PI_2;
             [(0, 0), (3, 1), (5, 2)].into_iter().fold(0.0, |most: f64, (joint, word)| {
@@ -107,116 +102,158 @@ impl<'a> Course<'a> {
         all.into_iter().find(|q| branch(q) && outside(q) < 1e-6)
     }
 
-    /// Takes every joint along the way.
-    fn follow(&mut self, motion: &Motion, points: &mut [Point]) {
-        let Some(end) = points[points.len() - 1].joints else {
-            self.doubt = [true; 6];
-            self.farthest = [f64::NAN; 6];
+    /// The joints of a line or an arc of which no configuration is checked: those to which the way leads that the arm
+    /// goes, from where it is.
+    fn along(&self, motion: &Motion, points: &mut [Point]) {
+        let Some(start) = self.joints else { return };
+        let way = self.way(motion, &start, &start, points);
+        if way.len() + 1 < PIECES {
             return;
-        };
-        let Some(start) = self.joints else {
-            self.farthest = end;
-            self.doubt = [true; 6];
-            points.iter_mut().for_each(|p| p.doubt = self.doubt);
-            return;
-        };
-        let before = self.sides;
-        let way = self.way(motion, &start, &end, points);
-        let mut turned = [false; 6];
-        for q in way.iter().chain([&end]) {
-            for j in 0..6 {
-                self.turn(j, q[j]);
-                turned[j] |= self.sides[j] != before[j];
-            }
         }
-        let last = way.last().unwrap_or(&start);
-        for j in 0..6 {
-            let moved = |from: f64| (end[j] - from).abs();
-            // A joint that has come back by hardly more, or hardly less, than the dead band, or that comes to rest where it
-            // might just have turned.
-            let near = moved(self.farthest[j]) > 1e-7 && moved(self.farthest[j]) < 1e-4;
-            let hardly = moved(start[j]) < 1e-4 && moved(start[j]) > 1e-8;
-            let resting = !way.is_empty()
-                && (moved(last[j]) < LITTLE || turned[j] && moved(self.turned_at[j]) < LITTLE);
-            // How the tool turns along an arc is the controller's own affair.
-            if near || hardly || resting || turned[j] && motion.way == Way::Arc {
-                self.doubt[j] = true;
-            }
-        }
+        let passing = self.passing(motion, points);
         let count = points.len();
         for (k, point) in points.iter_mut().enumerate() {
-            point.approach = self.sides;
-            point.doubt = self.doubt;
-            if k + 1 < count {
-                // Somewhere on the arc.
-                (0..6).for_each(|j| point.doubt[j] |= turned[j]);
-            }
+            let share = if k + 1 == count { 1.0 } else { passing };
+            let near = way.iter().rev().find(|(s, _)| *s <= share).map_or(start, |(_, q)| *q);
+            let reached = self.arm.nominal_nearest(&point.flange, &near);
+            point.joints = reached.filter(|q| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST));
         }
     }
 
-    fn turn(&mut self, j: usize, angle: f64) {
-        if self.farthest[j].is_nan() {
-            self.farthest[j] = angle;
-        }
-        let gone = angle - self.farthest[j];
-        let side = if gone > 0.0 { -1 } else { 1 };
-        if self.sides[j] == side {
-            self.farthest[j] = angle;
-            if gone.abs() > 1e-3 {
-                self.doubt[j] = false;
+    /// Takes the links along the way.
+    fn follow(&mut self, motion: &Motion, points: &mut [Point]) {
+        let count = points.len();
+        let Some(end) = points[count - 1].joints else { return self.links.lose() };
+        let way = match self.joints {
+            Some(start) => {
+                let way = self.way(motion, &start, &end, points);
+                if motion.way != Way::Joint && self.last.is_some() && way.len() + 1 < PIECES {
+                    // The arm cannot go along the path: how it comes to the end is not told.
+                    self.links.lose();
+                    Vec::new()
+                } else {
+                    way
+                }
             }
-        } else if gone.abs() > DEAD_BAND {
-            self.sides[j] = side;
-            self.turned_at[j] = self.farthest[j];
-            self.farthest[j] = angle;
-            if gone.abs() > 1e-3 {
-                self.doubt[j] = false;
+            None => {
+                self.links.lose();
+                Vec::new()
+            }
+        };
+        let mut passed = false;
+        for (share, q) in way.iter().chain([&(1.0, end)]) {
+            self.links.go(q);
+            // The circle point, which is passed on the way.
+            if count > 1 && !passed && *share >= self.passing(motion, points) {
+                passed = true;
+                (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
             }
         }
+        let last = &mut points[count - 1];
+        (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));
     }
 
-    /// Joints between the ends of a motion.
-    fn way(&self, motion: &Motion, start: &[f64; 6], end: &[f64; 6], points: &[Point]) -> Vec<[f64; 6]> {
+    /// At which share of an arc its point is passed.
+    fn passing(&self, motion: &Motion, points: &[Point]) -> f64 {
+        let (Some(from), true) = (&self.last, points.len() > 1) else { return 1.0 };
+        let place = |flange: &Pose| tool_in_object(motion, flange).translation.vector;
+        let arc = Arc::through(&place(from), &place(&points[0].flange), &place(&points[1].flange));
+        arc.map_or(0.5, |arc| arc.share(&place(&points[0].flange)))
+    }
+
+    /// Joints between the ends of a motion, with the share of the way.
+    fn way(
+        &self,
+        motion: &Motion,
+        start: &[f64; 6],
+        end: &[f64; 6],
+        points: &[Point],
+    ) -> Vec<(f64, [f64; 6])> {
         let mut out = Vec::new();
         let (Some(from), true) = (self.last, motion.way != Way::Joint) else { return out };
         let to = points[points.len() - 1].flange;
         // The path is one of the tool, in the object.
-        let tool = |flange: &Pose| match motion.tool.1 {
-            true => flange * motion.tool.2,
-            false => flange.inverse() * motion.tool.2,
-        };
-        let back = |tip: Pose| match motion.tool.1 {
-            true => tip * motion.tool.2.inverse(),
-            false => motion.tool.2 * tip.inverse(),
-        };
-        let (a, b) = (tool(&from), tool(&to));
+        let (a, b) = (tool_in_object(motion, &from), tool_in_object(motion, &to));
         let circle = (motion.way == Way::Arc)
             .then(|| {
-                Arc::through(
-                    &a.translation.vector,
-                    &tool(&points[0].flange).translation.vector,
-                    &b.translation.vector,
-                )
+                let via = tool_in_object(motion, &points[0].flange);
+                let arc =
+                    Arc::through(&a.translation.vector, &via.translation.vector, &b.translation.vector)?;
+                let turn = arc.turn_within(&a.rotation, &via, &b.rotation);
+                Some((arc, turn))
             })
             .flatten();
         let mut near = *start;
-        const PIECES: usize = 24;
         for k in 1..PIECES {
             let s = k as f64 / PIECES as f64;
-            let turn = between(&a.rotation, &b.rotation, s);
-            let place = match &circle {
-                Some(arc) => arc.at(s),
-                None => a.translation.vector.lerp(&b.translation.vector, s),
+            let tip = match &circle {
+                Some((arc, turn)) => {
+                    let turned = arc.turned(s) * a.rotation * UnitQuaternion::from_scaled_axis(turn * s);
+                    Isometry3::from_parts(Translation3::from(arc.at(s)), turned)
+                }
+                None => {
+                    let place = a.translation.vector.lerp(&b.translation.vector, s);
+                    Isometry3::from_parts(Translation3::from(place), between(&a.rotation, &b.rotation, s))
+                }
             };
-            let flange = back(Isometry3::from_parts(Translation3::from(place), turn));
-            match self.arm.nominal_inverse(&flange, Some(&near)).first() {
-                Some(q) if (0..6).all(|j| (q[j] - near[j]).abs() < 0.6) => near = *q,
+            let joints = if motion.wrist {
+                let wrist = std::array::from_fn(|j| start[j + 3] + (end[j + 3] - start[j + 3]) * s);
+                self.with_wrist(motion, &tip.translation.vector, &near, wrist)
+            } else {
+                let flange = flange_of(motion, &tip);
+                self.arm.nominal_nearest(&flange, &near)
+            };
+            match joints {
+                Some(q) if (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST) => near = q,
                 _ => break,
             }
-            out.push(near);
+            out.push((s, near));
         }
-        let _ = end;
         out
+    }
+
+    /// Joints at which the tool's tip is at a place of the object with the last three as they are (SingArea \Wrist).
+    fn with_wrist(
+        &self,
+        motion: &Motion,
+        place: &Vector3<f64>,
+        near: &[f64; 6],
+        wrist: [f64; 3],
+    ) -> Option<[f64; 6]> {
+        let mut q = *near;
+        q[3..].copy_from_slice(&wrist);
+        let at = |q: &[f64; 6]| tool_in_object(motion, &self.arm.nominal_forward(q)).translation.vector;
+        for _ in 0..12 {
+            let here = at(&q);
+            let off = place - here;
+            if off.norm() < 1e-9 {
+                return Some(q);
+            }
+            let slope = Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|j| {
+                let mut moved = q;
+                moved[j] += 1e-6;
+                (at(&moved) - here) / 1e-6
+            }));
+            let step = slope.try_inverse()? * off;
+            (0..3).for_each(|j| q[j] += step[j]);
+        }
+        ((at(&q) - place).norm() < 1e-6).then_some(q)
+    }
+}
+
+/// The tool as seen from the object that it works on, but for where the object stands.
+fn tool_in_object(motion: &Motion, flange: &Pose) -> Pose {
+    match motion.tool.1 {
+        true => flange * motion.tool.2,
+        false => flange.inverse() * motion.tool.2,
+    }
+}
+
+/// The flange that holds the tool so.
+fn flange_of(motion: &Motion, tip: &Pose) -> Pose {
+    match motion.tool.1 {
+        true => tip * motion.tool.2.inverse(),
+        false => motion.tool.2 * tip.inverse(),
     }
 }
 
@@ -250,6 +287,35 @@ impl Arc {
         let end = b - centre;
         let sweep = spoke.cross(&end).dot(&axis).atan2(spoke.dot(&end)).rem_euclid(std::f64::consts::TAU);
         Some(Self { centre, spoke, axis, sweep })
+    }
+
+    /// At which share of the way a point on it lies.
+    pub fn share(&self, point: &Vector3<f64>) -> f64 {
+        let off = point - self.centre;
+        let angle = self.spoke.cross(&off).dot(&self.axis).atan2(self.spoke.dot(&off));
+        angle.rem_euclid(std::f64::consts::TAU) / self.sweep
+    }
+
+    /// How far the path itself has turned part of the way.
+    pub fn turned(&self, s: f64) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&self.axis, self.sweep * s)
+    }
+
+    /// How the tool turns within the frame that goes along with the path, on the whole way: evenly, by the shortest turn,
+    /// or by one that is a whole turn longer where that comes clearly nearer to the orientation of the circle point (ABB,
+    /// RAPID, `MoveC` and `CirPathMode`).
+    fn turn_within(&self, from: &UnitQuaternion<f64>, via: &Pose, to: &UnitQuaternion<f64>) -> Vector3<f64> {
+        let short = (from.inverse() * self.turned(-1.0) * to).scaled_axis();
+        let axis = short.try_normalize(1e-3).unwrap_or_else(|| from.inverse() * self.axis.into_inner());
+        let share = self.share(&via.translation.vector);
+        let off = |v: &Vector3<f64>| {
+            let there = self.turned(share) * from * UnitQuaternion::from_scaled_axis(v * share);
+            there.angle_to(&via.rotation)
+        };
+        let whole = axis * std::f64::consts::TAU;
+        [short - whole, short + whole]
+            .iter()
+            .fold(short, |best, other| if off(other) + 0.1 < off(&best) { *other } else { best })
     }
 
     /// A point part of the way.

@@ -117,6 +117,8 @@ pub struct Motion {
     pub object: (String, bool, Pose, Pose),
     /// Whether its configuration is monitored.
     pub monitored: bool,
+    /// Whether the last three joints go in proportion on a line or an arc (SingArea \Wrist).
+    pub wrist: bool,
     /// What the arm carries.
     pub load: Load,
     /// What it carries without what is gripped.

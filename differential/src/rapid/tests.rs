@@ -396,13 +396,14 @@ fn a_program_without_end_is_cut_off() {
 
 #[test]
 fn a_joint_keeps_its_side_until_it_turns() {
-    let case = model::with(1, true, false);
+    let mut case = model::with(1, true, false);
+    case.arm.play = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
     let joint =
         |deg: f64| format!("MoveAbsJ [[{deg},0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\n");
-    let all = motions("", &[0.0, 10.0, 10.0, 5.0].map(joint).concat());
-    let mut course = Course::new(&case.arm, [1; 6]);
-    let sides: Vec<i8> = all.iter().map(|m| course.go(m)[0].approach[0]).collect();
-    assert_eq!(sides, [1, -1, -1, 1]);
+    let all = motions("", &[0.0, 10.0, 10.0, 9.99, 5.0].map(joint).concat());
+    let mut course = Course::new(&case.arm, [1.0; 6]);
+    let flanks: Vec<String> = all.iter().map(|m| course.go(m)[0].flanks.clone()).collect();
+    assert_eq!(flanks, ["+.....", "-.....", "-.....", "0.....", "+....."]);
 }
 
 #[test]

@@ -435,3 +435,40 @@ fn without_a_stated_configuration_the_nearest_solution_is_the_one_that_was_meant
         assert!(count > 20 && 3 * written > count && open > 0);
     }
 }
+
+/// The class: a solution is taken by guess. Where the configuration is not checked the controller goes to the one next to
+/// where the arm stands: a program of which that is not known, at its start or behind a motion that is not known, is not
+/// corrected there, and neither is what goes on from there unchecked.
+#[test]
+fn without_a_check_nothing_is_corrected_until_the_start_is_known() {
+    let robot = ARMS[0];
+    let arm = sheet(robot);
+    let joints: Vec<Joints> =
+        (0..6).map(|k| Joints::from_fn(|j, _| 0.3 + 0.05 * f64::from(k) + 0.1 * j as f64)).collect();
+    let line = |k: usize| {
+        let target = target(&forward(&arm, &joints[k]), confdata(&arm, &joints[k]));
+        format!("MoveL {target},v100,fine,tool0;\n")
+    };
+    let text = module(&[
+        "ConfL\\Off;\n".into(),
+        line(0),
+        line(1),
+        "ConfL\\On;\n".into(),
+        line(2),
+        "ConfL\\Off;\n".into(),
+        line(3),
+        "pElsewhere;\n".into(),
+        line(4),
+        "ConfL\\On;\n".into(),
+        line(5),
+    ]);
+    let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &Options::default());
+    let open: Vec<bool> = plan.outcomes.iter().map(|o| o.reason == Some(Why::OpenStart)).collect();
+    let motions = &plan.outcomes;
+    assert_eq!(open[..4], [true, true, false, false], "{motions:#?}");
+    assert!(corrected(&motions[2]) && corrected(&motions[3]), "{motions:#?}");
+    assert!(
+        open.iter().filter(|open| **open).count() >= 2 && corrected(motions.last().unwrap()),
+        "{motions:#?}"
+    );
+}

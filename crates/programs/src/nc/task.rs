@@ -275,6 +275,8 @@ struct Said<'s> {
     lengthens: bool,
     /// NX, NY, NZ: the surface normal.
     normal: bool,
+    /// LN: the block in which a tool vector may stand.
+    spatial: bool,
     /// Why the block is left though it moves as its words say: measuring, poles, angles of a contour.
     aside: Option<Reason>,
     /// A word that is not known: what it is, and why.

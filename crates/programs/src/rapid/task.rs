@@ -389,6 +389,8 @@ impl<'a, 's> Lister<'a, 's> {
             timed: false,
             insertable: false,
             straightens: false,
+            rapid: false,
+            configures: true,
             axis: None,
             modal: crate::motion::Modal::START,
             in_loop: around.in_loop,

@@ -1,7 +1,7 @@
 //! Blocks that move, and what stands beside their axes.
 
 use super::super::arc::Circle;
-use super::super::machine::{Mode, Say, Words};
+use super::super::machine::{Mode, Say, Turn, Words};
 use super::Heidenhain;
 
 /// What a path block says beside its axes.
@@ -68,6 +68,10 @@ impl Heidenhain<'_> {
         if !words.moves() {
             return Ok(());
         }
+        let vector = words.vector != [None; 3];
+        if vector && kind != "LN" {
+            return Err(format!("a tool vector in {line}, where the control takes none"));
+        }
         let along_normal = beside.normal && words.vector == [None; 3];
         if beside.machine || along_normal {
             let named = words.place.map(|say| along_normal || say.is_some());
@@ -93,6 +97,10 @@ impl Heidenhain<'_> {
             _ => None,
         };
         self.machine.go(words);
+        if vector {
+            // No other block can say again how the axes that turn the tool stand now.
+            self.machine.turn = Turn::Unknown;
+        }
         Ok(())
     }
 

@@ -46,10 +46,14 @@ impl Siemens<'_> {
         if path {
             self.machine.mode = Mode::Other(1);
         }
-        let begins = [33.0, 74.0, 75.0].iter().any(|g| code(*g));
+        // A thread: a line to the place that its words name, at a pace of its own, and it holds on.
+        if code(33.0) {
+            self.machine.mode = Mode::Other(33);
+        }
+        let begins = [74.0, 75.0].iter().any(|g| code(*g));
         let machine = code(53.0) || words.contains(&Word::Name("SUPA".into()));
         if begins || machine {
-            let mut named = [code(33.0); 3];
+            let mut named = [false; 3];
             for (axis, letter) in AXES.iter().enumerate() {
                 named[axis] |= self.say(words, letter, 1.0)?.is_some();
             }

@@ -38,6 +38,8 @@ impl Lister<'_, '_> {
             timed: false,
             insertable: false,
             straightens: false,
+            rapid: kind == MotionKind::Joint,
+            configures: false,
             axis: None,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
@@ -306,6 +308,11 @@ impl Lister<'_, '_> {
         self.state.previous = Some(index);
         self.state.position = to;
         self.arrived(said, mode, machine);
+        // A tool vector holds in its own LN: the blocks after it have no word that says how the tool is turned now.
+        if heidenhain && self.state.turn == Turn::Vector {
+            self.state.lose_orientation();
+            self.events.push(Event::Lost(super::ORIENTATION));
+        }
     }
 
     /// What is not where the words of the block say.

@@ -54,8 +54,11 @@ impl<'s> Lister<'_, 's> {
         if said.normal && said.vector.iter().all(Option::is_none) && self.may_turn_to_normal(said) {
             said.aside.get_or_insert(Reason::AlongNormal);
         }
+        // The control takes no tool vector elsewhere.
+        let heidenhain = self.dialect == Dialect::Heidenhain;
+        said.opaque |= heidenhain && !said.spatial && said.vector.iter().any(Option::is_some);
         let first = said.words.first();
-        said.paraxial = self.dialect == Dialect::Heidenhain
+        said.paraxial = heidenhain
             && first.is_some_and(|word| is_axis_name(word.name) && word.belongs != Belongs::Nothing);
         // Two motion words that differ: which of them holds is not certain.
         let mut modes = said.g.iter().filter(|&&code| matches!(code, 0 | 10 | 20 | 30));
@@ -181,10 +184,11 @@ impl<'s> Lister<'_, 's> {
             (Dialect::Heidenhain, b"RL" | b"RR") => said.compensates = Some(true),
             (
                 Dialect::Heidenhain,
-                b"L" | b"LN" | b"CC" | b"CR" | b"CT" | b"DR" | b"FU" | b"FZ" | b"FAUTO" | b"AUTO" | b"FQ"
-                | b"FQL" | b"FQR" | b"FT" | b"LA" | b"MB" | b"MAX" | b"TCPM",
+                b"L" | b"CC" | b"CR" | b"CT" | b"DR" | b"FU" | b"FZ" | b"FAUTO" | b"AUTO" | b"FQ" | b"FQL"
+                | b"FQR" | b"FT" | b"LA" | b"MB" | b"MAX" | b"TCPM",
             ) => {}
             (Dialect::Heidenhain, b"NX" | b"NY" | b"NZ") => said.normal = true,
+            (Dialect::Heidenhain, b"LN") => said.spatial = true,
             (Dialect::Heidenhain, _) => {
                 let text = String::from_utf8_lossy(&name).into_owned();
                 said.unknown = Some((text, Reason::UnknownWord));

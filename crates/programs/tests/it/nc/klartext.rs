@@ -81,6 +81,12 @@ fn a_surface_normal_alone_turns_the_tool() {
             ),
             // With a tool vector it goes where that says.
             (&format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1"), &[None]),
+            // The vector holds in its own LN: no other block can say how the tool is turned after it, or may hold one.
+            (
+                &format!("LN X+11 Y+0 Z+50 {n} TX+0 TY+0 TZ+1\nL X+12\nL X+12 A+180 B+0 C+90"),
+                &[None, left(OrientationUnknown), None],
+            ),
+            ("L X+11 TX+0 TY+0 TZ+1", &[left(Unread)]),
             (&format!("M129\nM128\nLN X+11 Y+0 Z+50 {n}"), &[left(AlongNormal)]),
             (&format!("M129\nLN X+11 Y+0 Z+50 {n} M128"), &[left(AlongNormal)]),
             (&format!("M129\nLN X+11 Y+0 Z+50 {n}"), &[left(NoTipControl)]),
