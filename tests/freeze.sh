@@ -75,7 +75,9 @@ shipped() {
   run compare-degradation compare --experiment rls-degradation --json result.json --csv table.csv
   run compare-measured compare "$tracker" "${arm[@]}" --experiment ltlm-table-6 --rows 200 --json result.json
   local model="../diagnose-irb120-tracker/model.toml"
+  # What one pose costs is said on stderr, in milliseconds of this run.
   run track track "$tracker" --model "$model" --date 2026-05-04T12:30:00Z -o models --json result.json --csv table.csv
+  rm "$out/track/stderr.txt"
   for surface in blade dome saddle-implicit plate; do
     run "path-$surface" path "../../surfaces/$surface.toml" "${arm[@]}" -o program.mod
     run "path-$surface-nc" path "../../surfaces/$surface.toml" "${arm[@]}" -o program.mpf
