@@ -94,6 +94,9 @@ fn a_doubtful_model_needs_a_flag_to_be_written_and_to_be_used() {
         assert!(err.contains("doubtful") && !at.join("out.mod").exists(), "{verb}: {err}");
         let (code, _, err) = truegrind(at, &[&compensate[..], &["--allow-doubtful"]].concat());
         assert!(code < 2 && err.contains("doubtful"), "{verb}: {err}");
+        // Who only looks at what it would do is told so too, and not refused.
+        let (code, _, err) = truegrind(at, &["deviation", "in.mod", "--model", "m.toml"]);
+        assert!(code < 2 && err.contains("this model is doubtful"), "{verb}: {err}");
         fs::remove_file(at.join("m.toml")).unwrap();
         fs::remove_file(at.join("out.mod")).unwrap();
     }

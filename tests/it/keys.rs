@@ -7,10 +7,15 @@
 
 use toml::{Table, Value};
 use truegrind::arm::arm_file::ArmFile;
+use truegrind::arm::estimated::Estimated;
+use truegrind::arm::model::Joints;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 use truegrind::compensation::cell::Cell;
+use truegrind::compensation::compensate::compensate;
+use truegrind::compensation::rewrite::Options;
 use truegrind::planning::toolpath::toolpath;
-use truegrind::programs::rapid::writer;
+use truegrind::programs::rapid::{self, writer};
+use truegrind::programs::reading::Program;
 use truegrind::report::format::markdown;
 use truegrind::report::robots as view;
 use truegrind::surfaces::{SurfaceFile, sample};
@@ -135,4 +140,41 @@ fn every_key_of_a_robot_file_is_read() {
         Ok(format!("{}{:?}", markdown::document(&view::document(&robot)), robot.model))
     };
     assert_eq!(unread(&text, seen), Vec::<String>::new());
+}
+
+/// Models and tracks are read, kept and written again, by `track` at every look: what is kept is all that a reader of the
+/// next model sees of where it came from, and what an arm is made of decides what programs become.
+#[test]
+fn every_key_of_a_model_is_kept_or_refused() {
+    let seen = |text: &str| Estimated::from_toml(text)?.to_toml();
+    let model =
+        include_str!("../../fuzz/corpus/model/play.toml").replace("set_aside = []", "set_aside = [3]");
+    assert_eq!(unread(&model, seen), Vec::<String>::new());
+}
+
+/// What the arms of a model are made of decides what a program becomes.
+#[test]
+fn every_key_of_the_arms_of_a_model_decides_what_programs_become() {
+    let program = "MODULE m\nPROC main()\n\
+        MoveJ [[350,-40,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n\
+        MoveL [[350,60,380],[0.1,0,0.99498744,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\n\
+        MoveL [[300,90,390],[0.1,0,0.99498744,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n\
+        ENDPROC\nENDMODULE\n";
+    let whole: Table = include_str!("../../fuzz/corpus/model/play.toml").parse().unwrap();
+    let task = Program::Rapid(rapid::Task::read(&[("m.mod", program.as_bytes())]));
+    for part in ["nominal", "estimated"] {
+        let seen = |text: &str| -> Result<String, String> {
+            let mut model = whole.clone();
+            model.insert(part.to_owned(), Value::Table(text.parse().unwrap()));
+            let arm = Estimated::from_toml(&toml::to_string(&model).unwrap())?;
+            let options = Options { condition: arm.condition, ..Options::default() };
+            let done =
+                compensate(&task, &arm, &Cell::default(), &options, None).map_err(|e| e.to_string())?;
+            let joints = Joints::from([0.3, 0.2, -0.3, 0.4, 0.6, -0.5]);
+            let fast = (&arm.model.limits, &arm.nominal.limits, &arm.model.bodies, &arm.nominal.bodies);
+            Ok(format!("{:?}{:?}{fast:?}", done.plan, arm.nominal.forward(&joints, &arm.condition)))
+        };
+        let found = unread(&toml::to_string(&whole[part]).unwrap(), seen);
+        assert_eq!(found, Vec::<String>::new(), "{part}");
+    }
 }

@@ -625,3 +625,85 @@ fn a_cut_corrected_in_part_says_so_in_its_mark() {
     assert!(text.contains("4 changed") || text.contains("4 flagged"), "{text}");
     assert!(partial.contains("! truegrind ") && partial.contains(" partial\n"), "{partial}");
 }
+
+/// A report that would go where a program of the folder goes is refused before the first program is written.
+#[test]
+fn a_report_over_a_program_is_refused_before_anything_is_written() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in/below")).unwrap();
+    fs::write(at.join("in/a.mod"), module("A", 3, 0.0)).unwrap();
+    fs::write(at.join("in/below/b.mod"), module("B", 3, 0.0)).unwrap();
+    for (option, report) in
+        [("--csv", "out/a.mod"), ("--json", "out/below/../below/b.mod"), ("--diff", "./out/a.mod")]
+    {
+        let (code, _, err) =
+            truegrind(at, &["compensate", "in", "--model", "model.toml", "-o", "out", option, report]);
+        assert_eq!(code, 2, "{err}");
+        assert!(!at.join("out").exists(), "{option} {report}: {err}");
+    }
+    let given = ["compensate", "in", "--model", "model.toml", "-o", "out", "--csv", "out.csv"];
+    let (code, _, err) = truegrind(at, &given);
+    assert!(code == 0 || code == UNSURE, "{err}");
+    assert!(at.join("out/a.mod").is_file() && at.join("out.csv").is_file());
+}
+
+/// The class: something stated that nobody asks for, such as a misspelt name. Every entry of a cell file that no program of a
+/// run uses is named, and none that one of them does.
+#[test]
+fn entries_of_a_cell_file_that_no_program_uses_are_named() {
+    let dir = workshop();
+    let at = dir.path();
+    let tool = "PERS tooldata tOne:=[TRUE,[[0,0,50],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];\n  PROC main()";
+    fs::create_dir_all(at.join("in")).unwrap();
+    let one = module("A", 3, 0.0).replace("PROC main()", tool).replace("tool0", "tOne");
+    fs::write(at.join("in/a.mod"), one).unwrap();
+    fs::write(at.join("in/b.mod"), module("B", 3, 0.0)).unwrap();
+    let cell = "[[tool]]\nname = \"TONE\"\norigin = \"metrology\"\n[[tool]]\nname = \"tOen\"\norigin = \"metrology\"\n\
+                [[wobj]]\nname = \"wPart\"\norigin = \"metrology\"\n[[external]]\naxis = \"b\"\ncarries = \"other\"\n";
+    fs::write(at.join("cell.toml"), cell).unwrap();
+    for verb in [["compensate", "in", "--dry-run"], ["deviation", "in", "--threads=1"]] {
+        let given = [&verb[..], &["--model", "model.toml", "--cell", "cell.toml"]].concat();
+        let (_, _, err) = truegrind(at, &given);
+        let notes: Vec<&str> = err.lines().filter(|line| line.contains("cell file:")).collect();
+        assert_eq!(notes.len(), 3, "{err}");
+        for (note, entry) in notes.iter().zip(["tool \"tOen\"", "wobj \"wPart\"", "axis 'b'"]) {
+            assert!(note.contains(entry), "{note}");
+        }
+    }
+}
+
+/// A task list reads plain files below its own folder, and elsewhere only where the command line says so; a device never.
+#[cfg(unix)]
+#[test]
+fn a_task_list_reads_no_device_and_nothing_outside_its_folder_unless_told() {
+    let dir = workshop();
+    let at = dir.path();
+    fs::create_dir_all(at.join("in/sub")).unwrap();
+    fs::write(at.join("away.mod"), module("A", 3, 0.0)).unwrap();
+    fs::write(at.join("in/sub/near.mod"), module("B", 3, 0.0)).unwrap();
+    std::os::unix::fs::symlink("../away.mod", at.join("in/link.mod")).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", at.join("in/zero.mod")).unwrap();
+    let run = |module: &str, more: &[&str]| {
+        fs::write(at.join("in/t.pgf"), format!("<Program><Module>{module}</Module></Program>")).unwrap();
+        let given = [&["compensate", "in/t.pgf", "--model", "model.toml", "--dry-run"], more].concat();
+        truegrind(at, &given)
+    };
+    for module in ["sub\\near.mod", "SUB/NEAR.MOD", "./sub/near.mod"] {
+        let (code, _, err) = run(module, &[]);
+        assert!(code == 0 || code == UNSURE, "{module}: {err}");
+    }
+    let whole = at.join("away.mod").display().to_string();
+    for module in ["../away.mod", "sub/../../away.mod", "link.mod", whole.as_str()] {
+        let (code, _, err) = run(module, &[]);
+        assert!(code == 2 && err.contains("--outside"), "{module}: {code} {err}");
+        let (code, _, err) = run(module, &["--outside"]);
+        assert!(code == 0 || code == UNSURE, "{module}: {err}");
+    }
+    for module in ["/dev/zero", "zero.mod", "sub", "/dev/stdin"] {
+        for more in [&[][..], &["--outside"]] {
+            let (code, _, err) = run(module, more);
+            assert!(code == 2 && err.contains("plain file"), "{module} {more:?}: {code} {err}");
+        }
+    }
+}

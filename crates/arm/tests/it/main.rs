@@ -8,6 +8,7 @@ mod robots;
 mod files;
 mod batch;
 mod effect;
+mod effort;
 mod forward;
 mod inverse;
 mod inverse_path;

@@ -171,8 +171,9 @@ pub fn identify(
     let everything = options.solver.parameters(nominal, &sensing);
     let seed = options.seed;
     // Stages on the training rows: errors. Literal forms move frames first, then links without priors.
-    let registered =
+    let mut registered =
         fit(&fitted_rows, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
+    registered.task.forget_rows();
     let rmse_mm = summary_on(&fitted_rows, &registered.model, &registered.frames).rmse;
     if !(rmse_mm < WRONG_ARM_MM) {
         return Err(IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm });
@@ -194,7 +195,8 @@ pub fn identify(
             fit(rows, from, &everything, &options.solver.tolerance(&options.tolerance), options.solver, seed)
         }
     };
-    let training = geometry_of(&fitted_rows, &registered);
+    let mut training = geometry_of(&fitted_rows, &registered);
+    training.task.forget_rows();
     let ((registered_errors, before), (geometry_errors, after)) = (on(&registered), on(&training));
     let held_out = test
         .iter()
@@ -203,7 +205,9 @@ pub fn identify(
         .map(|((&i, before), after)| (observed.dataset.rows[i].number, before, after))
         .collect();
     // The model itself: all rows.
-    let registered = fit(&observed, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
+    let mut registered =
+        fit(&observed, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
+    registered.task.forget_rows();
     let geometry = geometry_of(&observed, &registered);
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let identifiability = geometry.identifiability();

@@ -61,6 +61,12 @@ impl Calibration {
         self
     }
 
+    /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take a
+    /// hundred and fifty bytes each.
+    pub(crate) fn forget_rows(&mut self) {
+        self.columns = Columns::default();
+    }
+
     /// Weight of a row.
     ///
     /// # Panics

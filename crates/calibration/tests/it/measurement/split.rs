@@ -79,3 +79,64 @@ fn nearly_equal_poses_are_one_unless_the_read_out_differs() {
     data.rows[2].readout_mm = Some(nalgebra::Vector3::new(1.0, 2.3, 3.0));
     assert_eq!(split::poses(&data).len(), 4);
 }
+
+/// The class: a number of rows decides how often they are compared with each other. Rows that are one to the last bit are not
+/// compared, and the groups are those that comparing every pair gives.
+#[test]
+fn poses_are_those_that_comparing_every_pair_gives() {
+    let mut data = repeated();
+    let rows: Vec<usize> =
+        (0..200).chain(std::iter::repeat_n(7, 60)).chain((0..100).map(|i| i % 9)).collect();
+    data = data.subset(&rows);
+    for (i, row) in data.rows.iter_mut().enumerate() {
+        if i % 5 == 0 {
+            row.joints[2] += 2e-6 * (i % 3) as f64;
+        }
+        if i % 11 == 0 {
+            row.readout_mm = Some(nalgebra::Vector3::new((i % 2) as f64, 0.0, -0.0));
+        }
+    }
+    let alike = |i: usize, j: usize| {
+        let (a, b) = (&data.rows[i], &data.rows[j]);
+        let apart = match (a.readout_mm, b.readout_mm) {
+            (Some(a), Some(b)) => (a - b).amax() > 1.5e-3,
+            _ => false,
+        };
+        (a.joints - b.joints).amax() <= 0.000_5f64.to_radians() && !apart
+    };
+    let mut group: Vec<usize> = (0..data.rows.len()).collect();
+    loop {
+        let before = group.clone();
+        for i in 0..group.len() {
+            for j in 0..group.len() {
+                if alike(i, j) {
+                    let least = group[i].min(group[j]);
+                    (group[i], group[j]) = (least, least);
+                }
+            }
+        }
+        if group == before {
+            break;
+        }
+    }
+    let expected: Vec<Vec<usize>> = (0..group.len())
+        .filter(|i| group[*i] == *i)
+        .map(|first| (0..group.len()).filter(|i| group[*i] == first).collect())
+        .collect();
+    assert!(data.angle_step_rad.is_some());
+    assert_eq!(split::poses(&data), expected);
+}
+
+/// Parts share the rows of the whole until one of them is changed.
+#[test]
+fn a_part_shares_its_rows_until_it_is_changed() {
+    let whole = repeated();
+    let mut part = whole.subset(&[3, 1, 150]).subset(&[2, 0]);
+    assert_eq!(part.rows.iter().collect::<Vec<_>>(), [&whole.rows[150], &whole.rows[3]]);
+    assert!(std::ptr::eq(&part.rows[0], &whole.rows[150]), "copied");
+    part.rows[0].anchor = 9;
+    assert_eq!((part.rows[0].anchor, whole.rows[150].anchor, part.rows.len()), (9, 0, 2));
+    part.rows.push(whole.rows[0].clone());
+    assert_eq!(part.rows.last(), Some(&whole.rows[0]));
+    assert_eq!(part.rows.iter().rev().step_by(2).count(), 2);
+}
