@@ -295,7 +295,8 @@ impl<'s> Machine<'s> {
         self.trace.push(Event::Move(Box::new(done)));
     }
 
-    fn turn_to(&mut self, words: &Words) {
+    /// How the words of a block turn the tool.
+    pub fn turn_to(&mut self, words: &Words) {
         if words.turn.iter().any(Option::is_some) {
             let mut angles = if let Turn::Angles(angles) = self.turn { angles } else { [None; 3] };
             for (angle, say) in angles.iter_mut().zip(words.turn) {

@@ -137,7 +137,9 @@ impl Fanuc<'_> {
         if block.has(921) {
             for (axis, place) in places.iter().enumerate() {
                 if place.is_some() {
-                    self.preset[axis] = Some(0.0);
+                    // Back to the offset itself: what G92 and what G52 have shifted goes (30i operator's manual, workpiece
+                    // coordinate system preset).
+                    (self.preset[axis], self.local[axis]) = (Some(0.0), 0.0);
                 }
             }
             self.recount();

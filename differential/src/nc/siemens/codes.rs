@@ -296,6 +296,7 @@ impl Siemens<'_> {
             let (at, turn) = (self.machine.at, self.machine.turn);
             self.machine.elsewhere(text, true);
             (self.machine.at, self.machine.turn) = (at, turn);
+            self.machine.turn_to(&words);
             for axis in 0..3 {
                 if let Some(say) = words.place[axis] {
                     self.machine.at[axis] = match say {
