@@ -16,8 +16,8 @@
 //!
 //! ```
 //! use std::ops::Range;
-//! use crate::least_squares::lm;
-//! use crate::problem::Problem;
+//! use truegrind_estimation::least_squares::lm;
+//! use truegrind_estimation::problem::Problem;
 //!
 //! /// y = a e^(−b t), measured at t = 0, 1, 2, 3 with σ = 0.01.
 //! struct Decay;
