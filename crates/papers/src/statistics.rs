@@ -37,7 +37,7 @@ pub struct SignedRank {
 /// that diverged is the worse one; equal sizes share the mean of their ranks. Without a difference p is 1.
 ///
 /// ```
-/// use crate::statistics::signed_rank;
+/// use truegrind_papers::statistics::signed_rank;
 /// // Nine differences of one sign: the smallest one-sided p that nine pairs can give is 1/512.
 /// let test = signed_rank(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]);
 /// assert_eq!(test.positive, 45.0);

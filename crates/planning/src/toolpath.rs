@@ -18,6 +18,7 @@ use truegrind_surfaces::{SurfaceError, SurfaceFile};
 
 /// Why no program can be made.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ToolpathError {
     /// The surface has no path.
     #[error(transparent)]

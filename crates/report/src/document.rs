@@ -7,9 +7,9 @@ use super::table::{Cell, Table};
 /// A document, in no format yet.
 ///
 /// ```
-/// use crate::document::{Block, Document, Verdict};
-/// use crate::format::html;
-/// use crate::status::Status;
+/// use truegrind_report::document::{Block, Document, Verdict};
+/// use truegrind_report::format::html;
+/// use truegrind_report::status::Status;
 /// let mut page = Document::new("Identification of abb-irb-120");
 /// page.push(Verdict::new(Status::Good, "The model may be used", ["converged", "rank 27 of 27"]));
 /// page.heading(2, "Residuals");
@@ -28,6 +28,7 @@ pub struct Document {
 
 /// A piece of a document.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Block {
     /// A heading; level 2 is a section, 3 and 4 lie below. Level 1 is the document's title.
     Heading(u8, String),

@@ -17,7 +17,7 @@ impl Precision {
     /// The number as text. NaN is absence, `–`; infinities are `∞` and `-∞`; zero has no sign.
     ///
     /// ```
-    /// use crate::number::Precision::{Decimals, Significant};
+    /// use truegrind_report::number::Precision::{Decimals, Significant};
     /// assert_eq!(Decimals(3).format(-0.0001), "0.000");
     /// assert_eq!(Significant(3).format(0.012345), "0.0123");
     /// assert_eq!(Significant(2).format(1.27e-9), "1.3e-9");
@@ -39,7 +39,7 @@ impl Precision {
     /// Value and standard uncertainty as `1.270 ± 0.021`. A σ that is not known or not finite is shown as `–`.
     ///
     /// ```
-    /// use crate::number::Precision::{Decimals, Significant};
+    /// use truegrind_report::number::Precision::{Decimals, Significant};
     /// assert_eq!(Significant(2).format_with_sigma(1.27042, 0.0213), "1.270 ± 0.021");
     /// assert_eq!(Significant(2).format_with_sigma(3.1e-9, 4.0e-10), "(3.10 ± 0.40)e-9");
     /// assert_eq!(Decimals(1).format_with_sigma(5.04, f64::NAN), "5.0 ± –");

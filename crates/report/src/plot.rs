@@ -10,7 +10,7 @@
 //! fractions of a pixel nor dashes, and its width of a text is a count of bytes. No font is needed on the machine.
 //!
 //! ```
-//! use crate::plot::{Axis, Graph, Series};
+//! use truegrind_report::plot::{Axis, Graph, Series};
 //! let graph = Graph {
 //!     title: "Convergence".to_owned(),
 //!     x: Axis::new("iteration", ""),

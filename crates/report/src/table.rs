@@ -6,8 +6,8 @@ use super::status::Status;
 /// A table, in no format yet.
 ///
 /// ```
-/// use crate::table::{Cell, Column, Table};
-/// use crate::format::terminal;
+/// use truegrind_report::table::{Cell, Column, Table};
+/// use truegrind_report::format::terminal;
 /// let mut table = Table::new(
 ///     "Deviation",
 ///     vec![Column::text("method", "method"), Column::number("rmse_mm", "RMSE", "mm", 2)],
@@ -60,6 +60,7 @@ pub enum Alignment {
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Cell {
     /// Words.
     Text(String),

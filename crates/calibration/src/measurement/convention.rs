@@ -63,14 +63,22 @@ impl fmt::Display for AngleConvention {
     }
 }
 
-impl FromStr for AngleConvention {
-    type Err = String;
+/// A word that names no convention of angles.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("found angle convention \"{found}\", expected logged or dh")]
+pub struct UnknownConvention {
+    /// The word.
+    pub found: String,
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for AngleConvention {
+    type Err = UnknownConvention;
+
+    fn from_str(text: &str) -> Result<Self, UnknownConvention> {
         match text {
             "logged" => Ok(AngleConvention::Logged),
             "dh" => Ok(AngleConvention::Dh),
-            other => Err(format!("found angle convention \"{other}\", expected logged or dh")),
+            other => Err(UnknownConvention { found: other.to_owned() }),
         }
     }
 }

@@ -34,6 +34,7 @@ const LEVER_MM: f64 = 300.0;
 
 /// Unit of the file's angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum AngleUnit {
     /// As the format says.
     Degrees,
@@ -43,6 +44,7 @@ pub enum AngleUnit {
 
 /// Unit of the file's lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum LengthUnit {
     /// As the format says.
     Millimetres,
@@ -68,6 +70,7 @@ impl LengthUnit {
 
 /// Meaning of the four numbers of an orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Orientation {
     /// Scalar first, target seen by the sensor, as the format says.
     ScalarFirst,

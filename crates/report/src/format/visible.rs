@@ -11,7 +11,7 @@ use std::fmt::Write;
 /// does a carriage return before a line feed.
 ///
 /// ```
-/// use crate::format::visible;
+/// use truegrind_report::format::visible;
 /// assert_eq!(visible::text("q1\u{1b}[2J"), r"q1\x1b[2J");
 /// assert_eq!(visible::text("a\u{202e}b"), r"a\u{202e}b");
 /// ```

@@ -151,7 +151,7 @@ impl ValueFormatter<f64> for Scale {
 /// Round numbers between two ends, at steps of 1, 2 or 5 times a power of ten, at most about `wanted` of them.
 ///
 /// ```
-/// use crate::plot::linear_ticks;
+/// use truegrind_report::plot::linear_ticks;
 /// assert_eq!(linear_ticks(-0.31, 0.62, 5), [-0.2, 0.0, 0.2, 0.4, 0.6]);
 /// ```
 pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
@@ -185,7 +185,7 @@ pub fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
 /// where there are few, and round linear numbers where the ends are closer than that.
 ///
 /// ```
-/// use crate::plot::log_ticks;
+/// use truegrind_report::plot::log_ticks;
 /// assert_eq!(log_ticks(1e-9, 1e3, 5), [1e-9, 1e-6, 1e-3, 1.0, 1e3]);
 /// assert_eq!(log_ticks(0.4, 3.0, 6), [0.5, 1.0, 2.0]);
 /// ```
