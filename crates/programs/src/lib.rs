@@ -11,9 +11,9 @@
 //! - [`reading`]: a program in whichever of them it is written.
 //!
 //! ```
-//! use crate::motion::TargetValue;
-//! use crate::rapid::Task;
-//! use crate::rewrite::{Change, NewTarget, RewriteOptions};
+//! use truegrind_programs::motion::TargetValue;
+//! use truegrind_programs::rapid::Task;
+//! use truegrind_programs::rewrite::{Change, NewTarget, RewriteOptions};
 //!
 //! let source = b"MODULE M\nPROC main()\n  MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\nENDPROC\nENDMODULE\n";
 //! let task = Task::read(&[("main.mod", &source[..])]);

@@ -93,15 +93,15 @@ struct Cut {
 /// Quaternions are continuous in sign.
 ///
 /// ```
-/// use crate::path::{self, PathOptions};
-/// use crate::{Domain, Explicit, PointKind, Surface};
+/// use truegrind_surfaces::path::{self, PathOptions};
+/// use truegrind_surfaces::{Domain, Explicit, PointKind, Surface};
 ///
 /// let domain = Domain { first: [-50.0, 50.0], second: [-30.0, 30.0] };
 /// let bump = Surface::Explicit(Explicit::new("10 - x^2/400 - y^2/900", domain)?);
 /// let points = path::over(&bump, &PathOptions::default())?;
 /// assert_eq!(points[0].kind, PointKind::Approach);
 /// assert!(points.iter().filter(|p| p.kind == PointKind::Cut).all(|p| p.tool_z().dot(&p.normal) < -0.999));
-/// # Ok::<(), crate::SurfaceError>(())
+/// # Ok::<(), truegrind_surfaces::SurfaceError>(())
 /// ```
 ///
 /// # Errors
