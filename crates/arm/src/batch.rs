@@ -118,7 +118,9 @@ impl PreparedModel<'_> {
     /// let ready = arm.at_condition(&still);
     /// let rows: Vec<Joints> = (0..20).map(|k| Joints::repeat(0.05 * f64::from(k))).collect();
     /// let poses = ready.forward_many(&rows);
-    /// assert!(rows.iter().zip(&poses).all(|(q, pose)| (ready.forward(q).translation.vector - pose.translation.vector).norm() < 1e-9));
+    /// for (q, pose) in rows.iter().zip(&poses) {
+    ///     assert!((ready.forward(q).translation.vector - pose.translation.vector).norm() < 1e-9);
+    /// }
     /// # Ok::<(), robots::RobotError>(())
     /// ```
     pub fn forward_many(&self, joints: &[Joints]) -> Vec<Pose> {

@@ -287,6 +287,18 @@ pub struct Cell {
 impl Cell {
     /// Reads a cell file.
     ///
+    /// ```
+    /// use truegrind_compensation::cell::{Cell, CellError, FrameOrigin};
+    ///
+    /// let cell = Cell::from_toml("[[tool]]\nname = \"tDisc\"\norigin = \"metrology\"\nposition_mm = [0, 0, 120]\n")?;
+    /// assert_eq!(cell.tool[0].origin, FrameOrigin::Metrology);
+    /// assert_eq!(cell.tool[0].pose().map(|pose| pose.translation.z), Some(120.0));
+    /// // One tool under two names.
+    /// let twice = "[[tool]]\nname = \"T8\"\norigin = \"metrology\"\n[[tool]]\nname = \"T08\"\norigin = \"taught\"\n";
+    /// assert!(matches!(Cell::from_toml(twice), Err(CellError::Twice { kind: "tool", .. })));
+    /// # Ok::<(), CellError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`CellError`], with key and reason.
     pub fn from_toml(text: &str) -> Result<Self, CellError> {

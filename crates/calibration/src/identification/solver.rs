@@ -303,6 +303,19 @@ pub fn all() -> impl Iterator<Item = &'static Solver> {
 
 /// The solver of that name.
 ///
+/// ```
+/// use truegrind_calibration::identification::solver::{SolverError, by_name};
+///
+/// let method = by_name("lm").map_err(|error| error.to_string())?;
+/// assert!(!method.literal);
+/// let Err(SolverError::Unknown { known, .. }) = by_name("annealing") else { panic!("there is no annealing") };
+/// assert!(known.contains(&"ltlm"));
+/// // A setting that a method has not is refused, with the method's name.
+/// let wrong = method.configured(&"no-such = 1".parse().map_err(|_| "no table")?).map(|_| ());
+/// assert!(wrong.is_err_and(|error| error.to_string().starts_with("settings of lm: ")));
+/// # Ok::<(), String>(())
+/// ```
+///
 /// # Errors
 /// [`SolverError::Unknown`] lists the names that exist.
 pub fn by_name(name: &str) -> Result<&'static Solver, SolverError> {

@@ -64,6 +64,14 @@ impl fmt::Display for AngleConvention {
 }
 
 /// A word that names no convention of angles.
+///
+/// ```
+/// use truegrind_calibration::measurement::convention::AngleConvention;
+///
+/// assert_eq!("dh".parse(), Ok(AngleConvention::Dh));
+/// let refused = "DH".parse::<AngleConvention>().map_err(|error| error.to_string());
+/// assert_eq!(refused, Err("found angle convention \"DH\", expected logged or dh".into()));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("found angle convention \"{found}\", expected logged or dh")]
 pub struct UnknownConvention {

@@ -105,6 +105,21 @@ fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
 
 /// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
 ///
+/// ```
+/// use truegrind_planning::poses::rival::{NoDiagnosis, questions};
+///
+/// let diagnosis = r#"{"schema": "truegrind.diagnosis/1", "findings": [
+///     {"effect": "gear-ratio", "joints": [4], "confidence": "identified"},
+///     {"effect": "backlash", "joints": [2], "confidence": "ambiguous", "alternatives": [{"effect": "thermal-drift"}]}
+/// ]}"#;
+/// let asked = questions(diagnosis)?;
+/// assert_eq!(asked.len(), 1);
+/// assert_eq!(asked[0].suspects[0].joints, [1]);
+/// assert_eq!(asked[0].suspects[1].effect, "thermal-drift");
+/// assert_eq!(questions(r#"{"schema": "other/1"}"#), Err(NoDiagnosis::Schema { found: "other/1".into() }));
+/// # Ok::<(), NoDiagnosis>(())
+/// ```
+///
 /// # Errors
 /// [`NoDiagnosis`], where the text is none.
 pub fn questions(text: &str) -> Result<Vec<Question>, NoDiagnosis> {

@@ -63,7 +63,12 @@ pub enum WriteError {
 ///     user_frame: frame,
 ///     object_frame: frame,
 /// };
-/// let to = RobTarget { position_mm: [380.0, -60.5, 250.0], quaternion: [0.0, 0.0, 1.0, 0.0], conf: [-1, -1, 0, 0], external: [None; 6] };
+/// let to = RobTarget {
+///     position_mm: [380.0, -60.5, 250.0],
+///     quaternion: [0.0, 0.0, 1.0, 0.0],
+///     conf: [-1, -1, 0, 0],
+///     external: [None; 6],
+/// };
 /// let step = Step {
 ///     kind: MotionKind::Linear,
 ///     to: TargetValue::Cartesian(to),
