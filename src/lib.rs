@@ -53,7 +53,7 @@ pub use truegrind_arm::effect::smooth::Smooth;
 pub use truegrind_arm::effect::thermal::Thermal;
 pub use truegrind_arm::effect::{Effect, EffectParameter};
 pub use truegrind_arm::estimated::{
-    Estimated, EstimatedParameter, Judgement, Provenance, RidingPoint, StageErrors, Verdict,
+    Estimated, EstimatedParameter, Judgement, ModelFileError, Provenance, RidingPoint, StageErrors, Verdict,
 };
 pub use truegrind_arm::inverse::Inverse;
 pub use truegrind_arm::inverse::configuration::Configuration;
@@ -62,12 +62,12 @@ pub use truegrind_arm::link::{Link, LinkModel};
 pub use truegrind_arm::model::{Body, Joints, Limits, Model};
 pub use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 pub use truegrind_arm::region::{Outside, Region};
-pub use truegrind_arm::robots::{self, Robot, RobotError};
+pub use truegrind_arm::robots::{self, NominalMismatch, Robot, RobotError};
 pub use truegrind_math::se3::Pose;
 pub use truegrind_math::statistics::ErrorSummary;
 
 // What was measured.
-pub use truegrind_calibration::measurement::convention::AngleConvention;
+pub use truegrind_calibration::measurement::convention::{AngleConvention, UnknownConvention};
 pub use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 pub use truegrind_calibration::measurement::import::{
     ImportError, Options as ImportOptions, Place as ImportPlace, read as read_measurements,
@@ -91,11 +91,11 @@ pub use truegrind_calibration::identification::identify::{
     Identification, IdentifyError, Options as IdentifyOptions, identify, observe,
 };
 pub use truegrind_calibration::identification::register::{Registered, register, starting_frames};
-pub use truegrind_calibration::identification::solver::{Solver, by_name as solver_by_name};
+pub use truegrind_calibration::identification::solver::{Solver, SolverError, by_name as solver_by_name};
 pub use truegrind_calibration::identification::start::NoStart;
 pub use truegrind_calibration::identification::tolerance::Tolerance;
 pub use truegrind_calibration::tracking::{
-    Alarm, Options as TrackOptions, State as TrackState, TrackError, Tracker,
+    Alarm, Options as TrackOptions, State as TrackState, StateError as TrackStateError, TrackError, Tracker,
 };
 
 // Solvers, for any problem.
@@ -126,7 +126,7 @@ pub use truegrind_planning::toolpath::{Toolpath, ToolpathError, toolpath};
 pub use truegrind_surfaces::{Contact, Domain, Mesh, Surface, SurfaceFile};
 
 // What is corrected, and by how much.
-pub use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin, Teaches};
+pub use truegrind_compensation::cell::{Cell, CellError, CellFrame, FrameOrigin, Teaches};
 pub use truegrind_compensation::compensate::{CompensateError, Compensated, compensate};
 pub use truegrind_compensation::cut::Cuts;
 pub use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status};

@@ -132,8 +132,8 @@ pub fn corrected_task(
     cell: &str,
     options: &Options,
 ) -> Result<CorrectedTask, String> {
-    let estimated = Estimated::from_toml(&case.model_toml)?;
-    let cell = Cell::from_toml(cell)?;
+    let estimated = Estimated::from_toml(&case.model_toml).map_err(|e| e.to_string())?;
+    let cell = Cell::from_toml(cell).map_err(|e| e.to_string())?;
     let mut setup = Setup::default();
     let frame = |p: truegrind::math::se3::Pose| truegrind::programs::motion::Frame::from_pose(&p);
     setup.tools.extend(cell.tool.iter().filter_map(|f| Some((f.name.clone(), frame(f.pose()?)))));

@@ -94,13 +94,17 @@ impl CellArguments {
         }
         let cell = match &self.cell {
             Some(path) => Cell::from_toml(&files::read_text(path)?).map_err(|e| {
-                anyhow!("{}: {}; a cell file lists [[tool]] and [[wobj]]", path.display(), e.trim_end())
+                anyhow!(
+                    "{}: {}; a cell file lists [[tool]] and [[wobj]]",
+                    path.display(),
+                    e.to_string().trim_end()
+                )
             })?,
             None => Cell::default(),
         };
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
         let cell = match &surface {
-            Some(surface) => cell.with_surface(surface).map_err(anyhow::Error::msg)?,
+            Some(surface) => cell.with_surface(surface)?,
             None => cell,
         };
         let mut condition = model.map(|m| m.condition).unwrap_or_default();

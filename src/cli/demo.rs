@@ -93,7 +93,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let mut rewritten_program = None;
     for (name, estimated) in arms {
         let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
-        let text = estimated.to_toml().map_err(anyhow::Error::msg)?;
+        let text = estimated.to_toml()?;
         let mark = Mark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             model: inputs::hash(text.as_bytes()),

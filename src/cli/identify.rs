@@ -173,7 +173,7 @@ pub(super) fn write_model(
             batch.write()?;
             bail!("{} was not written, because {why}: {}", path.display(), reasons());
         }
-        batch.add(path, estimated.to_toml().map_err(anyhow::Error::msg)?);
+        batch.add(path, estimated.to_toml()?);
     }
     batch.write()?;
     let poor = matches!(status, Judgement::Fail | Judgement::Doubtful);
@@ -195,7 +195,7 @@ fn options(arguments: &Arguments) -> anyhow::Result<Options> {
     }
     Ok(Options {
         tolerance,
-        solver: by_name(&arguments.method).map_err(anyhow::Error::msg)?,
+        solver: by_name(&arguments.method)?,
         held_out: arguments.held_out,
         seed: arguments.common.seed,
         fuse_readout: !arguments.raw_columns,

@@ -46,7 +46,10 @@ pub(super) fn model(argument: &str) -> anyhow::Result<NamedModel> {
     let path = Path::new(argument);
     let text = files::read_text(path)?;
     let arm = Estimated::from_toml(&text).map_err(|e| {
-        anyhow!("{argument}: {}; a model file is what `truegrind identify -o` writes", e.trim_end())
+        anyhow!(
+            "{argument}: {}; a model file is what `truegrind identify -o` writes",
+            e.to_string().trim_end()
+        )
     })?;
     robots::agrees(&arm.robot, &arm.nominal).map_err(|e| anyhow!("{argument}: {e}"))?;
     if arm.verdict.status == Judgement::Fail {

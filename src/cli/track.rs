@@ -236,7 +236,7 @@ impl Track<'_> {
             None => now()?,
         };
         let model_path = self.folder.join(format!("{}-{date}-{:06}.toml", self.stem, tracker.state().poses));
-        let text = tracker.model().to_toml().map_err(anyhow::Error::msg)?;
+        let text = tracker.model().to_toml()?;
         let path = model_path.display().to_string();
         arguments.outputs.print(&view::summary(tracker, fresh, alarms, &path))?;
         if arguments.output.is_some() {
@@ -255,7 +255,7 @@ impl Track<'_> {
             || view::table(tracker),
             || view::json(tracker, fresh, alarms),
         )?;
-        batch.add(self.state_path, tracker.state().to_toml().map_err(anyhow::Error::msg)?);
+        batch.add(self.state_path, tracker.state().to_toml()?);
         batch.write()
     }
 

@@ -33,7 +33,7 @@ fn every_key_of_a_surface_file_is_read() {
             let file = read.map_err(|error| error.to_string())?;
             let path = toolpath(&file, &sheet, "abb-irb-120").map_err(|error| error.to_string())?;
             let program = writer::write(&path.draft).map_err(|error| error.to_string())?;
-            let cell = Cell::default().with_surface(&file)?;
+            let cell = Cell::default().with_surface(&file).map_err(|error| error.to_string())?;
             Ok(format!("{}{cell:?}", String::from_utf8_lossy(&program)))
         };
         // Coarser, so that it does not take long.

@@ -92,10 +92,23 @@ impl From<&Model> for ArmFile {
 impl ArmFile {
     /// The arm.
     ///
+    /// ```
+    /// use truegrind_arm::arm_file::ArmFile;
+    /// use truegrind_arm::robots;
+    ///
+    /// let arm = robots::load("abb-irb-120")?.model;
+    /// let mut file = ArmFile::from(&arm);
+    /// assert!((file.model()?.links[1].a_mm - arm.links[1].a_mm).abs() < 1e-12);
+    /// file.link[1].a_mm = f64::NAN;
+    /// let refused = file.model().map_err(|unfit| unfit.to_string());
+    /// assert_eq!(refused, Err("link 2 a_mm: found NaN, expected a finite length in mm, within ±10,000".into()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
-    /// A sentence that names the key when a list has the wrong length or a number cannot be used.
-    pub fn model(&self) -> Result<Model, String> {
-        self.check().map_err(|unfit| unfit.to_string())?;
+    /// [`Unfit`], which names the key, where a list has the wrong length or a number cannot be used.
+    pub fn model(&self) -> Result<Model, Unfit> {
+        self.check()?;
         let count = self.link.len();
         let links: Vec<Link> = self
             .link
@@ -110,12 +123,12 @@ impl ArmFile {
             })
             .collect();
         let links: [Link; 6] =
-            links.try_into().map_err(|_| format!("`link`: found {count} links, expected 6"))?;
+            links.try_into().map_err(|_| Unfit::new("`link`", format!("{count} links"), "6"))?;
         let bodies = match &self.body {
             None => None,
             Some(list) => Some(
                 <[Body; 6]>::try_from(list.clone())
-                    .map_err(|_| format!("`body`: found {} bodies, expected 6", list.len()))?,
+                    .map_err(|_| Unfit::new("`body`", format!("{} bodies", list.len()), "6"))?,
             ),
         };
         let [w, i, j, k] = self.flange_wxyz;

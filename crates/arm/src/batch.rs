@@ -107,6 +107,22 @@ impl PreparedModel<'_> {
     }
 
     /// Poses of the flange for many joint vectors.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// let arm = robots::load("abb-irb-120")?.model;
+    /// let still = Condition::default();
+    /// let ready = arm.at_condition(&still);
+    /// let rows: Vec<Joints> = (0..20).map(|k| Joints::repeat(0.05 * f64::from(k))).collect();
+    /// let poses = ready.forward_many(&rows);
+    /// for (q, pose) in rows.iter().zip(&poses) {
+    ///     assert!((ready.forward(q).translation.vector - pose.translation.vector).norm() < 1e-9);
+    /// }
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
     pub fn forward_many(&self, joints: &[Joints]) -> Vec<Pose> {
         let columns: JointColumns = joints.iter().copied().collect();
         let mut poses = PoseColumns::default();

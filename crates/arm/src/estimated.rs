@@ -4,6 +4,7 @@
 //! alone.
 
 mod checks;
+mod error;
 mod file;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
@@ -19,6 +20,8 @@ use crate::joints::Joints;
 use truegrind_math::lanes::{Lanes, Real, WIDTH, vectorised};
 use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::statistics::ErrorSummary;
+
+pub use error::ModelFileError;
 
 /// The name and version of the file format.
 pub const SCHEMA: &str = "truegrind.model/1";

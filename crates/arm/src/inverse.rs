@@ -143,6 +143,26 @@ impl<'a> Inverse<'a> {
     ///
     /// A branch is left only across its border: where the seed or the solution stands within 2 % of a singularity,
     /// either side counts as the seed's.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::inverse::{Inverse, InverseError};
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// let arm = robots::load("abb-irb-120")?.model;
+    /// let still = Condition::default();
+    /// let inverse = Inverse::new(&arm, &still, &arm);
+    /// let meant = Joints::new(0.3, 0.2, -0.1, 0.5, 0.8, -0.4);
+    /// let found = inverse.solve_near(&arm.forward(&meant, &still), &Joints::new(0.2, 0.1, 0.0, 0.4, 0.7, -0.3))?;
+    /// assert!((found.joints - meant).norm() < 1e-9);
+    ///
+    /// // Two metres away there is nothing to be found, and it is said by how much.
+    /// let far = nalgebra::Translation3::new(2000.0, 0.0, 0.0) * arm.forward(&meant, &still);
+    /// let refused = inverse.solve_near(&far, &meant);
+    /// assert!(matches!(refused, Err(InverseError::Unreachable { beyond_mm }) if beyond_mm > 1000.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn solve_near(&self, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
         let goal = self.goal(target)?;
         if !seed.iter().all(|q| q.is_finite()) {
@@ -175,6 +195,28 @@ impl<'a> Inverse<'a> {
     /// meant. Among several the one nearest to `near` is taken, without `near` the one that best keeps to the quarters.
     /// Joints 2, 3 and 5 stand on the turn nearest to `near`; without it, or with less than a turn of room, on that nearest
     /// to the middle of their range.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::inverse::Inverse;
+    /// use truegrind_arm::inverse::configuration::Configuration;
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// // A target in an open place, as a RAPID program states it: the same flange with the wrist the other way round.
+    /// let arm = robots::load("abb-irb-120")?.model;
+    /// let still = Condition::default();
+    /// let inverse = Inverse::new(&arm, &still, &arm);
+    /// let meant = Joints::new(0.3, 0.2, -0.1, 0.5, 0.8, -0.4);
+    /// let flange = arm.forward(&meant, &still);
+    /// let up = inverse.configuration(&meant);
+    /// let found = inverse.solve_configured(&flange, &up, None)?;
+    /// assert!((found.joints - meant).norm() < 1e-9);
+    /// let flipped = Configuration { cf4: -2, cf6: 1, cfx: up.cfx + 1, ..up };
+    /// let other = inverse.solve_configured(&flange, &flipped, None)?;
+    /// assert!(other.joints[4] < 0.0 && (other.joints[4] + 0.8).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn solve_configured(
         &self,
         target: &Pose,

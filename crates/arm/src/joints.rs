@@ -18,6 +18,17 @@ pub struct Limits {
 
 impl Limits {
     /// The first joint (0-based) outside its range, if any.
+    ///
+    /// ```
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// // Axis 5 of an IRB 120 turns by 120° either way.
+    /// let limits = robots::load("abb-irb-120")?.model.limits;
+    /// assert_eq!(limits.violated(&Joints::zeros()), None);
+    /// assert_eq!(limits.violated(&Joints::new(0.0, 0.0, 0.0, 0.0, 2.2, 0.0)), Some(4));
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
     pub fn violated(&self, q: &Joints) -> Option<usize> {
         (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
     }

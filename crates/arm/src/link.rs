@@ -37,6 +37,18 @@ pub struct Link {
 
 impl Link {
     /// The pose of frame i in frame i−1 with the joint at `angle_rad` (offset not included).
+    ///
+    /// ```
+    /// use std::f64::consts::FRAC_PI_2;
+    /// use nalgebra::Point3;
+    /// use truegrind_arm::link::{Link, LinkModel};
+    ///
+    /// // An upper arm of 270 mm whose joint stands at 90°: its end lies on y, its own x axis along y.
+    /// let link = Link { model: LinkModel::Dh, a_mm: 270.0, d_mm: 0.0, alpha_rad: 0.0, theta_rad: 0.0, beta_rad: 0.0 };
+    /// let end = link.pose(FRAC_PI_2);
+    /// assert!((end * Point3::origin() - Point3::new(0.0, 270.0, 0.0)).norm() < 1e-12);
+    /// assert!((end * Point3::new(1.0, 0.0, 0.0) - Point3::new(0.0, 271.0, 0.0)).norm() < 1e-12);
+    /// ```
     pub fn pose(&self, angle_rad: f64) -> Pose {
         let rz = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad + self.theta_rad);
         let rx = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.alpha_rad);

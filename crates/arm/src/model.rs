@@ -33,11 +33,41 @@ pub struct Model {
 
 impl Model {
     /// Pose of the flange in the base. For many poses under one condition take [`Model::at_condition`] once.
+    ///
+    /// ```
+    /// use std::f64::consts::FRAC_PI_2;
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// // The picture in the manual, turned by a quarter about axis 1.
+    /// let arm = robots::load("abb-irb-120")?.model;
+    /// let flange = arm.forward(&Joints::new(FRAC_PI_2, 0.0, 0.0, 0.0, 0.0, 0.0), &Condition::default());
+    /// assert!((flange.translation.vector - nalgebra::Vector3::new(0.0, 374.0, 630.0)).norm() < 1e-9);
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
     pub fn forward(&self, q: &Joints, condition: &Condition) -> Pose {
         self.at_condition(condition).forward(q)
     }
 
     /// The model with everything worked out that does not depend on the joints.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::effect::{Effect, thermal::Thermal};
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// let mut arm = robots::load("abb-irb-120")?.model;
+    /// let thermal = Thermal { growth: 0.0, time_constant_h: 1.0, growth_per_k: 1.2e-5, reference_c: 20.0 };
+    /// arm.effects.push(Effect::ThermalDrift(thermal));
+    ///
+    /// // Ten kelvin above its reference every length of the arm is 0.12 ‰ longer.
+    /// let (cold, warm) = (Condition::default(), Condition { temperature_c: Some(30.0), ..Condition::default() });
+    /// let place = |condition| arm.at_condition(condition).forward(&Joints::zeros()).translation.vector;
+    /// assert!((place(&warm) - place(&cold) * (1.0 + 1.2e-4)).norm() < 1e-9);
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
     pub fn at_condition(&self, condition: &Condition) -> PreparedModel<'_> {
         PreparedModel {
             model: self,
@@ -140,6 +170,21 @@ impl PreparedModel<'_> {
     }
 
     /// Derivative of [`PreparedModel::rotations`] with respect to the controller's angles.
+    ///
+    /// ```
+    /// use truegrind_arm::condition::Condition;
+    /// use truegrind_arm::effect::{Effect, coupling::Coupling};
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::robots;
+    ///
+    /// // A wrist whose sixth axis turns by 0.1 % of what the fifth does.
+    /// let mut arm = robots::load("abb-irb-120")?.model;
+    /// arm.effects.push(Effect::JointCoupling(Coupling { joint: 5, driver: 4, factor: 1e-3 }));
+    /// let still = Condition::default();
+    /// let slopes = arm.at_condition(&still).rotation_slopes(&Joints::repeat(0.3));
+    /// assert_eq!((slopes[(5, 4)], slopes[(4, 5)], slopes[(5, 5)]), (1e-3, 0.0, 1.0));
+    /// # Ok::<(), robots::RobotError>(())
+    /// ```
     pub fn rotation_slopes(&self, q: &Joints) -> Matrix6<f64> {
         let mut slope = Matrix6::identity();
         if let Some(statics) = &self.statics {

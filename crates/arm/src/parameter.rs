@@ -172,6 +172,21 @@ impl Link {
 }
 
 /// Parameters of the arm: links, then effects.
+///
+/// ```
+/// use truegrind_arm::effect::{Effect, backlash::Backlash};
+/// use truegrind_arm::parameter::arm_parameters;
+/// use truegrind_arm::robots;
+///
+/// // Four numbers a link, then those of the effects; where axes are parallel, beta in place of d.
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::Backlash(Backlash { joint: 0, play_rad: 0.0 }));
+/// let names: Vec<String> = arm_parameters(&arm).iter().map(ToString::to_string).collect();
+/// assert_eq!(names.len(), 25);
+/// assert_eq!(names[4..8], ["link2.a", "link2.beta", "link2.alpha", "link2.theta"]);
+/// assert_eq!(names[24], "effect1.1");
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 pub fn arm_parameters(model: &Model) -> Vec<Parameter> {
     let mut out = link_parameters(model);
     for (index, effect) in model.effects.iter().enumerate() {

@@ -99,6 +99,20 @@ impl Region {
     }
 
     /// Whether a joint vector (rad) leaves the region: the joint that leaves its range farthest, else coverage.
+    ///
+    /// ```
+    /// use truegrind_arm::model::Joints;
+    /// use truegrind_arm::region::{Outside, Region};
+    ///
+    /// // Poses on a grid of 10° over joints 1 and 2, all within ±20°.
+    /// let degrees = |a: f64, b: f64| Joints::new(a.to_radians(), b.to_radians(), 0.0, 0.0, 0.0, 0.0);
+    /// let grid: Vec<Joints> =
+    ///     (-2..=2).flat_map(|i| (-2..=2).map(move |k| degrees(10.0 * f64::from(i), 10.0 * f64::from(k)))).collect();
+    /// let region = Region::of(&grid, 0.02);
+    /// assert_eq!(region.outside(&degrees(4.0, -13.0)), None);
+    /// let Some(Outside::Joint { joint: 1, by_deg }) = region.outside(&degrees(0.0, 35.0)) else { panic!("joint 2 is out") };
+    /// assert!((by_deg - 15.0).abs() < 1e-9);
+    /// ```
     pub fn outside(&self, q: &Joints) -> Option<Outside> {
         self.outside_near(q, &mut Nearest::default())
     }

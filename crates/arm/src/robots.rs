@@ -18,7 +18,7 @@ pub mod validation;
 use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
 
-pub use error::RobotError;
+pub use error::{NominalMismatch, RobotError};
 
 /// The files of the catalogue: name for messages, text.
 const FILES: [(&str, &str); 7] = [
@@ -67,6 +67,15 @@ pub fn catalogue() -> Vec<String> {
 }
 
 /// An arm of the catalogue. Capitals do not matter.
+///
+/// ```
+/// use truegrind_arm::robots;
+///
+/// assert_eq!(robots::load("ABB-IRB-120")?.sheet.maker, "ABB");
+/// let unknown = robots::load("abb-irb-121").map(|robot| robot.sheet.name).map_err(|error| error.to_string());
+/// assert!(unknown.is_err_and(|said| said.contains("unknown robot \"abb-irb-121\"") && said.contains("abb-irb-120")));
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 pub fn load(name: &str) -> Result<Robot, RobotError> {
     for (file, text) in FILES {
         let sheets = read(text, file)?.robot;
@@ -80,9 +89,22 @@ pub fn load(name: &str) -> Result<Robot, RobotError> {
 /// Refuses a nominal arm that goes by a name of the catalogue and is not that arm. A name that the catalogue has not is
 /// nobody's business.
 ///
+/// ```
+/// use truegrind_arm::robots::{self, NominalMismatch};
+///
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// assert_eq!(robots::agrees("abb-irb-120", &arm), Ok(()));
+/// arm.links[3].d_mm += 1.0;
+/// let Err(NominalMismatch::Name { place, .. }) = robots::agrees("abb-irb-120", &arm) else { panic!("another arm") };
+/// assert!(place.contains("link 4 d_mm"));
+/// // An arm of one's own has a name of its own.
+/// assert_eq!(robots::agrees("workshop-6", &arm), Ok(()));
+/// # Ok::<(), robots::RobotError>(())
+/// ```
+///
 /// # Errors
-/// A sentence that says where the two differ first.
-pub fn agrees(name: &str, nominal: &Model) -> Result<(), String> {
+/// [`NominalMismatch::Name`], which says where the two differ first.
+pub fn agrees(name: &str, nominal: &Model) -> Result<(), NominalMismatch> {
     let plain =
         |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     let wanted = plain(name);
@@ -101,25 +123,30 @@ pub fn agrees(name: &str, nominal: &Model) -> Result<(), String> {
             }
         }
     }
-    different.map_or(Ok(()), |place| {
-        Err(format!(
-            "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give \
-             an arm of your own a name of its own"
-        ))
-    })
+    different.map_or(Ok(()), |place| Err(NominalMismatch::Name { name: name.to_owned(), place }))
 }
 
 /// Refuses a nominal arm whose links are not those of another of the same name.
 ///
 /// # Errors
-/// A sentence that says where the two differ first.
-pub fn same(nominal: &Model, stated: &Model) -> Result<(), String> {
-    validation::difference(nominal, stated).map_or(Ok(()), |place| {
-        Err(format!("the two have one name and are not one arm: {place}; give the robot that the model was identified for"))
-    })
+/// [`NominalMismatch::Arms`], which says where the two differ first.
+pub fn same(nominal: &Model, stated: &Model) -> Result<(), NominalMismatch> {
+    validation::difference(nominal, stated).map_or(Ok(()), |place| Err(NominalMismatch::Arms { place }))
 }
 
 /// An arm from a user's own file, which holds exactly one `[[robot]]`. `file` is named in errors.
+///
+/// ```
+/// use truegrind_arm::robots::{self, RobotError};
+///
+/// let misspelt = "[[robot]]\nname = \"mine\"\nmakr = \"ours\"\n";
+/// let Err(RobotError::Syntax { line, found, .. }) = robots::parse(misspelt, "mine.toml") else { panic!("no such key") };
+/// assert_eq!((line, found.as_str()), (3, "makr = \"ours\""));
+/// assert_eq!(
+///     robots::parse("robot = []", "mine.toml").map_err(|error| error.to_string()).err().as_deref(),
+///     Some("mine.toml: found 0 robots, expected one [[robot]]; put each arm into a file of its own")
+/// );
+/// ```
 pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
     let mut sheets = read(text, file)?.robot;
     match (sheets.pop(), sheets.len()) {

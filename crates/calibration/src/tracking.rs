@@ -48,7 +48,7 @@ pub mod state;
 mod tracker;
 
 pub use alarm::{Alarm, Course};
-pub use error::TrackError;
+pub use error::{StateError, TrackError};
 pub use options::Options;
 pub use state::State;
 pub use tracker::{Taken, Tracker, first_poses};

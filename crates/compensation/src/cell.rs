@@ -27,6 +27,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 pub use super::taught::{taught_frame, taught_tcp};
 use truegrind_math::se3::Pose;
@@ -38,6 +39,7 @@ use truegrind_surfaces::file::Origin;
 /// Which frame of a work object its teaching points make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Teaches {
     /// The user frame, as the controller's three-point method: the object frame and program displacements stay on top of it.
     #[default]
@@ -49,6 +51,7 @@ pub enum Teaches {
 /// How a frame was obtained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum FrameOrigin {
     /// From CAD or measured by other means: true as it stands.
     Metrology,
@@ -128,6 +131,75 @@ impl CellFrame {
     }
 }
 
+/// Why a cell file cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CellError {
+    /// More teaching points of tools than can be worked through.
+    #[error(
+        "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all tools together, \
+         expected at most {MOST_TEACHING}: four to ten points tell a TCP, keep those that differ most"
+    )]
+    TooManyPoints {
+        /// The tool with the most.
+        name: String,
+        /// Its points.
+        points: usize,
+        /// The sum of the squares.
+        work: usize,
+    },
+    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
+    #[error("not a cell file: {0}")]
+    Syntax(String),
+    /// Keys of a frame that do not go together, or a number that cannot be.
+    #[error("{kind} \"{name}\": {what}")]
+    Frame {
+        /// `tool` or `wobj`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// The key and what is wrong.
+        what: String,
+    },
+    /// One frame under two names that mean the same.
+    #[error("{kind} \"{name}\" is stated twice (as \"{before}\" before): keep one of the two")]
+    Twice {
+        /// `tool` or `wobj`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// The name of the first.
+        before: String,
+    },
+    /// A letter that no external axis has.
+    #[error("external axis '{axis}': expected one of a, b, c, d, e, f")]
+    UnknownAxis {
+        /// The letter.
+        axis: char,
+    },
+    /// An external axis that is stated twice.
+    #[error("external axis '{axis}' is stated twice: keep one of the two")]
+    AxisTwice {
+        /// The letter.
+        axis: char,
+    },
+    /// A surface file says otherwise.
+    #[error(
+        "{kind} \"{name}\": the cell file says origin = \"{}\", the surface file origin = \"{}\": correct the one that is wrong",
+        cell.word(), surface.word()
+    )]
+    Contradicted {
+        /// `tool` or `wobj`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// What the cell file says.
+        cell: FrameOrigin,
+        /// What the surface file says.
+        surface: FrameOrigin,
+    },
+}
+
 /// Joint angles beyond this are none (°).
 const MOST_DEG: f64 = 3600.0;
 
@@ -136,8 +208,9 @@ const MOST_TEACHING: usize = 250_000;
 
 impl CellFrame {
     /// Whether its keys go together and its numbers can be.
-    fn check(&self, kind: &str) -> Result<(), String> {
-        let wrong = |what: &str| Err(format!("{kind} \"{}\": {what}", self.name));
+    fn check(&self, kind: &'static str) -> Result<(), CellError> {
+        let wrong =
+            |what: &str| Err(CellError::Frame { kind, name: self.name.clone(), what: what.to_owned() });
         if self.name.trim().is_empty() {
             return wrong("a name is expected, as the program writes it");
         }
@@ -189,6 +262,7 @@ impl CellFrame {
 /// What an external axis carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Carries {
     /// The robot's base: a track or gantry.
     Base,
@@ -231,19 +305,32 @@ pub struct Cell {
 impl Cell {
     /// Reads a cell file.
     ///
+    /// ```
+    /// use truegrind_compensation::cell::{Cell, CellError, FrameOrigin};
+    ///
+    /// let cell = Cell::from_toml("[[tool]]\nname = \"tDisc\"\norigin = \"metrology\"\nposition_mm = [0, 0, 120]\n")?;
+    /// assert_eq!(cell.tool[0].origin, FrameOrigin::Metrology);
+    /// assert_eq!(cell.tool[0].pose().map(|pose| pose.translation.z), Some(120.0));
+    /// // One tool under two names.
+    /// let twice = "[[tool]]\nname = \"T8\"\norigin = \"metrology\"\n[[tool]]\nname = \"T08\"\norigin = \"taught\"\n";
+    /// assert!(matches!(Cell::from_toml(twice), Err(CellError::Twice { kind: "tool", .. })));
+    /// # Ok::<(), CellError>(())
+    /// ```
+    ///
     /// # Errors
-    /// A sentence with key and reason.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        let cell: Self = toml::from_str(text).map_err(|e| format!("not a cell file: {e}"))?;
+    /// [`CellError`], with key and reason.
+    pub fn from_toml(text: &str) -> Result<Self, CellError> {
+        let cell: Self = toml::from_str(text).map_err(|e| CellError::Syntax(e.to_string()))?;
         for (kind, frames) in [("tool", &cell.tool), ("wobj", &cell.wobj)] {
             let mut stated: HashMap<String, &CellFrame> = HashMap::new();
             for frame in frames {
                 frame.check(kind)?;
                 if let Some(other) = stated.insert(setup::plain(&frame.name), frame) {
-                    return Err(format!(
-                        "{kind} \"{}\" is stated twice (as \"{}\" before): keep one of the two",
-                        frame.name, other.name
-                    ));
+                    return Err(CellError::Twice {
+                        kind,
+                        name: frame.name.clone(),
+                        before: other.name.clone(),
+                    });
                 }
             }
         }
@@ -252,17 +339,14 @@ impl Cell {
         if work > MOST_TEACHING {
             let most = cell.tool.iter().max_by_key(|tool| tool.teaching_deg.len());
             let (name, points) = most.map_or(("", 0), |tool| (tool.name.as_str(), tool.teaching_deg.len()));
-            return Err(format!(
-                "tool \"{name}\": {points} teaching points, and the squares of these numbers are {work} for all tools together, \
-                 expected at most {MOST_TEACHING}: four to ten points tell a TCP, keep those that differ most"
-            ));
+            return Err(CellError::TooManyPoints { name: name.to_owned(), points, work });
         }
         if let Some(wrong) = cell.external.iter().find(|axis| axis.index().is_none()) {
-            return Err(format!("external axis '{}': expected one of a, b, c, d, e, f", wrong.axis));
+            return Err(CellError::UnknownAxis { axis: wrong.axis });
         }
         for (place, axis) in cell.external.iter().enumerate() {
             if cell.external[..place].iter().any(|other| other.index() == axis.index()) {
-                return Err(format!("external axis '{}' is stated twice: keep one of the two", axis.axis));
+                return Err(CellError::AxisTwice { axis: axis.axis });
             }
         }
         Ok(cell)
@@ -271,8 +355,8 @@ impl Cell {
     /// The cell with what a surface file says of the origin of its tool and its work object.
     ///
     /// # Errors
-    /// A sentence, where the cell file says otherwise.
-    pub fn with_surface(mut self, surface: &SurfaceFile) -> Result<Self, String> {
+    /// [`CellError::Contradicted`], where the cell file says otherwise.
+    pub fn with_surface(mut self, surface: &SurfaceFile) -> Result<Self, CellError> {
         let (tool, object) = (&surface.tool, &surface.work_object);
         for (kind, frames, name, origin) in [
             ("tool", &mut self.tool, &tool.name, tool.origin),
@@ -281,12 +365,12 @@ impl Cell {
             let Some(origin) = origin.map(FrameOrigin::from) else { continue };
             match frames.iter().find(|frame| frame.name.eq_ignore_ascii_case(name)) {
                 Some(stated) if stated.origin != origin => {
-                    return Err(format!(
-                        "{kind} \"{name}\": the cell file says origin = \"{}\", the surface file origin = \"{}\": correct the \
-                         one that is wrong",
-                        stated.origin.word(),
-                        origin.word()
-                    ));
+                    return Err(CellError::Contradicted {
+                        kind,
+                        name: name.clone(),
+                        cell: stated.origin,
+                        surface: origin,
+                    });
                 }
                 Some(_) => {}
                 None => frames.push(CellFrame::of(name, origin)),

@@ -41,6 +41,7 @@ impl Compensated {
 
 /// Why nothing was corrected.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CompensateError {
     /// Cell file and program contradict each other: sentences that name both.
     #[error("{0}")]

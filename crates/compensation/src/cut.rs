@@ -16,6 +16,7 @@ use truegrind_programs::motion::{Listing, Motion, MotionKind, Reason};
 
 /// What becomes of a cut of which not every motion can be corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Cuts {
     /// It stays as it is, as a whole.
     #[default]

@@ -42,6 +42,7 @@ use truegrind_programs::rewrite::{Change, NewTarget};
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Emit {
     /// Moved robtargets: the program keeps its form.
     #[default]
@@ -52,6 +53,7 @@ pub enum Emit {
 
 /// What becomes of circular motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Circles {
     /// Three corrected points make a circle again; the path is checked by sampling it.
     #[default]

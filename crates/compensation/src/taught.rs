@@ -97,12 +97,55 @@ fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<FixedPoin
 
 /// The TCP that stays at one point over all poses (mm, on the flange), by linear least squares (the n-point method).
 /// `None` for poses that do not fix it: fewer than three, or orientations too much alike.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::inverse::Inverse;
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+/// use truegrind_compensation::cell::taught_tcp;
+/// use truegrind_math::se3::Pose;
+///
+/// // A tip of 95 mm that touches one point with the flange turned four ways.
+/// let arm = robots::load("abb-irb-120")?.model;
+/// let still = Condition::default();
+/// let inverse = Inverse::new(&arm, &still, &arm);
+/// let (tip, fixed) = (Vector3::new(3.0, -4.0, 95.0), Vector3::new(380.0, 40.0, 200.0));
+/// let start = Joints::new(0.0, 0.3, 0.0, 0.1, 0.9, 0.0);
+/// let teaching = [[0.0, 3.1, 0.1], [0.3, 2.8, 0.0], [-0.3, 2.9, 0.3], [0.1, 2.6, -0.4]]
+///     .iter()
+///     .map(|turn| {
+///         let rotation = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::from(*turn));
+///         let flange = Pose::from_parts((fixed - rotation * tip).into(), rotation);
+///         inverse.solve_near(&flange, &start).map(|solution| solution.joints)
+///     })
+///     .collect::<Result<Vec<_>, _>>()?;
+/// let found = taught_tcp(&arm.at_condition(&still), &teaching).ok_or("not fixed")?;
+/// assert!((found - tip).norm() < 1e-6, "{found}");
+/// // Always turned alike, the poses fix nothing.
+/// assert_eq!(taught_tcp(&arm.at_condition(&still), &[teaching[0]; 4]), None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn taught_tcp(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<Vector3<f64>> {
     fixed_point(arm, teaching).map(|found| found.on_flange)
 }
 
 /// The frame through three taught points: the first two on x, the third on y (the origin is its foot on x).
 /// `None` where the points are in line.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use truegrind_compensation::cell::taught_frame;
+///
+/// // Two points on x, one on y: the origin is where the third one's foot lies.
+/// let points = [Point3::new(400.0, 0.0, 100.0), Point3::new(500.0, 0.0, 100.0), Point3::new(420.0, 70.0, 100.0)];
+/// let frame = taught_frame(&points).ok_or("in line")?;
+/// assert!((frame * Point3::new(80.0, 0.0, 0.0) - points[1]).norm() < 1e-9);
+/// assert!((frame * Point3::new(0.0, 70.0, 0.0) - points[2]).norm() < 1e-9);
+/// assert!(taught_frame(&[points[0], points[1], Point3::new(450.0, 0.0, 100.0)]).is_none());
+/// # Ok::<(), &str>(())
+/// ```
 pub fn taught_frame(points: &[Point3<f64>; 3]) -> Option<Pose> {
     let x = (points[1] - points[0]).try_normalize(1e-9)?;
     let along = x.dot(&(points[2] - points[0]));

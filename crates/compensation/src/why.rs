@@ -6,6 +6,16 @@ use truegrind_arm::inverse::InverseError;
 use truegrind_programs::motion::Reason;
 
 /// A reason.
+///
+/// ```
+/// use truegrind_compensation::why::Why;
+///
+/// assert_eq!(Why::OutsideLimits { joint: 4 }.to_string(), "joint 5 would leave its range");
+/// let far = Why::TooFar { mm: 3.25 };
+/// assert_eq!(far.to_string(), "correction of 3.250 mm exceeds the bound (--max-correction)");
+/// // In a summary, motions are counted by the reason without its figures.
+/// assert_eq!(far.kind(), Why::TooFar { mm: 8.0 }.kind());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Why {
     /// The program does not say enough, or says what must not be touched.

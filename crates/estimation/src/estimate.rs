@@ -41,6 +41,7 @@ pub struct Evaluations {
 /// How a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Termination {
     /// The residual vector is orthogonal to every column of the Jacobian within tolerance.
     Gradient,
@@ -65,6 +66,15 @@ pub enum Termination {
 impl Termination {
     /// Whether a test of convergence held. A one-pass method that has seen all data is *finished* but does not
     /// claim a minimum, so it is not converged.
+    ///
+    /// ```
+    /// use truegrind_estimation::estimate::Termination;
+    ///
+    /// assert!(Termination::Gradient.is_converged());
+    /// // To have seen every row is not to stand at a minimum, and no failure either.
+    /// assert!(!Termination::DataProcessed.is_converged() && !Termination::DataProcessed.is_failure());
+    /// assert_eq!(Termination::DataProcessed.to_string(), "all rows taken in");
+    /// ```
     pub fn is_converged(self) -> bool {
         matches!(self, Self::Gradient | Self::Step | Self::Cost | Self::SmallResidual)
     }

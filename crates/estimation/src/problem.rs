@@ -15,6 +15,41 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Prior knowledge of one parameter: a normal distribution. `sigma` infinite means none.
+///
+/// ```
+/// use std::ops::Range;
+/// use truegrind_estimation::least_squares::lm;
+/// use truegrind_estimation::problem::{Prior, Problem};
+///
+/// /// Reads one length; of a second one it says nothing.
+/// struct OneOfTwo;
+///
+/// impl Problem for OneOfTwo {
+///     fn parameters(&self) -> usize {
+///         2
+///     }
+///     fn rows(&self) -> usize {
+///         1
+///     }
+///     fn residuals(&self, x: &[f64], _: Range<usize>, out: &mut [f64]) {
+///         out[0] = (x[0] - 0.4) / 0.01;
+///     }
+///     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+///         self.residuals(x, rows, residuals);
+///         jacobian.copy_from_slice(&[1.0 / 0.01, 0.0]);
+///     }
+///     fn priors(&self) -> &[Prior] {
+///         &[Prior { mean: 0.0, sigma: f64::INFINITY }, Prior { mean: 0.1, sigma: 0.5 }]
+///     }
+/// }
+///
+/// // What no row sees stays where its prior holds it, as unsure as before.
+/// let found = lm::solve(&OneOfTwo, &[0.0, 0.0], &lm::Options::default());
+/// let sigmas = found.sigmas().ok_or("none")?;
+/// assert!((found.x[0] - 0.4).abs() < 1e-9 && (sigmas[0] - 0.01).abs() < 1e-9);
+/// assert!((found.x[1] - 0.1).abs() < 1e-9 && (sigmas[1] - 0.5).abs() < 1e-9);
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Mean, in the unit of the parameter.

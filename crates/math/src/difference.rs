@@ -6,6 +6,16 @@ use nalgebra::DMatrix;
 ///
 /// Shapes: `x` has n entries, `f` fills m entries, the result is m × n. `steps[k]` is the step of `x[k]` in its own
 /// unit (a length wants some 1e-2 mm, an angle some 1e-4 rad).
+///
+/// ```
+/// use truegrind_math::difference::jacobian;
+///
+/// // Where a link of 300 mm ends over its angle: the derivative at 0.5 rad is known.
+/// let end = |x: &[f64], out: &mut [f64]| out.copy_from_slice(&[300.0 * x[0].cos(), 300.0 * x[0].sin()]);
+/// let found = jacobian(end, &[0.5], 2, &[1e-3]);
+/// assert!((found[(0, 0)] + 300.0 * 0.5_f64.sin()).abs() < 1e-9);
+/// assert!((found[(1, 0)] - 300.0 * 0.5_f64.cos()).abs() < 1e-9);
+/// ```
 pub fn jacobian(f: impl Fn(&[f64], &mut [f64]), x: &[f64], m: usize, steps: &[f64]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(m, x.len());
     let (mut at, mut plus, mut minus) = (x.to_vec(), vec![0.0; m], vec![0.0; m]);

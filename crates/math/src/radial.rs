@@ -7,6 +7,15 @@
 use super::lanes::Real;
 
 /// Value of the bump at `u` around `centre`, for one point or eight in lanes.
+///
+/// ```
+/// use truegrind_math::radial::bump;
+///
+/// let centre = [0.2, -0.1];
+/// assert_eq!(bump(&centre, &centre, 0.5), 1.0);
+/// // Not small beyond its reach, but zero.
+/// assert_eq!(bump(&[0.2, 0.41], &centre, 0.5), 0.0);
+/// ```
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn bump<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> R {
     let (t, r) = inside(u, centre, reach);
@@ -41,6 +50,15 @@ fn inside<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) ->
 /// Up to `most` of `points`, each the one farthest from those taken before, beginning with the first; and the fill
 /// distance: how far the farthest point lies from its nearest centre. Ties go to the earlier point, so the choice is
 /// the same for the same points.
+///
+/// ```
+/// use truegrind_math::radial::spread_out;
+///
+/// // Two heaps of poses: two centres, one in each, and no pose farther than 1 from its own.
+/// let (centres, fill) = spread_out(&[[0.0], [1.0], [10.0], [9.0]], 2);
+/// assert_eq!(centres, [[0.0], [10.0]]);
+/// assert_eq!(fill, 1.0);
+/// ```
 pub fn spread_out<const D: usize>(points: &[[f64; D]], most: usize) -> (Vec<[f64; D]>, f64) {
     let mut nearest = vec![f64::INFINITY; points.len()];
     let mut centres: Vec<[f64; D]> = Vec::new();

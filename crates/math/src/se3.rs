@@ -15,6 +15,17 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
 
 /// The twist, in the frame in which both poses are given, that carries `from` to `to`: translation of the origin
 /// (mm) first, then the rotation vector (rad) of `to.rotation * from.rotation⁻¹`.
+///
+/// ```
+/// use truegrind_math::se3::{difference, moved, pose_from_vector};
+///
+/// let from = pose_from_vector(&[300.0, 0.0, 500.0, 0.0, 0.4, 0.0]);
+/// let to = pose_from_vector(&[300.5, -0.2, 500.0, 0.0, 0.4, 0.01]);
+/// let twist = difference(&from, &to);
+/// assert!((twist.fixed_rows::<3>(0) - nalgebra::Vector3::new(0.5, -0.2, 0.0)).norm() < 1e-9);
+/// // Moved by what it lacks, a pose is the other one.
+/// assert!(difference(&moved(&from, &twist), &to).norm() < 1e-12);
+/// ```
 pub fn difference(from: &Pose, to: &Pose) -> Vector6<f64> {
     let translation = to.translation.vector - from.translation.vector;
     let rotation = (to.rotation * from.rotation.inverse()).scaled_axis();
@@ -28,6 +39,19 @@ pub fn moved(pose: &Pose, twist: &Vector6<f64>) -> Pose {
 }
 
 /// A pose from x, y, z (mm) and a rotation vector (rad).
+///
+/// ```
+/// use std::f64::consts::FRAC_PI_2;
+/// use nalgebra::Point3;
+/// use truegrind_math::se3::{pose_from_vector, vector_from_pose};
+///
+/// // A flange at 400 mm, turned by a quarter about z, and a disc that stands 100 mm off it along x.
+/// let base_from_flange = pose_from_vector(&[400.0, 0.0, 600.0, 0.0, 0.0, FRAC_PI_2]);
+/// let flange_from_tool = pose_from_vector(&[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let base_from_tool = base_from_flange * flange_from_tool;
+/// assert!((base_from_tool * Point3::origin() - Point3::new(400.0, 100.0, 600.0)).norm() < 1e-12);
+/// assert!((vector_from_pose(&base_from_tool)[5] - FRAC_PI_2).abs() < 1e-12);
+/// ```
 pub fn pose_from_vector(v: &[f64; 6]) -> Pose {
     Pose::new(Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
 }
@@ -45,6 +69,16 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 
 /// Left Jacobian of the rotation group: a change `dφ` of the rotation vector `φ` turns the rotation by
 /// `left_jacobian(φ) · dφ`, seen from the outer frame (Solà et al. 2018, eq. 145).
+///
+/// ```
+/// use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+/// use truegrind_math::se3::{left_jacobian, left_jacobian_inverse};
+///
+/// let (phi, step) = (Vector3::new(0.3, -0.5, 0.2), Vector3::new(2e-6, 1e-6, -1e-6));
+/// let turned = UnitQuaternion::new(phi + step) * UnitQuaternion::new(phi).inverse();
+/// assert!((turned.scaled_axis() - left_jacobian(&phi) * step).norm() < 1e-11);
+/// assert!((left_jacobian(&phi) * left_jacobian_inverse(&phi) - Matrix3::identity()).norm() < 1e-12);
+/// ```
 pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let square = phi.norm_squared();
     let k = skew(phi);

@@ -10,6 +10,17 @@ const MOST_STEPS: usize = 200;
 const PRECISION: f64 = 5.0 * f64::EPSILON;
 
 /// Singular values, largest first; `None` for a matrix that is not finite.
+///
+/// ```
+/// use nalgebra::{Matrix6, Vector6};
+/// use truegrind_math::spectral::singular_values;
+///
+/// let lengths = Vector6::new(3.0, -7.0, 1.0, 0.5, 2.0, 4.0);
+/// let found = singular_values(&Matrix6::from_diagonal(&lengths)).ok_or("finite")?;
+/// assert!((found.max() - 7.0).abs() < 1e-12 && (found.min() - 0.5).abs() < 1e-12);
+/// assert!(singular_values(&Matrix6::from_diagonal(&lengths).map(|_| f64::NAN)).is_none());
+/// # Ok::<(), &str>(())
+/// ```
 pub fn singular_values(matrix: &Matrix6<f64>) -> Option<Vector6<f64>> {
     decomposed(matrix, false).map(|svd| svd.singular_values)
 }

@@ -22,6 +22,17 @@ pub struct ErrorSummary {
 
 impl ErrorSummary {
     /// Summary of signed errors.
+    ///
+    /// ```
+    /// use truegrind_math::statistics::ErrorSummary;
+    ///
+    /// let errors = ErrorSummary::of([0.3, -0.4]);
+    /// assert!((errors.rmse - 0.125_f64.sqrt()).abs() < 1e-15);
+    /// assert!((errors.mean_absolute - 0.35).abs() < 1e-15 && (errors.mean + 0.05).abs() < 1e-15);
+    /// assert_eq!((errors.count, errors.max), (2, 0.4));
+    /// // An error that is not known is not 0.
+    /// assert!(ErrorSummary::of([0.3, f64::NAN]).max.is_nan());
+    /// ```
     pub fn of(errors: impl IntoIterator<Item = f64>) -> Self {
         let values: Vec<f64> = errors.into_iter().collect();
         let n = values.len() as f64;
@@ -54,6 +65,14 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
 }
 
 /// Median; `None` of nothing. Not finite values are sorted last.
+///
+/// ```
+/// use truegrind_math::statistics::median;
+///
+/// assert_eq!(median(&[0.4, 9.0, 0.2]), Some(0.4));
+/// assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
+/// assert_eq!(median(&[]), None);
+/// ```
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

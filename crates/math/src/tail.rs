@@ -55,6 +55,14 @@ pub fn chi_square_tail(value: f64, freedom: usize) -> f64 {
 }
 
 /// Probability that a standard normal number exceeds `value` in magnitude.
+///
+/// ```
+/// use truegrind_math::tail::{log_chi_square_tail, normal_two_sided};
+///
+/// assert!((normal_two_sided(1.959_964) - 0.05).abs() < 1e-7);
+/// // Where the probability itself would be 0: with two degrees of freedom its logarithm is −x / 2.
+/// assert!((log_chi_square_tail(5_000.0, 2) + 2_500.0).abs() < 1e-9);
+/// ```
 pub fn normal_two_sided(value: f64) -> f64 {
     chi_square_tail(value * value, 1)
 }

@@ -334,6 +334,7 @@ pub struct SignedRankMethod {
 
 /// Why an experiment cannot be run.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ExperimentError {
     /// No experiment of that name.
     #[error("unknown experiment \"{name}\"; the experiments are {}", known.join(", "))]
@@ -616,7 +617,7 @@ impl Methods {
             if let Ok(solver) = solver::by_name(&method.solver)
                 && let Err(why) = solver.configured(&method.settings)
             {
-                wrong(&key, why, "settings of that method")?;
+                wrong(&key, why.to_string(), "settings of that method")?;
             }
         }
         Ok(())

@@ -218,7 +218,7 @@ pub fn run(
     let solvers = settings
         .method
         .iter()
-        .map(|m| solver::by_name(&m.solver).map_err(fail))
+        .map(|m| solver::by_name(&m.solver).map_err(|e| fail(e.to_string())))
         .collect::<Result<Vec<&'static Solver>, _>>()?;
     let cases: Vec<Vec<(GrindingCase, Option<PathReport>)>> = (0..settings.cases as u64)
         .into_par_iter()

@@ -40,7 +40,7 @@ use truegrind_calibration::identification::fit::{
 use truegrind_calibration::identification::identify::observe;
 use truegrind_calibration::identification::register::{Registered, register};
 use truegrind_calibration::identification::rounding;
-use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver};
+use truegrind_calibration::identification::solver::{Family, Run, SOLVERS, Scope, Solver, SolverError};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::split;
@@ -185,10 +185,10 @@ pub fn run(
     for method in &methods.method {
         let solver = method.solver();
         let treatment = treatment_of(method, methods);
-        let fail = |found: String| ExperimentError::Invalid {
+        let fail = |found: SolverError| ExperimentError::Invalid {
             file: experiment.name.clone(),
             key: method.id.clone(),
-            found,
+            found: found.to_string(),
             expected: "settings of that method".to_owned(),
         };
         let configured = solver.configured(&method.settings).map_err(fail)?;

@@ -74,6 +74,7 @@ pub struct Quality {
 
 /// Why there is no plan.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// Too few poses are allowed.
     #[error(

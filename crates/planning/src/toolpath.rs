@@ -18,6 +18,7 @@ use truegrind_surfaces::{SurfaceError, SurfaceFile};
 
 /// Why no program can be made.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ToolpathError {
     /// The surface has no path.
     #[error(transparent)]
@@ -71,6 +72,23 @@ pub struct Toolpath {
 }
 
 /// Makes the program of a surface file for a nominal arm. `robot` is named in errors and comments.
+///
+/// ```
+/// use truegrind_arm::{condition::Condition, robots};
+/// use truegrind_planning::toolpath::toolpath;
+/// use truegrind_surfaces::sample;
+///
+/// let arm = robots::load("abb-irb-120")?.model;
+/// let file = sample::BLADE.read()?;
+/// let path = toolpath(&file, &arm, "abb-irb-120")?;
+/// assert_eq!(path.points.len(), path.joints.len());
+/// assert!(path.joints.iter().all(|joints| arm.limits.violated(joints).is_none()));
+/// // Its joints put the tool where the path wants it.
+/// let tool = arm.forward(&path.joints[0], &Condition::default()) * file.tool.flange_from_tool;
+/// let wanted = file.work_object.base_from_work_object * path.points[0].work_object_from_tool();
+/// assert!((tool.translation.vector - wanted.translation.vector).norm() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`ToolpathError`], naming the first point that the best branch does not reach.

@@ -18,6 +18,20 @@ struct Piece {
 
 /// The unified diff of a file and what its edits make of it; empty where nothing changes.
 ///
+/// ```
+/// use truegrind_programs::diff::unified;
+/// use truegrind_programs::edit::Edits;
+///
+/// let source = b"G90\nG1 X10\nM30\n";
+/// let mut edits = Edits::new();
+/// edits.replace(7..10, b"X10.02");
+/// let told = unified(source, &edits, "old.nc", "new.nc")?;
+/// let expected = "--- old.nc\n+++ new.nc\n@@ -1,3 +1,3 @@\n G90\n-G1 X10\n+G1 X10.02\n M30\n";
+/// assert_eq!(String::from_utf8_lossy(&told), expected);
+/// assert!(unified(source, &Edits::new(), "old.nc", "new.nc")?.is_empty());
+/// # Ok::<(), truegrind_programs::edit::EditError>(())
+/// ```
+///
 /// # Errors
 /// As [`Edits::apply`].
 pub fn unified(source: &[u8], edits: &Edits, old_name: &str, new_name: &str) -> Result<Vec<u8>, EditError> {

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 /// Why edits cannot be applied.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum EditError {
     /// Two edits share bytes.
     #[error("edits of bytes {}..{} and {}..{} overlap: nothing was changed", .first.start, .first.end, .second.start, .second.end)]
@@ -174,6 +175,22 @@ impl Edits {
     }
 
     /// The new bytes. Sorts a copy of the list where it is not sorted.
+    ///
+    /// ```
+    /// use truegrind_programs::edit::Edits;
+    ///
+    /// let source = b"MoveL p10,v100,fine,tool0;";
+    /// let mut edits = Edits::new();
+    /// edits.replace(10..14, b"v50");
+    /// edits.insert(0, b"! slower\n");
+    /// assert_eq!(edits.apply(source)?, b"! slower\nMoveL p10,v50,fine,tool0;");
+    ///
+    /// // Two edits of the same bytes are nobody's to settle.
+    /// edits.replace(12..16, b"x");
+    /// let refused = edits.apply(source).map_err(|error| error.to_string());
+    /// assert_eq!(refused, Err("edits of bytes 10..14 and 12..16 overlap: nothing was changed".into()));
+    /// # Ok::<(), truegrind_programs::edit::EditError>(())
+    /// ```
     pub fn apply(&self, source: &[u8]) -> Result<Vec<u8>, EditError> {
         if self.too_long {
             return Err(EditError::TooLong);

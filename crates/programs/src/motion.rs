@@ -80,6 +80,15 @@ impl Frame {
     }
 
     /// The frame of a rigid motion.
+    ///
+    /// ```
+    /// use truegrind_programs::motion::Frame;
+    ///
+    /// let frame = Frame { position_mm: [420.0, -10.5, 250.0], quaternion: [0.6, 0.0, 0.8, 0.0] };
+    /// let back = Frame::from_pose(&frame.pose());
+    /// assert_eq!(back.position_mm, frame.position_mm);
+    /// assert!(back.quaternion.iter().zip(frame.quaternion).all(|(found, told)| (found - told).abs() < 1e-12));
+    /// ```
     pub fn from_pose(pose: &Pose) -> Frame {
         let (t, q) = (pose.translation.vector, pose.rotation.quaternion());
         Frame { position_mm: [t.x, t.y, t.z], quaternion: [q.w, q.i, q.j, q.k] }
@@ -183,6 +192,7 @@ pub enum Role {
 
 /// Where the numbers of a target stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Origin {
     /// A literal in the instruction itself.
     Inline,
@@ -343,6 +353,7 @@ pub struct ZoneValue {
 
 /// What is known of a switch that acts in execution order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Switch {
     /// Certainly off.
     Off,
@@ -460,6 +471,23 @@ pub struct Routine {
 }
 
 /// A region that could not be read; it is never edited.
+///
+/// ```
+/// use truegrind_programs::rapid::Task;
+///
+/// // What cannot be read is listed with its line, and the motions around it are read all the same.
+/// let source = b"MODULE M
+///   PROC main()
+///     MoveL [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;
+///     x := ;
+///     MoveL [[530,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;
+///   ENDPROC
+/// ENDMODULE
+/// ";
+/// let listing = Task::read(&[("m.mod", &source[..])]).listing;
+/// assert_eq!(listing.motions.iter().map(|motion| motion.place.line).collect::<Vec<_>>(), [3, 5]);
+/// assert_eq!(listing.opaque.iter().map(|region| region.place.line).collect::<Vec<_>>(), [4]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OpaqueRegion {
     /// Where it begins.
@@ -471,6 +499,28 @@ pub struct OpaqueRegion {
 }
 
 /// Everything that a program, given as one or several files of one task, does with the robot.
+///
+/// ```
+/// use truegrind_programs::motion::Reason;
+/// use truegrind_programs::rapid::Task;
+///
+/// let source = b"MODULE M
+///   CONST robtarget p10 := [[500,0,300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+///   PROC grind(robtarget given)
+///     MoveL p10, v50, z1, tool0;
+///     MoveL given, v50, fine, tool0;
+///   ENDPROC
+/// ENDMODULE
+/// ";
+/// let listing = Task::read(&[("m.mod", &source[..])]).listing;
+/// let [first, second] = &listing.motions[..] else { panic!("two motions") };
+/// let speed = listing.speed(first).ok_or("none")?;
+/// assert_eq!((speed.text.as_str(), speed.value.map(|value| value.tcp_mm_s)), ("v50", Ok(50.0)));
+/// assert_eq!(listing.zone(first).ok_or("none")?.value.map(|zone| (zone.fine, zone.tcp_mm)), Ok((false, 1.0)));
+/// // What only the caller knows is never guessed.
+/// assert_eq!((first.reason(), second.reason()), (None, Some(Reason::Parameter)));
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Listing {
     /// The motions, in the order of files and lines.
@@ -568,6 +618,7 @@ macro_rules! reasons {
     ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident => $text:literal,)* }) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
         pub enum $name { $($(#[doc = $doc])* $variant,)* }
 
         impl $name {

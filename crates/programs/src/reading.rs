@@ -26,6 +26,16 @@ const NC: [&str; 22] = [
 
 impl Language {
     /// The language of a file by the ending of its name, else by what it says.
+    ///
+    /// ```
+    /// use truegrind_programs::reading::Language;
+    ///
+    /// // By the ending, else by what the file says.
+    /// assert_eq!(Language::of("blade.MOD", b""), Language::Rapid);
+    /// assert_eq!(Language::of("blade.mpf", b""), Language::Nc);
+    /// assert_eq!(Language::of("blade.txt", b"MODULE M\nENDMODULE\n"), Language::Rapid);
+    /// assert_eq!(Language::of("blade.txt", b"G90 G1 X10 F500\n"), Language::Nc);
+    /// ```
     pub fn of(name: &str, bytes: &[u8]) -> Language {
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
         if RAPID.contains(&ending.as_str()) {
@@ -73,6 +83,19 @@ pub enum Program<'s> {
 impl<'s> Program<'s> {
     /// Reads files of one language, given by name and bytes. The first one says which. Never fails: what cannot be read
     /// is listed.
+    ///
+    /// ```
+    /// use truegrind_programs::motion::MotionKind;
+    /// use truegrind_programs::nc::setup::Setup;
+    /// use truegrind_programs::reading::{Language, Program};
+    ///
+    /// let source = b"G90 G21\nG0 X0 Y0 Z50\nG1 Z10 F600\nX40\nM30\n";
+    /// let program = Program::read(&[("face.nc", &source[..])], &Setup::default());
+    /// assert_eq!(program.language(), Language::Nc);
+    /// let motions = &program.listing().motions;
+    /// assert_eq!(motions.iter().map(|motion| motion.place.line).collect::<Vec<_>>(), [2, 3, 4]);
+    /// assert_eq!((motions[0].kind, motions[2].kind), (MotionKind::Joint, MotionKind::Linear));
+    /// ```
     pub fn read(files: &[(&str, &'s [u8])], setup: &Setup) -> Program<'s> {
         match files.first().map(|(name, bytes)| Language::of(name, bytes)) {
             Some(Language::Nc) => Program::Nc(nc::Task::read(files, setup)),

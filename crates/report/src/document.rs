@@ -28,6 +28,7 @@ pub struct Document {
 
 /// A piece of a document.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Block {
     /// A heading; level 2 is a section, 3 and 4 lie below. Level 1 is the document's title.
     Heading(u8, String),

@@ -72,6 +72,7 @@ pub enum Alignment {
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Cell {
     /// Words.
     Text(String),

@@ -43,6 +43,23 @@ pub struct Explicit {
 impl Explicit {
     /// Reads `z` as an expression in x and y in mm.
     ///
+    /// ```
+    /// use nalgebra::{Point3, Vector3};
+    /// use truegrind_surfaces::{Domain, Explicit, Surface};
+    ///
+    /// // A dome of radius 200 mm about (0, 0, −200): a point 0.3 mm above its top, and how strongly it is bent there.
+    /// let domain = Domain { first: [-40.0, 40.0], second: [-40.0, 40.0] };
+    /// let dome = Surface::Explicit(Explicit::new("sqrt(200^2 - x^2 - y^2) - 200", domain)?);
+    /// let above = dome.deviation_mm(&Point3::new(0.0, 0.0, 0.3)).ok_or("no foot")?;
+    /// assert!((above - 0.3).abs() < 1e-9);
+    /// let top = dome.contact([0.0, 0.0]).ok_or("no contact")?;
+    /// assert!((dome.curvature_per_mm(&top, &Vector3::x()) - 1.0 / 200.0).abs() < 1e-9);
+    ///
+    /// let refused = Explicit::new("sqrt(x", domain).map(|_| ()).map_err(|error| error.to_string());
+    /// assert!(refused.is_err_and(|said| said.contains("cannot read the expression `sqrt(x`")));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// A text that cannot be read, an empty range, or a value that is not finite in the domain.
     pub fn new(z: &str, domain: Domain) -> Result<Self, SurfaceError> {

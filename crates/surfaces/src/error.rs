@@ -4,6 +4,7 @@ use super::expression::ExpressionError;
 
 /// Why there is no surface or no path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// The text is not TOML, or holds a key that means nothing or a value of another kind.
     #[error("{file}, line {line}, column {column}: {message}")]

@@ -88,6 +88,16 @@ fn on_ample_stack<T: Send>(work: impl FnOnce() -> T + Send) -> Option<T> {
 impl Expression {
     /// Reads `text` as an expression in `variables` (at most three, in alphabetical order).
     ///
+    /// ```
+    /// use truegrind_surfaces::expression::Expression;
+    ///
+    /// let z = Expression::parse("x^2/400 - sin(y)", &["x", "y"])?;
+    /// assert!((z.value(&[20.0, 0.0]) - 1.0).abs() < 1e-12);
+    /// assert!((z.gradient(&[20.0, 0.0]) - nalgebra::Vector3::new(0.1, -1.0, 0.0)).norm() < 1e-12);
+    /// assert!(Expression::parse("x^2 + w", &["x", "y"]).is_err_and(|error| error.column == 7));
+    /// # Ok::<(), truegrind_surfaces::expression::ExpressionError>(())
+    /// ```
+    ///
     /// # Errors
     /// The position of the first character that does not belong there, what was found and what was expected.
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExpressionError> {

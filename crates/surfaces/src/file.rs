@@ -144,6 +144,21 @@ impl SurfaceFile {
     /// Reads the bytes of a surface file. `file` is the name that errors state; a mesh is asked for by the name
     /// that the file gives it.
     ///
+    /// ```
+    /// use truegrind_surfaces::{Origin, SurfaceFile, sample};
+    ///
+    /// let none = |_: &str| Err("there is none");
+    /// let blade = SurfaceFile::read("blade.toml", sample::BLADE.bytes, none)?;
+    /// assert_eq!(blade.tool.name, "tSpindle");
+    /// assert!(blade.points()?.len() > 100);
+    /// // A mesh is asked for by its name; where it is not there, the file says so.
+    /// let refused = SurfaceFile::read("plate.toml", sample::PLATE.bytes, none).map(|_| ()).map_err(|error| error.to_string());
+    /// assert!(refused.is_err_and(|said| said.contains("plate.toml") && said.contains("there is none")));
+    /// let plate = SurfaceFile::read("plate.toml", sample::PLATE.bytes, |_| Ok::<_, String>(sample::PLATE_STL.to_vec()))?;
+    /// assert_eq!(plate.work_object.origin, Some(Origin::Taught));
+    /// # Ok::<(), truegrind_surfaces::SurfaceError>(())
+    /// ```
+    ///
     /// # Errors
     /// File, key (or line and column), what was found, what was expected and what to do.
     pub fn read<E: Display>(

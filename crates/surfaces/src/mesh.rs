@@ -83,6 +83,20 @@ impl Default for MeshOptions {
 impl Mesh {
     /// Reads an STL file, binary or text.
     ///
+    /// ```
+    /// use truegrind_surfaces::mesh::{Mesh, MeshOptions};
+    /// use truegrind_surfaces::{Surface, sample};
+    ///
+    /// let mesh = Mesh::from_stl(sample::PLATE_STL, &MeshOptions::default())?;
+    /// assert_eq!(mesh.triangle_count(), 1676);
+    /// let plate = Surface::Mesh(mesh);
+    /// // It has a hole about (12, 20).
+    /// assert!(plate.contact([12.0, 20.0]).is_none() && plate.contact([-20.0, -20.0]).is_some());
+    /// let refused = Mesh::from_stl(b"not a mesh", &MeshOptions::default()).map_err(|error| error.to_string());
+    /// assert!(refused.is_err_and(|said| said.contains("STL")));
+    /// # Ok::<(), truegrind_surfaces::SurfaceError>(())
+    /// ```
+    ///
     /// # Errors
     /// Bytes that are not STL, a mesh without triangles or so small that its unit must be wrong, or one of which
     /// nothing is seen from above.

@@ -33,6 +33,18 @@ pub const FINEST: usize = 1 << 20;
 ///
 /// `None` where there is none: a ball that does not fit into the hollow, or a cusp not below the ball's radius. On
 /// a surface so strongly rounded that any distance leaves a lower cusp, half the way round.
+///
+/// ```
+/// use truegrind_surfaces::sampling::{scallop_mm, step_over_mm};
+///
+/// // A ball of 10 mm on a plane, passes 2 mm apart: a cusp of some s² / 8r = 0.05 mm.
+/// let cusp = scallop_mm(2.0, 10.0, 0.0).ok_or("none")?;
+/// assert!((cusp - 0.05).abs() < 2e-4);
+/// assert!((step_over_mm(cusp, 10.0, 0.0).ok_or("none")? - 2.0).abs() < 1e-9);
+/// // It does not fit into a hollow of 8 mm.
+/// assert_eq!(step_over_mm(0.05, 10.0, -1.0 / 8.0), None);
+/// # Ok::<(), &str>(())
+/// ```
 pub fn step_over_mm(scallop_mm: f64, tool_radius_mm: f64, curvature_per_mm: f64) -> Option<f64> {
     let (h, r, k) = (scallop_mm, tool_radius_mm, curvature_per_mm);
     let fits = (1.0 + k * r) * (1.0 + k * h);

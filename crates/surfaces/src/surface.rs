@@ -10,6 +10,7 @@ use crate::tessellation::Tessellation;
 
 /// A workpiece's surface.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Surface {
     /// z as a function of x and y.
     Explicit(Explicit),

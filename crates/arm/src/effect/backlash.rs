@@ -10,6 +10,22 @@ use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Play of one joint.
+///
+/// ```
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::{Effect, backlash::Backlash};
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::Backlash(Backlash { joint: 1, play_rad: 4e-4 }));
+/// let from = |side| Condition { approach: [0, side, 0, 0, 0, 0], ..Condition::default() };
+/// let turned = |condition: &Condition| arm.at_condition(condition).rotations(&Joints::zeros())[1];
+/// // From above and from below the joint rests on flanks that are one play apart; where the side is not known, between them.
+/// assert!((turned(&from(1)) - turned(&from(-1)) - 4e-4).abs() < 1e-15);
+/// assert_eq!(turned(&from(0)), 0.0);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {

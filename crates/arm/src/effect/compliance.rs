@@ -13,6 +13,22 @@ use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Compliance of one joint.
+///
+/// ```
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::{Effect, compliance::Compliance};
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 1e-5 }));
+/// let loaded = |kg| Condition { payload_kg: Some(kg), ..Condition::default() };
+/// let height = |kg| arm.forward(&Joints::zeros(), &loaded(kg)).translation.z;
+/// // 3 kg, 374 mm in front of axis 2: 11.0 N m turn it by 1.1e-4 rad, and the flange sinks by 0.041 mm.
+/// let torque_nm = 3.0 * 9.80665 * 0.374;
+/// assert!((height(0.0) - height(3.0) - 374.0 * 1e-5 * torque_nm).abs() < 1e-4);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Compliance {

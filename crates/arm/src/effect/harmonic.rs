@@ -13,6 +13,26 @@ use crate::joints::Joints;
 use truegrind_math::lanes::{SinCos, sin_cos};
 
 /// One harmonic of one joint.
+///
+/// ```
+/// use std::f64::consts::FRAC_PI_2;
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::{Effect, harmonic::Harmonic};
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// // A gear that runs out of centre: once per turn of joint 1.
+/// let runout = Harmonic { joint: 0, order: 1.0, sine_rad: 3e-4, cosine_rad: 4e-4 };
+/// assert!((runout.amplitude_rad() - 5e-4).abs() < 1e-18);
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::GearEccentricity(runout));
+/// let still = Condition::default();
+/// let error = |angle: f64| {
+///     arm.at_condition(&still).rotations(&Joints::new(angle, 0.0, 0.0, 0.0, 0.0, 0.0))[0] - angle
+/// };
+/// assert!((error(0.0) - 4e-4).abs() < 1e-12 && (error(FRAC_PI_2) - 3e-4).abs() < 1e-12);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Harmonic {

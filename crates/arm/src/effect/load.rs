@@ -35,6 +35,27 @@ pub struct Lump {
 }
 
 /// Compliance of one joint under lumped masses.
+///
+/// ```
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::load::{GravityLoad, Lump};
+/// use truegrind_arm::effect::{Effect, compliance::Compliance};
+/// use truegrind_arm::model::{Joints, Model};
+/// use truegrind_arm::robots;
+///
+/// // Where masses are not known, a lump of compliance × 3 kg at the flange does what 3 kg do to a compliance.
+/// let bare = Model { bodies: None, ..robots::load("abb-irb-120")?.model };
+/// let with = |effect| Model { effects: vec![effect], ..bare.clone() };
+/// let lump = Lump { frame: 6, axis: None, moment: None, factor: 3.0 * 1e-5 };
+/// let lumped = with(Effect::LumpedCompliance(GravityLoad { joint: 1, lump: vec![lump] }));
+/// let known = with(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: 1e-5 }));
+///
+/// let (q, load) = (Joints::repeat(0.3), Condition { payload_kg: Some(3.0), ..Condition::default() });
+/// let flange = |arm: &Model, condition: &Condition| arm.forward(&q, condition).translation.vector;
+/// assert!((flange(&lumped, &Condition::default()) - flange(&known, &load)).norm() < 1e-9);
+/// assert!((flange(&lumped, &load) - flange(&bare, &load)).norm() > 0.01);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GravityLoad {

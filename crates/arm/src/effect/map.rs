@@ -18,6 +18,28 @@ use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Map of one joint.
+///
+/// ```
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::{Effect, map::JointMap};
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// // A worn stretch of teeth about angle 0: one knot of twelve, 30° apart.
+/// let mut knots_rad = vec![0.0; 12];
+/// knots_rad[0] = 6e-4;
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::GearMap(JointMap { joint: 0, knots_rad }));
+/// let still = Condition::default();
+/// let error = |angle_deg: f64| {
+///     let q = Joints::new(angle_deg.to_radians(), 0.0, 0.0, 0.0, 0.0, 0.0);
+///     arm.at_condition(&still).rotations(&q)[0] - q[0]
+/// };
+/// // A cubic spline: two thirds of the knot above it, a sixth at its neighbours, nothing two spacings away.
+/// assert!((error(0.0) - 4e-4).abs() < 1e-12 && (error(-30.0) - 1e-4).abs() < 1e-12);
+/// assert!(error(60.0).abs() < 1e-12 && error(180.0) == 0.0);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointMap {

@@ -10,6 +10,20 @@ use crate::joints::Joints;
 use truegrind_math::lanes::Real;
 
 /// Ratio error of one joint.
+///
+/// ```
+/// use truegrind_arm::condition::Condition;
+/// use truegrind_arm::effect::{Effect, ratio::Ratio};
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// // A joint that turns by 0.05 % too much errs the more the farther it turns.
+/// let mut arm = robots::load("abb-irb-120")?.model;
+/// arm.effects.push(Effect::GearRatio(Ratio { joint: 3, error: 5e-4 }));
+/// let turned = arm.at_condition(&Condition::default()).rotations(&Joints::new(0.0, 0.0, 0.0, 2.0, 0.0, 0.0));
+/// assert!((turned[3] - 2.001).abs() < 1e-12);
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ratio {

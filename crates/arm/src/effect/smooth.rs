@@ -23,6 +23,25 @@ use truegrind_math::radial;
 pub const JOINTS: usize = 3;
 
 /// A network over the first three joints.
+///
+/// ```
+/// use truegrind_arm::effect::smooth::Smooth;
+/// use truegrind_arm::effect::Effect;
+/// use truegrind_arm::model::{Joints, Model};
+/// use truegrind_arm::robots;
+///
+/// let plain = robots::load("abb-irb-120")?.model;
+/// let mut learned = Smooth::still(vec![[0.2, -0.3, 0.1]], 0.5);
+/// learned.weights_rad[0] = [1e-4, 0.0, -2e-4];
+/// let (near, far) = (Joints::new(0.2, -0.3, 0.1, 0.0, 0.4, 0.0), Joints::new(1.2, 0.4, 0.1, 0.0, 0.4, 0.0));
+/// assert!(learned.reaches(&near) && !learned.reaches(&far));
+/// let arm = Model { effects: vec![Effect::SmoothCorrection(learned)], ..plain };
+/// let still = Default::default();
+/// let added = |q: &Joints| arm.at_condition(&still).rotations(q) - q;
+/// assert!((added(&near) - Joints::new(1e-4, 0.0, -2e-4, 0.0, 0.0, 0.0)).norm() < 1e-12);
+/// assert_eq!(added(&far), Joints::zeros());
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Smooth {

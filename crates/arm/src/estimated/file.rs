@@ -3,7 +3,9 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::{Estimated, EstimatedParameter, Provenance, SCHEMA, StageErrors, Verdict, checks};
+use super::{
+    Estimated, EstimatedParameter, ModelFileError, Provenance, SCHEMA, StageErrors, Verdict, checks,
+};
 use crate::arm_file::ArmFile;
 use crate::condition::Condition;
 use crate::parameter::{LinkCoordinate, Parameter};
@@ -13,8 +15,8 @@ impl Estimated {
     /// The file.
     ///
     /// # Errors
-    /// A sentence, when a number cannot be written (not finite).
-    pub fn to_toml(&self) -> Result<String, String> {
+    /// [`ModelFileError::Unwritable`], when a number cannot be written (not finite).
+    pub fn to_toml(&self) -> Result<String, ModelFileError> {
         let file = ModelFile {
             schema: SCHEMA.to_owned(),
             robot: self.robot.clone(),
@@ -35,39 +37,81 @@ impl Estimated {
             },
             parameter: self.parameters.clone(),
         };
-        let text = toml::to_string(&file).map_err(|e| format!("the model cannot be written: {e}"))?;
+        let text = toml::to_string(&file).map_err(|e| ModelFileError::Unwritable(e.to_string()))?;
         Ok(format!("# An estimated arm, written by truegrind {}.\n{text}", self.provenance.version))
     }
 
     /// Reads the file. Every number is finite and such as an arm has, the covariance is positive semi-definite, and the
     /// parameters are the arm's.
     ///
+    /// ```
+    /// # use nalgebra::DMatrix;
+    /// use truegrind_arm::estimated::{Estimated, ModelFileError};
+    /// # use truegrind_arm::estimated::{Judgement, Provenance, StageErrors, Verdict};
+    /// # use truegrind_arm::{condition::Condition, model::Joints, region::Region, robots};
+    /// # use truegrind_math::statistics::ErrorSummary;
+    /// # let nominal = robots::load("abb-irb-120")?.model;
+    /// # let summary = ErrorSummary::of([0.1, -0.2]);
+    /// # let stage = StageErrors { fitted: summary, held_out: summary };
+    /// # let arm = Estimated {
+    /// #     robot: "abb-irb-120".into(),
+    /// #     nominal: nominal.clone(),
+    /// #     model: nominal,
+    /// #     parameters: Vec::new(),
+    /// #     order: Vec::new(),
+    /// #     covariance: DMatrix::zeros(0, 0),
+    /// #     provenance: Provenance::default(),
+    /// #     registered: stage,
+    /// #     geometry: stage,
+    /// #     noise_floor_mm: None,
+    /// #     verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
+    /// #     region: Region::of(&[Joints::zeros(), Joints::repeat(0.5)], 0.1),
+    /// #     condition: Condition::default(),
+    /// # };
+    /// let text = arm.to_toml()?;
+    /// assert_eq!(Estimated::from_toml(&text)?.verdict, arm.verdict);
+    ///
+    /// // A number that no arm has is refused under its key, before anything is computed with it.
+    /// let error = Estimated::from_toml(&text.replacen("a_mm = 270.0", "a_mm = nan", 1)).err().ok_or("NaN passed")?;
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "`nominal`: link 2 a_mm: found NaN, expected a finite length in mm, within ±10,000"
+    /// );
+    /// let other = Estimated::from_toml(&text.replacen("truegrind.model/1", "truegrind.model/9", 1));
+    /// assert_eq!(other, Err(ModelFileError::Schema { found: "truegrind.model/9".into() }));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
-    /// A sentence that says what in the file cannot be used: key, what was found, what was expected.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        let file: ModelFile = toml::from_str(text).map_err(|e| format!("not a truegrind model: {e}"))?;
+    /// [`ModelFileError`] says what in the file cannot be used: key, what was found, what was expected.
+    pub fn from_toml(text: &str) -> Result<Self, ModelFileError> {
+        let file: ModelFile = toml::from_str(text).map_err(|e| ModelFileError::Syntax(e.to_string()))?;
         if file.schema != SCHEMA {
-            return Err(format!("`schema` is \"{}\", expected \"{SCHEMA}\"", file.schema));
+            return Err(ModelFileError::Schema { found: file.schema });
         }
         let order = file
             .covariance
             .order
             .iter()
             .map(|name| {
-                parse_arm_parameter(name).ok_or_else(|| format!("`covariance.order`: unknown {name}"))
+                parse_arm_parameter(name)
+                    .ok_or_else(|| ModelFileError::UnknownParameter { name: name.clone() })
             })
             .collect::<Result<Vec<_>, _>>()?;
         let n = order.len();
         if file.covariance.lower.len() != n
             || file.covariance.lower.iter().enumerate().any(|(i, r)| r.len() != i + 1)
         {
-            return Err(format!("`covariance.lower`: expected {n} rows of 1 to {n} numbers"));
+            return Err(ModelFileError::Triangle { expected: n });
         }
         let covariance = DMatrix::from_fn(n, n, |i, j| file.covariance.lower[i.max(j)][i.min(j)]);
         let model = Self {
             robot: file.robot,
-            nominal: file.nominal.model().map_err(|e| format!("`nominal`: {e}"))?,
-            model: file.estimated.model().map_err(|e| format!("`estimated`: {e}"))?,
+            nominal: file.nominal.model().map_err(|fault| ModelFileError::Arm { part: "nominal", fault })?,
+            model: file
+                .estimated
+                .model()
+                .map_err(|fault| ModelFileError::Arm { part: "estimated", fault })?,
             parameters: file.parameter,
             order,
             covariance,
@@ -79,7 +123,7 @@ impl Estimated {
             region: file.region,
             condition: file.condition,
         };
-        checks::check(&model).map_err(|unfit| unfit.to_string())?;
+        checks::check(&model)?;
         Ok(model)
     }
 }

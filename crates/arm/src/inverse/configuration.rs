@@ -62,6 +62,19 @@ pub(super) const BRANCH_TOLERANCE: f64 = 0.02;
 
 /// Configuration of an arm at controller angles (rad); cfx is 0 for an arm without a closed form. For the nominal arm,
 /// or for an estimated one without its effects; [`Inverse::configuration`](super::Inverse::configuration) counts them in.
+///
+/// ```
+/// use truegrind_arm::inverse::configuration::configuration;
+/// use truegrind_arm::model::Joints;
+/// use truegrind_arm::robots;
+///
+/// // Quarter turns of axes 1, 4 and 6 count down from −1 below zero; axis 5 below zero is the odd branch.
+/// let arm = robots::load("abb-irb-120")?.model;
+/// let degrees = [-20.0, 10.0, 15.0, 100.0, -40.0, 190.0_f64];
+/// let found = configuration(&arm, &Joints::from(degrees.map(f64::to_radians)));
+/// assert_eq!(found.to_string(), "[-1,1,2,1]");
+/// # Ok::<(), robots::RobotError>(())
+/// ```
 pub fn configuration(model: &Model, joints: &Joints) -> Configuration {
     let frames = model.at_condition(&Condition::default()).frames(joints);
     let structure = Structure::of(model);

@@ -22,6 +22,7 @@ pub struct Solution {
 
 /// A named singularity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Singularity {
     /// Axes 4 and 6 (UR: 6 and the parallel ones) in line: joint 5.
     Wrist,
@@ -83,6 +84,7 @@ impl SingularityDistances {
 
 /// Why a target has no joints.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InverseError {
     /// No branch reaches the target.
     #[error("target is out of reach by {beyond_mm:.3} mm")]

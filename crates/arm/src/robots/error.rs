@@ -1,9 +1,10 @@
-//! Why there is no robot.
+//! Why there is no robot, or not the one that was meant.
 
 use thiserror::Error;
 
 /// Why there is no robot.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RobotError {
     /// The name is not in the catalogue.
     #[error("unknown robot \"{name}\", expected one of {known}; or give the path of a TOML file of your own")]
@@ -52,5 +53,30 @@ pub enum RobotError {
         expected: &'static str,
         /// What to do.
         remedy: &'static str,
+    },
+}
+
+/// Why a nominal arm is not the one that its name says.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NominalMismatch {
+    /// It goes by a name of the catalogue and has other links.
+    #[error(
+        "its nominal arm goes by the name {name} and is not the one of the catalogue: {place}; correct the name, or give an arm \
+         of your own a name of its own"
+    )]
+    Name {
+        /// The name.
+        name: String,
+        /// Where the two differ first, with both values.
+        place: String,
+    },
+    /// Two arms of one name differ.
+    #[error(
+        "the two have one name and are not one arm: {place}; give the robot that the model was identified for"
+    )]
+    Arms {
+        /// Where the two differ first, with both values.
+        place: String,
     },
 }

@@ -67,6 +67,7 @@ impl Default for Options {
 
 /// Why nothing could be fitted.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// Fewer scalar readings than parameters.
     #[error(

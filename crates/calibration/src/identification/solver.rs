@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use thiserror::Error;
 
 use crate::identification::network::{network_parameters, with_network};
 use crate::identification::tolerance::{SMOOTH_SIGMA_RAD, Tolerance};
@@ -21,6 +22,7 @@ use truegrind_estimation::swarm::{bas, de, pso, qibas, sca};
 
 /// What a method is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Family {
     /// All rows at once, with derivatives; has tests of convergence.
     LeastSquares,
@@ -34,6 +36,7 @@ pub enum Family {
 
 /// What a network is fitted together with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Scope {
     /// Links and frames: what they cannot explain is left to the network.
     WithLinks,
@@ -59,6 +62,28 @@ pub struct Solver {
     configure: fn(&toml::Table) -> Result<Configured, String>,
 }
 
+/// Why there is no such method, or not with such settings.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum SolverError {
+    /// No method has that name.
+    #[error("unknown method \"{name}\"; the methods are {}", known.join(", "))]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The names that there are.
+        known: Vec<&'static str>,
+    },
+    /// A setting that the method has not, or of the wrong type.
+    #[error("settings of {method}: {fault}")]
+    Settings {
+        /// The method.
+        method: &'static str,
+        /// What is wrong, with the settings that there are.
+        fault: String,
+    },
+}
+
 /// A method's call: problem, start, seed.
 pub type Run = Box<dyn Fn(&dyn Problem, &[f64], u64) -> Estimate + Send + Sync>;
 
@@ -79,9 +104,9 @@ impl Solver {
     /// The method with `changes` to its settings (the fields of its `Options`, in kebab-case).
     ///
     /// # Errors
-    /// What the settings are, where a name or a type is wrong.
-    pub fn configured(&self, changes: &toml::Table) -> Result<Configured, String> {
-        (self.configure)(changes).map_err(|why| format!("settings of {}: {why}", self.name))
+    /// [`SolverError::Settings`] says what the settings are, where a name or a type is wrong.
+    pub fn configured(&self, changes: &toml::Table) -> Result<Configured, SolverError> {
+        (self.configure)(changes).map_err(|fault| SolverError::Settings { method: self.name, fault })
     }
 
     /// The arm that the method fits: with a network that does nothing yet, where the method has one.
@@ -278,11 +303,23 @@ pub fn all() -> impl Iterator<Item = &'static Solver> {
 
 /// The solver of that name.
 ///
+/// ```
+/// use truegrind_calibration::identification::solver::{SolverError, by_name};
+///
+/// let method = by_name("lm").map_err(|error| error.to_string())?;
+/// assert!(!method.literal);
+/// let Err(SolverError::Unknown { known, .. }) = by_name("annealing") else { panic!("there is no annealing") };
+/// assert!(known.contains(&"ltlm"));
+/// // A setting that a method has not is refused, with the method's name.
+/// let wrong = method.configured(&"no-such = 1".parse().map_err(|_| "no table")?).map(|_| ());
+/// assert!(wrong.is_err_and(|error| error.to_string().starts_with("settings of lm: ")));
+/// # Ok::<(), String>(())
+/// ```
+///
 /// # Errors
-/// A sentence that lists the names that exist.
-pub fn by_name(name: &str) -> Result<&'static Solver, String> {
-    all().find(|s| s.name == name).ok_or_else(|| {
-        let names: Vec<&str> = all().map(|s| s.name).collect();
-        format!("unknown method \"{name}\"; the methods are {}", names.join(", "))
-    })
+/// [`SolverError::Unknown`] lists the names that exist.
+pub fn by_name(name: &str) -> Result<&'static Solver, SolverError> {
+    all()
+        .find(|s| s.name == name)
+        .ok_or_else(|| SolverError::Unknown { name: name.to_owned(), known: all().map(|s| s.name).collect() })
 }

@@ -63,14 +63,30 @@ impl fmt::Display for AngleConvention {
     }
 }
 
-impl FromStr for AngleConvention {
-    type Err = String;
+/// A word that names no convention of angles.
+///
+/// ```
+/// use truegrind_calibration::measurement::convention::AngleConvention;
+///
+/// assert_eq!("dh".parse(), Ok(AngleConvention::Dh));
+/// let refused = "DH".parse::<AngleConvention>().map_err(|error| error.to_string());
+/// assert_eq!(refused, Err("found angle convention \"DH\", expected logged or dh".into()));
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("found angle convention \"{found}\", expected logged or dh")]
+pub struct UnknownConvention {
+    /// The word.
+    pub found: String,
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for AngleConvention {
+    type Err = UnknownConvention;
+
+    fn from_str(text: &str) -> Result<Self, UnknownConvention> {
         match text {
             "logged" => Ok(AngleConvention::Logged),
             "dh" => Ok(AngleConvention::Dh),
-            other => Err(format!("found angle convention \"{other}\", expected logged or dh")),
+            other => Err(UnknownConvention { found: other.to_owned() }),
         }
     }
 }

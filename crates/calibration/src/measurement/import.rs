@@ -26,6 +26,22 @@ use self::columns::Columns;
 use super::dataset::Dataset;
 
 /// Reads a measurement file. `file` is the name that messages and reports print; the format is told by the bytes.
+///
+/// ```
+/// use truegrind_calibration::measurement::dataset::{Reading, Sensor};
+/// use truegrind_calibration::measurement::import::{Options, read};
+///
+/// let rows = read("poses.csv", b"q1,q2,q3,q4,q5,q6,L\n10,20,30,40,50,60,500.25\n", &Options::default())?;
+/// assert_eq!(rows.sensor, Sensor::Cable);
+/// assert_eq!(rows.rows[0].reading, Reading::Cable(500.25));
+/// assert!((rows.rows[0].joints[1].to_degrees() - 20.0).abs() < 1e-12);
+///
+/// // A fault is named with its place.
+/// let error = read("poses.csv", b"q1,q2,q3,q4,q5,q6,L\n10,20,30,40,fifty,60,500.25\n", &Options::default());
+/// let said = error.map(|_| ()).map_err(|error| error.to_string()).err().ok_or("was read")?;
+/// assert!(said.starts_with("poses.csv, row 2, column q5") && said.contains("fifty"), "{said}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, ImportError> {
     let mut dataset = if xlsx::is_workbook(bytes) {
         let tables = xlsx::tables(file, bytes)?;

@@ -34,6 +34,7 @@ const LEVER_MM: f64 = 300.0;
 
 /// Unit of the file's angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum AngleUnit {
     /// As the format says.
     Degrees,
@@ -43,6 +44,7 @@ pub enum AngleUnit {
 
 /// Unit of the file's lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum LengthUnit {
     /// As the format says.
     Millimetres,
@@ -68,6 +70,7 @@ impl LengthUnit {
 
 /// Meaning of the four numbers of an orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Orientation {
     /// Scalar first, target seen by the sensor, as the format says.
     ScalarFirst,
@@ -130,6 +133,33 @@ pub struct MeaningError {
 /// [`AngleConvention::apply`]; `stated` is the convention they are taken for.
 ///
 /// Empty when all is well, and when too few rows are there to tell.
+///
+/// ```
+/// use truegrind_arm::robots;
+/// use truegrind_calibration::measurement::convention::AngleConvention;
+/// use truegrind_calibration::measurement::import::{Options, read};
+/// use truegrind_calibration::measurement::plausibility::{LengthUnit, plausibility};
+///
+/// // A tracker that wrote inches where mm are expected. (Metres are so few that the import refuses them.)
+/// let arm = robots::load("abb-irb-120")?.model;
+/// let rows: String = (0..30)
+///     .map(|k| {
+///         let k = f64::from(k);
+///         let degrees = [(70.0, 1.3), (40.0, 2.1), (30.0, 0.7), (80.0, 1.9), (60.0, 2.7), (90.0, 0.4)]
+///             .map(|(most, pace): (f64, f64)| most * (pace * k + most).sin());
+///         let flange = arm.forward(&degrees.map(f64::to_radians).into(), &Default::default()).translation.vector;
+///         let read = flange / 25.4;
+///         let [q1, q2, q3, q4, q5, q6] = degrees;
+///         format!("{q1},{q2},{q3},{q4},{q5},{q6},{},{},{}\n", read.x, read.y, read.z)
+///     })
+///     .collect();
+/// let csv = format!("q1,q2,q3,q4,q5,q6,measured_x,measured_y,measured_z\n{rows}");
+/// let data = read("tracker.csv", csv.as_bytes(), &Options::default())?;
+/// let found = plausibility(&data, &arm, AngleConvention::Logged);
+/// assert_eq!(found.len(), 1);
+/// assert_eq!(found[0].likely.lengths, LengthUnit::Inches);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn plausibility(data: &Dataset, model: &Model, stated: AngleConvention) -> Vec<UnitSuspicion> {
     let stride = data.rows.len().div_ceil(ROWS).max(1);
     let rows: Vec<&Row> = data.rows.iter().step_by(stride).collect();

@@ -59,6 +59,51 @@ pub struct SimulatedRow {
 
 impl Recipe {
     /// Measures the actual arm. `resolve` gives the nominal model of a robot by name.
+    ///
+    /// ```
+    /// use truegrind_arm::robots;
+    /// use truegrind_calibration::identification::identify::{Options, identify};
+    /// use truegrind_calibration::identification::register::starting_frames;
+    /// use truegrind_calibration::identification::tolerance::Tolerance;
+    /// use truegrind_calibration::measurement::dataset::Dataset;
+    /// use truegrind_calibration::measurement::simulation::recipe::Recipe;
+    /// use truegrind_calibration::measurement::{import, split};
+    ///
+    /// // An arm whose third joint stands 0.1° beside its mark, seen by a tracker.
+    /// let recipe = r#"
+    /// robot = "abb-irb-120"
+    /// seed = 4
+    /// [[arm.link]]
+    /// joint = 2
+    /// theta_deg = 0.1
+    /// [poses]
+    /// kind = "random"
+    /// count = 60
+    /// [sensor]
+    /// kind = "position"
+    /// frame = { position_mm = [2000.0, -600.0, 500.0], wxyz = [1.0, 0.0, 0.0, 0.0] }
+    /// reflector_mm = [38.0, 12.0, 61.0]
+    /// [noise]
+    /// sigma_mm = 0.01
+    /// "#;
+    /// let resolve = |name: &str| robots::load(name).map(|robot| robot.model).map_err(|error| error.to_string());
+    /// let simulation = Recipe::parse(recipe, "recipe.toml")?.simulate(resolve)?;
+    /// let turned = simulation.actual.links[2].theta_rad - simulation.nominal.links[2].theta_rad;
+    /// assert!((turned.to_degrees() - 0.1).abs() < 1e-9);
+    ///
+    /// // What it wrote is a measurement like any other; the fit of it finds the joint.
+    /// let rows = import::read("simulated.csv", simulation.csv.as_bytes(), &import::Options::default())?;
+    /// assert_eq!(rows.rows.len(), 60);
+    /// let options = Options::default();
+    /// let nominal = &simulation.nominal;
+    /// let frames = starting_frames(&rows, nominal, &Tolerance::default(), options.fuse_readout)?;
+    /// let share = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
+    /// let found = identify(&rows, "abb-irb-120", nominal, &frames, &share, &options)?.estimated;
+    /// let fitted = found.model.links[2].theta_rad - nominal.links[2].theta_rad;
+    /// assert!((fitted - turned).to_degrees().abs() < 0.02, "{}°", fitted.to_degrees());
+    /// assert!(found.geometry.held_out.rmse < 0.5 * found.registered.held_out.rmse);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn simulate(
         &self,
         resolve: impl Fn(&str) -> Result<Model, String>,

@@ -106,6 +106,20 @@ fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
 
 /// A random share of the poses held out: `held_out` = 0.2 for 80/20. Both sides get a pose at least, where there are
 /// two; a share outside 0 to 1 is taken to its nearest end.
+///
+/// ```
+/// use truegrind_calibration::measurement::import::{Options, read};
+/// use truegrind_calibration::measurement::split;
+///
+/// // Ten poses, each read twice: whoever has fitted a pose has seen its repetition.
+/// let lines: String = (0..20).map(|k| format!("{},20,30,40,50,60,500.{k}\n", k / 2)).collect();
+/// let rows = read("poses.csv", format!("q1,q2,q3,q4,q5,q6,L\n{lines}").as_bytes(), &Options::default())?;
+/// let split = split::random(&rows, 0.2, 7);
+/// assert_eq!((split.train.len(), split.test.len()), (16, 4));
+/// assert!(split.test.chunks(2).all(|pair| pair[0] / 2 == pair[1] / 2));
+/// assert_eq!(split, split::random(&rows, 0.2, 7));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
     let poses = shuffled(poses(data), seed);
     let wanted = (data.rows.len() as f64 * held_out.clamp(0.0, 1.0)).round() as usize;
@@ -193,6 +207,18 @@ pub struct NoiseFloor {
 
 /// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
 /// `None` where no pose was repeated. Drift between the repetitions counts as noise.
+///
+/// ```
+/// use truegrind_calibration::measurement::import::{Options, read};
+/// use truegrind_calibration::measurement::split::noise_floor;
+///
+/// let csv = "q1,q2,q3,q4,q5,q6,L\n1,2,3,4,5,6,500.00\n9,2,3,4,5,6,612.00\n1,2,3,4,5,6,500.06\n1,2,3,4,5,6,500.03\n";
+/// let rows = read("poses.csv", csv.as_bytes(), &Options::default())?;
+/// let floor = noise_floor(&rows).ok_or("no pose was repeated")?;
+/// assert_eq!((floor.poses, floor.freedom), (1, 2));
+/// assert!((floor.sigma_mm - 0.03).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
     let (mut square, mut count, mut freedom) = (0.0, 0, 0);
     for pose in poses(data) {

@@ -6,6 +6,7 @@ use crate::identification::start::NoStart;
 
 /// Why an arm cannot be tracked.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// Not enough poses yet.
     #[error(
@@ -59,4 +60,16 @@ pub enum TrackError {
         /// Why.
         why: String,
     },
+}
+
+/// Why the state of a track cannot be read or written.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum StateError {
+    /// A number cannot be written.
+    #[error("the state cannot be written: {0}")]
+    Unwritable(String),
+    /// Not TOML, or a key that is missing, misspelt or of the wrong type.
+    #[error("not a track of truegrind: {0}")]
+    Syntax(String),
 }

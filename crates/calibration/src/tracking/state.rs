@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::alarm::Alarm;
+use super::error::StateError;
 use super::options::Options;
 use crate::measurement::dataset::{Reading, Row};
 use truegrind_arm::condition::Condition;
@@ -149,19 +150,18 @@ impl State {
     /// The file.
     ///
     /// # Errors
-    /// A sentence, when a number cannot be written.
-    pub fn to_toml(&self) -> Result<String, String> {
-        let text = toml::to_string(self).map_err(|e| format!("the state cannot be written: {e}"))?;
+    /// [`StateError::Unwritable`], when a number cannot be written.
+    pub fn to_toml(&self) -> Result<String, StateError> {
+        let text = toml::to_string(self).map_err(|e| StateError::Unwritable(e.to_string()))?;
         Ok(format!("# The state of a track, written by truegrind {}.\n{text}", env!("CARGO_PKG_VERSION")))
     }
 
     /// Reads the file.
     ///
     /// # Errors
-    /// A sentence that says what cannot be used.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        toml::from_str(text)
-            .map_err(|e| format!("not a track of truegrind: {}", e.message().replace('\n', " ")))
+    /// [`StateError::Syntax`] says what cannot be used.
+    pub fn from_toml(text: &str) -> Result<Self, StateError> {
+        toml::from_str(text).map_err(|e| StateError::Syntax(e.message().replace('\n', " ")))
     }
 }
 

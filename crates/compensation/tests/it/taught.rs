@@ -528,7 +528,7 @@ fn every_key_of_a_cell_file_is_read() {
         degrees(&scene.touching, 6)
     );
     let seen = |text: &str| -> Result<String, String> {
-        let cell = Cell::from_toml(text)?;
+        let cell = Cell::from_toml(text).map_err(|error| error.to_string())?;
         match faults(&source, &cell).as_slice() {
             [] => {
                 let (plan, told) = planned(&source, &cell, &scene.actual);
@@ -577,7 +577,7 @@ fn a_cell_file_that_contradicts_itself_is_refused() {
             "stated twice",
         ),
     ] {
-        let error = Cell::from_toml(text).unwrap_err();
+        let error = Cell::from_toml(text).unwrap_err().to_string();
         assert!(error.contains(part), "{text}: {error}");
     }
     // What a surface file says of the same frame counts as much.
@@ -592,7 +592,7 @@ fn a_cell_file_that_contradicts_itself_is_refused() {
         },
         ..surface
     };
-    let error = cell.with_surface(&taught).unwrap_err();
+    let error = cell.with_surface(&taught).unwrap_err().to_string();
     assert!(error.contains("surface file") && error.contains("tSpindle"), "{error}");
 }
 

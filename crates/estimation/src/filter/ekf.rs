@@ -134,6 +134,47 @@ impl Filter {
 
 /// Filters all observations of `problem` in order.
 ///
+/// ```
+/// use truegrind_estimation::estimate::Termination;
+/// use truegrind_estimation::filter::ekf;
+/// use truegrind_estimation::least_squares::lm;
+///
+/// // A straight line with σ = 0.02, one reading after the other: in the end the filter knows what all rows at once tell.
+/// # use std::ops::Range;
+/// # use truegrind_estimation::problem::{Prior, Problem};
+/// # struct Line;
+/// # const READ: [f64; 6] = [1.52, 1.69, 1.91, 2.08, 2.33, 2.49];
+/// # impl Problem for Line {
+/// #     fn parameters(&self) -> usize {
+/// #         2
+/// #     }
+/// #     fn rows(&self) -> usize {
+/// #         READ.len()
+/// #     }
+/// #     fn residuals(&self, x: &[f64], rows: Range<usize>, out: &mut [f64]) {
+/// #         out.iter_mut().zip(rows).for_each(|(out, t)| *out = (x[0] + x[1] * t as f64 - READ[t]) / 0.02);
+/// #     }
+/// #     fn jacobian(&self, x: &[f64], rows: Range<usize>, residuals: &mut [f64], jacobian: &mut [f64]) {
+/// #         self.residuals(x, rows.clone(), residuals);
+/// #         let (offset, slope) = jacobian.split_at_mut(rows.len());
+/// #         offset.fill(1.0 / 0.02);
+/// #         slope.iter_mut().zip(rows).for_each(|(slope, t)| *slope = t as f64 / 0.02);
+/// #     }
+/// #     fn priors(&self) -> &[Prior] {
+/// #         &[Prior { mean: 0.0, sigma: 5.0 }; 2]
+/// #     }
+/// # }
+/// let filtered = ekf::solve(&Line, &[0.0, 0.0], &ekf::Options::default());
+/// assert_eq!(filtered.termination, Termination::DataProcessed);
+/// let at_once = lm::solve(&Line, &[0.0, 0.0], &lm::Options::default());
+/// let (some, all) = (filtered.sigmas().ok_or("none")?, at_once.sigmas().ok_or("none")?);
+/// for k in 0..2 {
+///     assert!((filtered.x[k] - at_once.x[k]).abs() < 1e-8);
+///     assert!((some[k] / all[k] - 1.0).abs() < 1e-8);
+/// }
+/// # Ok::<(), &str>(())
+/// ```
+///
 /// # Panics
 /// Where `start` does not have one entry for each parameter.
 pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimate {

@@ -64,6 +64,7 @@ impl Default for Noise {
 
 /// What makes a set of poses good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Index {
     /// Determinant of the normal matrix with its priors: the volume of what stays unknown.
     #[default]

@@ -5,6 +5,7 @@
 //! that only the order or the approach of the rows can show (backlash, drift, a sensor that moved) ask for visits.
 
 use serde::Deserialize;
+use thiserror::Error;
 
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
@@ -32,6 +33,21 @@ pub struct Suspect {
 pub struct Question {
     /// The finding, then its alternatives; one alone where an effect could not be tested.
     pub suspects: Vec<Suspect>,
+}
+
+/// Why a text is no diagnosis.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoDiagnosis {
+    /// Not JSON, or a key that is missing or of the wrong type.
+    #[error("not a diagnosis: {0}")]
+    Syntax(String),
+    /// A file of another kind or version.
+    #[error("`schema` is \"{found}\", expected \"{SCHEMA}\"")]
+    Schema {
+        /// What it says of itself.
+        found: String,
+    },
 }
 
 /// A part of the measurement whose place is in question.
@@ -89,12 +105,27 @@ fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
 
 /// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
 ///
+/// ```
+/// use truegrind_planning::poses::rival::{NoDiagnosis, questions};
+///
+/// let diagnosis = r#"{"schema": "truegrind.diagnosis/1", "findings": [
+///     {"effect": "gear-ratio", "joints": [4], "confidence": "identified"},
+///     {"effect": "backlash", "joints": [2], "confidence": "ambiguous", "alternatives": [{"effect": "thermal-drift"}]}
+/// ]}"#;
+/// let asked = questions(diagnosis)?;
+/// assert_eq!(asked.len(), 1);
+/// assert_eq!(asked[0].suspects[0].joints, [1]);
+/// assert_eq!(asked[0].suspects[1].effect, "thermal-drift");
+/// assert_eq!(questions(r#"{"schema": "other/1"}"#), Err(NoDiagnosis::Schema { found: "other/1".into() }));
+/// # Ok::<(), NoDiagnosis>(())
+/// ```
+///
 /// # Errors
-/// A sentence, where the text is no diagnosis.
-pub fn questions(text: &str) -> Result<Vec<Question>, String> {
-    let file: File = serde_json::from_str(text).map_err(|e| format!("not a diagnosis: {e}"))?;
+/// [`NoDiagnosis`], where the text is none.
+pub fn questions(text: &str) -> Result<Vec<Question>, NoDiagnosis> {
+    let file: File = serde_json::from_str(text).map_err(|e| NoDiagnosis::Syntax(e.to_string()))?;
     if file.schema != SCHEMA {
-        return Err(format!("`schema` is \"{}\", expected \"{SCHEMA}\"", file.schema));
+        return Err(NoDiagnosis::Schema { found: file.schema });
     }
     let ambiguous = file.findings.iter().filter(|f| f.confidence == "ambiguous").map(|f| {
         let first = suspect(&f.effect, f.joints.as_ref());

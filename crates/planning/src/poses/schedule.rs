@@ -69,6 +69,7 @@ impl Visits {
 
 /// Why a row is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Purpose {
     /// For the geometry.
     Geometry,

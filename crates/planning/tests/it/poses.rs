@@ -287,7 +287,7 @@ fn a_diagnosis_that_is_ambiguous_gets_the_poses_that_decide() {
     let both = planned(Sensor::Cable, &cable(), &deciding);
     let sides = both.rows.iter().filter(|r| r.purpose == Purpose::OtherSide).count();
     assert_eq!(sides, 20, "more from both sides, for backlash");
-    assert!(questions(r#"{"schema": "other/1"}"#).unwrap_err().contains("truegrind.diagnosis/1"));
+    assert!(questions(r#"{"schema": "other/1"}"#).unwrap_err().to_string().contains("truegrind.diagnosis/1"));
     assert!(questions("no json").is_err());
 }
 

@@ -21,6 +21,17 @@ pub fn token(tree: &NcTree<'_>) -> Option<u32> {
 }
 
 /// Reads a comment as a mark.
+///
+/// ```
+/// use truegrind_programs::motion::Mark;
+/// use truegrind_programs::nc::{dialect::Dialect, mark};
+///
+/// let told = Mark { version: "0.1.0".into(), model: "3f9a".into(), partial: true };
+/// let comment = mark::text(&told, Dialect::Fanuc);
+/// assert_eq!(comment, "(truegrind 0.1.0 model 3f9a partial)");
+/// assert_eq!(mark::read(comment.as_bytes()), Some(told));
+/// assert_eq!(mark::read(b"(ROUGH PASS)"), None);
+/// ```
 pub fn read(comment: &[u8]) -> Option<Mark> {
     let text = comment.trim_ascii();
     let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"("))?;

@@ -55,6 +55,17 @@ impl Angles {
     }
 
     /// The three angles (°) of a rotation, of all that mean it the nearest to `near`.
+    ///
+    /// ```
+    /// use truegrind_programs::nc::orientation::Angles;
+    ///
+    /// // Of all angles that mean one rotation, those nearest to where the machine stands.
+    /// for convention in [Angles::Abc, Angles::Wpr, Angles::Rxyz] {
+    ///     let stood = [30.0, -40.0, 200.0];
+    ///     let found = convention.angles(&convention.rotation(stood), [25.0, -35.0, 190.0]);
+    ///     assert!(found.iter().zip(stood).all(|(found, told)| (found - told).abs() < 1e-9), "{found:?}");
+    /// }
+    /// ```
     pub fn angles(self, rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
         if self == Angles::RotationVector {
             return rotation_vector(rotation, near);

@@ -44,6 +44,13 @@ fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
 }
 
 /// Whether two names are one: in any case, T08 is T8.
+///
+/// ```
+/// use truegrind_programs::nc::setup::same;
+///
+/// assert!(same("T08", "t8") && same("g54.1 P1", "G54.1P1"));
+/// assert!(!same("T8", "T80"));
+/// ```
 pub fn same(one: &str, other: &str) -> bool {
     plain(one) == plain(other)
 }

@@ -15,6 +15,7 @@ use crate::rewrite::RewriteOptions;
 
 /// Why a draft cannot be written.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// A dialect that is read only.
     #[error(
@@ -41,6 +42,52 @@ pub enum WriteError {
 }
 
 /// Writes a program. `angles` says what A, B and C mean; Siemens programs carry a tool vector instead.
+///
+/// ```
+/// use truegrind_programs::draft::{Draft, Step};
+/// use truegrind_programs::motion::{Frame, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
+/// use truegrind_programs::nc::{dialect::Dialect, orientation::Angles, setup::Setup, writer};
+/// use truegrind_programs::reading::Program;
+/// # let frame = Frame::IDENTITY;
+/// # let tool = ToolValue { robhold: true, frame, mass_kg: 0.8, centre_of_gravity_mm: [0.0, 0.0, 40.0] };
+/// # let object = WorkObjectValue {
+/// #     robhold: false,
+/// #     fixed: true,
+/// #     mechanical_unit: String::new(),
+/// #     user_frame: frame,
+/// #     object_frame: frame,
+/// # };
+///
+/// let quaternion = [0.0, 0.0, 1.0, 0.0];
+/// let to = RobTarget { position_mm: [380.0, -60.5, 250.0], quaternion, conf: [0; 4], external: [None; 6] };
+/// let step = Step {
+///     kind: MotionKind::Linear,
+///     to: TargetValue::Cartesian(to),
+///     via: None,
+///     speed_mm_s: 50.0,
+///     zone_mm: None,
+///     comment: None,
+///     wait_s: None,
+/// };
+/// let draft = Draft {
+///     name: "blade".into(),
+///     comments: Vec::new(),
+///     tool: ("T1".into(), tool),
+///     work_object: ("G54".into(), object),
+///     named_targets: false,
+///     monitor_configuration: true,
+///     steps: vec![step],
+/// };
+/// // Each dialect says the same place in its own words.
+/// for (name, dialect) in [("blade.nc", Dialect::Fanuc), ("blade.mpf", Dialect::Siemens)] {
+///     let file = writer::write(&draft, dialect, Angles::Wpr)?;
+///     let program = Program::read(&[(name, &file[..])], &Setup::default());
+///     let target = program.listing().motions.last().and_then(|motion| motion.to()?.value.ok()).ok_or("no target")?;
+///     assert_eq!(target.cartesian().ok_or("no pose")?.position_mm, [380.0, -60.5, 250.0]);
+/// }
+/// assert!(writer::write(&draft, Dialect::Heidenhain, Angles::Wpr).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`WriteError`].

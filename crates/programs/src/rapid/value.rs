@@ -7,6 +7,7 @@ use crate::motion::{
 
 /// A value, whole or in part.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Value {
     /// num, dnum.
     Number(f64),

@@ -17,6 +17,7 @@ use crate::rewrite::RewriteOptions;
 
 /// Why a draft cannot be written.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// A name that RAPID does not allow.
     #[error(
@@ -47,6 +48,55 @@ pub enum WriteError {
 }
 
 /// Writes a module. Line ends are LF, characters outside Latin-1 become `?`.
+///
+/// ```
+/// use truegrind_programs::draft::{Draft, Step};
+/// use truegrind_programs::motion::{Frame, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
+/// use truegrind_programs::rapid::{Task, writer};
+///
+/// let frame = Frame::IDENTITY;
+/// let tool = ToolValue { robhold: true, frame, mass_kg: 0.8, centre_of_gravity_mm: [0.0, 0.0, 40.0] };
+/// let object = WorkObjectValue {
+///     robhold: false,
+///     fixed: true,
+///     mechanical_unit: String::new(),
+///     user_frame: frame,
+///     object_frame: frame,
+/// };
+/// let to = RobTarget {
+///     position_mm: [380.0, -60.5, 250.0],
+///     quaternion: [0.0, 0.0, 1.0, 0.0],
+///     conf: [-1, -1, 0, 0],
+///     external: [None; 6],
+/// };
+/// let step = Step {
+///     kind: MotionKind::Linear,
+///     to: TargetValue::Cartesian(to),
+///     via: None,
+///     speed_mm_s: 50.0,
+///     zone_mm: None,
+///     comment: None,
+///     wait_s: None,
+/// };
+/// let mut draft = Draft {
+///     name: "Blade".into(),
+///     comments: Vec::new(),
+///     tool: ("tDisc".into(), tool),
+///     work_object: ("wPart".into(), object),
+///     named_targets: true,
+///     monitor_configuration: true,
+///     steps: vec![step],
+/// };
+/// // What is written reads back as what was meant.
+/// let module = writer::write(&draft)?;
+/// let listing = Task::read(&[("blade.mod", &module[..])]).listing;
+/// assert_eq!(listing.motions[0].targets[0].value, Ok(TargetValue::Cartesian(to)));
+///
+/// draft.tool.0 = "disc 2".into();
+/// let refused = writer::write(&draft).map_err(|error| error.to_string());
+/// assert!(refused.is_err_and(|said| said.starts_with("`disc 2` is no RAPID name")));
+/// # Ok::<(), writer::WriteError>(())
+/// ```
 pub fn write(draft: &Draft) -> Result<Vec<u8>, WriteError> {
     for name in [&draft.name, &draft.tool.0, &draft.work_object.0] {
         check_name(name)?;

@@ -12,6 +12,17 @@ use crate::number::exact;
 use crate::table::{Cell, Table};
 
 /// The table as CSV.
+///
+/// ```
+/// use truegrind_report::format::csv;
+/// use truegrind_report::table::{Cell, Column, Table};
+///
+/// let mut table = Table::new("", vec![Column::text("name", "name"), Column::number("rmse_mm", "RMSE", "mm", 2)]);
+/// table.push(["p10, p20".into(), 0.125.into()]);
+/// table.push(["p30".into(), Cell::Missing]);
+/// // Every digit for programs, and nothing where nothing is known.
+/// assert_eq!(csv::table(&table), "name,rmse_mm\r\n\"p10, p20\",0.125\r\np30,\r\n");
+/// ```
 pub fn table(table: &Table) -> String {
     let fields = table.fields();
     let header: Vec<String> = fields

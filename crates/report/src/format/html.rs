@@ -81,6 +81,13 @@ pub fn table(table: &Table) -> String {
 
 /// Text with what HTML reads as markup made harmless, in content and in quoted attributes; control characters, which are
 /// errors in HTML and forbidden in XML, and others that act without showing are spelled out.
+///
+/// ```
+/// use truegrind_report::format::html;
+///
+/// // A name from a program is text on a page, whatever it says.
+/// assert_eq!(html::escape("<b>\"p10\" & p20"), "&lt;b&gt;&quot;p10&quot; &amp; p20");
+/// ```
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in visible::text(text).chars() {

@@ -7,6 +7,19 @@ use crate::document::{Block, Document};
 use crate::table::{Alignment, Table};
 
 /// The table with a bold title above and its notes below.
+///
+/// ```
+/// use truegrind_report::format::markdown;
+/// use truegrind_report::table::{Cell, Column, Table};
+///
+/// let mut table = Table::new("", vec![Column::text("name", "name"), Column::number("rmse_mm", "RMSE", "mm", 2)]);
+/// table.push(["a|b".into(), 1.5.into()]);
+/// table.push(["c".into(), Cell::Missing]);
+/// let text = markdown::table(&table);
+/// assert!(text.contains("RMSE [mm]") && text.contains("1.50") && text.contains('–'), "{text}");
+/// // A bar in a name ends no column.
+/// assert!(text.contains(r"a\|b"), "{text}");
+/// ```
 pub fn table(table: &Table) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {

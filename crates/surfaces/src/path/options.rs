@@ -8,6 +8,7 @@ use crate::error::SurfaceError;
 /// The family of curves that a path follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Pattern {
     /// Straight passes over the whole domain, side by side.
     Raster,
@@ -21,6 +22,7 @@ pub enum Pattern {
 /// Along which plan coordinate the passes of a raster run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Along {
     /// Along the first one, x or u.
     #[default]
@@ -32,6 +34,7 @@ pub enum Along {
 /// Whether every second pass of a raster runs backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Traverse {
     /// To and fro.
     #[default]
@@ -42,6 +45,7 @@ pub enum Traverse {
 
 /// Where the tool's x axis points, about the tool's own z axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum ToolX {
     /// As near as possible to one direction in the surface's frame. The right choice for a tool that turns about
     /// its z axis: the wrist stays calm.
@@ -52,6 +56,7 @@ pub enum ToolX {
 
 /// How far apart neighbouring passes are.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Spacing {
     /// Largest distance on the surface in mm.
     StepOver {

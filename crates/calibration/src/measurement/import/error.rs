@@ -42,6 +42,7 @@ impl fmt::Display for Place {
 
 /// A measurement file that cannot be used.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ImportError {
     /// Neither text nor a workbook.
     #[error("{place}: this is neither a text table nor a workbook; export the measurements as CSV or XLSX")]

@@ -14,6 +14,7 @@ use crate::measurement::dataset::Row;
 
 /// What is pushed.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Kind {
     /// Length added to a cable's reading (mm).
     Zero,
@@ -41,6 +42,7 @@ pub enum Kind {
 
 /// In which rows, and how far.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Course {
     /// Everywhere alike.
     Always,

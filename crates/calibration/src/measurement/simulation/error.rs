@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Why a recipe gives no measurements.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RecipeError {
     /// Not TOML, or a key that is missing, misspelt or of the wrong type.
     #[error("{file}: line {line}: {message}")]

@@ -11,6 +11,7 @@ use truegrind_math::se3::Pose;
 /// One fault.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "fault", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Fault {
     /// The cable's zero is another one in some rows.
     SensorZeroShift {

@@ -154,6 +154,7 @@ pub struct LinkDeviation {
 /// Where the arm is measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Poses {
     /// Joint angles drawn evenly from a box.
     Random {
@@ -222,6 +223,7 @@ impl View {
 /// From which side the joints come to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Approach {
     /// Not known, and without consequence: play stays in the middle.
     #[default]
@@ -298,6 +300,7 @@ impl Frame {
 /// The sensor as it stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum SensorSetup {
     /// Draw-wires. With several outlets each pose is measured with one after the other.
     Cable {
