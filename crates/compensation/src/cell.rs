@@ -473,6 +473,9 @@ impl<'a> Stated<'a> {
     }
 }
 
+/// So many unused entries are named one by one.
+const MOST_UNUSED: usize = 20;
+
 /// Which entries of a cell file programs use.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Used {
@@ -534,7 +537,13 @@ impl Used {
                     frame.name
                 )
             };
-            unused.map(say).collect::<Vec<_>>()
+            let mut out: Vec<String> = unused.map(say).collect();
+            let more = out.len().saturating_sub(MOST_UNUSED);
+            out.truncate(MOST_UNUSED);
+            if more > 0 {
+                out.push(format!("cell file: {more} more [[{kind}]] are used by no program"));
+            }
+            out
         };
         let mut out = frames("tool", &cell.tool, &self.tool);
         out.extend(frames("wobj", &cell.wobj, &self.wobj));

@@ -18,7 +18,7 @@ fn nothing_that_is_reached_is_told_to_be_out_of_reach() {
     for sheet in SHEETS {
         let nominal = sheet.model();
         let mut random = generator(77);
-        for round in 0..40 {
+        for round in 0..12 {
             let (mm, deg) = [(0.3, 0.05), (3.0, 0.5)][round % 2];
             let actual = perturbed(&nominal, &mut random, mm, deg);
             let actual = if round % 3 == 0 { with_effects(&actual, &mut random) } else { actual };
