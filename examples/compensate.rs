@@ -1,5 +1,7 @@
 //! Rewrites a RAPID program so that the estimated arm follows it: `cargo run --example compensate`.
 
+#![allow(clippy::print_stdout)]
+
 use std::error::Error;
 
 use truegrind::{

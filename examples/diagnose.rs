@@ -1,5 +1,7 @@
 //! Names the causes of what geometry does not explain, and writes the model that holds them: `cargo run --example diagnose`.
 
+#![allow(clippy::print_stdout)]
+
 use std::error::Error;
 
 use truegrind::{

@@ -1,6 +1,8 @@
 //! Fits an arm to measured poses: `cargo run --example identify`, or with a CSV or XLSX file and a robot of the catalogue
 //! `cargo run --example identify -- poses.csv abb-irb-120`.
 
+#![allow(clippy::print_stdout)]
+
 use std::error::Error;
 
 use truegrind::{

@@ -4,6 +4,8 @@
 //! Keys and their units: the files of the catalogue, `crates/arm/src/robots/`. A number that the maker does not publish is
 //! left out, never guessed.
 
+#![allow(clippy::print_stdout)]
+
 use std::error::Error;
 
 use truegrind::{Condition, Inverse, Joints, robots};

@@ -3,6 +3,8 @@
 //! Every method of the project sees the same [`Problem`]: residuals, derivatives, normal equations, priors. So does this one,
 //! plain gradient descent with a line search along Cauchy's step, to show how far it gets.
 
+#![allow(clippy::print_stdout)]
+
 use std::error::Error;
 
 use truegrind::estimation::least_squares::lm;

@@ -21,10 +21,7 @@ use truegrind_math::lanes::{Lanes, Real, WIDTH, vectorised};
 use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::statistics::ErrorSummary;
 
-pub use error::ModelFileError;
-
-/// The name and version of the file format.
-pub const SCHEMA: &str = "truegrind.model/1";
+pub use error::{ModelFileError, SCHEMA};
 
 /// How a fit is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

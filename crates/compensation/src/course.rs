@@ -42,6 +42,7 @@ const MOST_STEP_RAD: f64 = 0.6;
 
 /// Where a motion ends.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "nearly all are `At`")]
 pub(super) enum Stop<'a> {
     /// The arm does not move (external axes alone).
     Stays,

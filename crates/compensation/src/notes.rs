@@ -59,8 +59,8 @@ pub(super) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
     }
     if let Some(lines) = lines_of(listing, &solved.guessed) {
         out.push(format!(
-            "{} of the motions go to the configuration next to where the arm stands, which the text does not tell there: the one \
-             nearest to all axes at 0 is taken ({lines})",
+            "{} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
+             which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})",
             solved.guessed.len()
         ));
     }

@@ -92,7 +92,7 @@ pub(super) struct SolvedTargets {
     portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     ways: Vec<Way>,
-    /// Motions of languages without configurations whose start is not known.
+    /// Motions of which the configuration is not checked and the start not known.
     pub(super) guessed: Vec<u32>,
 }
 
@@ -544,10 +544,6 @@ fn start(
             let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
             let conf = arms.nominal.configuration(&joints);
             let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
-            // Where no language states a configuration, the nearest to that of all axes at 0 is meant, and it is said.
-            if guessed && asked.motion.configures {
-                return Err(Why::OpenStart);
-            }
             let margins = arms.nominal.branch_margins(&joints);
             Ok(Start { mounted, meant, joints, conf, margins, guessed })
         }

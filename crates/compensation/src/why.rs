@@ -68,9 +68,6 @@ pub enum Why {
     OtherBranch,
     /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
     OpenBranch,
-    /// The controller does not check the stated configuration but takes the one next to where the arm stands, which is not
-    /// known.
-    OpenStart,
     /// The path between two targets leaves the intended one by more than the tolerance.
     Bend {
         /// By how much (mm).
@@ -167,7 +164,6 @@ impl Why {
             Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
             Why::SingularWay => "the way to it passes too close to a singularity",
             Why::OpenBranch => "which configuration the controller takes is open",
-            Why::OpenStart => "where the arm comes from is not known, and its configuration is not checked",
             Why::PartOfCut { because, .. } => because,
             Why::Step { .. } => "the step to its neighbour is too large",
             Why::NotCovered { .. } => "no measured pose is near",
@@ -209,10 +205,6 @@ impl fmt::Display for Why {
             Why::OpenBranch => f.write_str(
                 "the controller may take another configuration, since none is stated and another lies as near: state it, or \
                  come nearer before",
-            ),
-            Why::OpenStart => f.write_str(
-                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
-                 arm stands, which the text does not tell here: check it, or begin with a joint target",
             ),
             Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
             Why::Corner { mm } if !mm.is_finite() => {

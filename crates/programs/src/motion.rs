@@ -425,8 +425,6 @@ pub struct Motion {
     pub insertable: bool,
     /// Whether the language lets a circular motion be replaced by straight ones.
     pub straightens: bool,
-    /// Whether the language lets targets state a configuration of the arm.
-    pub configures: bool,
     /// Whether the control goes as fast as it can (G0, FMAX): on a line or joint by joint, as it is set up.
     pub rapid: bool,
     /// The axis about which a circular motion turns, positively, in the axes of its targets; `None` where its three

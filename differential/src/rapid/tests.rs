@@ -403,7 +403,8 @@ fn a_joint_keeps_its_side_until_it_turns() {
     let all = motions("", &[0.0, 10.0, 10.0, 9.99, 5.0].map(joint).concat());
     let mut course = Course::new(&case.arm, [1.0; 6]);
     let flanks: Vec<String> = all.iter().map(|m| course.go(m)[0].flanks.clone()).collect();
-    assert_eq!(flanks, ["+.....", "-.....", "-.....", "0.....", "+....."]);
+    // On which flank the joint lies at first nobody knows.
+    assert_eq!(flanks[1..], ["-.....", "-.....", "0.....", "+....."]);
 }
 
 #[test]

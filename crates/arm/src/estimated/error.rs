@@ -2,8 +2,10 @@
 
 use thiserror::Error;
 
-use super::SCHEMA;
 use crate::bounds::Unfit;
+
+/// The name and version of the file format.
+pub const SCHEMA: &str = "truegrind.model/1";
 
 /// Why a model file cannot be read or written.
 #[derive(Debug, Clone, PartialEq, Error)]

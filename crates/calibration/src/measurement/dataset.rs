@@ -1,14 +1,11 @@
 //! Measured rows as the rest of truegrind sees them: units converted, columns resolved.
 
+mod row;
 mod rows;
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use truegrind_arm::condition::Condition;
-use truegrind_arm::model::Joints;
-use truegrind_math::se3::Pose;
-
+pub use self::row::{Reading, Row};
 pub use self::rows::{Iter, Rows};
 
 /// What the sensor tells of a pose.
@@ -21,40 +18,6 @@ pub enum Sensor {
     Position,
     /// Position and orientation of a target on the flange, in the sensor's own frame.
     Pose,
-}
-
-/// One reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reading {
-    /// Cable length (mm), its zero unknown.
-    Cable(f64),
-    /// Position in the sensor's frame (mm).
-    Position(Vector3<f64>),
-    /// Pose in the sensor's frame (mm).
-    Pose(Pose),
-}
-
-/// One measured pose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// Index of the data row in the file, from 0 at the first row below the header.
-    pub number: usize,
-    /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
-    pub line: usize,
-    /// Logged joint angles of the controller (rad).
-    pub joints: Joints,
-    /// What the sensor read.
-    pub reading: Reading,
-    /// The controller's own Cartesian read-out (mm), where logged.
-    pub readout_mm: Option<Vector3<f64>>,
-    /// Time, temperature, payload and approach sides, where logged.
-    pub condition: Condition,
-    /// Which cable outlet (0-based) the row belongs to.
-    pub anchor: usize,
-    /// Session label, where logged.
-    pub session: Option<String>,
-    /// Cells of [`Dataset::other_columns`], as text, up to the last one that holds something.
-    pub other: Vec<String>,
 }
 
 /// A measurement file.
@@ -80,23 +43,6 @@ pub struct Dataset {
     pub readout_step_mm: Option<f64>,
     /// Step to which the sensor's lengths are rounded (mm), where all are multiples of one.
     pub reading_step_mm: Option<f64>,
-}
-
-impl Row {
-    /// A row of nothing but joint angles (rad) and a reading, line `number + 2` of a file with a header.
-    pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
-        Self {
-            number,
-            line: number + 2,
-            joints,
-            reading,
-            readout_mm: None,
-            condition: Condition::default(),
-            anchor: 0,
-            session: None,
-            other: Vec::new(),
-        }
-    }
 }
 
 impl Dataset {

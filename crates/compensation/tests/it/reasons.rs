@@ -33,8 +33,6 @@ fn name(why: &Why) -> &'static str {
         Why::SingularWay => "singular way",
         Why::OtherBranch => "other branch",
         Why::OpenBranch => "open branch",
-        // Only where the start is unknown (tests/it/compensation/singular.rs).
-        Why::OpenStart => "open start",
         Why::Bend { .. } => "bend",
         Why::Corner { .. } => "corner",
         Why::CircleKept => "circle kept",

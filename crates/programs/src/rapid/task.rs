@@ -390,7 +390,6 @@ impl<'a, 's> Lister<'a, 's> {
             insertable: false,
             straightens: false,
             rapid: false,
-            configures: true,
             axis: None,
             modal: crate::motion::Modal::START,
             in_loop: around.in_loop,

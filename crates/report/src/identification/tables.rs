@@ -184,8 +184,8 @@ pub fn frame_table(found: &Identification) -> Table {
 
 fn meaning(name: &str) -> &'static str {
     match name.split(['.', '1', '2', '3', '4', '5', '6', '7', '8', '9', '0']).next() {
-        Some("tool") => "touched point on the flange, not the TCP",
-        Some("base") => "sensor frame in the base of the arm",
+        Some("target") => "touched point on the flange, not the TCP",
+        Some("sensor") => "sensor frame in the base of the arm",
         Some("outlet") => "outlet of the cable in the base of the arm",
         Some("zero") => "reading of the cable at length zero",
         _ => "",

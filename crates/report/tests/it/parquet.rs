@@ -63,7 +63,7 @@ impl Reader<'_> {
         match kind {
             1 | 2 => Thrift::Int(i64::from(kind == 1)),
             3 => Thrift::Int(i64::from(self.byte())),
-            5 | 6 => Thrift::Int(self.zigzag()),
+            4..=6 => Thrift::Int(self.zigzag()),
             8 => {
                 let length = self.varint() as usize;
                 self.at += length;

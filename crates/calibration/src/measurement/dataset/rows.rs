@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::{Index, IndexMut, Range};
 use std::sync::Arc;
 
-use super::Row;
+use super::row::Row;
 
 /// Measured rows. A copy and a part share them with the whole until one of them is changed.
 #[derive(Clone, Default)]

@@ -39,7 +39,6 @@ impl Lister<'_, '_> {
             insertable: false,
             straightens: false,
             rapid: kind == MotionKind::Joint,
-            configures: false,
             axis: None,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,

@@ -1,0 +1,58 @@
+//! One measured row.
+
+use nalgebra::Vector3;
+
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::Joints;
+use truegrind_math::se3::Pose;
+
+/// One reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reading {
+    /// Cable length (mm), its zero unknown.
+    Cable(f64),
+    /// Position in the sensor's frame (mm).
+    Position(Vector3<f64>),
+    /// Pose in the sensor's frame (mm).
+    Pose(Pose),
+}
+
+/// One measured pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Index of the data row in the file, from 0 at the first row below the header.
+    pub number: usize,
+    /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
+    pub line: usize,
+    /// Logged joint angles of the controller (rad).
+    pub joints: Joints,
+    /// What the sensor read.
+    pub reading: Reading,
+    /// The controller's own Cartesian read-out (mm), where logged.
+    pub readout_mm: Option<Vector3<f64>>,
+    /// Time, temperature, payload and approach sides, where logged.
+    pub condition: Condition,
+    /// Which cable outlet (0-based) the row belongs to.
+    pub anchor: usize,
+    /// Session label, where logged.
+    pub session: Option<String>,
+    /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), as text, up to the last one that holds something.
+    pub other: Vec<String>,
+}
+
+impl Row {
+    /// A row of nothing but joint angles (rad) and a reading, line `number + 2` of a file with a header.
+    pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
+        Self {
+            number,
+            line: number + 2,
+            joints,
+            reading,
+            readout_mm: None,
+            condition: Condition::default(),
+            anchor: 0,
+            session: None,
+            other: Vec::new(),
+        }
+    }
+}
