@@ -1,4 +1,4 @@
-//! Methods side by side under the protocols of the three papers, and an arm that is watched over its life.
+//! Methods side by side under the protocols of the three papers.
 //!
 //! An experiment is a TOML file under `experiments/` ([`experiment`]); a new one needs no code. Of the kinds of
 //! experiment, each in its own file:
@@ -10,8 +10,7 @@
 //! - [`signed_rank`]: a paper's own test on its own figures (ukf-vslm-2023 Tables X and XI);
 //! - [`degradation`]: an arm that warms up and wears, calibrated now and then or all the time (rls-2025).
 //!
-//! [`tracking`] keeps a model accurate as measurements come in. [`statistics`] has the tests, [`distribution`] their
-//! distributions.
+//! [`statistics`] has the tests; what each experiment came to is told in [`views`].
 //!
 //! A method may end in numbers that are none: that is a row of the table which says so, never a missing row.
 
