@@ -7,7 +7,7 @@
 //! 3. [`design`]: that fit linearised and whitened, with frames, links and accepted causes projected off.
 //! 4. [`catalogue`]: every candidate cause as regressors; [`intervals`] finds the rows of shifts, [`lines`] the orders of
 //!    reducer lines.
-//! 5. [`score`]: each candidate fitted jointly with everything else, to first order: gain, evidence, p-value. [`board`] does
+//! 5. [`score`]: each candidate fitted jointly with everything else, to first order: gain, evidence, p-value. [`candidate_scores`] does
 //!    that for all candidates at once, and again for the model without one of its causes.
 //! 6. [`selection`]: the best candidate is accepted when it passes the likelihood ratio corrected for all trials and lowers
 //!    the held-out error; then accepted ones are dropped or exchanged while that helps; then again. [`levels`] tells shifts

@@ -9,7 +9,7 @@
 //! - pose: the same, and three rows of ½ vee(E − Eᵀ), E = R_C R_m (R R_t)ᵀ, which is the rotation vector up to third
 //!   order of the remaining angle, with a weight of its own.
 //!
-//! Shapes: x holds deviations from the starting values of [`Calibration::parameters`], so that the nominal arm is
+//! Shapes: x holds deviations from the starting values of [`Calibration::parameters_list`], so that the nominal arm is
 //! x = 0 and every prior has mean 0. Rows travel eight at a time in lanes; sines and cosines of the logged joints are
 //! taken once. One pass over n rows with 28 parameters costs some 1,200 n operations and reads 13 numbers a row.
 //! Checked against: numerical twins of every column in the tests.
