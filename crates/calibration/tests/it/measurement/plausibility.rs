@@ -48,7 +48,13 @@ fn a_proper_file_is_not_doubted() {
     for data in sensors() {
         assert_eq!(plausibility(&data, &arm(), AngleConvention::Logged), []);
     }
-    let (_, data) = measure(&std::fs::read_to_string("tests/data/irb120-rounded.toml").unwrap());
+    let (_, data) = measure(
+        &std::fs::read_to_string(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/data/irb120-rounded.toml"
+        ))
+        .unwrap(),
+    );
     assert_eq!(plausibility(&data, &arm(), AngleConvention::Logged), []);
 }
 

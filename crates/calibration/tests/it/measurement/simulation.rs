@@ -102,7 +102,9 @@ fn noise_has_the_stated_size() {
 
 #[test]
 fn rounding_leaves_its_steps() {
-    let text = std::fs::read_to_string("tests/data/irb120-rounded.toml").unwrap();
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/irb120-rounded.toml"))
+            .unwrap();
     let (simulation, data) = measure(&text);
     assert_eq!(data.angle_step_rad, Some(0.1f64.to_radians()));
     assert_eq!((data.readout_step_mm, data.reading_step_mm), (Some(0.1), Some(0.01)));
