@@ -12,8 +12,8 @@ use truegrind::{
 const MODULE: &str = "\
 MODULE Grind
   PERS tooldata tDisc := [TRUE,[[0,0,85],[1,0,0,0]],[0.8,[0,0,40],[1,0,0,0],0,0,0]];
-  CONST robtarget p10 := [[380,-60,250],[0,0,1,0],[-1,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
-  CONST robtarget p20 := [[380,60,250],[0,0,1,0],[0,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p10 := [[380,-60,250],[0,0,1,0],[-1,-1,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p20 := [[380,60,250],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
   PROC main()
     MoveL p10,v50,fine,tDisc;
     MoveL p20,v50,fine,tDisc;
