@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::algebra::{finite, gram, lower_factor, outer, product, product_of_transposed, solved};
+use super::correlated::filter;
 use super::extension::{Extended, Subject};
 use crate::identification::calibration::Calibration;
 use crate::measurement::dataset::{Reading, Sensor};
@@ -193,6 +194,66 @@ impl Linear {
             precision,
             slopes,
         }
+    }
+
+    /// The rows of some observations alone. What candidates are made of stays that of all rows.
+    pub(super) fn part(&self, observations: &[usize]) -> Self {
+        let scalars: Vec<usize> =
+            observations.iter().flat_map(|&i| i * self.per..(i + 1) * self.per).collect();
+        let residual = DVector::from_iterator(scalars.len(), scalars.iter().map(|&s| self.residual[s]));
+        self.with_rows(self.rows.select_columns(&scalars), residual)
+    }
+
+    /// The same with random functions free too: `columns`, n × m, whose coefficients have variance 1.
+    pub(super) fn beside(&self, columns: &DMatrix<f64>) -> Self {
+        let (p, m) = (self.rows.nrows(), columns.ncols());
+        let mut rows = self.rows.clone().insert_rows(p, m, 0.0);
+        rows.rows_mut(p, m).tr_copy_from(columns);
+        let mut wider = self.clone();
+        wider.x.extend(vec![0.0; m]);
+        wider.precision.extend(vec![1.0; m]);
+        wider.with_rows(rows, self.residual.clone())
+    }
+
+    /// The same where neighbouring rows are correlated by `rho` and the noise is `noise` times what it was taken for;
+    /// `numbers` are the data rows of the observations.
+    pub(super) fn filtered(&self, rho: f64, numbers: &[usize], noise: f64) -> Self {
+        if rho == 0.0 && noise == 1.0 {
+            return self.clone();
+        }
+        let whitened = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.per) / noise;
+        let residual = whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
+        self.with_rows(whitened(&self.rows.transpose()).transpose(), residual)
+    }
+
+    fn with_rows(&self, rows: DMatrix<f64>, residual: DVector<f64>) -> Self {
+        let mut normal = outer(&rows);
+        let mut gradient = &rows * &residual;
+        for (k, precision) in self.precision.iter().enumerate() {
+            normal[(k, k)] += precision;
+            gradient[k] += precision * self.x[k];
+        }
+        Self {
+            observations: rows.ncols() / self.per.max(1),
+            per: self.per,
+            rows,
+            normal,
+            residual,
+            gradient,
+            x: self.x.clone(),
+            precision: self.precision.clone(),
+            slopes: Arc::clone(&self.slopes),
+        }
+    }
+
+    /// How many parameters the rows determine, those at `dropped` left out: each counts by the share that its prior does not.
+    pub(super) fn spent(&self, dropped: &[usize]) -> f64 {
+        let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
+        let p = kept.len();
+        let lower = lower_factor(DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]));
+        let inverse = solved(&lower, DMatrix::identity(p, p));
+        let variances = inverse.column_iter().map(|c| c.norm_squared());
+        kept.iter().zip(variances).map(|(&k, v)| (1.0 - v * self.precision[k]).clamp(0.0, 1.0)).sum()
     }
 
     /// Residuals at x with the parameters at `dropped` set to 0.

@@ -4,12 +4,13 @@ use super::cause::Cause;
 use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
 use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
+use super::finding::{Confidence, DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
 use super::findings::{Context, told_short};
 use super::held::FoldErrors;
 use super::picture::Picture;
 use super::remaining;
 use super::rows::{Prepared, prepare};
+use super::standing::Charge;
 use super::selection::{self, Accepted, BLOCKS, Selection};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
@@ -120,7 +121,7 @@ pub fn diagnose(
     let searched = Subject { observed: thinned.as_ref().unwrap_or(&prepared.observed), ..subject };
     let most = if needed.is_some() { 0 } else { options.selection.most };
     let selection = selection::select(&searched, &selection::Options { most, ..options.selection }, tell);
-    let Selection { geometric, extended: mut found, mut accepted, left } = selection;
+    let Selection { geometric, extended: mut found, mut accepted, left, families } = selection;
     let (geometric, mut extended) = match &thinned {
         None => (geometric, found.clone()),
         Some(thin) => {
@@ -195,6 +196,31 @@ pub fn diagnose(
         set_aside: &aside,
     };
     let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
+    tell("looking whether the causes come back in halves of the rows");
+    let charge = Charge {
+        subject: &searched,
+        found: &found,
+        linear: &linear,
+        accepted: &accepted,
+        pool: &left,
+        options: &options.selection,
+        families,
+        raw: &whole.design,
+    };
+    let trial = charge.tried();
+    if std::env::var_os("TG_DEBUG").is_some() {
+        eprintln!("noise {} rho {} evidence {} {:?}", trial.discrepancy.noise, trial.discrepancy.correlation, trial.discrepancy.evidence, trial.discrepancy.carried);
+        for (c, s) in found.causes.iter().zip(&trial.standings) {
+            eprintln!("{} {:?}", told_short(c), s);
+        }
+    }
+    // A story of several causes stands with one of them.
+    for (place, finding) in findings.iter_mut().enumerate() {
+        let mut own = trial.standings.iter().zip(&finding_of_cause).filter(|(_, p)| **p == place);
+        if !own.any(|(standing, _)| standing.stands()) {
+            finding.confidence = Confidence::Ambiguous;
+        }
+    }
     if smoothed.is_some() {
         let added = "smooth correction, without a physical name".to_owned();
         steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });

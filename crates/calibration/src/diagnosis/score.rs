@@ -105,19 +105,28 @@ fn in_sizes(
 /// Natural logarithm of a candidate's p-value under whichever noise explains more of it: the model's own, or the scatter of
 /// the residuals. Not corrected for trials.
 pub fn log_p(design: &Design, candidate: &Candidate, score: &Score) -> f64 {
-    let sizes = candidate.cause.sizes();
-    let plain = || score.plain_log_p(&sizes);
+    log_p_of(design, || candidate.columns(design), &candidate.cause.sizes(), score)
+}
+
+/// The same for columns that are made when they are needed.
+pub fn log_p_of(
+    design: &Design,
+    columns: impl FnOnce() -> DMatrix<f64>,
+    sizes: &[f64],
+    score: &Score,
+) -> f64 {
+    let plain = || score.plain_log_p(sizes);
     // Of many parameters the scatter of a few hundred rows says nothing.
     if score.gain <= SOME || sizes.len() > MOST_SCATTERED {
         return plain();
     }
-    let columns = candidate.columns(design);
+    let columns = columns();
     let projected = design.project(&columns);
-    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, &sizes);
+    let (information, gradient) = in_sizes(&projected.information, &projected.gradient, sizes);
     let k = columns.ncols();
     let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else { return plain() };
     let step = factor.solve(&gradient);
-    let scattered = scatter_statistic(design, &columns, &projected, &sizes, &gradient, &step);
+    let scattered = scatter_statistic(design, &columns, &projected, sizes, &gradient, &step);
     let (plain, freedom) = plain_statistic(&information, &gradient);
     log_chi_square_tail(plain.min(scattered), freedom.max(1))
 }

@@ -61,6 +61,8 @@ pub struct Selection {
     pub accepted: Vec<Accepted>,
     /// Every candidate against the extended model, best first: what is left to find, and what could not be seen.
     pub left: Vec<Scored>,
+    /// Kinds of candidates that were tried.
+    pub families: f64,
 }
 
 /// A finding may raise the error on held-out blocks by this share at most, where it is not about rows.
@@ -119,6 +121,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
                         extended: Arc::unwrap_or_clone(current).refine(),
                         accepted,
                         left,
+                        families: catalogue.families,
                     };
                 }
             }
@@ -166,7 +169,8 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
     let board = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
-    Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left }
+    let families = catalogue.families;
+    Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left, families }
 }
 
 /// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.
@@ -210,7 +214,7 @@ fn next<'a>(
 const DOUBT: f64 = 30.0;
 
 /// Whether a cause with the same parameters is in the model.
-fn already(causes: &[Cause], candidate: &Cause) -> bool {
+pub(super) fn already(causes: &[Cause], candidate: &Cause) -> bool {
     causes.iter().any(|c| match (c, candidate) {
         (Cause::Arm(a), Cause::Arm(b)) => {
             let still = |e: &Effect| {

@@ -152,8 +152,12 @@ pub struct Outcome {
     pub hidden: Vec<(Hidden, f64)>,
     /// Whether each was found by name and joint or rows.
     pub found: Vec<bool>,
+    /// Whether each was found and called identified.
+    pub identified: Vec<bool>,
     /// Findings that nothing hidden accounts for.
     pub wrong: Vec<String>,
+    /// How many of those were called identified.
+    pub wrong_identified: usize,
     /// Everything found, in words.
     pub all: Vec<String>,
     /// Parameters that can be compared, and how many lie within three standard deviations.
@@ -185,11 +189,15 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
     let findings = &diagnosed.diagnosis.findings;
     let found: Vec<bool> =
         hidden.iter().map(|h| findings.iter().any(|f| matches(h, f, setup.rows))).collect();
-    let wrong = findings
+    let sure = |f: &&Finding| f.confidence == Confidence::Identified;
+    let identified: Vec<bool> =
+        hidden.iter().map(|h| findings.iter().filter(sure).any(|f| matches(h, f, setup.rows))).collect();
+    let strange: Vec<&Finding> = findings
         .iter()
         .filter(|f| !hidden.iter().any(|h| accounts(h, f, setup.rows, &setup.log)))
-        .map(told)
         .collect();
+    let wrong_identified = strange.iter().copied().filter(|f| sure(&f)).count();
+    let wrong = strange.into_iter().map(told).collect();
     let mut truth: Vec<Cause> = hidden.iter().filter_map(cause).collect();
     if hidden.iter().any(|h| matches!(h, Hidden::Payload { .. })) {
         let yielding = |joint| Compliance { joint, compliance_rad_per_nm: 0.0 };
@@ -202,7 +210,9 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
     Outcome {
         hidden: hidden.iter().cloned().zip(lambdas).collect(),
         found,
+        identified,
         wrong,
+        wrong_identified,
         all: findings.iter().map(told).collect(),
         within,
         over_truth,

@@ -1,13 +1,13 @@
-//! How often a diagnosis names what was hidden, and how often it names what is not there: `cargo bench --bench diagnosis`.
+//! How often a diagnosis names what was hidden, and how often it names what is not there: `cargo bench -p truegrind-calibration --bench diagnosis`.
 //!
 //! Arguments: runs of each kind and sensor (default 8), clean runs of each sensor (default 40), kinds to try.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[path = "../crates/calibration/tests/it/diagnosis/simulator.rs"]
+#[path = "../tests/it/diagnosis/simulator.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod simulator;
-#[path = "../crates/calibration/tests/it/diagnosis/scenarios.rs"]
+#[path = "../tests/it/diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod scenarios;
 
@@ -17,8 +17,8 @@ use std::time::Instant;
 use rand::RngExt;
 use scenarios::{FIELD, KINDS, Outcome, draw, hide, log, outcome, stream};
 use simulator::{Hidden, Log, Setup};
-use truegrind::calibration::measurement::dataset::Sensor;
-use truegrind::robots;
+use truegrind_arm::robots;
+use truegrind_calibration::measurement::dataset::Sensor;
 
 /// Arms in turn.
 const ARMS: [&str; 4] = ["abb-irb-120", "universal-robots-ur10", "abb-irb-120", "staubli-tx60"];
@@ -54,10 +54,11 @@ fn main() {
         .filter(|k| arguments.len() < 3 || arguments[2..].iter().any(|a| a == k))
         .collect();
     let arms: Vec<_> = ARMS.iter().map(|name| robots::load(name).unwrap().model).collect();
-    let mut singles: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
-    let mut pairs: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    let mut singles: BTreeMap<usize, (usize, usize, usize)> = BTreeMap::new();
+    let mut pairs: BTreeMap<usize, (usize, usize, usize)> = BTreeMap::new();
     let mut by_kind: BTreeMap<(String, &str), (usize, usize)> = BTreeMap::new();
     let (mut within, mut ratios, mut wrong, mut total) = ((0, 0), Vec::new(), 0, 0);
+    let mut wrong_identified = 0;
     let start = Instant::now();
     for kind in &wanted {
         for (sensor, label, sigma_mm) in [(Sensor::Cable, "cable", 0.04), (Sensor::Position, "tracker", 0.03)]
@@ -87,11 +88,12 @@ fn main() {
                 let out: Outcome = outcome(nominal, &hidden, &setup);
                 let took = began.elapsed().as_secs_f64();
                 let visible = out.hidden.iter().all(|(_, l)| *l > 40.0);
-                for ((h, lambda), found) in out.hidden.iter().zip(&out.found) {
+                for (((h, lambda), found), sure) in out.hidden.iter().zip(&out.found).zip(&out.identified) {
                     let place = if hidden.len() > 1 { &mut pairs } else { &mut singles };
                     let entry = place.entry(bin(*lambda)).or_default();
                     entry.1 += 1;
                     entry.0 += usize::from(*found);
+                    entry.2 += usize::from(*sure);
                     if *lambda > 40.0 {
                         let entry = by_kind.entry((h.name().to_owned(), label)).or_default();
                         entry.1 += 1;
@@ -100,12 +102,13 @@ fn main() {
                 }
                 total += 1;
                 wrong += usize::from(!out.wrong.is_empty());
+                wrong_identified += out.wrong_identified;
                 within.0 += out.within.0;
                 within.1 += out.within.1;
                 if visible {
                     ratios.push(out.over_truth);
                 }
-                if out.found.iter().zip(&out.hidden).any(|(f, (_, l))| !f && *l > 40.0)
+                if out.identified.iter().zip(&out.hidden).any(|(f, (_, l))| !f && *l > 40.0)
                     || !out.wrong.is_empty()
                 {
                     println!("{kind} {label} {run} n={rows} σ={sigma_mm} mm {took:.1} s");
@@ -131,14 +134,14 @@ fn main() {
             }
         }
     }
-    let table = |name: &str, rates: &BTreeMap<usize, (usize, usize)>| {
+    let table = |name: &str, rates: &BTreeMap<usize, (usize, usize, usize)>| {
         println!("\n{name}: found by name and joint or rows, by non-centrality λ");
-        for (b, (hits, all)) in rates {
+        for (b, (hits, all, sure)) in rates {
             let low = if *b == 0 { 0.0 } else { BINS[b - 1] };
             let high = BINS.get(*b).map_or("…".to_owned(), |h| format!("{h:.0}"));
             let (l, h) = bounds(*hits, *all);
             println!(
-                "  λ {low:>4.0} to {high:>4}: {hits:>4} of {all:>4}  ({:.0} to {:.0} %)",
+                "  λ {low:>4.0} to {high:>4}: {hits:>4} of {all:>4}  ({:.0} to {:.0} %), {sure:>4} identified",
                 100.0 * l,
                 100.0 * h
             );
@@ -160,7 +163,9 @@ fn main() {
             ratios.len()
         );
     }
-    println!("runs with a further finding that was not hidden: {wrong} of {total}");
+    println!(
+        "runs with a further finding that was not hidden: {wrong} of {total}; false identified names: {wrong_identified}"
+    );
     for (sensor, label, sigma_mm) in [(Sensor::Cable, "cable", 0.04), (Sensor::Position, "tracker", 0.03)] {
         let mut alarms = 0;
         for run in 0..clean {
