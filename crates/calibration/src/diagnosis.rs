@@ -30,6 +30,8 @@ mod discrepancy;
 mod halves;
 mod marginal;
 mod standing;
+mod stories;
+mod something_else;
 pub mod newton;
 pub mod extension;
 pub mod design;

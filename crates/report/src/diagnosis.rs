@@ -26,7 +26,7 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         page.heading(2, format!("{}. {}", k + 1, title(finding)));
         page.paragraph(format!("{}. ({}.)", sentence(&finding.cause), sentence(word(finding.confidence))));
         page.push(Block::List(reasons(finding)));
-        if let Some(picture) = found.pictures.get(k) {
+        if let Some(picture) = found.pictures.get(k).and_then(Option::as_ref) {
             page.figure(drawn(picture), caption(picture));
         }
         if !finding.parameters.is_empty() {

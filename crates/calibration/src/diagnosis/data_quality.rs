@@ -1,9 +1,7 @@
-//! Findings about the record itself, which no parameter of the model stands for: rounding, contradicting columns, outliers;
-//! and what the extended model leaves, against the noise floor.
+//! Findings about the record itself, which no parameter of the model stands for: rounding, contradicting columns, outliers.
 
 use super::extension::{Extended, Freedom, Subject, fit};
 use super::finding::{Confidence, Finding, FoundParameter, Gain};
-use super::remaining::{Structure, stands_out};
 use super::rows::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
@@ -74,6 +72,8 @@ pub(super) fn rounding_finding(
         p_value: 0.0,
         non_centrality: None,
         gain,
+        worth_mm: Some(share.sqrt()),
+        sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy("angle-rounding").to_owned(),
     })
@@ -112,6 +112,8 @@ pub(super) fn mismatch_finding(
         p_value: 0.0,
         non_centrality: None,
         gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        worth_mm: None,
+        sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy("readout-mismatch").to_owned(),
     })
@@ -144,6 +146,8 @@ pub(super) fn outlier_finding(
         p_value: 1e-2,
         non_centrality: None,
         gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
+        worth_mm: None,
+        sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy("outliers").to_owned(),
     })
@@ -170,65 +174,4 @@ pub(super) fn noise_floor(
     } else {
         (None, "no pose was repeated and nothing is rounded".to_owned())
     }
-}
-
-/// A sentence on what is left, and a finding where it has a pattern. `smoothed`: the held-out error before a smooth
-/// correction, where there is one (mm).
-pub(super) fn told(
-    structure: &Structure,
-    after: &StageError,
-    smoothed: Option<f64>,
-    floor_mm: Option<f64>,
-    findings: &mut Vec<Finding>,
-) -> Option<String> {
-    let mut patterns = Vec::new();
-    let mut strongest = 0.0_f64;
-    for (r, z, what) in [
-        (structure.neighbours, structure.neighbours_z, "neighbouring poses"),
-        (structure.order, structure.order_z, "consecutive rows"),
-    ] {
-        if stands_out(r, z) {
-            patterns.push(format!("{what} share {:.0} % of it", 100.0 * r));
-            strongest = strongest.max(z);
-        }
-    }
-    let rmse = after.fitted.rmse;
-    if patterns.is_empty() {
-        return match floor_mm {
-            Some(floor) if rmse > 1.5 * floor => Some(format!(
-                "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
-            )),
-            _ => None,
-        };
-    }
-    let text = format!("{rmse:.3} mm RMS with a pattern: {}", patterns.join(", "));
-    let followed = match smoothed {
-        Some(_) => "; a smooth correction follows a part of it, without saying what it is",
-        None => "",
-    };
-    findings.push(Finding {
-        effect: "unexplained".to_owned(),
-        cause: format!(
-            "something repeatable is left that nothing in the catalogue explains: {}{followed}",
-            patterns.join(", ")
-        ),
-        confidence: Confidence::Identified,
-        rows: None,
-        row_list: None,
-        joints: None,
-        parameters: Vec::new(),
-        evidence: format!(
-            "correlation of residuals: nearest poses {:.2} (z = {:.1}), consecutive rows {:.2} (z = {:.1})",
-            structure.neighbours, structure.neighbours_z, structure.order, structure.order_z
-        ),
-        p_value: truegrind_math::tail::normal_two_sided(strongest),
-        non_centrality: None,
-        gain: Gain {
-            cv_rmse_before_mm: smoothed.unwrap_or(after.random.rmse),
-            cv_rmse_after_mm: after.random.rmse,
-        },
-        alternatives: Vec::new(),
-        remedy: words::remedy("unexplained").to_owned(),
-    });
-    Some(text)
 }

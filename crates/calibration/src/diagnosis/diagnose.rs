@@ -1,17 +1,19 @@
 //! The whole diagnosis of one data set.
 
 use super::cause::Cause;
-use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding, told};
+use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding};
 use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
-use super::finding::{Confidence, DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
+use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage, Step};
 use super::findings::{Context, told_short};
 use super::held::FoldErrors;
 use super::picture::Picture;
 use super::remaining;
 use super::rows::{Prepared, prepare};
-use super::standing::Charge;
 use super::selection::{self, Accepted, BLOCKS, Selection};
+use super::something_else::Left;
+use super::standing::Charge;
+use super::stories::{self, Story, Worth};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
 use crate::identification::benefit::benefit;
@@ -74,8 +76,8 @@ pub struct Diagnosed {
     pub set_aside: Vec<usize>,
     /// Which finding belongs to which cause of the extended model, in their order; several causes may share one.
     pub finding_of_cause: Vec<usize>,
-    /// A picture for each finding that has a cause in the model, in the order of the findings.
-    pub pictures: Vec<Picture>,
+    /// A picture for each finding that has a cause in the model, `None` for the others.
+    pub pictures: Vec<Option<Picture>>,
 }
 
 /// With frames alone fitted, an error beyond this is no tolerance but a mistake (mm).
@@ -195,7 +197,7 @@ pub fn diagnose(
         held: &held,
         set_aside: &aside,
     };
-    let (mut findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
+    let (findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking whether the causes come back in halves of the rows");
     let charge = Charge {
         subject: &searched,
@@ -208,32 +210,40 @@ pub fn diagnose(
         raw: &whole.design,
     };
     let trial = charge.tried();
-    if std::env::var_os("TG_DEBUG").is_some() {
-        eprintln!("noise {} rho {} evidence {} {:?}", trial.discrepancy.noise, trial.discrepancy.correlation, trial.discrepancy.evidence, trial.discrepancy.carried);
-        for (c, s) in found.causes.iter().zip(&trial.standings) {
-            eprintln!("{} {:?}", told_short(c), s);
-        }
-    }
-    // A story of several causes stands with one of them.
-    for (place, finding) in findings.iter_mut().enumerate() {
-        let mut own = trial.standings.iter().zip(&finding_of_cause).filter(|(_, p)| **p == place);
-        if !own.any(|(standing, _)| standing.stands()) {
-            finding.confidence = Confidence::Ambiguous;
-        }
-    }
+    let mut stories = stories::told(
+        stories::of(findings, &finding_of_cause, pictures),
+        &trial.standings,
+        &trial.discrepancy,
+        &Worth::new(&searched, &found, &whole.design),
+        stages[1].fitted.rmse,
+    );
     if smoothed.is_some() {
         let added = "smooth correction, without a physical name".to_owned();
         steps.push(Step { added, cv_rmse_mm: stages[2].random.rmse });
     }
     tell("looking at what is left");
-    findings.extend(rounding_finding(dataset, &prepared, &subject, &geometric, &stages));
-    findings.extend(mismatch_finding(dataset, &prepared, &stages[2]));
-    findings.extend(outlier_finding(dataset, &wild, &stages[2]));
-    let noise = remaining::noise_model(&subject, &extended, &set_aside);
     let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
-    let names: Vec<String> = findings.iter().map(|f| f.effect.clone()).collect();
+    let rest = Left {
+        dataset: &searched.observed.dataset,
+        discrepancy: &trial.discrepancy,
+        structure: &structure,
+        after: &stages[2],
+        smoothed,
+        floor_mm,
+    };
+    let of_the_record = [
+        rounding_finding(dataset, &prepared, &subject, &geometric, &stages),
+        mismatch_finding(dataset, &prepared, &stages[2]),
+        outlier_finding(dataset, &wild, &stages[2]),
+        rest.finding(),
+    ];
+    let without_causes = of_the_record.into_iter().flatten();
+    stories.extend(without_causes.map(|finding| Story { finding, picture: None, causes: Vec::new() }));
+    stories::rank(&mut stories);
+    let noise = remaining::noise_model(&subject, &extended, &set_aside);
+    let names: Vec<String> = found.causes.iter().map(|c| c.name().to_owned()).collect();
     let not_testable = not_testable(&searched.observed.dataset, &whole.design, &left, &names, &prepared);
-    let remaining = told(&structure, &stages[2], smoothed, floor_mm, &mut findings);
+    let remaining = rest.sentence();
     if let Err(why) = &prepared.readout_fusion
         && dataset.angle_step_rad.is_some()
         && let crate::identification::rounding::NotFused::Mismatch { found_mm, expected_mm } = why
@@ -249,6 +259,11 @@ pub fn diagnose(
         .collect();
     measure_again.sort_unstable();
     measure_again.dedup();
+    let mut finding_of_cause = vec![0; found.causes.len()];
+    for (place, story) in stories.iter().enumerate() {
+        story.causes.iter().for_each(|&k| finding_of_cause[k] = place);
+    }
+    let (findings, pictures) = stories.into_iter().map(|s| (s.finding, s.picture)).unzip();
     let mut diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict: None,

@@ -196,6 +196,8 @@ pub struct Discrepancy {
     pub columns: DMatrix<f64>,
     /// What each group that carries anything is worth in the readings (mm RMS), largest first.
     pub carried: Vec<(Group, f64)>,
+    /// How far all of it moves the reading of each observation (mm).
+    pub push_mm: Vec<f64>,
     /// Twice the log Bayes factor for there being anything of it.
     pub evidence: f64,
     /// Standard deviation of what is left, in units of what the fit took for the noise.
@@ -226,7 +228,8 @@ impl Discrepancy {
     /// Nothing but the noise, and its correlation.
     fn silent(self) -> Self {
         let columns = DMatrix::zeros(self.columns.nrows(), 0);
-        Self { columns, carried: Vec::new(), evidence: 0.0, noise: 1.0, ..self }
+        let push_mm = vec![0.0; self.push_mm.len()];
+        Self { columns, carried: Vec::new(), push_mm, evidence: 0.0, noise: 1.0, ..self }
     }
 
     /// The same where neighbouring rows are correlated by `rho`.
@@ -255,16 +258,17 @@ impl Discrepancy {
         let left = &design.residual + &pure * &coefficients;
         let mut carried = Vec::new();
         let mut kept = Vec::new();
+        let mut push_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
             if size * size <= NOTHING * noise * noise {
                 continue;
             }
             let part = functions.columns.columns(range.start, range.len())
                 * coefficients.rows(range.start, range.len());
-            let coordinates = linear.slopes.mm.iter().filter(|mm| **mm > 0.0).count() as f64;
-            let lengths = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| (mm * v).powi(2)).sum::<f64>();
-            let per_row = coordinates / linear.observations as f64;
-            carried.push((*group, (lengths / coordinates.max(1.0) * per_row).sqrt()));
+            let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
+            let square: f64 = lengths.iter().map(|l| l * l).sum();
+            carried.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
+            push_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
             kept.extend(range.clone().map(|k| (k, *size)));
         }
         carried.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -276,7 +280,22 @@ impl Discrepancy {
             DMatrix::from_columns(&scaled)
         };
         let correlation = if rho == 0.0 { correlation(&left, linear.per, numbers) } else { rho };
-        Self { sizes, columns, carried, evidence, noise, correlation }
+        let push_mm = push_mm
+            .chunks(linear.per)
+            .map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt())
+            .collect();
+        Self { sizes, columns, carried, push_mm, evidence, noise, correlation }
+    }
+
+    /// Whether something follows the rows, not the poses.
+    pub fn in_time(&self) -> bool {
+        self.correlation != 0.0 || self.carried.iter().any(|(group, _)| group.in_time())
+    }
+
+    /// What all of it together is worth in the readings (mm RMS).
+    pub fn worth_mm(&self) -> f64 {
+        let square: f64 = self.push_mm.iter().map(|l| l * l).sum();
+        (square / self.push_mm.len().max(1) as f64).sqrt()
     }
 
     /// Whether there is anything of it that a reader should hear of.

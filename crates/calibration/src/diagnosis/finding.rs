@@ -96,6 +96,19 @@ pub struct Alternative {
     pub beaten_by: f64,
 }
 
+/// Rows in which the set-up stood otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Session {
+    /// Data rows from 0, both ends included.
+    pub rows: [usize; 2],
+    /// What a shift of these rows alone would be called.
+    pub effect: String,
+    /// The same in a sentence.
+    pub cause: String,
+    /// By how much it moves the readings (mm RMS over all rows).
+    pub worth_mm: f64,
+}
+
 /// A finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -122,6 +135,12 @@ pub struct Finding {
     pub non_centrality: Option<f64>,
     /// What it brought.
     pub gain: Gain,
+    /// By how much it moves the readings (mm RMS over all rows); absent where that is no question.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worth_mm: Option<f64>,
+    /// Of a set-up that changed with time: what stood where from which row to which.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<Session>,
     /// What else was tried in its place, best first.
     pub alternatives: Vec<Alternative>,
     /// What to do about it in the workshop.

@@ -179,6 +179,8 @@ impl Context<'_> {
             p_value: own.log_p.exp(),
             non_centrality: Some(lambda),
             gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
+            worth_mm: None,
+            sessions: Vec::new(),
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),
         };

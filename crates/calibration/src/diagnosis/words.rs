@@ -226,6 +226,10 @@ pub fn remedy(effect: &str) -> &'static str {
             "write angles and read-out at the same moment, at rest; measure these rows again"
         }
         "outliers" => "measure these rows again",
+        "setup-change" => {
+            "measure reference points before and after each session, and the rows of a session that is off again"
+        }
+        "small-disturbances" => "nothing: the model carries them where they are the arm's",
         _ => "measure more poses where the picture shows the largest residuals",
     }
 }

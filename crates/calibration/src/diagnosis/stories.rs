@@ -1,0 +1,217 @@
+//! From causes to what a person is told: one finding for each story, ranked by the millimetres that it is worth.
+//!
+//! Causes of one name and joint are one finding already. Here three or more shifts become one ("the set-up changed with
+//! time"), and so do shifts that cannot be told from a smooth course; what is worth little is summed up without the name of
+//! a part.
+
+use super::catalogue::Candidate;
+use super::cause::Cause;
+use super::design::Design;
+use super::discrepancy::Discrepancy;
+use super::extension::{Extended, Subject};
+use super::finding::{Confidence, Finding, Gain, Session};
+use super::picture::Picture;
+use super::standing::Standing;
+use super::words;
+
+/// A finding with what stands behind it.
+#[derive(Debug, Clone)]
+pub(super) struct Story {
+    pub(super) finding: Finding,
+    pub(super) picture: Option<Picture>,
+    /// Places of its causes in the fit.
+    pub(super) causes: Vec<usize>,
+}
+
+/// Shifts from which on they are one story.
+const MANY_SHIFTS: usize = 3;
+
+/// Share of the error of geometry alone below which a finding is a small disturbance.
+const SMALL: f64 = 0.02;
+
+/// Stories of findings that have causes in the fit, in the order of `findings`.
+pub(super) fn of(findings: Vec<Finding>, finding_of_cause: &[usize], pictures: Vec<Picture>) -> Vec<Story> {
+    findings
+        .into_iter()
+        .zip(pictures)
+        .enumerate()
+        .map(|(place, (finding, picture))| Story {
+            finding,
+            picture: Some(picture),
+            causes: (0..finding_of_cause.len()).filter(|&k| finding_of_cause[k] == place).collect(),
+        })
+        .collect()
+}
+
+/// Marks what did not stand the trial, states what each finding is worth, and makes one story of what is one.
+pub(super) fn told(
+    mut stories: Vec<Story>,
+    standings: &[Standing],
+    discrepancy: &Discrepancy,
+    worth: &Worth,
+    geometric_mm: f64,
+) -> Vec<Story> {
+    for story in &mut stories {
+        // A story of several causes stands with one of them.
+        if !story.causes.iter().any(|&k| standings[k].stands()) {
+            story.finding.confidence = Confidence::Ambiguous;
+        }
+        story.finding.worth_mm = Some(worth.of(&story.causes));
+    }
+    let smooth = discrepancy.in_time();
+    let is_shift = |s: &Story| s.finding.rows.is_some();
+    let drowned = |s: &Story| smooth && s.causes.iter().all(|&k| !standings[k].beside);
+    let shifts = stories.iter().filter(|s| is_shift(s)).count();
+    if shifts >= MANY_SHIFTS || stories.iter().any(|s| is_shift(s) && drowned(s)) {
+        merge(&mut stories, is_shift, worth, |members, worth_mm| {
+            set_up_changed(members, worth_mm, shifts >= MANY_SHIFTS && !members.iter().all(|s| drowned(s)))
+        });
+    }
+    let small = |s: &Story| s.finding.worth_mm.is_some_and(|w| w < SMALL * geometric_mm);
+    if stories.iter().any(small) {
+        merge(&mut stories, small, worth, small_disturbances);
+    }
+    stories
+}
+
+/// Puts findings in the order of what they are worth; those without a number come last, as they were.
+pub(super) fn rank(stories: &mut [Story]) {
+    let key = |s: &Story| s.finding.worth_mm.unwrap_or(-1.0);
+    stories.sort_by(|a, b| key(b).total_cmp(&key(a)));
+}
+
+/// Replaces the stories that are `of` a kind by one, in the place of the first.
+fn merge(
+    stories: &mut Vec<Story>,
+    of: impl Fn(&Story) -> bool,
+    worth: &Worth,
+    told: impl FnOnce(&[Story], f64) -> Finding,
+) {
+    let first = stories.iter().position(&of).unwrap_or(0);
+    let (members, mut others): (Vec<Story>, Vec<Story>) = stories.drain(..).partition(of);
+    let causes: Vec<usize> = members.iter().flat_map(|s| s.causes.iter().copied()).collect();
+    let finding = told(&members, worth.of(&causes));
+    let size = |s: &Story| s.finding.worth_mm.unwrap_or(0.0);
+    let largest = members.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let picture = largest.and_then(|s| s.picture);
+    others.insert(first.min(others.len()), Story { finding, picture, causes });
+    *stories = others;
+}
+
+fn gain(members: &[Story]) -> Gain {
+    let gains = members.iter().map(|s| s.finding.gain);
+    gains
+        .reduce(|a, b| Gain {
+            cv_rmse_before_mm: a.cv_rmse_before_mm.max(b.cv_rmse_before_mm),
+            cv_rmse_after_mm: a.cv_rmse_after_mm.min(b.cv_rmse_after_mm),
+        })
+        .unwrap_or(Gain { cv_rmse_before_mm: f64::NAN, cv_rmse_after_mm: f64::NAN })
+}
+
+fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool) -> Finding {
+    let mut sessions: Vec<Session> = members
+        .iter()
+        .filter_map(|s| {
+            Some(Session {
+                rows: s.finding.rows?,
+                effect: s.finding.effect.clone(),
+                cause: s.finding.cause.clone(),
+                worth_mm: s.finding.worth_mm.unwrap_or(0.0),
+            })
+        })
+        .collect();
+    sessions.sort_by_key(|s| s.rows);
+    let confidence = if steps && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
+        Confidence::Identified
+    } else {
+        Confidence::Ambiguous
+    };
+    Finding {
+        effect: "setup-change".to_owned(),
+        cause: if steps {
+            format!("the set-up changed with time: {} shifts, see the table of sessions", sessions.len())
+        } else {
+            "the set-up changed with time; whether it moved in steps or wandered cannot be told".to_owned()
+        },
+        confidence,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: members.iter().map(|s| s.finding.evidence.as_str()).collect::<Vec<_>>().join("; "),
+        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
+        non_centrality: None,
+        gain: gain(members),
+        worth_mm: Some(worth_mm),
+        sessions,
+        alternatives: Vec::new(),
+        remedy: words::remedy("setup-change").to_owned(),
+    }
+}
+
+fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
+    Finding {
+        effect: "small-disturbances".to_owned(),
+        cause: format!(
+            "{} small disturbance{}, together {worth_mm:.4} mm: too little to send anybody to a part",
+            members.len(),
+            if members.len() == 1 { "" } else { "s" }
+        ),
+        confidence: Confidence::Ambiguous,
+        rows: None,
+        row_list: None,
+        joints: None,
+        parameters: Vec::new(),
+        evidence: format!(
+            "each is worth less than {:.0} % of the error that geometry alone leaves",
+            100.0 * SMALL
+        ),
+        p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
+        non_centrality: None,
+        gain: gain(members),
+        worth_mm: Some(worth_mm),
+        sessions: Vec::new(),
+        alternatives: Vec::new(),
+        remedy: words::remedy("small-disturbances").to_owned(),
+    }
+}
+
+/// How many millimetres causes push the readings by.
+pub(super) struct Worth {
+    /// What each cause does to each scalar row (mm), 0 for orientations.
+    pushes: Vec<Vec<f64>>,
+    observations: usize,
+}
+
+impl Worth {
+    /// Of the causes of `fit`; candidates are made of the slopes of `raw`.
+    pub(super) fn new(subject: &Subject<'_>, fit: &Extended, raw: &Design) -> Self {
+        let (dataset, nominal) = (&subject.observed.dataset, subject.nominal);
+        let pushes = fit
+            .causes
+            .iter()
+            .map(|cause| {
+                let (candidate, values) = match cause {
+                    Cause::Arm(effect) => (
+                        Candidate::arm(effect.clone(), dataset, nominal),
+                        effect.parameters().iter().map(|p| p.value).collect::<Vec<_>>(),
+                    ),
+                    Cause::Measurement(d) => {
+                        (Candidate::measurement(d.clone(), dataset, nominal), d.values.clone())
+                    }
+                };
+                let push = candidate.columns(raw) * nalgebra::DVector::from_vec(values);
+                push.iter().zip(&raw.slopes.mm).map(|(v, mm)| v * mm).collect()
+            })
+            .collect();
+        Self { pushes, observations: raw.observations }
+    }
+
+    /// Of some of the causes together (mm RMS over the observations).
+    pub(super) fn of(&self, causes: &[usize]) -> f64 {
+        let rows = self.pushes.first().map_or(0, Vec::len);
+        let square: f64 =
+            (0..rows).map(|s| causes.iter().map(|&k| self.pushes[k][s]).sum::<f64>().powi(2)).sum();
+        (square / self.observations.max(1) as f64).sqrt()
+    }
+}
