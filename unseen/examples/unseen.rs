@@ -1,0 +1,94 @@
+//! `cargo run --release -p truegrind-unseen --example unseen -- [RUNS] [KIND…] [--seed S] [--from N] [--rows MOST]
+//! [--design NAME] [--workers W] [--stability] [--quiet] [--show] [--list]`
+//!
+//! RUNS runs in all, the kinds in turn; all kinds where none is named. Each worker diagnoses on one thread; with `--workers 1`
+//! one run after another has all threads, so that its time is a user's. The same marks for any number of workers.
+
+use std::process::ExitCode;
+
+use truegrind_unseen::case::Limits;
+use truegrind_unseen::designs::Design;
+use truegrind_unseen::report::{Plan, line, stability_line, stability_table, table};
+use truegrind_unseen::truth::Kind;
+
+/// Options that take a value.
+const VALUED: [&str; 5] = ["--seed", "--from", "--rows", "--design", "--workers"];
+
+/// Options that do not.
+const PLAIN: [&str; 3] = ["--stability", "--quiet", "--list"];
+
+fn main() -> ExitCode {
+    match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<(), String> {
+    let has = |name: &str| arguments.iter().any(|a| a == name);
+    if has("--list") {
+        Kind::ALL.iter().for_each(|kind| println!("{}", kind.name()));
+        return Ok(());
+    }
+    let plan = plan(arguments)?;
+    let quiet = has("--quiet");
+    if has("--stability") {
+        let all = plan.stabilities(|index, run| {
+            if !quiet {
+                println!("{}", stability_line(index, run));
+            }
+        });
+        println!("{}", stability_table(&plan, &all));
+    } else {
+        let all = plan.outcomes(|index, outcome| {
+            if !quiet {
+                println!("{}", line(index, outcome));
+            }
+        });
+        println!("\n{}", table(&plan, &all));
+    }
+    Ok(())
+}
+
+fn plan(arguments: &[String]) -> Result<Plan, String> {
+    let mut plan = Plan {
+        kinds: Vec::new(),
+        runs: 90,
+        first: 0,
+        seed: 0,
+        limits: Limits::default(),
+        workers: std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let mut rest = arguments.iter();
+    while let Some(argument) = rest.next() {
+        if VALUED.contains(&argument.as_str()) {
+            let value = rest.next().ok_or_else(|| format!("{argument}: expected a value"))?;
+            let number = || value.parse::<u64>().map_err(|_| format!("{argument} {value}: expected a number"));
+            match argument.as_str() {
+                "--seed" => plan.seed = number()?,
+                "--from" => plan.first = number()? as usize,
+                "--rows" => plan.limits.rows = (number()? as usize).max(60),
+                "--workers" => plan.workers = number()? as usize,
+                _ => {
+                    let design = Design::ALL.into_iter().find(|d| d.name() == value);
+                    plan.limits.design = Some(design.ok_or_else(|| {
+                        format!("--design {value}: expected one of {}", Design::ALL.map(Design::name).join(", "))
+                    })?);
+                }
+            }
+        } else if let Ok(runs) = argument.parse::<usize>() {
+            plan.runs = runs;
+        } else if let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.name() == argument) {
+            plan.kinds.push(kind);
+        } else if !PLAIN.contains(&argument.as_str()) {
+            return Err(format!("{argument}: expected a number of runs, a kind (--list) or an option"));
+        }
+    }
+    if plan.kinds.is_empty() {
+        plan.kinds = Kind::ALL.to_vec();
+    }
+    Ok(plan)
+}

@@ -1,0 +1,183 @@
+//! Effects of the arm itself.
+
+use rand::{Rng, RngExt};
+
+use super::Scene;
+use super::warmth::Warmth;
+use crate::arms::{Angles, Arm, Strain};
+use crate::designs::Visit;
+use crate::draw::{between, one};
+use crate::truth::Kind;
+
+/// The shape of an effect of the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Links grow with the warmth, each by its share; size: relative growth.
+    Warm {
+        /// Of each link.
+        shares: [f64; 6],
+        /// Over time.
+        course: Warmth,
+    },
+    /// A spring whose stiffness grows with the torque: size · bend · asinh(τ / bend), size in rad/(N m).
+    Hardening {
+        /// From 0.
+        joint: usize,
+        /// Torque at which it hardens (N m).
+        bend_nm: f64,
+    },
+    /// A joint that holds up to a torque and yields beyond it, size in rad/(N m).
+    DeadBand {
+        /// From 0.
+        joint: usize,
+        /// The torque (N m).
+        band_nm: f64,
+    },
+    /// A beam; size: 1/(E I) in 1/(N m²).
+    Bending {
+        /// From 0.
+        link: usize,
+    },
+    /// size · sin(n q + m q' + φ), rad.
+    TwoJointGear {
+        /// From 0.
+        joint: usize,
+        /// The other joint.
+        other: usize,
+        /// n and m.
+        orders: [f64; 2],
+        /// φ (rad).
+        phase: f64,
+    },
+    /// size · sin(n q + φ) under a hump about one place of the turn, rad.
+    ModulatedGear {
+        /// From 0.
+        joint: usize,
+        /// n.
+        order: f64,
+        /// φ (rad).
+        phase: f64,
+        /// Where the hump is (rad).
+        place: f64,
+        /// How narrow it is.
+        narrow: f64,
+    },
+    /// Half the play (rad) to the side to which the load pushes, or from which the joint came where the load is small.
+    LoadedPlay {
+        /// From 0.
+        joint: usize,
+        /// Load that decides (N m).
+        friction_nm: f64,
+    },
+}
+
+impl Shape {
+    /// Draws one, and the joints (from 1) that have it.
+    pub fn draw(kind: Kind, scene: &Scene<'_>, rng: &mut impl Rng) -> (Self, Vec<usize>) {
+        match kind {
+            Kind::WarmLinks => (Self::warm(scene, rng), Vec::new()),
+            Kind::Hardening => {
+                let joint = one(rng, &[1, 1, 2, 2, 4]);
+                let bend_nm = between(rng, 0.1, 0.3) * most_torque(scene, joint);
+                (Shape::Hardening { joint, bend_nm }, vec![joint + 1])
+            }
+            Kind::DeadBand => {
+                let joint = one(rng, &[1, 1, 2, 2, 4]);
+                let band_nm = between(rng, 0.3, 0.6) * most_torque(scene, joint);
+                (Shape::DeadBand { joint, band_nm }, vec![joint + 1])
+            }
+            Kind::Bending => {
+                let (link, joints) = one(rng, &scene.sheet.beams);
+                (Shape::Bending { link }, joints.map(|j| j + 1).to_vec())
+            }
+            Kind::TwoJointGear => {
+                let joint = rng.random_range(0..6_usize);
+                let other = if joint == 0 || (joint < 5 && rng.random_range(0..2) == 0) { joint + 1 } else { joint - 1 };
+                let orders = [one(rng, &[1.0, 2.0, 3.0]), one(rng, &[-2.0, -1.0, 1.0, 2.0])];
+                let phase = between(rng, 0.0, std::f64::consts::TAU);
+                (Shape::TwoJointGear { joint, other, orders, phase }, vec![joint + 1])
+            }
+            Kind::ModulatedGear => {
+                let joint = rng.random_range(0..6);
+                let [low, high] = scene.sheet.room_deg[joint];
+                let shape = Shape::ModulatedGear {
+                    joint,
+                    order: one(rng, &[3.0, 4.0, 6.0, 9.0, 14.0]),
+                    phase: between(rng, 0.0, std::f64::consts::TAU),
+                    place: between(rng, low, high).to_radians(),
+                    narrow: between(rng, 1.0, 4.0),
+                };
+                (shape, vec![joint + 1])
+            }
+            _ => {
+                let joint = one(rng, &[1, 2, 2, 3, 4]);
+                let friction_nm = between(rng, 0.1, 0.35) * most_torque(scene, joint);
+                (Shape::LoadedPlay { joint, friction_nm }, vec![joint + 1])
+            }
+        }
+    }
+
+    fn warm(scene: &Scene<'_>, rng: &mut impl Rng) -> Self {
+        let length = scene.walk.length_h();
+        let mut shares = [0.0; 6];
+        for share in &mut shares {
+            // Some links have no motor near.
+            *share = if rng.random_range(0..3) == 0 { 0.0 } else { between(rng, 0.1, 1.0) };
+        }
+        shares[1] = f64::max(shares[1], 0.5);
+        let course = Warmth {
+            hours: [between(rng, 0.05, 0.15) * length, between(rng, 0.4, 1.2) * length],
+            quick: between(rng, 0.3, 0.7),
+            pause: scene.walk.pause,
+        };
+        Shape::Warm { shares, course }
+    }
+
+    /// What it does at a visit.
+    pub fn strain(&self, size: f64, arm: &Arm, visit: &Visit) -> Strain {
+        let mut out = Strain::default();
+        let q = &visit.q;
+        match *self {
+            Shape::Warm { shares, course } => {
+                out.growth = shares.map(|share| size * share * course.at(visit.hours));
+            }
+            Shape::Hardening { joint, bend_nm } => {
+                out.turn[joint] = size * bend_nm * (arm.torques(q)[joint] / bend_nm).asinh();
+            }
+            Shape::DeadBand { joint, band_nm } => {
+                let torque = arm.torques(q)[joint];
+                out.turn[joint] = size * (torque - torque.clamp(-band_nm, band_nm));
+            }
+            Shape::Bending { link } => {
+                let (sag, slope) = arm.beam(q, link);
+                out.bend[link] = (sag * size, slope * size);
+            }
+            Shape::TwoJointGear { joint, other, orders, phase } => {
+                out.turn[joint] = size * (orders[0] * q[joint] + orders[1] * q[other] + phase).sin();
+            }
+            Shape::ModulatedGear { joint, order, phase, place, narrow } => {
+                let hump = (narrow * ((q[joint] - place).cos() - 1.0)).exp();
+                out.turn[joint] = size * hump * (order * q[joint] + phase).sin();
+            }
+            Shape::LoadedPlay { joint, friction_nm } => {
+                let torque = arm.torques(q)[joint];
+                let step = q[joint] - visit.before[joint];
+                let flank = if torque.abs() > friction_nm {
+                    torque.signum()
+                } else if step.abs() > 1e-6 {
+                    // A joint that moved up rests on its lower flank.
+                    -step.signum()
+                } else {
+                    0.0
+                };
+                out.turn[joint] = 0.5 * size * flank;
+            }
+        }
+        out
+    }
+}
+
+fn most_torque(scene: &Scene<'_>, joint: usize) -> f64 {
+    let torque = |q: &Angles| scene.arm.torques(q)[joint].abs();
+    scene.walk.visits.iter().map(|v| torque(&v.q)).fold(1e-6, f64::max)
+}

@@ -1,0 +1,130 @@
+//! Whether the same rows give the same findings when nothing that matters is changed.
+
+use rand::{Rng, RngExt};
+
+use crate::case::Case;
+use crate::draw::Purpose;
+use crate::score::{Setting, setting};
+use crate::table::{Format, Line, text};
+use crate::under_test::{Finding, diagnosed};
+
+/// A change that should change nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Change {
+    /// Every number rounded at its eighth decimal.
+    Rounded,
+    /// One row left out.
+    OneLess,
+    /// Lines of the same pose in another order among themselves.
+    Shuffled,
+}
+
+impl Change {
+    /// All of them.
+    pub const ALL: [Change; 3] = [Change::Rounded, Change::OneLess, Change::Shuffled];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Change::Rounded => "rounded at the eighth decimal",
+            Change::OneLess => "one row left out",
+            Change::Shuffled => "shuffled within repeats",
+        }
+    }
+
+    /// The changed rows; `None` where the change needs repeats and there are none.
+    pub fn of(self, lines: &[Line], rng: &mut impl Rng) -> Option<(Vec<Line>, Format)> {
+        let mut out = lines.to_vec();
+        let mut format = Format::default();
+        match self {
+            Change::Rounded => format.eight_decimals = true,
+            Change::OneLess => {
+                out.remove(rng.random_range(0..lines.len()));
+            }
+            Change::Shuffled => {
+                let mut from = 0;
+                while from < out.len() {
+                    let count = out[from..].iter().take_while(|line| line.q == lines[from].q).count();
+                    // Times stay in order; readings, which are what repeats differ in, change places.
+                    for k in (1..count).rev() {
+                        let other = rng.random_range(0..=k);
+                        let (a, b) = (out[from + k].reading, out[from + other].reading);
+                        (out[from + k].reading, out[from + other].reading) = (b, a);
+                    }
+                    from += count;
+                }
+                if out == lines {
+                    return None;
+                }
+            }
+        }
+        Some((out, format))
+    }
+}
+
+/// What a run says of stability.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stability {
+    /// What it was.
+    pub setting: Setting,
+    /// Identified findings of the rows as they are.
+    pub plain: Vec<Finding>,
+    /// Those after each change, and whether they are the same.
+    pub changed: Vec<(Change, Vec<Finding>, bool)>,
+    /// Why there was no diagnosis.
+    pub refused: Option<String>,
+}
+
+fn identified(file: &str, robot: &str) -> Result<Vec<Finding>, String> {
+    let all = diagnosed(file, robot)?.findings;
+    Ok(all.into_iter().filter(|finding| finding.identified).collect())
+}
+
+/// Diagnoses a case as it is and after each change.
+pub fn stability(case: &Case) -> Stability {
+    let lines = case.lines();
+    let mut rng = case.generator(Purpose::Variant);
+    let mut out =
+        Stability { setting: setting(case), plain: Vec::new(), changed: Vec::new(), refused: None };
+    let mut of = |lines: &[Line], format: Format| {
+        let found = identified(&text(case.sensor.kind, lines, format), case.sheet.name);
+        found.map_err(|why| out.refused = Some(why)).unwrap_or_default()
+    };
+    let plain = of(&lines, Format::default());
+    let mut changed = Vec::new();
+    for change in Change::ALL {
+        if let Some((lines, format)) = change.of(&lines, &mut rng) {
+            let found = of(&lines, format);
+            let alike = same(&plain, &found);
+            changed.push((change, found, alike));
+        }
+    }
+    (out.plain, out.changed) = (plain, changed);
+    out
+}
+
+/// Whether two lists tell the same: names, joints, and rows that overlap by four in five, in any order.
+pub fn same(a: &[Finding], b: &[Finding]) -> bool {
+    let mut left: Vec<&Finding> = b.iter().collect();
+    a.len() == b.len()
+        && a.iter().all(|finding| {
+            let place = left.iter().position(|other| alike(finding, other));
+            place.is_some_and(|k| {
+                left.remove(k);
+                true
+            })
+        })
+}
+
+fn alike(a: &Finding, b: &Finding) -> bool {
+    let rows = match (a.rows, b.rows) {
+        (None, None) => true,
+        (Some(a), Some(b)) => {
+            let length = |from: usize, to: usize| (to + 1).saturating_sub(from) as f64;
+            let both = length(a[0].max(b[0]), a[1].min(b[1]));
+            both >= 0.8 * (length(a[0], a[1]) + length(b[0], b[1]) - both)
+        }
+        _ => false,
+    };
+    rows && a.effect == b.effect && a.joints == b.joints
+}

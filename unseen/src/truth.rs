@@ -1,0 +1,302 @@
+//! What is hidden, and which names of the diagnosis are true of it.
+
+use crate::sensors::Kind as Sensor;
+
+/// Where a cause belongs. A technician who is sent to the wrong one repairs what is whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    /// Links.
+    Geometry,
+    /// What yields under weight, joint or link.
+    Compliance,
+    /// Gear errors: eccentricity, transmission, ratio, coupling.
+    Gear,
+    /// Play.
+    Backlash,
+    /// Links that grow.
+    Thermal,
+    /// A load that the log does not tell of.
+    Load,
+    /// The sensor's stand, or the arm's base against it.
+    Frame,
+    /// The zero of a cable.
+    Zero,
+    /// The scale of a sensor.
+    Scale,
+    /// The wire of a cable sensor and what leads it.
+    Cable,
+    /// The air that a tracker looks through.
+    Air,
+    /// The target on the flange.
+    Target,
+    /// Noise and single wild readings.
+    Noise,
+    /// The set-up changed with time, without saying which part of it.
+    SetUp,
+    /// What the log says does not belong to what was read: rounding, lag, contradiction, a reading before the arm stood still.
+    Log,
+}
+
+/// What a name of the diagnosis says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Meaning {
+    /// A cause.
+    Cause(Family),
+    /// That something is left without a name: never false, never an answer.
+    SomethingElse,
+    /// A name that this table does not know. Counted as false.
+    Unknown,
+}
+
+/// The names of the diagnosis. One name stands for several families: see [`meaning`].
+///
+/// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
+pub const NAMES: [(&str, Family); 41] = [
+    ("link-geometry", Family::Geometry),
+    ("joint-compliance", Family::Compliance),
+    ("joint-stiffness", Family::Compliance),
+    ("link-bending", Family::Compliance),
+    ("compliance", Family::Compliance),
+    ("gear-eccentricity", Family::Gear),
+    ("gear-transmission", Family::Gear),
+    ("gear-ratio", Family::Gear),
+    ("gear-two-joints", Family::Gear),
+    ("gear-modulation", Family::Gear),
+    ("gear-error", Family::Gear),
+    ("joint-coupling", Family::Gear),
+    ("drive", Family::Gear),
+    ("backlash", Family::Backlash),
+    ("backlash-load", Family::Backlash),
+    ("thermal-growth", Family::Thermal),
+    ("link-growth", Family::Thermal),
+    ("payload-change", Family::Load),
+    ("sensor-frame-shift", Family::Frame),
+    ("sensor-frame-drift", Family::Frame),
+    ("base-settling", Family::Frame),
+    ("sensor-zero-shift", Family::Zero),
+    ("sensor-zero-drift", Family::Zero),
+    ("sensor-scale", Family::Scale),
+    ("sensor-scale-drift", Family::Scale),
+    ("cable-sag", Family::Cable),
+    ("cable-pulley", Family::Cable),
+    ("cable-drum", Family::Cable),
+    ("cable", Family::Cable),
+    ("air-refraction", Family::Air),
+    ("tool-shift", Family::Target),
+    ("tool-drift", Family::Target),
+    ("target-nest", Family::Target),
+    ("outliers", Family::Noise),
+    ("correlated-noise", Family::Noise),
+    ("set-up-change", Family::SetUp),
+    ("set-up-drift", Family::SetUp),
+    ("angle-rounding", Family::Log),
+    ("readout-mismatch", Family::Log),
+    ("latency", Family::Log),
+    ("unsettled", Family::Log),
+];
+
+/// Names that say that something is left.
+pub const SOMETHING_ELSE: [&str; 4] =
+    ["unexplained", "smooth-correction", "something-else", "small-disturbances"];
+
+/// What a finding says. `thermal-drift` is told of the arm, of the sensor's frame and of a cable's zero: its parameters say which.
+pub fn meaning(effect: &str, parameters: &[String]) -> Meaning {
+    if SOMETHING_ELSE.contains(&effect) {
+        return Meaning::SomethingElse;
+    }
+    if effect == "thermal-drift" {
+        let has = |name: &str| parameters.iter().any(|p| p == name);
+        return Meaning::Cause(if has("offset") {
+            Family::Zero
+        } else if has("x") || has("rx") {
+            Family::Frame
+        } else {
+            Family::Thermal
+        });
+    }
+    NAMES.iter().find(|(name, _)| *name == effect).map_or(Meaning::Unknown, |(_, family)| Meaning::Cause(*family))
+}
+
+/// Kinds of what is hidden.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Nothing.
+    Clean,
+    /// Links that warm up each by its own share, by two exponentials, and cool while the arm pauses.
+    WarmLinks,
+    /// A joint spring that hardens.
+    Hardening,
+    /// A joint that yields only beyond a torque.
+    DeadBand,
+    /// A link that bends.
+    Bending,
+    /// A gear error that depends on two joints.
+    TwoJointGear,
+    /// A gear error whose size changes along the turn.
+    ModulatedGear,
+    /// Play whose flank follows the load, and the last motion where the load is small.
+    LoadedPlay,
+    /// A cable over a pulley.
+    Pulley,
+    /// A cable wound in layers.
+    Drum,
+    /// A hanging cable on a spring.
+    Catenary,
+    /// A beam through warm layers of air.
+    Refraction,
+    /// A target whose centre depends on how it is looked at.
+    Nest,
+    /// Readings that drift.
+    Drift,
+    /// Autocorrelated noise.
+    Correlated,
+    /// Readings that belong to an earlier pose.
+    Latency,
+    /// Readings taken before the arm stood still.
+    Unsettled,
+    /// The arm's base settles.
+    Settling,
+}
+
+/// Who may be told of a kind, and who must.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Truth {
+    /// What was hidden.
+    pub kind: Kind,
+    /// Families that are true of it.
+    pub families: Vec<Family>,
+    /// Joints that have it, from 1; empty where no joint has.
+    pub joints: Vec<usize>,
+}
+
+/// What one finding is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Mark {
+    /// The family is true, and so are the joints where it names any.
+    True,
+    /// Another family.
+    WrongFamily,
+    /// The family is true, but of a joint that has nothing.
+    WrongJoint,
+    /// No cause: neither.
+    None,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 18] = [
+        Kind::Clean,
+        Kind::WarmLinks,
+        Kind::Hardening,
+        Kind::DeadBand,
+        Kind::Bending,
+        Kind::TwoJointGear,
+        Kind::ModulatedGear,
+        Kind::LoadedPlay,
+        Kind::Pulley,
+        Kind::Drum,
+        Kind::Catenary,
+        Kind::Refraction,
+        Kind::Nest,
+        Kind::Drift,
+        Kind::Correlated,
+        Kind::Latency,
+        Kind::Unsettled,
+        Kind::Settling,
+    ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Clean => "clean",
+            Kind::WarmLinks => "warm-links",
+            Kind::Hardening => "hardening",
+            Kind::DeadBand => "dead-band",
+            Kind::Bending => "bending",
+            Kind::TwoJointGear => "two-joint-gear",
+            Kind::ModulatedGear => "modulated-gear",
+            Kind::LoadedPlay => "loaded-play",
+            Kind::Pulley => "pulley",
+            Kind::Drum => "drum",
+            Kind::Catenary => "catenary",
+            Kind::Refraction => "refraction",
+            Kind::Nest => "nest",
+            Kind::Drift => "drift",
+            Kind::Correlated => "correlated",
+            Kind::Latency => "latency",
+            Kind::Unsettled => "unsettled",
+            Kind::Settling => "settling",
+        }
+    }
+
+    /// Whether it is in the arm, so that a model of the arm should have it.
+    pub fn in_arm(self) -> bool {
+        matches!(
+            self,
+            Kind::WarmLinks
+                | Kind::Hardening
+                | Kind::DeadBand
+                | Kind::Bending
+                | Kind::TwoJointGear
+                | Kind::ModulatedGear
+                | Kind::LoadedPlay
+        )
+    }
+
+    /// Whether there is a part that a technician could be sent to. Noise has none, and so has nothing.
+    pub fn has_a_part(self) -> bool {
+        !matches!(self, Kind::Clean | Kind::Correlated)
+    }
+
+    /// Whether only a cable has it, only a tracker, or either.
+    pub fn sensors(self) -> [bool; 2] {
+        match self {
+            Kind::Pulley | Kind::Drum | Kind::Catenary => [true, false],
+            Kind::Refraction | Kind::Nest => [false, true],
+            _ => [true, true],
+        }
+    }
+
+    /// Families that are true of it under a sensor.
+    ///
+    /// A course in time may be told as a set-up that changed with time. A drum in layers has its radius wrong, so its scale is
+    /// off. A base that settles under a sensor that stands still is a sensor that moves. Play whose flank follows the load
+    /// is a spring of the same joint, as stiff as one likes.
+    pub fn families(self, sensor: Sensor) -> Vec<Family> {
+        match self {
+            Kind::Clean => vec![],
+            Kind::WarmLinks => vec![Family::Thermal, Family::SetUp],
+            Kind::Hardening | Kind::DeadBand | Kind::Bending => vec![Family::Compliance],
+            Kind::TwoJointGear | Kind::ModulatedGear => vec![Family::Gear],
+            Kind::LoadedPlay => vec![Family::Backlash, Family::Compliance],
+            Kind::Pulley | Kind::Catenary => vec![Family::Cable],
+            Kind::Drum => vec![Family::Cable, Family::Scale],
+            Kind::Refraction => vec![Family::Air],
+            Kind::Nest => vec![Family::Target],
+            Kind::Drift if sensor == Sensor::Cable => vec![Family::Zero, Family::SetUp],
+            Kind::Drift | Kind::Settling => vec![Family::Frame, Family::SetUp],
+            Kind::Correlated => vec![Family::Noise],
+            Kind::Latency | Kind::Unsettled => vec![Family::Log],
+        }
+    }
+}
+
+impl Truth {
+    /// Marks a finding: its meaning and its joints, from 1. Of a coupling, driver and driven joint, the driven one counts.
+    pub fn mark(&self, effect: &str, meaning: Meaning, joints: Option<&[usize]>) -> Mark {
+        let family = match meaning {
+            Meaning::SomethingElse => return Mark::None,
+            Meaning::Unknown => return Mark::WrongFamily,
+            Meaning::Cause(family) => family,
+        };
+        if !self.families.contains(&family) {
+            return Mark::WrongFamily;
+        }
+        let told = match joints {
+            Some([_, driven]) if effect == "joint-coupling" => &[*driven],
+            Some(joints) => joints,
+            None => &[],
+        };
+        if told.iter().all(|joint| self.joints.contains(joint)) { Mark::True } else { Mark::WrongJoint }
+    }
+}

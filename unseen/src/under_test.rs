@@ -1,0 +1,208 @@
+//! The tool under test, called as its command line calls it. Nothing else of truegrind is used anywhere in this crate.
+
+use std::time::Instant;
+
+use nalgebra::Vector6;
+use serde_json::Value;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::estimated::{Estimated, Judgement};
+use truegrind_arm::model::Model;
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind_calibration::diagnosis::rows::prepare;
+use truegrind_calibration::identification::fit::errors_on;
+use truegrind_calibration::identification::register::starting_frames;
+use truegrind_calibration::measurement::convention::AngleConvention;
+use truegrind_calibration::measurement::dataset::Dataset;
+use truegrind_calibration::measurement::import;
+use truegrind_calibration::measurement::plausibility::{Evidence, plausibility};
+
+use crate::arms::{Angles, Pose};
+use crate::designs::Visit;
+
+/// A finding, as the JSON has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Its name.
+    pub effect: String,
+    /// Names of its parameters.
+    pub parameters: Vec<String>,
+    /// Joints, from 1.
+    pub joints: Option<Vec<usize>>,
+    /// Rows, from 0.
+    pub rows: Option<[usize; 2]>,
+    /// Whether it is told without a doubt.
+    pub identified: bool,
+}
+
+/// What becomes of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Written {
+    /// `-o` writes it.
+    Yes,
+    /// Only with `--allow-doubtful`.
+    Doubtful,
+    /// Not at all.
+    No,
+}
+
+/// Which arm is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// The data sheet's.
+    Sheet,
+    /// Geometry alone.
+    Geometry,
+    /// The model file's.
+    Written,
+}
+
+/// What the tool says.
+#[derive(Debug)]
+pub struct Reply {
+    /// Its findings.
+    pub findings: Vec<Finding>,
+    /// Held-out error, random folds (mm).
+    pub held_out_mm: f64,
+    /// Held-out error, contiguous blocks (mm).
+    pub held_out_blocks_mm: f64,
+    /// Held-out error of geometry alone, random folds (mm).
+    pub geometry_held_out_mm: f64,
+    /// What becomes of the model.
+    pub written: Written,
+    /// Wall time of import and diagnosis (s).
+    pub seconds: f64,
+    sheet: Model,
+    model: Model,
+    found: Diagnosed,
+    convention: AngleConvention,
+}
+
+fn dataset(text: &str, convention: AngleConvention, nominal: &Model) -> Result<Dataset, String> {
+    let rows = import::read("unseen.csv", text.as_bytes(), &import::Options::default());
+    let rows = rows.map_err(|error| error.to_string())?;
+    convention.apply(&rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
+}
+
+/// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`.
+///
+/// # Errors
+/// What the command line would say.
+pub fn diagnosed(text: &str, robot: &str) -> Result<Reply, String> {
+    let start = Instant::now();
+    let robot = robots::load(robot).map_err(|error| error.to_string())?;
+    let dh = robot.sheet.joints.angles == robots::sheet::Angles::Dh;
+    let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
+    let rows = dataset(text, convention, &robot.model)?;
+    for suspicion in plausibility(&rows, &robot.model, convention) {
+        if suspicion.evidence == Evidence::Sensor {
+            return Err(suspicion.to_string());
+        }
+    }
+    let options = Options::default();
+    let frames = starting_frames(&rows, &robot.model, &options.tolerance, true);
+    let frames = frames.map_err(|error| error.to_string())?;
+    let name = &robot.sheet.name;
+    let found = diagnose(&rows, name, &robot.model, &frames, &options, &|_| {});
+    let found = found.map_err(|error| error.to_string())?;
+    let file = found.estimated.to_toml().map_err(|error| error.to_string())?;
+    let seconds = start.elapsed().as_secs_f64();
+    let written = match found.estimated.verdict.status {
+        Judgement::Fail => Written::No,
+        Judgement::Doubtful => Written::Doubtful,
+        _ => Written::Yes,
+    };
+    let read = Estimated::from_toml(&file).map_err(|error| error.to_string())?;
+    let json = serde_json::to_value(&found.diagnosis).map_err(|error| error.to_string())?;
+    let error = |stage: &str, key: &str| {
+        json["fits"][stage][key].as_f64().ok_or_else(|| format!("fits.{stage}.{key} is no number"))
+    };
+    Ok(Reply {
+        findings: findings(&json)?,
+        held_out_mm: error("extended", "cv_rmse_mm")?,
+        held_out_blocks_mm: error("extended", "cv_blocks_rmse_mm")?,
+        geometry_held_out_mm: error("geometric", "cv_rmse_mm")?,
+        written,
+        seconds,
+        sheet: robot.model,
+        model: read.model,
+        found,
+        convention,
+    })
+}
+
+fn findings(json: &Value) -> Result<Vec<Finding>, String> {
+    if json["schema"] != "truegrind.diagnosis/1" {
+        return Err(format!("schema: expected truegrind.diagnosis/1, found {}", json["schema"]));
+    }
+    let list = json["findings"].as_array().ok_or("findings: expected a list")?;
+    let numbers = |value: &Value| -> Option<Vec<usize>> {
+        value.as_array()?.iter().map(|n| n.as_u64().map(|n| n as usize)).collect()
+    };
+    let finding = |f: &Value| -> Result<Finding, String> {
+        let names = f["parameters"].as_array().into_iter().flatten();
+        Ok(Finding {
+            effect: f["effect"].as_str().ok_or("a finding without an effect")?.to_owned(),
+            parameters: names.filter_map(|p| p["name"].as_str().map(str::to_owned)).collect(),
+            joints: numbers(&f["joints"]),
+            rows: numbers(&f["rows"]).and_then(|rows| rows.try_into().ok()),
+            identified: match f["confidence"].as_str() {
+                Some("identified") => true,
+                Some(_) => false,
+                None => return Err("a finding without a confidence".to_owned()),
+            },
+        })
+    };
+    list.iter().map(finding).collect()
+}
+
+impl Reply {
+    /// The flange as an arm has it, at a visit (mm).
+    pub fn flange(&self, which: Which, visit: &Visit) -> Pose {
+        let model = match which {
+            Which::Sheet => &self.sheet,
+            Which::Geometry => &self.found.geometric.model,
+            Which::Written => &self.model,
+        };
+        let condition =
+            Condition { time_h: Some(visit.hours), approach: sides(&visit.q, &visit.before), ..Condition::default() };
+        let pose = model.forward(&Vector6::from(visit.q), &condition);
+        Pose::from_parts(pose.translation, pose.rotation)
+    }
+
+    /// What the extended model, frames and causes of the measurement included, gets wrong on fresh rows of the same
+    /// measurement (RMS, mm): on those rows of a file that are counted.
+    ///
+    /// # Errors
+    /// What the import would say.
+    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<f64, String> {
+        let mut rows = dataset(text, self.convention, &self.sheet)?;
+        // A fresh row stands in the measurement where its time does.
+        for (row, visit) in rows.rows.iter_mut().zip(visits) {
+            row.number = visit.row;
+        }
+        let observed = prepare(&rows, &self.sheet).observed;
+        let errors = errors_on(&observed, &self.found.extended.model, &self.found.extended.frames);
+        let counted: Vec<f64> =
+            errors.iter().zip(visits).filter(|(_, v)| v.counted).map(|(error, _)| error * error).collect();
+        Ok((counted.iter().sum::<f64>() / counted.len() as f64).sqrt())
+    }
+}
+
+/// From which side each joint came, as the condition of a pose has it: −1 from below.
+fn sides(q: &Angles, before: &Angles) -> [i8; 6] {
+    std::array::from_fn(|j| {
+        let step = q[j] - before[j];
+        if step.abs() < 1e-6 { 0 } else { -step.signum() as i8 }
+    })
+}
+
+/// The data sheet's flange at logged angles, for the check that both sides mean the same arm.
+///
+/// # Errors
+/// An arm that the catalogue has not.
+pub fn sheet_flange(robot: &str, q: &Angles) -> Result<Pose, String> {
+    let robot = robots::load(robot).map_err(|error| error.to_string())?;
+    let pose = robot.model.forward(&Vector6::from(*q), &Condition::default());
+    Ok(Pose::from_parts(pose.translation, pose.rotation))
+}

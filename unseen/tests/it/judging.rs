@@ -1,0 +1,119 @@
+//! The judge: what it calls true and false, and that its figures are right where the answer is known.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use truegrind_unseen::arms::{Pose, SHEETS, Strain};
+use truegrind_unseen::draw::{Purpose, between, generator};
+use truegrind_unseen::shape::distance;
+use truegrind_unseen::stability::same;
+use truegrind_unseen::statistics::{quantile, wilson};
+use truegrind_unseen::sensors::Kind as Measures;
+use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, SOMETHING_ELSE, Truth, meaning};
+use truegrind_unseen::under_test::Finding;
+
+#[test]
+fn a_name_means_one_family_and_a_kind_has_one_name() {
+    let names: BTreeSet<&str> = NAMES.iter().map(|n| n.0).chain(SOMETHING_ELSE).collect();
+    assert_eq!(names.len(), NAMES.len() + SOMETHING_ELSE.len());
+    let kinds: BTreeSet<&str> = Kind::ALL.iter().map(|k| k.name()).collect();
+    assert_eq!(kinds.len(), Kind::ALL.len());
+    for kind in Kind::ALL {
+        for measures in [Measures::Cable, Measures::Position, Measures::Pose] {
+            assert_eq!(kind.families(measures).is_empty(), kind == Kind::Clean, "{kind:?}");
+        }
+    }
+}
+
+/// A warm-up is told of the arm, of the stand and of the cable's zero by one name; what moves is in its parameters.
+#[test]
+fn a_thermal_drift_is_of_what_its_parameters_move() {
+    let of = |names: &[&str]| meaning("thermal-drift", &names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+    assert_eq!(of(&["growth"]), Meaning::Cause(Family::Thermal));
+    assert_eq!(of(&["x", "y", "z", "rx"]), Meaning::Cause(Family::Frame));
+    assert_eq!(of(&["offset"]), Meaning::Cause(Family::Zero));
+}
+
+#[test]
+fn a_joint_that_has_nothing_is_false_and_an_unknown_name_too() {
+    let truth = Truth { kind: Kind::TwoJointGear, families: vec![Family::Gear], joints: vec![3] };
+    let mark = |effect: &str, joints: Option<&[usize]>| truth.mark(effect, meaning(effect, &[]), joints);
+    assert_eq!(mark("gear-transmission", Some(&[3])), Mark::True);
+    assert_eq!(mark("gear-transmission", Some(&[2])), Mark::WrongJoint);
+    assert_eq!(mark("joint-coupling", Some(&[2, 3])), Mark::True);
+    assert_eq!(mark("joint-coupling", Some(&[3, 2])), Mark::WrongJoint);
+    assert_eq!(mark("gear-ratio", Some(&[2, 3])), Mark::WrongJoint);
+    assert_eq!(mark("drive", None), Mark::True);
+    assert_eq!(mark("backlash", Some(&[3])), Mark::WrongFamily);
+    assert_eq!(mark("a-name-of-tomorrow", Some(&[3])), Mark::WrongFamily);
+    assert_eq!(mark("unexplained", None), Mark::None);
+}
+
+/// Where nothing is hidden no name is true, whatever it is.
+#[test]
+fn noise_has_no_true_name_of_a_part() {
+    for kind in [Kind::Clean, Kind::Correlated] {
+        assert!(!kind.has_a_part());
+        let truth = Truth { kind, families: kind.families(Measures::Position), joints: Vec::new() };
+        for (name, family) in NAMES {
+            let right = truth.mark(name, meaning(name, &[]), None) == Mark::True;
+            assert_eq!(right, kind == Kind::Correlated && family == Family::Noise, "{name}");
+        }
+    }
+}
+
+/// A model that differs by its base and by the point on the flange has the same shape; one that differs in a link has not.
+#[test]
+fn the_shape_of_a_model_does_not_see_base_and_target() {
+    let sheet = &SHEETS[1];
+    let arm = sheet.nominal();
+    let mut rng = generator(3, 0, 0, 0, Purpose::Clean);
+    let poses: Vec<Pose> = (0..200)
+        .map(|_| arm.flange(&sheet.room_deg.map(|[l, h]| between(&mut rng, l, h).to_radians()), &Strain::default()))
+        .collect();
+    let point = Vector3::new(20.0, -10.0, 80.0);
+    let base = Pose::from_parts(Vector3::new(0.4, -0.3, 0.2).into(), UnitQuaternion::from_scaled_axis(Vector3::new(3e-4, -2e-4, 5e-4)));
+    let target = Pose::translation(0.3, 0.1, -0.2);
+    let moved: Vec<Pose> = poses.iter().map(|pose| base * pose * target).collect();
+    let found = distance(&poses, &moved, &point);
+    assert!(found.as_is > 0.3 && found.shape < 1e-3, "{found:?}");
+    // Five micrometres of normal noise keep their size but for the nine numbers that were fitted.
+    let noisy: Vec<Pose> = poses
+        .iter()
+        .map(|p| {
+            let push = Vector3::from_fn(|_, _| 0.005 * truegrind_unseen::draw::normal(&mut rng));
+            Pose::from_parts((p.translation.vector + push).into(), p.rotation)
+        })
+        .collect();
+    let found = distance(&poses, &noisy, &point);
+    let expected = 0.005 * 3.0_f64.sqrt();
+    assert!((found.as_is / expected - 1.0).abs() < 0.1 && found.shape < found.as_is && found.shape > 0.9 * expected);
+}
+
+#[test]
+fn findings_are_the_same_in_any_order_and_with_rows_that_nearly_agree() {
+    let finding = |effect: &str, joint: Option<usize>, rows: Option<[usize; 2]>| Finding {
+        effect: effect.to_owned(),
+        parameters: Vec::new(),
+        joints: joint.map(|j| vec![j]),
+        rows,
+        identified: true,
+    };
+    let a = [finding("gear-ratio", Some(1), None), finding("sensor-zero-shift", None, Some([0, 99]))];
+    let b = [finding("sensor-zero-shift", None, Some([10, 99])), finding("gear-ratio", Some(1), None)];
+    let c = [finding("sensor-zero-shift", None, Some([30, 99])), finding("gear-ratio", Some(1), None)];
+    let d = [finding("gear-ratio", Some(2), None), finding("sensor-zero-shift", None, Some([0, 99]))];
+    assert!(same(&a, &b) && !same(&a, &c) && !same(&a, &d) && !same(&a, &a[..1]) && same(&[], &[]));
+    let twice = [a[0].clone(), a[0].clone()];
+    assert!(!same(&twice, &a));
+}
+
+/// Wilson's interval of 1 in 20, by the formula of 1927 worked out by hand.
+#[test]
+fn intervals_and_quantiles() {
+    let (low, high) = wilson(1, 20);
+    assert!((low - 0.008_881).abs() < 1e-5 && (high - 0.236_131).abs() < 1e-5, "{low} {high}");
+    assert_eq!(wilson(0, 0), (0.0, 1.0));
+    assert_eq!(quantile(&[3.0, 1.0, 2.0, 5.0], 0.5), Some(2.5));
+    assert_eq!(quantile(&[], 0.5), None);
+}
