@@ -87,7 +87,7 @@ pub const NAMES: [(&str, Family); 41] = [
     ("target-nest", Family::Target),
     ("outliers", Family::Noise),
     ("correlated-noise", Family::Noise),
-    ("set-up-change", Family::SetUp),
+    ("setup-change", Family::SetUp),
     ("set-up-drift", Family::SetUp),
     ("angle-rounding", Family::Log),
     ("readout-mismatch", Family::Log),

@@ -80,7 +80,7 @@ impl<'a> CandidateScores<'a> {
             .collect();
         let known = known_load(&fit).map(|kind| {
             let always = Disturbance::new(kind, Course::Always);
-            Candidate::measurement(always, &subject.observed.dataset, subject.nominal)
+            Candidate::measurement(always, &subject.observed.dataset, subject.nominal, subject.frames)
         });
         let shifts: Vec<&Candidate> = catalogue.shifts.iter().chain(&known).collect();
         let shifts = shifts
@@ -123,7 +123,7 @@ impl<'a> CandidateScores<'a> {
                 found.into_iter().map(|interval| {
                     let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
                     let disturbance = Disturbance::new(shift.kind.clone(), Course::Rows { from, to });
-                    let candidate = Candidate::measurement(disturbance, dataset, self.subject.nominal);
+                    let candidate = Candidate::measurement(disturbance, dataset, self.subject.nominal, self.subject.frames);
                     Candidate { tried, ..candidate }
                 })
             })

@@ -47,7 +47,7 @@ impl Catalogue {
             .into_iter()
             .map(|kind| {
                 let disturbance = Disturbance::new(kind, Course::Always);
-                Candidate::measurement(disturbance, dataset, subject.nominal)
+                Candidate::measurement(disturbance, dataset, subject.nominal, subject.frames)
             })
             .collect();
         let mut stories: Vec<(&str, Vec<usize>)> =

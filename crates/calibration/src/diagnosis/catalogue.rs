@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use super::cause::Cause;
 use super::design::Design;
 use super::extension::Subject;
-use crate::identification::calibration::flange_torques;
+use crate::identification::calibration::{Frames, rotations, shifts};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::sensor::form::Form;
 use crate::measurement::split;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
@@ -55,6 +56,8 @@ pub enum Regressor {
         /// How far in each row.
         course: Vec<f64>,
     },
+    /// Shifts the sensor in the base.
+    Shift([Vec<f64>; 3]),
 }
 
 /// A direction in which a measurement can be pushed.
@@ -112,7 +115,7 @@ impl Candidate {
     }
 
     /// A candidate of the measurement.
-    pub fn measurement(disturbance: Disturbance, dataset: &Dataset, nominal: &Model) -> Self {
+    pub fn measurement(disturbance: Disturbance, dataset: &Dataset, nominal: &Model, frames: &Frames) -> Self {
         let course: Vec<f64> = dataset.rows.iter().map(|r| disturbance.course.at(r)).collect();
         let push = |along| Regressor::Push { along, course: course.clone() };
         let regressors = match &disturbance.kind {
@@ -123,22 +126,21 @@ impl Candidate {
             Kind::Tool => (0..3).map(|k| push(Along::Tool(k))).collect(),
             Kind::Scale => vec![push(Along::Scale)],
             Kind::Sag => vec![push(Along::Sag)],
-            Kind::Load { joints, compliance } => {
-                let torques = flange_torques(dataset, nominal);
-                let bent = |joint: usize, factor: f64| {
-                    (joint, torques.iter().zip(&course).map(|(t, c)| factor * c * t[joint]).collect())
-                };
-                match compliance {
-                    Some(compliance) => vec![Regressor::Arm {
-                        rotation: joints.iter().zip(compliance).map(|(&j, &c)| bent(j, c)).collect(),
-                        growth: Vec::new(),
-                    }],
-                    None => joints
-                        .iter()
-                        .map(|&j| Regressor::Arm { rotation: vec![bent(j, 1.0)], growth: Vec::new() })
+            Kind::Form(form) if !form.turns() => shifts(*form, dataset, nominal, frames)
+                .into_iter()
+                .map(|v| Regressor::Shift(std::array::from_fn(|k| v.iter().map(|v| v[k]).collect())))
+                .collect(),
+            kind => rotations(kind, dataset, nominal)
+                .into_iter()
+                .map(|rotation| Regressor::Arm {
+                    rotation: rotation
+                        .into_iter()
+                        .enumerate()
+                        .filter_map(|(j, r)| Some((j, r?.iter().zip(&course).map(|(r, c)| r * c).collect())))
                         .collect(),
-                }
-            }
+                    growth: Vec::new(),
+                })
+                .collect(),
         };
         Self { cause: Cause::Measurement(disturbance), regressors, tried: 1.0 }
     }
@@ -170,6 +172,11 @@ impl Candidate {
                     Along::Scale => add(course, &|s| design.slopes.by_scale[s]),
                     Along::Sag => add(course, &|s| design.slopes.by_sag[s]),
                 },
+                Regressor::Shift(vectors) => {
+                    for (axis, course) in vectors.iter().enumerate() {
+                        add(course, &|s| design.slopes.by_frame[(s, axis)]);
+                    }
+                }
             }
         }
         out
@@ -364,10 +371,39 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             }
         }
     }
+    let forms = forms(dataset, &columns).into_iter().map(|(form, tried)| (Kind::Form(form), Course::Always, tried));
     list.into_iter()
+        .chain(forms)
         .map(|(kind, course, tried)| Candidate {
             tried,
-            ..Candidate::measurement(Disturbance::new(kind, course), dataset, subject.nominal)
+            ..Candidate::measurement(Disturbance::new(kind, course), dataset, subject.nominal, subject.frames)
         })
         .collect()
+}
+
+/// Pairs of joints whose gears may disturb each other.
+const NEIGHBOURS: [(usize, usize); 10] =
+    [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
+
+/// Forms that the columns allow, with the variants tried of each.
+fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
+    let mut out = Vec::new();
+    let has = |rate: bool| {
+        dataset.rows.iter().any(|r| r.motion.as_ref().is_some_and(|m| !rate || m.rate_per_h.is_some()))
+    };
+    if has(true) {
+        out.push((Form::Latency, 1.0));
+    } else if has(false) {
+        out.extend([(Form::LastStep, 2.0), (Form::SlowReading, 2.0)]);
+    }
+    let moves = |j: usize| columns.range_rad[j] > STILL_RAD;
+    out.extend((0..3).map(|joint| (Form::Stiffness { joint }, 1.0)));
+    let pairs = NEIGHBOURS.into_iter().filter(|&(a, b)| moves(a) && moves(b));
+    out.extend(pairs.map(|(joint, other)| (Form::TwoJointGear { joint, other }, 1.0)));
+    if dataset.sensor == Sensor::Cable {
+        out.extend([(Form::Pulley, 1.0), (Form::Drum, 1.0)]);
+    } else {
+        out.extend([(Form::Refraction, 1.0), (Form::Nest, 1.0)]);
+    }
+    out
 }

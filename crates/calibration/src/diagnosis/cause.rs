@@ -19,6 +19,7 @@ impl Cause {
         match self {
             Cause::Arm(effect) => effect.name(),
             Cause::Measurement(disturbance) => match (&disturbance.kind, &disturbance.course) {
+                (Kind::Form(form), _) => form.name(),
                 (Kind::Load { .. }, _) => "payload-change",
                 (_, Course::Clock { .. } | Course::Thermometer { .. }) => "thermal-drift",
                 (Kind::Zero, _) => "sensor-zero-shift",
@@ -35,6 +36,7 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCoupling(c)) => vec![c.driver, c.joint],
             Cause::Arm(effect) => effect.joint().into_iter().collect(),
+            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.joints(),
             Cause::Measurement(_) => Vec::new(),
         }
     }

@@ -8,9 +8,10 @@ use nalgebra::{Point3, Vector3};
 
 use crate::identification::fit::Observed;
 use crate::identification::rounding::{NotFused, ReadoutFusion, fuse_readout, logged_covariance};
-use crate::measurement::dataset::Dataset;
+use super::halves::is_path;
+use crate::measurement::dataset::{Dataset, Motion};
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::Model;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_math::statistics::median;
 
 /// Rows whose columns contradict each other.
@@ -88,6 +89,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
                 std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { -step[j].signum() as i8 });
         }
     }
+    fill_motion(&mut rows);
     let logged = Observed { angles: logged_covariance(&rows), dataset: rows.clone() };
     let good: Vec<usize> =
         (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
@@ -104,4 +106,19 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
         Err(why) => (logged.clone(), Err(why)),
     };
     Prepared { observed, logged, readout_fusion, mismatch, sides_from_order: silent }
+}
+
+/// Notes for each row how the arm came to it; the first row came from nowhere.
+fn fill_motion(dataset: &mut Dataset) {
+    let path = is_path(dataset);
+    let rows: Vec<(Joints, Option<f64>)> =
+        dataset.rows.iter().map(|r| (r.joints, r.condition.time_h)).collect();
+    let n = rows.len();
+    for (i, row) in dataset.rows.iter_mut().enumerate().skip(1) {
+        let step = rows[i].0 - rows[i - 1].0;
+        let next = (i + 1).min(n - 1);
+        let hours = rows[next].1.zip(rows[i - 1].1).map(|(b, a)| b - a).filter(|h| path && *h > 0.0);
+        let rate_per_h = hours.map(|h| (rows[next].0 - rows[i - 1].0) / h);
+        row.motion = Some(Box::new(Motion { step, rate_per_h }));
+    }
 }

@@ -300,7 +300,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
     let dataset = &subject.observed.dataset;
     let candidate = match cause {
         Cause::Arm(effect) => Candidate::arm(effect.clone(), dataset, subject.nominal),
-        Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, subject.nominal),
+        Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, subject.nominal, subject.frames),
     };
     let tried = scored
         .iter()

@@ -144,7 +144,7 @@ impl Charge<'_> {
         let (dataset, nominal) = (&self.subject.observed.dataset, self.subject.nominal);
         let candidate = match cause {
             Cause::Arm(effect) => Candidate::arm(effect.clone(), dataset, nominal),
-            Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, nominal),
+            Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, nominal, self.subject.frames),
         };
         Tried { columns: candidate.columns(raw), candidate: Arc::new(candidate) }
     }
@@ -162,8 +162,7 @@ impl Charge<'_> {
     ) -> (Vec<Standing>, Vec<usize>, Discrepancy) {
         let mut out: Vec<usize> = Vec::new();
         let mut discrepancy = Discrepancy::of(functions, self.linear, &[], numbers, None);
-        let mut standings: Vec<Standing> = Vec::new();
-        loop {
+        let mut standings = loop {
             let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
             let whole = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise).whole();
             let whiten = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.linear.per) / noise;
@@ -181,12 +180,11 @@ impl Charge<'_> {
             let worst = (0..own.len())
                 .filter(|k| !out.contains(k) && !judged[*k].beside)
                 .max_by(|&a, &b| judged[a].log_p.total_cmp(&judged[b].log_p).then(b.cmp(&a)));
-            standings = judged;
-            let Some(worst) = worst else { break };
+            let Some(worst) = worst else { break judged };
             out.push(worst);
             discrepancy =
                 Discrepancy::of(functions, self.linear, &self.places(&out), numbers, Some(&discrepancy));
-        }
+        };
         for k in &out {
             standings[*k].beside = false;
         }
@@ -299,7 +297,7 @@ impl<'a> Half<'a> {
         // The kind in all rows, not only in its own.
         let always = Disturbance::new(disturbance.kind.clone(), Course::Always);
         let (dataset, nominal) = (&self.charge.subject.observed.dataset, self.charge.subject.nominal);
-        let everywhere = Candidate::measurement(always, dataset, nominal).columns(self.charge.raw);
+        let everywhere = Candidate::measurement(always, dataset, nominal, self.charge.subject.frames).columns(self.charge.raw);
         let everywhere = self.columns(&everywhere);
         let Some(strip) = Strip::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
             return score.evidence > 0.0;

@@ -197,7 +197,7 @@ impl Worth {
                         effect.parameters().iter().map(|p| p.value).collect::<Vec<_>>(),
                     ),
                     Cause::Measurement(d) => {
-                        (Candidate::measurement(d.clone(), dataset, nominal), d.values.clone())
+                        (Candidate::measurement(d.clone(), dataset, nominal, subject.frames), d.values.clone())
                     }
                 };
                 let push = candidate.columns(raw) * nalgebra::DVector::from_vec(values);

@@ -4,6 +4,7 @@ use super::cause::Cause;
 use super::extension::Extended;
 use super::finding::FoundParameter;
 use crate::measurement::sensor::disturbance::{Course, Kind};
+use crate::measurement::sensor::form::Form;
 use truegrind_arm::effect::Effect;
 
 /// Value and σ of the parameters of cause `index`.
@@ -130,6 +131,7 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
         Cause::Measurement(d) => {
             let rows = when(cause.rows());
             match (&d.kind, &d.course) {
+                (Kind::Form(form), _) => of_form(*form, parameters),
                 (Kind::Load { compliance: Some(_), .. }, _) => {
                     format!("{rows} the arm carried {value:.1} kg more than the log says")
                 }
@@ -164,6 +166,36 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
     }
 }
 
+/// One sentence for a form.
+fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
+    let value = found(parameters, 0);
+    let joint = form.joints().first().map_or(0, |j| j + 1);
+    match form {
+        Form::Latency => format!(
+            "the reading and the angles of a row are {:.1} ms apart while the arm moves",
+            1e3 * value.abs()
+        ),
+        Form::LastStep => {
+            format!("readings were taken before the arm stood still: {:.2} % of the last step was still to come", 100.0 * value.abs())
+        }
+        Form::SlowReading => format!(
+            "readings were taken before the sensor had settled: {:.2} % of the way from the last one was still to come",
+            100.0 * value.abs()
+        ),
+        Form::Stiffness { .. } => format!("joint {joint} does not yield in proportion to its torque: its spring hardens, or has play"),
+        Form::TwoJointGear { other, .. } => {
+            format!("the error of joint {joint} depends on its own angle and on that of joint {}", other + 1)
+        }
+        Form::Refraction => format!(
+            "the tracker's beam is bent: {:.3} mm at 3 m, in proportion to the square of the distance, as by air that is warmer above than below",
+            9e3 * value.abs()
+        ),
+        Form::Pulley => "the cable's length depends on its direction, as over a pulley or through a worn outlet".to_owned(),
+        Form::Drum => "the cable's reading is not in proportion to its length, as from a drum wound in layers".to_owned(),
+        Form::Nest => "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned(),
+    }
+}
+
 /// Which pattern showed it.
 pub fn pattern(cause: &Cause) -> String {
     let joint = cause.joints().first().map_or(0, |j| j + 1);
@@ -181,6 +213,14 @@ pub fn pattern(cause: &Cause) -> String {
         "sensor-zero-shift" => "the cable's residual steps by one amount in these rows".to_owned(),
         "sensor-frame-shift" => "the residual steps by one vector in the base in these rows".to_owned(),
         "tool-shift" => "the residual steps by one vector on the flange in these rows".to_owned(),
+        "latency" => "the residual follows the speed of the joints".to_owned(),
+        "unsettled" => "the residual points back to the pose before".to_owned(),
+        "joint-stiffness" => format!("the residual turned to joint {joint} follows powers of its torque"),
+        "gear-two-joints" => format!("the residual turned to joint {joint} swings with the angles of two joints"),
+        "air-refraction" => "the residual grows up or down with the square of the distance".to_owned(),
+        "cable-pulley" => "the residual follows the direction of the cable".to_owned(),
+        "cable-drum" => "the residual follows powers of the cable's length".to_owned(),
+        "target-nest" => "the residual follows the direction of the beam as the target sees it".to_owned(),
         "sensor-scale" => "the residual grows in proportion to the reading".to_owned(),
         "cable-sag" => "the residual grows with the square of the cable's level span".to_owned(),
         _ => "see the picture".to_owned(),
@@ -220,6 +260,16 @@ pub fn remedy(effect: &str) -> &'static str {
         }
         "tool-shift" => "fasten the hook or reflector; measure the rows after the slip again",
         "sensor-scale" => "check the sensor against a length standard",
+        "latency" => "write angles and reading by one clock, or measure at rest",
+        "unsettled" => "wait longer before each reading",
+        "joint-stiffness" => {
+            "measure this joint with and without load, approached under the same torque; the model that is written has its linear part"
+        }
+        "gear-two-joints" => "measure both joints over their whole range, one at a time and together; look at the cable that crosses them",
+        "air-refraction" => "measure at even temperature and from near, or with the tracker at the height of the arm",
+        "cable-pulley" => "look at outlet and pulley; measure with the cable in one direction as far as possible",
+        "cable-drum" => "check the cable sensor against a length standard over its whole range",
+        "target-nest" => "turn the target towards the sensor; check its nest and exchange the reflector",
         "cable-sag" => "raise the cable's tension or shorten the distance",
         "angle-rounding" => "log angles with more digits",
         "readout-mismatch" => {

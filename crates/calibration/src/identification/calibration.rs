@@ -15,11 +15,12 @@
 //! Checked against: numerical twins of every column in the tests.
 
 mod columns;
+mod forms;
 mod frames;
 mod kernel;
 mod passes;
 mod task;
 
-pub use columns::flange_torques;
+pub use forms::{flange_torques, rotations, shifts};
 pub use frames::{Frames, Weight};
 pub use task::Calibration;

@@ -72,6 +72,7 @@ impl Tolerance {
             Kind::Sag => 3e-3,
             Kind::Load { compliance: Some(_), .. } => 10.0,
             Kind::Load { .. } => 1e-4,
+            Kind::Form(form) => form.size(parameter),
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a sensor reads of a pose of the flange: a cable's length, a position, a pose.
 
 pub mod disturbance;
+pub mod form;
 
 use nalgebra::{Point3, Vector3};
 

@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
+use super::forms::{self, rotations};
 use super::frames::{Frames, Weight};
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::condition::Condition;
-use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::lanes::WIDTH;
 
@@ -33,6 +34,8 @@ pub(super) struct Columns {
     pub(super) effect_at: Vec<usize>,
     /// How far each disturbance goes in each row.
     pub(super) courses: Vec<Vec<f64>>,
+    /// For each disturbance and each of its parameters the shift of the sensor in each row; none for those along an axis.
+    pub(super) shifts: Vec<Vec<[Vec<f64>; 3]>>,
 }
 
 impl Columns {
@@ -86,6 +89,11 @@ impl Columns {
                 .collect(),
             effect_at: self.effect_at.clone(),
             courses: self.courses.iter().map(|course| picked(course)).collect(),
+            shifts: self
+                .shifts
+                .iter()
+                .map(|of| of.iter().map(|v| std::array::from_fn(|k| picked(&v[k]))).collect())
+                .collect(),
         }
     }
 
@@ -134,15 +142,26 @@ impl Columns {
             anchor: (0..padded).map(|i| row(i).anchor).collect(),
             ..Self::default()
         };
-        let loads = frames.disturbances.iter().any(|d| matches!(d.kind, Kind::Load { .. }));
-        if !start.effects.is_empty() || loads {
+        let turned = frames.disturbances.iter().any(|d| d.kind.turns_joints());
+        if !start.effects.is_empty() || turned {
             out.add_effects(dataset, start, parameters, padded);
         }
         out.courses =
             frames.disturbances.iter().map(|d| column(&|i| d.course.at(row(i)))).collect::<Vec<_>>();
-        if loads {
-            out.add_loads(dataset, start, frames, parameters, padded);
+        if turned {
+            out.add_turns(dataset, start, frames, parameters, padded);
         }
+        out.shifts = frames
+            .disturbances
+            .iter()
+            .map(|d| match d.kind {
+                Kind::Form(form) if !form.turns() => forms::shifts(form, dataset, start, frames)
+                    .iter()
+                    .map(|v| std::array::from_fn(|k| column(&|i| v[i.min(n.saturating_sub(1))][k])))
+                    .collect(),
+                _ => Vec::new(),
+            })
+            .collect();
         out.effect_at = vec![usize::MAX; parameters.len()];
         for (e, effect) in out.effects.iter().enumerate() {
             out.effect_at[effect.place] = e;
@@ -150,8 +169,8 @@ impl Columns {
         out
     }
 
-    /// Loads that the log does not tell of bend the joints like an effect, in the rows of their course.
-    fn add_loads(
+    /// Disturbances that turn the joints like an effect, in the rows of their course.
+    fn add_turns(
         &mut self,
         dataset: &Dataset,
         start: &Model,
@@ -159,26 +178,12 @@ impl Columns {
         parameters: &[Parameter],
         padded: usize,
     ) {
-        let torques = flange_torques(dataset, start);
+        let last = dataset.rows.len().saturating_sub(1);
         for (index, disturbance) in frames.disturbances.iter().enumerate() {
-            let Kind::Load { joints, compliance } = &disturbance.kind else { continue };
-            let course = self.courses[index].clone();
-            let along = |k: usize, parameter: usize| match compliance {
-                Some(compliance) => compliance[k],
-                None => f64::from(u8::from(k == parameter)),
-            };
-            for parameter in 0..disturbance.values.len() {
-                let rotation: [Option<Vec<f64>>; 6] = std::array::from_fn(|joint| {
-                    let k = joints.iter().position(|&j| j == joint)?;
-                    let factor = along(k, parameter);
-                    (factor != 0.0).then(|| {
-                        (0..padded)
-                            .map(|i| {
-                                factor * course[i] * torques[i.min(torques.len().saturating_sub(1))][joint]
-                            })
-                            .collect()
-                    })
-                });
+            for (parameter, rotation) in rotations(&disturbance.kind, dataset, start).into_iter().enumerate() {
+                let course = &self.courses[index];
+                let rotation: [Option<Vec<f64>>; 6] =
+                    rotation.map(|r| r.map(|r| (0..padded).map(|i| course[i] * r[i.min(last)]).collect()));
                 if let Some(extra) = &mut self.extra {
                     for (column, rotation) in extra.iter_mut().zip(&rotation) {
                         let Some(rotation) = rotation else { continue };
@@ -247,12 +252,4 @@ impl Columns {
         self.growth = growth;
         self.effects = effects;
     }
-}
-
-/// Torque about each joint of 1 kg at the flange, for every row (N m).
-pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
-    let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
-    let statics = bare.statics();
-    let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
-    dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::columns::Columns;
 use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
@@ -45,7 +46,8 @@ struct Pushed {
 }
 
 impl Pushed {
-    fn of(disturbances: &[Disturbance], courses: &[Vec<f64>]) -> Option<Self> {
+    fn of(disturbances: &[Disturbance], columns: &Columns) -> Option<Self> {
+        let courses = &columns.courses;
         let n = courses.first().map(Vec::len)?;
         let zeros = || vec![0.0; n];
         let mut out = Self {
@@ -59,8 +61,11 @@ impl Pushed {
         let add = |to: &mut [f64], value: f64, course: &[f64]| {
             to.iter_mut().zip(course).for_each(|(t, c)| *t += value * c);
         };
-        for (disturbance, course) in disturbances.iter().zip(courses) {
+        for ((disturbance, course), shifts) in disturbances.iter().zip(courses).zip(&columns.shifts) {
             let v = &disturbance.values;
+            for (shift, value) in shifts.iter().zip(v) {
+                (0..3).for_each(|k| add(&mut out.frame[k], *value, &shift[k]));
+            }
             match &disturbance.kind {
                 Kind::Zero => add(&mut out.zero, v[0], course),
                 Kind::Frame { turning } => {
@@ -74,7 +79,7 @@ impl Pushed {
                 Kind::Tool => (0..3).for_each(|k| add(&mut out.tool[k], v[k], course)),
                 Kind::Scale => add(&mut out.scale, v[0], course),
                 Kind::Sag => add(&mut out.sag, v[0], course),
-                Kind::Load { .. } => {}
+                Kind::Load { .. } | Kind::Form(_) => {}
             }
         }
         Some(out)
@@ -112,7 +117,7 @@ impl State {
             target_axes: flange * left_jacobian(&target),
             flange,
             effects: task.columns.effects.iter().map(|e| x[e.place]).collect(),
-            pushed: Pushed::of(&frames.disturbances, &task.columns.courses),
+            pushed: Pushed::of(&frames.disturbances, &task.columns),
         }
     }
 }
@@ -285,7 +290,7 @@ fn cable(
             Parameter::Zero { anchor } => {
                 weight * scaled * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
             }
-            Parameter::Disturbance { index, parameter } if !is_load(task, index) => {
+            Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
                 let how_far = course(task, index, at);
                 how_far
                     * match task.frames.disturbances[index].kind {
@@ -294,6 +299,7 @@ fn cable(
                         Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
                         Kind::Sag => weight * sagging(&v, length),
+                        Kind::Form(_) => -dot(&load(&task.columns.shifts[index][parameter], at), &u),
                         Kind::Load { .. } => none,
                     }
             }
@@ -324,8 +330,8 @@ fn cable(
 
 /// Whether a disturbance bends the joints, as effects do.
 #[inline(always)]
-fn is_load(task: &Calibration, index: usize) -> bool {
-    matches!(task.frames.disturbances[index].kind, Kind::Load { .. })
+fn turns_joints(task: &Calibration, index: usize) -> bool {
+    task.frames.disturbances[index].kind.turns_joints()
 }
 
 /// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
@@ -480,7 +486,7 @@ fn space(
                 let w = splat(&state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
-            Parameter::Disturbance { index, parameter } if !is_load(task, index) => {
+            Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
                 let how_far = course(task, index, at);
                 let kind = &task.frames.disturbances[index].kind;
                 of_sensor = !matches!(kind, Kind::Tool);
@@ -492,6 +498,7 @@ fn space(
                     }
                     Kind::Tool => (in_base(&frames, &state.flange.column(parameter).into()), none),
                     Kind::Scale => (seen.map(|v| -v / scaled), none),
+                    Kind::Form(_) => (load(&columns.shifts[index][parameter], at), none),
                     Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
                 };
                 (v.map(|v| how_far * v), w.map(|w| how_far * w))

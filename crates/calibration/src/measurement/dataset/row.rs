@@ -17,6 +17,15 @@ pub enum Reading {
     Pose(Pose),
 }
 
+/// How the arm came to a pose, from the rows around it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Joint angles less those of the row before (rad).
+    pub step: Joints,
+    /// Joint speeds where the rows are a path with a clock (rad/h).
+    pub rate_per_h: Option<Joints>,
+}
+
 /// One measured pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -34,6 +43,8 @@ pub struct Row {
     pub condition: Condition,
     /// Which cable outlet (0-based) the row belongs to.
     pub anchor: usize,
+    /// How the arm came here, where the order of the rows is that of measuring; filled in by a diagnosis.
+    pub motion: Option<Box<Motion>>,
     /// Session label, where logged.
     pub session: Option<String>,
     /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), as text, up to the last one that holds something.
@@ -51,6 +62,7 @@ impl Row {
             readout_mm: None,
             condition: Condition::default(),
             anchor: 0,
+            motion: None,
             session: None,
             other: Vec::new(),
         }

@@ -255,6 +255,7 @@ impl Reader<'_> {
             readout_mm,
             condition,
             anchor,
+            motion: None,
             session: columns.session.map(text).filter(|s| !s.is_empty()),
             other: columns.other[..kept].iter().map(|(_, i)| text(*i)).collect(),
         })

@@ -10,6 +10,7 @@
 
 use nalgebra::Vector3;
 
+use super::form::Form;
 use crate::measurement::dataset::Row;
 
 /// What is pushed.
@@ -38,6 +39,20 @@ pub enum Kind {
         /// compliance and mass for each joint.
         compliance: Option<Vec<f64>>,
     },
+    /// What depends on the whole pose, on the reading, or on the row before.
+    Form(Form),
+}
+
+impl Kind {
+    /// Whether it turns joints, as effects of the arm do.
+    #[inline]
+    pub fn turns_joints(&self) -> bool {
+        match self {
+            Kind::Load { .. } => true,
+            Kind::Form(form) => form.turns(),
+            _ => false,
+        }
+    }
 }
 
 /// In which rows, and how far.
@@ -121,7 +136,8 @@ impl Disturbance {
             Kind::Tool => out.tool_mm = vector(0),
             Kind::Scale => out.scale = value(0),
             Kind::Sag => out.sag_per_m2 = value(0),
-            Kind::Load { .. } => {}
+            // They act on the joints, or differ from row to row.
+            Kind::Load { .. } | Kind::Form(_) => {}
         }
         out
     }
@@ -172,6 +188,7 @@ fn names(kind: &Kind) -> Vec<(String, &'static str)> {
         }
         Kind::Scale => vec![("scale error".to_owned(), "1")],
         Kind::Sag => vec![("weight over tension squared".to_owned(), "1/m²")],
+        Kind::Form(form) => form.names(),
         Kind::Load { compliance: Some(_), .. } => vec![("mass".to_owned(), "kg")],
         Kind::Load { joints, .. } => {
             joints.iter().map(|j| (format!("compliance x mass, joint {}", j + 1), "rad kg/(N m)")).collect()

@@ -125,6 +125,14 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
         kinds.push((Kind::Zero, rows));
         kinds.push((Kind::Sag, Course::Always));
     }
+    let of_pose = [Form::Stiffness { joint: 1 }, Form::TwoJointGear { joint: 2, other: 3 }];
+    let of_sensor = match sensor {
+        Sensor::Cable => [Form::Pulley, Form::Drum],
+        _ => [Form::Refraction, Form::Nest],
+    };
+    let of_motion = [Form::Latency, Form::LastStep, Form::SlowReading];
+    let forms = of_pose.into_iter().chain(of_sensor).chain(of_motion);
+    kinds.extend(forms.map(|form| (Kind::Form(form), Course::Always)));
     kinds
         .into_iter()
         .map(|(kind, course)| {
@@ -134,6 +142,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
                 // Its slope by the geometry is left out: a millionth of the length's own.
                 Kind::Sag => 1e-6,
                 Kind::Load { compliance: None, .. } => 1e-5,
+                Kind::Form(form) => 0.1 * form.size(0),
                 _ => 0.6,
             };
             out.values.iter_mut().enumerate().for_each(|(k, v)| *v = size * (1.0 - 0.3 * k as f64));

@@ -1,0 +1,156 @@
+//! What loads and forms do to each row, per unit of their parameters.
+
+use nalgebra::{Point3, Vector3};
+
+use super::frames::Frames;
+use crate::measurement::dataset::{Dataset, Motion, Row, Sensor};
+use crate::measurement::sensor::disturbance::Kind;
+use crate::measurement::sensor::form::Form;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, Model};
+
+/// Seconds in an hour.
+const HOUR_S: f64 = 3600.0;
+
+/// For each parameter the rotation of each joint (rad), row by row; for forms that turn joints.
+fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+    let rows = &dataset.rows;
+    let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
+    let of_motion = |value: &dyn Fn(&Motion, usize) -> f64| {
+        vec![std::array::from_fn(|j| {
+            Some(rows.iter().map(|r| r.motion.as_ref().map_or(0.0, |m| value(m, j))).collect())
+        })]
+    };
+    match form {
+        Form::Latency => of_motion(&|m, j| m.rate_per_h.map_or(0.0, |rate| rate[j] / HOUR_S)),
+        Form::LastStep => of_motion(&|m, j| -m.step[j]),
+        Form::Stiffness { joint } => {
+            let torques = torques(dataset, model);
+            [2, 3]
+                .map(|power: i32| {
+                    let mut out = none();
+                    let bent = |t: f64| t.abs().powi(power - 1) * t;
+                    out[joint] = Some(torques.iter().map(|t| bent(t[joint])).collect());
+                    out
+                })
+                .to_vec()
+        }
+        Form::TwoJointGear { joint, other } => {
+            let angle = |r: &Row, sign: f64| {
+                let u = model.joint_map * r.joints;
+                u[joint] + sign * u[other]
+            };
+            [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)]
+                .map(|(sign, sine)| {
+                    let mut out = none();
+                    let wave = |a: f64| if sine { a.sin() } else { a.cos() };
+                    out[joint] = Some(rows.iter().map(|r| wave(angle(r, sign))).collect());
+                    out
+                })
+                .to_vec()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Static torques (N m): of the arm's own masses where they are known, else of a kilogram at the flange.
+fn torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+    if model.bodies.is_none() {
+        return flange_torques(dataset, model);
+    }
+    let statics = Model { effects: Vec::new(), ..model.clone() }.statics();
+    let torque = |r: &Row| statics.torques(&(model.joint_map * r.joints), &r.condition).0;
+    dataset.rows.iter().map(torque).collect()
+}
+
+/// For each parameter the shift of the sensor in the base (mm), row by row; for forms that shift it.
+pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> Vec<Vec<Vector3<f64>>> {
+    let posed = model.at_condition(&Condition::default());
+    let touched = Point3::from(frames.flange_from_target.translation.vector);
+    let sensor = |row: &Row| match dataset.sensor {
+        Sensor::Cable => frames.outlets_mm[row.anchor.min(frames.outlets_mm.len().saturating_sub(1))],
+        _ => frames.base_from_sensor.translation.vector,
+    };
+    let pushed = |push: &dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>>| {
+        let count = form.names().len();
+        let mut out = vec![Vec::with_capacity(dataset.rows.len()); count];
+        for row in dataset.rows.iter() {
+            let away = (posed.forward(&row.joints) * touched).coords - sensor(row);
+            let here = push(row, away);
+            out.iter_mut().zip(here).for_each(|(column, v)| column.push(v));
+        }
+        out
+    };
+    match form {
+        Form::SlowReading => pushed(&|row, _| {
+            let Some(motion) = &row.motion else { return vec![Vector3::zeros()] };
+            let (here, before) = (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
+            vec![here - before]
+        }),
+        Form::Refraction => pushed(&|_, away| vec![model.gravity * (away.norm_squared() * 1e-3)]),
+        Form::Pulley => pushed(&|_, away| {
+            let u = away.normalize();
+            let values =
+                [u.x * u.y, u.y * u.z, u.z * u.x, u.x * u.x - u.y * u.y, 3.0 * u.z * u.z - 1.0];
+            values.map(|v| u * v).to_vec()
+        }),
+        Form::Drum => {
+            let lengths: Vec<f64> = dataset
+                .rows
+                .iter()
+                .map(|row| ((posed.forward(&row.joints) * touched).coords - sensor(row)).norm())
+                .collect();
+            let (low, high) =
+                lengths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            pushed(&|_, away| {
+                let (d, u) = (away.norm(), away.normalize());
+                // From −1 to 1, as Legendre's polynomials have it.
+                let t = (2.0 * d - low - high) / (high - low).max(1.0);
+                vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
+            })
+        }
+        Form::Nest => pushed(&|row, away| {
+            let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
+            let seen = turn.inverse() * away.normalize();
+            // All of a matrix times the direction but its trace, which lengthens the beam.
+            let places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1)];
+            places.map(|(i, j)| turn * (Vector3::ith(i, 1.0) * seen[j])).to_vec()
+        }),
+        _ => Vec::new(),
+    }
+}
+
+/// Rotation of each joint (rad) per unit of each parameter of a disturbance that turns joints, row by row.
+pub fn rotations(kind: &Kind, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
+    match kind {
+        Kind::Form(form) => of_form(*form, dataset, model),
+        Kind::Load { joints, compliance } => {
+            let torques = flange_torques(dataset, model);
+            let bent = |joint: usize, factor: f64| torques.iter().map(|t| factor * t[joint]).collect();
+            match compliance {
+                Some(compliance) => {
+                    let mut out: [Option<Vec<f64>>; 6] = Default::default();
+                    joints.iter().zip(compliance).for_each(|(&j, &c)| out[j] = Some(bent(j, c)));
+                    vec![out]
+                }
+                None => joints
+                    .iter()
+                    .map(|&j| {
+                        let mut out: [Option<Vec<f64>>; 6] = Default::default();
+                        out[j] = Some(bent(j, 1.0));
+                        out
+                    })
+                    .collect(),
+            }
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Torque about each joint of 1 kg at the flange, for every row (N m).
+pub fn flange_torques(dataset: &Dataset, model: &Model) -> Vec<Joints> {
+    let bare = Model { bodies: None, effects: Vec::new(), ..model.clone() };
+    let statics = bare.statics();
+    let kilogram = Condition { payload_kg: Some(1.0), ..Condition::default() };
+    dataset.rows.iter().map(|r| statics.torques(&(model.joint_map * r.joints), &kilogram).0).collect()
+}

@@ -1,0 +1,105 @@
+//! Faults of a measurement or of an arm that are more than a push along an axis: what each does to a row depends on the whole
+//! pose, on the reading, or on the row before.
+//!
+//! A form turns joints or shifts the sensor; [`columns`](crate::identification::calibration) has the regressors. All are linear
+//! in their parameters and taken at the data sheet's arm. They stand beside the causes of the arm as rivals, and are left behind
+//! when a model is written.
+
+/// Which fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Form {
+    /// The reading belongs to the pose a time τ later or earlier: δq = τ q̇.
+    Latency,
+    /// The arm has not settled: a share of the last step is still to be made.
+    LastStep,
+    /// The reading has not settled: a share of the way from the last one is still to be made.
+    SlowReading,
+    /// A joint (0-based) whose spring is not linear: the square and the cube of its torque.
+    Stiffness {
+        /// The joint.
+        joint: usize,
+    },
+    /// An error of a joint that depends on the sum and the difference of its angle and another's.
+    TwoJointGear {
+        /// The joint (0-based).
+        joint: usize,
+        /// The other.
+        other: usize,
+    },
+    /// A tracker's beam bent in air whose temperature changes with height: the square of the distance, along gravity.
+    Refraction,
+    /// A cable that is led over a pulley: harmonics of second degree of its direction.
+    Pulley,
+    /// A cable wound in layers: the square and the cube of its length.
+    Drum,
+    /// A target whose centre depends on the direction from which it is seen.
+    Nest,
+}
+
+impl Form {
+    /// The contract name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Form::Latency => "latency",
+            Form::LastStep | Form::SlowReading => "unsettled",
+            Form::Stiffness { .. } => "joint-stiffness",
+            Form::TwoJointGear { .. } => "gear-two-joints",
+            Form::Refraction => "air-refraction",
+            Form::Pulley => "cable-pulley",
+            Form::Drum => "cable-drum",
+            Form::Nest => "target-nest",
+        }
+    }
+
+    /// Joints (0-based) that it is about.
+    pub fn joints(self) -> Vec<usize> {
+        match self {
+            Form::Stiffness { joint } => vec![joint],
+            Form::TwoJointGear { joint, other } => vec![joint, other],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Whether it turns joints; the others shift the sensor.
+    pub fn turns(self) -> bool {
+        matches!(self, Form::Latency | Form::LastStep | Form::Stiffness { .. } | Form::TwoJointGear { .. })
+    }
+
+    /// Name and unit of each parameter.
+    pub fn names(self) -> Vec<(String, &'static str)> {
+        let listed = |names: &[&str], unit: &'static str| {
+            names.iter().map(|name| ((*name).to_owned(), unit)).collect::<Vec<_>>()
+        };
+        match self {
+            Form::Latency => listed(&["delay"], "s"),
+            Form::LastStep | Form::SlowReading => listed(&["share of the last step"], "1"),
+            Form::Stiffness { .. } => {
+                let mut out = listed(&["square of the torque"], "rad/(N m)²");
+                out.extend(listed(&["cube of the torque"], "rad/(N m)³"));
+                out
+            }
+            Form::TwoJointGear { .. } => {
+                listed(&["sine of the sum", "cosine of the sum", "sine of the difference", "cosine of the difference"], "rad")
+            }
+            Form::Refraction => listed(&["bend of the beam"], "1/m"),
+            Form::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
+            Form::Drum => listed(&["square of the length", "cube of the length"], "mm"),
+            Form::Nest => listed(&["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"], "mm"),
+        }
+    }
+
+    /// Standard deviation of a parameter before anything was measured, in its unit.
+    pub fn size(self, parameter: usize) -> f64 {
+        match self {
+            Form::Latency => 0.03,
+            Form::LastStep | Form::SlowReading => 1e-3,
+            // Beside a compliance of 1e-5 rad/(N m): as much again at some 30 N m of a kilogram's torque.
+            Form::Stiffness { .. } => [1e-6, 1e-7][parameter.min(1)],
+            Form::TwoJointGear { .. } => 3e-4,
+            Form::Refraction => 5e-6,
+            Form::Pulley | Form::Drum => 0.5,
+            Form::Nest => 0.05,
+        }
+    }
+}
