@@ -88,8 +88,7 @@ impl Walk {
             Design::Curve => (path(sheet, &curve(rng), 500.min(most), rng), 1),
             Design::Raster => (path(sheet, &raster(rng), 2500.min(most), rng), 1),
         };
-        let poses: Vec<Angles> =
-            poses.into_iter().flat_map(|q| std::iter::repeat_n(q, repeats)).collect();
+        let poses: Vec<Angles> = poses.into_iter().flat_map(|q| std::iter::repeat_n(q, repeats)).collect();
         let n = poses.len();
         let step_h = match design {
             Design::Curve => scaled(rng, 0.4, 6.0) / 3600.0,
@@ -155,7 +154,8 @@ impl Walk {
         let hours = if idle { a.hours } else { a.hours + share * (b.hours - a.hours) };
         let step = if idle { 0.0 } else { b.hours - a.hours };
         let row = place.round() as usize;
-        let visit = |q: Angles, before: Angles, hours: f64, counted: bool| Visit { q, before, hours, row, counted };
+        let visit =
+            |q: Angles, before: Angles, hours: f64, counted: bool| Visit { q, before, hours, row, counted };
         match self.design {
             Design::Curve | Design::Raster => {
                 let at = |k: f64| self.joints_at(hours + k * step);
@@ -180,9 +180,7 @@ impl Walk {
 }
 
 fn random(sheet: &Sheet, count: usize, rng: &mut impl Rng) -> Vec<Angles> {
-    (0..count)
-        .map(|_| sheet.room_deg.map(|[low, high]| between(rng, low, high).to_radians()))
-        .collect()
+    (0..count).map(|_| sheet.room_deg.map(|[low, high]| between(rng, low, high).to_radians())).collect()
 }
 
 /// Levels of the six joints, as near to `rows` in all as whole numbers allow.
@@ -233,7 +231,8 @@ fn curve(rng: &mut impl Rng) -> Course {
     Box::new(move |i, n| {
         let turn = std::f64::consts::TAU * i as f64 / n as f64;
         let wave = |k: usize, order: f64| (order * turn + phase[k]).sin();
-        let at = Vector3::new(size.x * wave(0, order[0]), size.y * wave(1, order[1]), size.z * wave(2, order[2]));
+        let at =
+            Vector3::new(size.x * wave(0, order[0]), size.y * wave(1, order[1]), size.z * wave(2, order[2]));
         (at, Vector3::new(wave(3, 1.0), wave(4, 2.0), 0.5 * wave(5, 1.0)) * tilt)
     })
 }

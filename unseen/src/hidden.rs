@@ -32,6 +32,22 @@ pub enum Shape {
     Correlated(f64),
 }
 
+impl Shape {
+    /// The least and greatest size that is met, in the unit of the shape.
+    pub fn sizes(&self) -> (f64, f64) {
+        match self {
+            Shape::Nothing => (1.0, 1.0),
+            Shape::Arm(shape) => shape.sizes(),
+            Shape::Sensor(shape) => shape.sizes(),
+            Shape::Drift(shape) => shape.sizes(),
+            // 10 ms to 1 s.
+            Shape::Latency(_) => (0.01 / 3600.0, 1.0 / 3600.0),
+            Shape::Unsettled(..) => (2e-4, 6e-3),
+            Shape::Correlated(_) => crate::worth::WORTH,
+        }
+    }
+}
+
 /// A hidden effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {

@@ -164,8 +164,22 @@ pub fn table(plan: &Plan, outcomes: &[Outcome]) -> String {
     let _ = writeln!(
         out,
         "{:<15}{:>5}{:>7}{:>8}{:>7}{:>7}{:>7}{:>7}{:>8}{:>9}{:>9}{:>9}{:>7}{:>20}{:>8}{:>8}",
-        "kind", "runs", "worth", "false/r", "any %", "true/r", "told %", "worse", "written", "sheet", "geom.",
-        "model", "as is", "held out / fresh", "±10 %", "s"
+        "kind",
+        "runs",
+        "worth",
+        "false/r",
+        "any %",
+        "true/r",
+        "told %",
+        "worse",
+        "written",
+        "sheet",
+        "geom.",
+        "model",
+        "as is",
+        "held out / fresh",
+        "±10 %",
+        "s"
     );
     for kind in Kind::ALL {
         let of: Vec<&Outcome> = outcomes.iter().filter(|o| o.setting.kind == kind).collect();
@@ -184,7 +198,8 @@ fn row(name: &str, of: &[&Outcome]) -> String {
     let marks: Vec<&Marks> = of.iter().filter_map(|o| o.marks.as_ref().ok()).collect();
     let n = marks.len().max(1) as f64;
     let count = |test: &dyn Fn(&Marks) -> bool| marks.iter().filter(|m| test(m)).count();
-    let middle = |value: &dyn Fn(&Marks) -> f64| quantile(&marks.iter().map(|m| value(m)).collect::<Vec<_>>(), 0.5);
+    let middle =
+        |value: &dyn Fn(&Marks) -> f64| quantile(&marks.iter().map(|m| value(m)).collect::<Vec<_>>(), 0.5);
     let ratios: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
     let falses: usize = marks.iter().map(|m| m.false_names().count()).sum();
     let trues: usize = marks.iter().map(|m| m.true_names()).sum();
@@ -272,7 +287,10 @@ fn names(outcomes: &[Outcome]) -> String {
         let _ = writeln!(out, "  {name:<20}{total:>5}  {}", list.join(", "));
     }
     for (name, count) in unknown {
-        let _ = writeln!(out, "  the table of names (truth.rs) has no {name}, told {count} times and counted as false");
+        let _ = writeln!(
+            out,
+            "  the table of names (truth.rs) has no {name}, told {count} times and counted as false"
+        );
     }
     out
 }
@@ -310,7 +328,12 @@ pub fn stability_line(index: usize, run: &Stability) -> String {
     let names = |findings: &[crate::under_test::Finding]| {
         let name = |f: &crate::under_test::Finding| {
             let at = f.joints.as_ref().map(|j| format!("{j:?}"));
-            format!("{}{}{}", f.effect, at.unwrap_or_default(), f.rows.map(|r| format!("{r:?}")).unwrap_or_default())
+            format!(
+                "{}{}{}",
+                f.effect,
+                at.unwrap_or_default(),
+                f.rows.map(|r| format!("{r:?}")).unwrap_or_default()
+            )
         };
         findings.iter().map(name).collect::<Vec<_>>().join(" ")
     };

@@ -84,8 +84,7 @@ fn identified(file: &str, robot: &str) -> Result<Vec<Finding>, String> {
 pub fn stability(case: &Case) -> Stability {
     let lines = case.lines();
     let mut rng = case.generator(Purpose::Variant);
-    let mut out =
-        Stability { setting: setting(case), plain: Vec::new(), changed: Vec::new(), refused: None };
+    let mut out = Stability { setting: setting(case), plain: Vec::new(), changed: Vec::new(), refused: None };
     let mut of = |lines: &[Line], format: Format| {
         let found = identified(&text(case.sensor.kind, lines, format), case.sheet.name);
         found.map_err(|why| out.refused = Some(why)).unwrap_or_default()

@@ -114,7 +114,10 @@ pub fn meaning(effect: &str, parameters: &[String]) -> Meaning {
             Family::Thermal
         });
     }
-    NAMES.iter().find(|(name, _)| *name == effect).map_or(Meaning::Unknown, |(_, family)| Meaning::Cause(*family))
+    NAMES
+        .iter()
+        .find(|(name, _)| *name == effect)
+        .map_or(Meaning::Unknown, |(_, family)| Meaning::Cause(*family))
 }
 
 /// Kinds of what is hidden.

@@ -164,8 +164,11 @@ impl Reply {
             Which::Geometry => &self.found.geometric.model,
             Which::Written => &self.model,
         };
-        let condition =
-            Condition { time_h: Some(visit.hours), approach: sides(&visit.q, &visit.before), ..Condition::default() };
+        let condition = Condition {
+            time_h: Some(visit.hours),
+            approach: sides(&visit.q, &visit.before),
+            ..Condition::default()
+        };
         let pose = model.forward(&Vector6::from(visit.q), &condition);
         Pose::from_parts(pose.translation, pose.rotation)
     }
