@@ -110,8 +110,9 @@ impl Case {
 
     /// Fresh visits, without any sensor.
     pub fn clean(&self) -> Vec<Visit> {
-        let visits = self.walk.fresh(self.sheet, CLEAN, &mut self.generator(Purpose::Clean));
-        visits.into_iter().filter(|visit| visit.counted).collect()
+        let count = CLEAN * self.walk.repeats;
+        let visits = self.walk.fresh(self.sheet, count, &mut self.generator(Purpose::Clean));
+        visits.into_iter().filter(|visit| visit.counted && visit.repeat == 0).collect()
     }
 
     /// Exact readings of visits, with what is wrong.

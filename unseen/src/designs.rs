@@ -48,8 +48,10 @@ impl Design {
 pub struct Visit {
     /// Logged angles (rad).
     pub q: Angles,
-    /// The angles before this visit's last step; the same where the arm did not move.
+    /// The angles from which the arm came to this pose.
     pub before: Angles,
+    /// How often the pose was read before, since the arm came.
+    pub repeat: usize,
     /// Time since the arm was switched on (h).
     pub hours: f64,
     /// Nearest measured row.
@@ -113,7 +115,15 @@ impl Walk {
                 } else {
                     between(rng, 0.7, 1.3)
                 };
-            visits.push(Visit { q: *q, before: poses[i.saturating_sub(1)], hours, row: i, counted: true });
+            let from = (i - i % repeats).saturating_sub(1);
+            visits.push(Visit {
+                q: *q,
+                before: poses[from],
+                repeat: i % repeats,
+                hours,
+                row: i,
+                counted: true,
+            });
         }
         Self { design, visits, pause, repeats }
     }
@@ -154,8 +164,14 @@ impl Walk {
         let hours = if idle { a.hours } else { a.hours + share * (b.hours - a.hours) };
         let step = if idle { 0.0 } else { b.hours - a.hours };
         let row = place.round() as usize;
-        let visit =
-            |q: Angles, before: Angles, hours: f64, counted: bool| Visit { q, before, hours, row, counted };
+        let visit = |q: Angles, before: Angles, hours: f64, counted: bool| Visit {
+            q,
+            before,
+            repeat: 0,
+            hours,
+            row,
+            counted,
+        };
         match self.design {
             Design::Curve | Design::Raster => {
                 let at = |k: f64| self.joints_at(hours + k * step);
@@ -172,7 +188,8 @@ impl Walk {
             Design::Random | Design::Repeats => {
                 let [from, to] = [0, 1].map(|_| random(sheet, 1, rng)[0]);
                 let mut out = vec![visit(from, from, hours, false), visit(to, from, hours, true)];
-                out.extend((1..self.repeats).map(|_| visit(to, to, hours, true)));
+                let again = |repeat| Visit { repeat, ..visit(to, from, hours, true) };
+                out.extend((1..self.repeats).map(again));
                 out
             }
         }

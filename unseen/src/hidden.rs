@@ -145,10 +145,10 @@ impl Hidden {
     }
 }
 
-/// What joints still lack of their last step.
+/// What joints still lack of their last step; each further reading waits for it.
 fn lacking(visit: &Visit, shares: &[f64; 6], halved: f64, size: f64) -> Angles {
     std::array::from_fn(|j| {
         let step = visit.q[j] - visit.before[j];
-        -size * shares[j] * step / (1.0 + step.abs() / halved)
+        -size * shares[j] * (-1.5 * visit.repeat as f64).exp() * step / (1.0 + step.abs() / halved)
     })
 }

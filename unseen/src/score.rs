@@ -5,7 +5,7 @@ use crate::case::Case;
 use crate::designs::Design;
 use crate::sensors::Kind as Measures;
 use crate::shape::{Distance, distance};
-use crate::table::{Format, text};
+use crate::table::text;
 use crate::truth::{Kind, Mark, meaning};
 use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
 
@@ -113,7 +113,7 @@ pub fn setting(case: &Case) -> Setting {
 
 /// Diagnoses a case and marks what is said.
 pub fn outcome(case: &Case) -> Outcome {
-    let file = text(case.sensor.kind, &case.lines(), Format::default());
+    let file = text(case.sensor.kind, &case.lines(), None);
     let marks = diagnosed(&file, case.sheet.name).and_then(|reply| marks(case, &reply));
     Outcome { setting: setting(case), marks }
 }
@@ -129,7 +129,7 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
         Marked { finding: finding.clone(), mark }
     });
     let (visits, lines) = case.fresh();
-    let fresh = text(case.sensor.kind, &lines, Format { sides: true, ..Format::default() });
+    let fresh = text(case.sensor.kind, &lines, None);
     Ok(Marks {
         findings: findings.collect(),
         written: reply.written,

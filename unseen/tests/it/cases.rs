@@ -120,7 +120,11 @@ fn designs_are_what_they_are_called() {
         let case = Case::draw(9, kind, 0, limits);
         let walk = &case.walk;
         let n = walk.visits.len();
-        assert!(walk.visits.windows(2).all(|w| w[1].hours > w[0].hours && w[1].before == w[0].q));
+        for w in walk.visits.windows(2) {
+            assert!(w[1].hours > w[0].hours);
+            assert_eq!(w[1].before, if w[1].repeat == 0 { w[0].q } else { w[0].before });
+            assert_eq!(w[1].q == w[0].q, w[1].repeat > 0);
+        }
         let same = walk.visits.windows(2).filter(|w| w[0].q == w[1].q).count();
         match design {
             Design::Curve => assert_eq!(n, 500),
@@ -141,8 +145,13 @@ fn designs_are_what_they_are_called() {
         assert_eq!(visits.len(), lines.len());
         let counted = visits.iter().filter(|v| v.counted).count();
         assert!((FRESH..FRESH + walk.repeats).contains(&counted));
-        assert!((CLEAN..CLEAN + walk.repeats).contains(&case.clean().len()));
+        assert_eq!(case.clean().len(), CLEAN);
         assert!(visits.iter().all(|v| v.row < n && v.hours <= walk.length_h()));
+        // In the file every counted row follows the pose from which it came, so that its sides follow from the order of the rows.
+        for w in visits.windows(2).filter(|w| w[1].counted) {
+            let from = if w[1].repeat == 0 { w[0].q } else { w[0].before };
+            assert_eq!(w[1].before.map(|q| (q * 1e9).round()), from.map(|q| (q * 1e9).round()));
+        }
         let known = visits.iter().filter(|v| walk.visits.iter().any(|w| w.q == v.q)).count();
         assert_eq!(known, 0, "a fresh pose was measured");
     }
