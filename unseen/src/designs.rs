@@ -86,7 +86,7 @@ impl Walk {
                 let each = rng.random_range(3..6);
                 (random(sheet, rows.div_ceil(each), rng), each)
             }
-            Design::Grid => (grid(sheet, rows, rng), 1),
+            Design::Grid => (grid(sheet, rows.max(216.min(most)), rng), 1),
             Design::Curve => (path(sheet, &curve(rng), 500.min(most), rng), 1),
             Design::Raster => (path(sheet, &raster(rng), 2500.min(most), rng), 1),
         };

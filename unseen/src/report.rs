@@ -238,6 +238,11 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let on_blocks: Vec<f64> = marks.iter().map(|m| m.blocks_mm / m.fresh_mm).collect();
     let held: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
     let seconds: Vec<f64> = marks.iter().map(|m| m.seconds).collect();
+    let surely = parts.clone().filter(|o| o.marks.as_ref().is_ok_and(|m| m.true_names() > 0)).count();
+    let jointed: Vec<_> = parts.clone().filter(|o| !o.setting.joints.is_empty()).collect();
+    let at_joint = jointed.iter().filter(|o| o.marks.as_ref().is_ok_and(Marks::told_with_joint)).count();
+    let doubtful = marks.iter().map(|m| m.doubtful_names()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let over = |k: usize| marks.iter().map(|m| m.fresh_over_noise[k]).collect::<Vec<f64>>();
     let near = |ratios: &[f64]| ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count();
     let written = |m: &Marks| m.written == Written::Yes;
     let quartiles = |v: &[f64]| [0.25, 0.5, 0.75].map(|q| number(quantile(v, q), 3)).join(", ");
@@ -246,13 +251,17 @@ fn marks_in_words(of: &[&Outcome]) -> String {
         format!("false identified names a run: {:.3} ({falses}, of them {joints} of the true family at a wrong joint)", falses as f64 / n.max(1) as f64),
         format!("runs with any: {}", bounded(count(&|m| m.false_names().next().is_some()), n)),
         format!("identified names that are true: {}", bounded(trues, trues + falses)),
-        format!("true family told, where there is a part: {}", bounded(told, parts.count())),
+        format!("true family told, where there is a part: {}", bounded(told, parts.clone().count())),
+        format!("  without a doubt: {}", bounded(surely, parts.count())),
+        format!("  with its joint, where a joint has it: {}", bounded(at_joint, jointed.len())),
+        format!("names told with a doubt: {} a run, {} of {} false", number(Some(doubtful.0 as f64 / n.max(1) as f64), 2), doubtful.1, doubtful.0),
         format!("arm's model worse in shape than geometry alone by more than {percent_worse:.0} %: {}", bounded(count(&|m| m.worse()[0]), n)),
         format!("  as it stands: {}", bounded(count(&|m| m.worse()[1]), n)),
         format!("  of those that -o writes, in shape: {}", bounded(count(&|m| written(m) && m.worse()[0]), count(&written))),
         format!("  not written but with --allow-doubtful: {}, not at all: {}", bounded(count(&|m| m.written == Written::Doubtful), n), bounded(count(&|m| m.written == Written::No), n)),
         format!("held-out error over that of fresh rows, quartiles: random folds {} (within 10 %: {})", quartiles(&held), bounded(near(&held), n)),
         format!("  blocks {} (within 10 %: {})", quartiles(&on_blocks), bounded(near(&on_blocks), n)),
+        format!("fresh rows over the noise, quartiles: geometry alone {}; with causes {}", quartiles(&over(0)), quartiles(&over(1))),
         format!("time: median {} s, nine in ten below {} s, longest {} s", number(quantile(&seconds, 0.5), 1), number(quantile(&seconds, 0.9), 1), number(quantile(&seconds, 1.0), 1)),
         format!("refused: {}", bounded(of.len() - n, of.len())),
     ]

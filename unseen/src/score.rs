@@ -54,8 +54,10 @@ pub struct Marks {
     pub held_out_mm: f64,
     /// Held-out error of the report, blocks (mm).
     pub blocks_mm: f64,
-    /// What fresh rows show (mm).
+    /// What fresh rows show of the extended model (mm).
     pub fresh_mm: f64,
+    /// Geometry alone on fresh rows, and the extended model, over the noise.
+    pub fresh_over_noise: [f64; 2],
     /// Time (s).
     pub seconds: f64,
 }
@@ -82,6 +84,17 @@ impl Marks {
     /// Findings told without a doubt that are true.
     pub fn true_names(&self) -> usize {
         self.findings.iter().filter(|m| m.finding.identified && m.mark == Mark::True).count()
+    }
+
+    /// Findings told with a doubt, and how many of them are false.
+    pub fn doubtful_names(&self) -> (usize, usize) {
+        let doubtful = self.findings.iter().filter(|m| !m.finding.identified && m.mark != Mark::None);
+        doubtful.fold((0, 0), |(all, wrong), m| (all + 1, wrong + usize::from(m.mark != Mark::True)))
+    }
+
+    /// Whether the true family is told with a joint that has it.
+    pub fn told_with_joint(&self) -> bool {
+        self.findings.iter().any(|m| m.mark == Mark::True && m.finding.joints.is_some())
     }
 
     /// Whether the true family is told, surely or not, and of a joint that has it where it tells one.
@@ -130,13 +143,16 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
     });
     let (visits, lines) = case.fresh();
     let fresh = text(case.sensor.kind, &lines, None);
+    let [geometry_mm, fresh_mm] = reply.fresh_mm(&fresh, &visits)?;
+    let noise_mm = case.sensor.sigma_mm * (case.sensor.lengths() as f64).sqrt();
     Ok(Marks {
         findings: findings.collect(),
         written: reply.written,
         distances: distances(case, reply),
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
-        fresh_mm: reply.fresh_mm(&fresh, &visits)?,
+        fresh_mm,
+        fresh_over_noise: [geometry_mm, fresh_mm].map(|error| error / noise_mm),
         seconds: reply.seconds,
     })
 }

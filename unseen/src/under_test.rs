@@ -173,22 +173,25 @@ impl Reply {
         Pose::from_parts(pose.translation, pose.rotation)
     }
 
-    /// What the extended model, frames and causes of the measurement included, gets wrong on fresh rows of the same
-    /// measurement (RMS, mm): on those rows of a file that are counted.
+    /// What geometry alone and the extended model, each with its frames and causes of the measurement, get wrong on fresh rows of
+    /// the same measurement (RMS, mm): on those rows of a file that are counted.
     ///
     /// # Errors
     /// What the import would say.
-    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<f64, String> {
+    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<[f64; 2], String> {
         let mut rows = dataset(text, self.convention, &self.sheet)?;
         // A fresh row stands in the measurement where its time does.
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
             row.number = visit.row;
         }
         let observed = prepare(&rows, &self.sheet).observed;
-        let errors = errors_on(&observed, &self.found.extended.model, &self.found.extended.frames);
-        let counted: Vec<f64> =
-            errors.iter().zip(visits).filter(|(_, v)| v.counted).map(|(error, _)| error * error).collect();
-        Ok((counted.iter().sum::<f64>() / counted.len() as f64).sqrt())
+        Ok([&self.found.geometric, &self.found.extended].map(|fit| {
+            let errors = errors_on(&observed, &fit.model, &fit.frames);
+            let counted = errors.iter().zip(visits).filter(|(_, visit)| visit.counted);
+            let (sum, count) =
+                counted.fold((0.0, 0.0), |(sum, n), (error, _)| (sum + error * error, n + 1.0));
+            (sum / count).sqrt()
+        }))
     }
 }
 

@@ -129,7 +129,7 @@ fn designs_are_what_they_are_called() {
         match design {
             Design::Curve => assert_eq!(n, 500),
             Design::Raster => assert_eq!(n, 2500),
-            _ => assert!((180..=1010).contains(&n), "{n}"),
+            _ => assert!((200..=1010).contains(&n), "{n}"),
         }
         assert_eq!(same > 0, design == Design::Repeats);
         if design.is_path() {
