@@ -9,7 +9,7 @@ use crate::case::{Case, Limits};
 use crate::score::{Marks, Outcome, WORSE, outcome};
 use crate::stability::{Change, Stability, stability};
 use crate::statistics::{quantile, wilson};
-use crate::truth::{Kind, Mark, Meaning, meaning};
+use crate::truth::{Family, Kind, Mark, Meaning};
 use crate::under_test::Written;
 
 /// What is run.
@@ -126,6 +126,12 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
                 };
                 let sure = if told.finding.identified { "" } else { "?" };
                 let _ = write!(out, "\n       {sign} {}{sure}", told.finding.effect);
+                if let Meaning::Cause(family) = told.says
+                    && told.finding.effect == "thermal-drift"
+                    && family != Family::Thermal
+                {
+                    let _ = write!(out, " of {family:?}");
+                }
                 if let Some(joints) = &told.finding.joints {
                     let _ = write!(out, " {joints:?}");
                 }
@@ -279,7 +285,7 @@ fn names(outcomes: &[Outcome]) -> String {
             *counts.entry((told.finding.effect.as_str(), o.setting.kind.name())).or_default() += 1;
         }
         for told in &marks.findings {
-            if meaning(&told.finding.effect, &told.finding.parameters) == Meaning::Unknown {
+            if told.says == Meaning::Unknown {
                 *unknown.entry(told.finding.effect.as_str()).or_default() += 1;
             }
         }

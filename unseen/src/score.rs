@@ -6,7 +6,7 @@ use crate::designs::Design;
 use crate::sensors::Kind as Measures;
 use crate::shape::{Distance, distance};
 use crate::table::text;
-use crate::truth::{Kind, Mark, meaning};
+use crate::truth::{Kind, Mark, Meaning, meanings};
 use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
 
 /// A finding with its mark.
@@ -14,6 +14,8 @@ use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
 pub struct Marked {
     /// The finding.
     pub finding: Finding,
+    /// What it says; a finding that says several things is listed once for each.
+    pub says: Meaning,
     /// What it is worth.
     pub mark: Mark,
 }
@@ -136,10 +138,11 @@ pub fn outcome(case: &Case) -> Outcome {
 /// # Errors
 /// Where fresh rows are refused that the import took before.
 pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
-    let findings = reply.findings.iter().map(|finding| {
-        let says = meaning(&finding.effect, &finding.parameters);
-        let mark = case.hidden.truth.mark(&finding.effect, says, finding.joints.as_deref());
-        Marked { finding: finding.clone(), mark }
+    let findings = reply.findings.iter().flat_map(|finding| {
+        meanings(&finding.effect, &finding.parameters).into_iter().map(|says| {
+            let mark = case.hidden.truth.mark(&finding.effect, says, finding.joints.as_deref());
+            Marked { finding: finding.clone(), says, mark }
+        })
     });
     let (visits, lines) = case.fresh();
     let fresh = text(case.sensor.kind, &lines, None);

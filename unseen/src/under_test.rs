@@ -84,11 +84,15 @@ fn dataset(text: &str, convention: AngleConvention, nominal: &Model) -> Result<D
     convention.apply(&rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
 }
 
-/// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`.
+/// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`. A panic is one run without an answer, not the end of all.
 ///
 /// # Errors
 /// What the command line would say.
 pub fn diagnosed(text: &str, robot: &str) -> Result<Reply, String> {
+    std::panic::catch_unwind(|| answer(text, robot)).unwrap_or_else(|_| Err("it panicked".to_owned()))
+}
+
+fn answer(text: &str, robot: &str) -> Result<Reply, String> {
     let start = Instant::now();
     let robot = robots::load(robot).map_err(|error| error.to_string())?;
     let dh = robot.sheet.joints.angles == robots::sheet::Angles::Dh;

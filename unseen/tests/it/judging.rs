@@ -9,7 +9,7 @@ use truegrind_unseen::sensors::Kind as Measures;
 use truegrind_unseen::shape::distance;
 use truegrind_unseen::stability::same;
 use truegrind_unseen::statistics::{quantile, wilson};
-use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, SOMETHING_ELSE, Truth, meaning};
+use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, SOMETHING_ELSE, Truth, meanings};
 use truegrind_unseen::under_test::Finding;
 
 #[test]
@@ -25,20 +25,25 @@ fn a_name_means_one_family_and_a_kind_has_one_name() {
     }
 }
 
-/// A warm-up is told of the arm, of the stand and of the cable's zero by one name; what moves is in its parameters.
+/// A warm-up is told of the arm, of the stand and of the cable's zero by one name, and by one finding of several; what moves is in
+/// its parameters.
 #[test]
 fn a_thermal_drift_is_of_what_its_parameters_move() {
-    let of =
-        |names: &[&str]| meaning("thermal-drift", &names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
-    assert_eq!(of(&["growth"]), Meaning::Cause(Family::Thermal));
-    assert_eq!(of(&["x", "y", "z", "rx"]), Meaning::Cause(Family::Frame));
-    assert_eq!(of(&["offset"]), Meaning::Cause(Family::Zero));
+    let of = |names: &[&str]| {
+        meanings("thermal-drift", &names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>())
+    };
+    let cause = Meaning::Cause;
+    assert_eq!(of(&["growth"]), [cause(Family::Thermal)]);
+    assert_eq!(of(&["x", "y", "z", "rx"]), [cause(Family::Frame)]);
+    assert_eq!(of(&["offset"]), [cause(Family::Zero)]);
+    assert_eq!(of(&["growth", "x", "y", "z"]), [cause(Family::Thermal), cause(Family::Frame)]);
+    assert_eq!(of(&[]), [cause(Family::Thermal)]);
 }
 
 #[test]
 fn a_joint_that_has_nothing_is_false_and_an_unknown_name_too() {
     let truth = Truth { kind: Kind::TwoJointGear, families: vec![Family::Gear], joints: vec![3] };
-    let mark = |effect: &str, joints: Option<&[usize]>| truth.mark(effect, meaning(effect, &[]), joints);
+    let mark = |effect: &str, joints: Option<&[usize]>| truth.mark(effect, meanings(effect, &[])[0], joints);
     assert_eq!(mark("gear-transmission", Some(&[3])), Mark::True);
     assert_eq!(mark("gear-transmission", Some(&[2])), Mark::WrongJoint);
     assert_eq!(mark("joint-coupling", Some(&[2, 3])), Mark::True);
@@ -57,7 +62,7 @@ fn noise_has_no_true_name_of_a_part() {
         assert!(!kind.has_a_part());
         let truth = Truth { kind, families: kind.families(Measures::Position), joints: Vec::new() };
         for (name, family) in NAMES {
-            let right = truth.mark(name, meaning(name, &[]), None) == Mark::True;
+            let right = truth.mark(name, meanings(name, &[])[0], None) == Mark::True;
             assert_eq!(right, kind == Kind::Correlated && family == Family::Noise, "{name}");
         }
     }
