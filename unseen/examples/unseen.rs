@@ -1,21 +1,23 @@
 //! `cargo run --release -p truegrind-unseen --example unseen -- [RUNS] [KIND…] [--seed S] [--from N] [--rows MOST]
-//! [--design NAME] [--workers W] [--stability] [--quiet] [--show] [--list]`
+//! [--design NAME] [--workers W] [--stability | --draw] [--quiet] [--list]`
 //!
 //! RUNS runs in all, the kinds in turn; all kinds where none is named. Each worker diagnoses on one thread; with `--workers 1`
-//! one run after another has all threads, so that its time is a user's. The same marks for any number of workers.
+//! one run after another has all threads, so that its time is a user's. The same marks for any number of workers. `--draw` shows what
+//! is drawn and diagnoses nothing.
 
 use std::process::ExitCode;
 
-use truegrind_unseen::case::Limits;
+use truegrind_unseen::case::{Case, Limits};
 use truegrind_unseen::designs::Design;
 use truegrind_unseen::report::{Plan, line, stability_line, stability_table, table};
 use truegrind_unseen::truth::Kind;
+use truegrind_unseen::worth::Measure;
 
 /// Options that take a value.
 const VALUED: [&str; 5] = ["--seed", "--from", "--rows", "--design", "--workers"];
 
 /// Options that do not.
-const PLAIN: [&str; 3] = ["--stability", "--quiet", "--list"];
+const PLAIN: [&str; 4] = ["--stability", "--draw", "--quiet", "--list"];
 
 fn main() -> ExitCode {
     match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
@@ -35,7 +37,9 @@ fn run(arguments: &[String]) -> Result<(), String> {
     }
     let plan = plan(arguments)?;
     let quiet = has("--quiet");
-    if has("--stability") {
+    if has("--draw") {
+        plan.over(drawn, |index, text| println!("{index:>4} {text}"));
+    } else if has("--stability") {
         let all = plan.stabilities(|index, run| {
             if !quiet {
                 println!("{}", stability_line(index, run));
@@ -53,6 +57,24 @@ fn run(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
+fn drawn(case: &Case) -> String {
+    let (scene, hidden) = (case.scene(), &case.hidden);
+    let (all, rest) = Measure::of(&scene).sizes(&scene, hidden);
+    format!(
+        "{} {} {} {} {} rows, attempt {}, σ {:.3} mm, all {all:.4} mm, beside geometry {rest:.4} mm, worth {:.2}\n      size {:.3e} of {:?}",
+        hidden.truth.kind.name(),
+        case.sheet.name,
+        case.sensor.kind.name(),
+        case.walk.design.name(),
+        case.walk.visits.len(),
+        case.attempt,
+        case.sensor.sigma_mm,
+        case.worth,
+        hidden.size,
+        hidden.shape
+    )
+}
+
 fn plan(arguments: &[String]) -> Result<Plan, String> {
     let mut plan = Plan {
         kinds: Vec::new(),
@@ -66,7 +88,8 @@ fn plan(arguments: &[String]) -> Result<Plan, String> {
     while let Some(argument) = rest.next() {
         if VALUED.contains(&argument.as_str()) {
             let value = rest.next().ok_or_else(|| format!("{argument}: expected a value"))?;
-            let number = || value.parse::<u64>().map_err(|_| format!("{argument} {value}: expected a number"));
+            let number =
+                || value.parse::<u64>().map_err(|_| format!("{argument} {value}: expected a number"));
             match argument.as_str() {
                 "--seed" => plan.seed = number()?,
                 "--from" => plan.first = number()? as usize,
@@ -75,7 +98,10 @@ fn plan(arguments: &[String]) -> Result<Plan, String> {
                 _ => {
                     let design = Design::ALL.into_iter().find(|d| d.name() == value);
                     plan.limits.design = Some(design.ok_or_else(|| {
-                        format!("--design {value}: expected one of {}", Design::ALL.map(Design::name).join(", "))
+                        format!(
+                            "--design {value}: expected one of {}",
+                            Design::ALL.map(Design::name).join(", ")
+                        )
                     })?);
                 }
             }

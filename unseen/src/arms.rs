@@ -139,9 +139,9 @@ impl Sheet {
 
     /// Whether angles lie in that room, with a margin (rad).
     pub fn has_room(&self, q: &Angles, margin: f64) -> bool {
-        q.iter().zip(self.room_deg).all(|(q, [low, high])| {
-            *q >= low.to_radians() - margin && *q <= high.to_radians() + margin
-        })
+        q.iter()
+            .zip(self.room_deg)
+            .all(|(q, [low, high])| *q >= low.to_radians() - margin && *q <= high.to_radians() + margin)
     }
 
     /// The arm exactly as the data sheet has it.
@@ -269,8 +269,7 @@ impl Arm {
         let moment = moment - along * along.dot(&moment);
         let (l2, l3) = (length.powi(2), length.powi(3));
         let sag = across * (own * l3 / 8.0 + carried * l3 / 3.0) + moment.cross(&along) * (l2 / 2.0);
-        let slope =
-            along.cross(&across) * (own * l2 / 6.0 + carried * l2 / 2.0) + moment * length;
+        let slope = along.cross(&across) * (own * l2 / 6.0 + carried * l2 / 2.0) + moment * length;
         let home = frames[beam + 1].rotation.inverse();
         (home * (sag * 1e3), home * slope)
     }

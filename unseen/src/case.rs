@@ -4,15 +4,12 @@ use rand::{Rng, RngExt};
 
 use crate::arms::{Arm, SHEETS, Sheet};
 use crate::designs::{Design, Visit, Walk};
-use crate::draw::{Purpose, generator, normal, one, scaled};
+use crate::draw::{Purpose, generator, normal, one};
 use crate::hidden::{Hidden, Scene, Shape};
 use crate::sensors::{self, Kind as Measures, Reading, Sensor, white};
 use crate::table::Line;
 use crate::truth::Kind;
-use crate::worth::sized;
-
-/// The least and greatest worth of an effect, in standard deviations of the noise.
-pub const WORTH: (f64, f64) = (1.0, 20.0);
+use crate::worth::{Sized, sized};
 
 /// Fresh rows by which a held-out error is judged.
 pub const FRESH: usize = 500;
@@ -54,9 +51,7 @@ pub struct Case {
     pub walk: Walk,
     /// What is wrong.
     pub hidden: Hidden,
-    /// What was asked for, in standard deviations of the noise.
-    pub wanted: f64,
-    /// What it is worth.
+    /// What it is worth, in standard deviations of the noise.
     pub worth: f64,
 }
 
@@ -74,14 +69,15 @@ impl Case {
         let sheet = &SHEETS[setting.random_range(0..SHEETS.len())];
         let measures = drawn_sensor(kind, &mut setting);
         let design = limits.design.unwrap_or_else(|| drawn_design(kind, &mut setting));
-        let sensor = Sensor::draw(sheet, measures, &mut setting);
-        let wanted = if kind == Kind::Clean { 0.0 } else { scaled(&mut setting, WORTH.0, WORTH.1) };
+        let ideal = Sensor::draw(sheet, measures, kind == Kind::Refraction, &mut setting);
         let arm = sheet.built(&mut rng(Purpose::Arm));
         let walk = Walk::draw(sheet, design, limits.rows, &mut rng(Purpose::Poses));
-        let scene = Scene { sheet, arm: &arm, sensor: &sensor, walk: &walk };
-        let shape = Hidden::draw(kind, &scene, &mut rng(Purpose::Effect));
-        let (hidden, worth) = sized(&scene, &shape, wanted)?;
-        Some(Self { seed, run, attempt, sheet, arm, sensor, walk, hidden, wanted, worth })
+        let scene = Scene { sheet, arm: &arm, sensor: &ideal, walk: &walk };
+        let mut effect = rng(Purpose::Effect);
+        let shape = Hidden::draw(kind, &scene, &mut effect);
+        let Sized { hidden, sigma_mm, worth } = sized(&scene, &shape, &mut effect)?;
+        let sensor = Sensor { sigma_mm, ..ideal };
+        Some(Self { seed, run, attempt, sheet, arm, sensor, walk, hidden, worth })
     }
 
     /// What is wrong.
@@ -114,8 +110,9 @@ impl Case {
 
     /// Fresh visits, without any sensor.
     pub fn clean(&self) -> Vec<Visit> {
-        let visits = self.walk.fresh(self.sheet, CLEAN, &mut self.generator(Purpose::Clean));
-        visits.into_iter().filter(|visit| visit.counted).collect()
+        let count = CLEAN * self.walk.repeats;
+        let visits = self.walk.fresh(self.sheet, count, &mut self.generator(Purpose::Clean));
+        visits.into_iter().filter(|visit| visit.counted && visit.repeat == 0).collect()
     }
 
     /// Exact readings of visits, with what is wrong.

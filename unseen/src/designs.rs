@@ -48,8 +48,10 @@ impl Design {
 pub struct Visit {
     /// Logged angles (rad).
     pub q: Angles,
-    /// The angles before this visit's last step; the same where the arm did not move.
+    /// The angles from which the arm came to this pose.
     pub before: Angles,
+    /// How often the pose was read before, since the arm came.
+    pub repeat: usize,
     /// Time since the arm was switched on (h).
     pub hours: f64,
     /// Nearest measured row.
@@ -84,12 +86,11 @@ impl Walk {
                 let each = rng.random_range(3..6);
                 (random(sheet, rows.div_ceil(each), rng), each)
             }
-            Design::Grid => (grid(sheet, rows, rng), 1),
+            Design::Grid => (grid(sheet, rows.max(216.min(most)), rng), 1),
             Design::Curve => (path(sheet, &curve(rng), 500.min(most), rng), 1),
             Design::Raster => (path(sheet, &raster(rng), 2500.min(most), rng), 1),
         };
-        let poses: Vec<Angles> =
-            poses.into_iter().flat_map(|q| std::iter::repeat_n(q, repeats)).collect();
+        let poses: Vec<Angles> = poses.into_iter().flat_map(|q| std::iter::repeat_n(q, repeats)).collect();
         let n = poses.len();
         let step_h = match design {
             Design::Curve => scaled(rng, 0.4, 6.0) / 3600.0,
@@ -114,7 +115,15 @@ impl Walk {
                 } else {
                     between(rng, 0.7, 1.3)
                 };
-            visits.push(Visit { q: *q, before: poses[i.saturating_sub(1)], hours, row: i, counted: true });
+            let from = (i - i % repeats).saturating_sub(1);
+            visits.push(Visit {
+                q: *q,
+                before: poses[from],
+                repeat: i % repeats,
+                hours,
+                row: i,
+                counted: true,
+            });
         }
         Self { design, visits, pause, repeats }
     }
@@ -155,7 +164,14 @@ impl Walk {
         let hours = if idle { a.hours } else { a.hours + share * (b.hours - a.hours) };
         let step = if idle { 0.0 } else { b.hours - a.hours };
         let row = place.round() as usize;
-        let visit = |q: Angles, before: Angles, hours: f64, counted: bool| Visit { q, before, hours, row, counted };
+        let visit = |q: Angles, before: Angles, hours: f64, counted: bool| Visit {
+            q,
+            before,
+            repeat: 0,
+            hours,
+            row,
+            counted,
+        };
         match self.design {
             Design::Curve | Design::Raster => {
                 let at = |k: f64| self.joints_at(hours + k * step);
@@ -172,7 +188,8 @@ impl Walk {
             Design::Random | Design::Repeats => {
                 let [from, to] = [0, 1].map(|_| random(sheet, 1, rng)[0]);
                 let mut out = vec![visit(from, from, hours, false), visit(to, from, hours, true)];
-                out.extend((1..self.repeats).map(|_| visit(to, to, hours, true)));
+                let again = |repeat| Visit { repeat, ..visit(to, from, hours, true) };
+                out.extend((1..self.repeats).map(again));
                 out
             }
         }
@@ -180,9 +197,7 @@ impl Walk {
 }
 
 fn random(sheet: &Sheet, count: usize, rng: &mut impl Rng) -> Vec<Angles> {
-    (0..count)
-        .map(|_| sheet.room_deg.map(|[low, high]| between(rng, low, high).to_radians()))
-        .collect()
+    (0..count).map(|_| sheet.room_deg.map(|[low, high]| between(rng, low, high).to_radians())).collect()
 }
 
 /// Levels of the six joints, as near to `rows` in all as whole numbers allow.
@@ -233,7 +248,8 @@ fn curve(rng: &mut impl Rng) -> Course {
     Box::new(move |i, n| {
         let turn = std::f64::consts::TAU * i as f64 / n as f64;
         let wave = |k: usize, order: f64| (order * turn + phase[k]).sin();
-        let at = Vector3::new(size.x * wave(0, order[0]), size.y * wave(1, order[1]), size.z * wave(2, order[2]));
+        let at =
+            Vector3::new(size.x * wave(0, order[0]), size.y * wave(1, order[1]), size.z * wave(2, order[2]));
         (at, Vector3::new(wave(3, 1.0), wave(4, 2.0), 0.5 * wave(5, 1.0)) * tilt)
     })
 }

@@ -32,6 +32,22 @@ pub enum Shape {
     Correlated(f64),
 }
 
+impl Shape {
+    /// The least and greatest size that is met, in the unit of the shape.
+    pub fn sizes(&self) -> (f64, f64) {
+        match self {
+            Shape::Nothing => (1.0, 1.0),
+            Shape::Arm(shape) => shape.sizes(),
+            Shape::Sensor(shape) => shape.sizes(),
+            Shape::Drift(shape) => shape.sizes(),
+            // 10 ms to 1 s.
+            Shape::Latency(_) => (0.01 / 3600.0, 1.0 / 3600.0),
+            Shape::Unsettled(..) => (2e-4, 6e-3),
+            Shape::Correlated(_) => crate::worth::WORTH,
+        }
+    }
+}
+
 /// A hidden effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
@@ -129,10 +145,10 @@ impl Hidden {
     }
 }
 
-/// What joints still lack of their last step.
+/// What joints still lack of their last step; each further reading waits for it.
 fn lacking(visit: &Visit, shares: &[f64; 6], halved: f64, size: f64) -> Angles {
     std::array::from_fn(|j| {
         let step = visit.q[j] - visit.before[j];
-        -size * shares[j] * step / (1.0 + step.abs() / halved)
+        -size * shares[j] * (-1.5 * visit.repeat as f64).exp() * step / (1.0 + step.abs() / halved)
     })
 }

@@ -9,7 +9,7 @@ use crate::case::{Case, Limits};
 use crate::score::{Marks, Outcome, WORSE, outcome};
 use crate::stability::{Change, Stability, stability};
 use crate::statistics::{quantile, wilson};
-use crate::truth::{Kind, Mark, Meaning, meaning};
+use crate::truth::{Family, Kind, Mark, Meaning};
 use crate::under_test::Written;
 
 /// What is run.
@@ -126,6 +126,12 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
                 };
                 let sure = if told.finding.identified { "" } else { "?" };
                 let _ = write!(out, "\n       {sign} {}{sure}", told.finding.effect);
+                if let Meaning::Cause(family) = told.says
+                    && told.finding.effect == "thermal-drift"
+                    && family != Family::Thermal
+                {
+                    let _ = write!(out, " of {family:?}");
+                }
                 if let Some(joints) = &told.finding.joints {
                     let _ = write!(out, " {joints:?}");
                 }
@@ -164,8 +170,22 @@ pub fn table(plan: &Plan, outcomes: &[Outcome]) -> String {
     let _ = writeln!(
         out,
         "{:<15}{:>5}{:>7}{:>8}{:>7}{:>7}{:>7}{:>7}{:>8}{:>9}{:>9}{:>9}{:>7}{:>20}{:>8}{:>8}",
-        "kind", "runs", "worth", "false/r", "any %", "true/r", "told %", "worse", "written", "sheet", "geom.",
-        "model", "as is", "held out / fresh", "±10 %", "s"
+        "kind",
+        "runs",
+        "worth",
+        "false/r",
+        "any %",
+        "true/r",
+        "told %",
+        "worse",
+        "written",
+        "sheet",
+        "geom.",
+        "model",
+        "as is",
+        "held out / fresh",
+        "±10 %",
+        "s"
     );
     for kind in Kind::ALL {
         let of: Vec<&Outcome> = outcomes.iter().filter(|o| o.setting.kind == kind).collect();
@@ -184,7 +204,8 @@ fn row(name: &str, of: &[&Outcome]) -> String {
     let marks: Vec<&Marks> = of.iter().filter_map(|o| o.marks.as_ref().ok()).collect();
     let n = marks.len().max(1) as f64;
     let count = |test: &dyn Fn(&Marks) -> bool| marks.iter().filter(|m| test(m)).count();
-    let middle = |value: &dyn Fn(&Marks) -> f64| quantile(&marks.iter().map(|m| value(m)).collect::<Vec<_>>(), 0.5);
+    let middle =
+        |value: &dyn Fn(&Marks) -> f64| quantile(&marks.iter().map(|m| value(m)).collect::<Vec<_>>(), 0.5);
     let ratios: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
     let falses: usize = marks.iter().map(|m| m.false_names().count()).sum();
     let trues: usize = marks.iter().map(|m| m.true_names()).sum();
@@ -223,6 +244,11 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let on_blocks: Vec<f64> = marks.iter().map(|m| m.blocks_mm / m.fresh_mm).collect();
     let held: Vec<f64> = marks.iter().map(|m| m.held_out_mm / m.fresh_mm).collect();
     let seconds: Vec<f64> = marks.iter().map(|m| m.seconds).collect();
+    let surely = parts.clone().filter(|o| o.marks.as_ref().is_ok_and(|m| m.true_names() > 0)).count();
+    let jointed: Vec<_> = parts.clone().filter(|o| !o.setting.joints.is_empty()).collect();
+    let at_joint = jointed.iter().filter(|o| o.marks.as_ref().is_ok_and(Marks::told_with_joint)).count();
+    let doubtful = marks.iter().map(|m| m.doubtful_names()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let over = |k: usize| marks.iter().map(|m| m.fresh_over_noise[k]).collect::<Vec<f64>>();
     let near = |ratios: &[f64]| ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count();
     let written = |m: &Marks| m.written == Written::Yes;
     let quartiles = |v: &[f64]| [0.25, 0.5, 0.75].map(|q| number(quantile(v, q), 3)).join(", ");
@@ -231,13 +257,17 @@ fn marks_in_words(of: &[&Outcome]) -> String {
         format!("false identified names a run: {:.3} ({falses}, of them {joints} of the true family at a wrong joint)", falses as f64 / n.max(1) as f64),
         format!("runs with any: {}", bounded(count(&|m| m.false_names().next().is_some()), n)),
         format!("identified names that are true: {}", bounded(trues, trues + falses)),
-        format!("true family told, where there is a part: {}", bounded(told, parts.count())),
+        format!("true family told, where there is a part: {}", bounded(told, parts.clone().count())),
+        format!("  without a doubt: {}", bounded(surely, parts.count())),
+        format!("  with its joint, where a joint has it: {}", bounded(at_joint, jointed.len())),
+        format!("names told with a doubt: {} a run, {} of {} false", number(Some(doubtful.0 as f64 / n.max(1) as f64), 2), doubtful.1, doubtful.0),
         format!("arm's model worse in shape than geometry alone by more than {percent_worse:.0} %: {}", bounded(count(&|m| m.worse()[0]), n)),
         format!("  as it stands: {}", bounded(count(&|m| m.worse()[1]), n)),
         format!("  of those that -o writes, in shape: {}", bounded(count(&|m| written(m) && m.worse()[0]), count(&written))),
         format!("  not written but with --allow-doubtful: {}, not at all: {}", bounded(count(&|m| m.written == Written::Doubtful), n), bounded(count(&|m| m.written == Written::No), n)),
         format!("held-out error over that of fresh rows, quartiles: random folds {} (within 10 %: {})", quartiles(&held), bounded(near(&held), n)),
         format!("  blocks {} (within 10 %: {})", quartiles(&on_blocks), bounded(near(&on_blocks), n)),
+        format!("fresh rows over the noise, quartiles: geometry alone {}; with causes {}", quartiles(&over(0)), quartiles(&over(1))),
         format!("time: median {} s, nine in ten below {} s, longest {} s", number(quantile(&seconds, 0.5), 1), number(quantile(&seconds, 0.9), 1), number(quantile(&seconds, 1.0), 1)),
         format!("refused: {}", bounded(of.len() - n, of.len())),
     ]
@@ -255,7 +285,7 @@ fn names(outcomes: &[Outcome]) -> String {
             *counts.entry((told.finding.effect.as_str(), o.setting.kind.name())).or_default() += 1;
         }
         for told in &marks.findings {
-            if meaning(&told.finding.effect, &told.finding.parameters) == Meaning::Unknown {
+            if told.says == Meaning::Unknown {
                 *unknown.entry(told.finding.effect.as_str()).or_default() += 1;
             }
         }
@@ -272,7 +302,10 @@ fn names(outcomes: &[Outcome]) -> String {
         let _ = writeln!(out, "  {name:<20}{total:>5}  {}", list.join(", "));
     }
     for (name, count) in unknown {
-        let _ = writeln!(out, "  the table of names (truth.rs) has no {name}, told {count} times and counted as false");
+        let _ = writeln!(
+            out,
+            "  the table of names (truth.rs) has no {name}, told {count} times and counted as false"
+        );
     }
     out
 }
@@ -310,7 +343,12 @@ pub fn stability_line(index: usize, run: &Stability) -> String {
     let names = |findings: &[crate::under_test::Finding]| {
         let name = |f: &crate::under_test::Finding| {
             let at = f.joints.as_ref().map(|j| format!("{j:?}"));
-            format!("{}{}{}", f.effect, at.unwrap_or_default(), f.rows.map(|r| format!("{r:?}")).unwrap_or_default())
+            format!(
+                "{}{}{}",
+                f.effect,
+                at.unwrap_or_default(),
+                f.rows.map(|r| format!("{r:?}")).unwrap_or_default()
+            )
         };
         findings.iter().map(name).collect::<Vec<_>>().join(" ")
     };

@@ -5,8 +5,8 @@ use crate::case::Case;
 use crate::designs::Design;
 use crate::sensors::Kind as Measures;
 use crate::shape::{Distance, distance};
-use crate::table::{Format, text};
-use crate::truth::{Kind, Mark, meaning};
+use crate::table::text;
+use crate::truth::{Kind, Mark, Meaning, meanings};
 use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
 
 /// A finding with its mark.
@@ -14,6 +14,8 @@ use crate::under_test::{Finding, Reply, Which, Written, diagnosed};
 pub struct Marked {
     /// The finding.
     pub finding: Finding,
+    /// What it says; a finding that says several things is listed once for each.
+    pub says: Meaning,
     /// What it is worth.
     pub mark: Mark,
 }
@@ -54,8 +56,10 @@ pub struct Marks {
     pub held_out_mm: f64,
     /// Held-out error of the report, blocks (mm).
     pub blocks_mm: f64,
-    /// What fresh rows show (mm).
+    /// What fresh rows show of the extended model (mm).
     pub fresh_mm: f64,
+    /// Geometry alone on fresh rows, and the extended model, over the noise.
+    pub fresh_over_noise: [f64; 2],
     /// Time (s).
     pub seconds: f64,
 }
@@ -82,6 +86,17 @@ impl Marks {
     /// Findings told without a doubt that are true.
     pub fn true_names(&self) -> usize {
         self.findings.iter().filter(|m| m.finding.identified && m.mark == Mark::True).count()
+    }
+
+    /// Findings told with a doubt, and how many of them are false.
+    pub fn doubtful_names(&self) -> (usize, usize) {
+        let doubtful = self.findings.iter().filter(|m| !m.finding.identified && m.mark != Mark::None);
+        doubtful.fold((0, 0), |(all, wrong), m| (all + 1, wrong + usize::from(m.mark != Mark::True)))
+    }
+
+    /// Whether the true family is told with a joint that has it.
+    pub fn told_with_joint(&self) -> bool {
+        self.findings.iter().any(|m| m.mark == Mark::True && m.finding.joints.is_some())
     }
 
     /// Whether the true family is told, surely or not, and of a joint that has it where it tells one.
@@ -113,7 +128,7 @@ pub fn setting(case: &Case) -> Setting {
 
 /// Diagnoses a case and marks what is said.
 pub fn outcome(case: &Case) -> Outcome {
-    let file = text(case.sensor.kind, &case.lines(), Format::default());
+    let file = text(case.sensor.kind, &case.lines(), None);
     let marks = diagnosed(&file, case.sheet.name).and_then(|reply| marks(case, &reply));
     Outcome { setting: setting(case), marks }
 }
@@ -123,20 +138,24 @@ pub fn outcome(case: &Case) -> Outcome {
 /// # Errors
 /// Where fresh rows are refused that the import took before.
 pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
-    let findings = reply.findings.iter().map(|finding| {
-        let says = meaning(&finding.effect, &finding.parameters);
-        let mark = case.hidden.truth.mark(&finding.effect, says, finding.joints.as_deref());
-        Marked { finding: finding.clone(), mark }
+    let findings = reply.findings.iter().flat_map(|finding| {
+        meanings(&finding.effect, &finding.parameters).into_iter().map(|says| {
+            let mark = case.hidden.truth.mark(&finding.effect, says, finding.joints.as_deref());
+            Marked { finding: finding.clone(), says, mark }
+        })
     });
     let (visits, lines) = case.fresh();
-    let fresh = text(case.sensor.kind, &lines, Format { sides: true, ..Format::default() });
+    let fresh = text(case.sensor.kind, &lines, None);
+    let [geometry_mm, fresh_mm] = reply.fresh_mm(&fresh, &visits)?;
+    let noise_mm = case.sensor.sigma_mm * (case.sensor.lengths() as f64).sqrt();
     Ok(Marks {
         findings: findings.collect(),
         written: reply.written,
         distances: distances(case, reply),
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
-        fresh_mm: reply.fresh_mm(&fresh, &visits)?,
+        fresh_mm,
+        fresh_over_noise: [geometry_mm, fresh_mm].map(|error| error / noise_mm),
         seconds: reply.seconds,
     })
 }

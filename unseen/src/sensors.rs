@@ -26,6 +26,14 @@ impl Kind {
             Kind::Pose => "tracker pose",
         }
     }
+
+    /// Least and greatest standard deviation of a length (mm).
+    pub fn noise(self) -> (f64, f64) {
+        match self {
+            Kind::Cable => (0.02, 0.15),
+            _ => (0.005, 0.06),
+        }
+    }
 }
 
 /// A sensor in its place.
@@ -41,8 +49,8 @@ pub struct Sensor {
     pub target: Pose,
     /// Standard deviation of a coordinate or a length (mm).
     pub sigma_mm: f64,
-    /// Of an angle (rad).
-    pub sigma_rad: f64,
+    /// Distance at which an error of orientation weighs as one of position (mm).
+    pub lever_mm: f64,
 }
 
 /// A reading: one length, three coordinates, or three coordinates and a rotation vector (rad) besides the rotation meant.
@@ -68,8 +76,8 @@ impl Reading {
 }
 
 impl Sensor {
-    /// Draws a sensor beside an arm.
-    pub fn draw(sheet: &Sheet, kind: Kind, rng: &mut impl Rng) -> Self {
+    /// Draws a sensor beside an arm, or at the other end of the hall; its noise is drawn later.
+    pub fn draw(sheet: &Sheet, kind: Kind, far: bool, rng: &mut impl Rng) -> Self {
         let reach = sheet.reach_mm();
         let place = match kind {
             Kind::Cable => {
@@ -81,31 +89,33 @@ impl Sensor {
                 Pose::from_parts(at.into(), UnitQuaternion::identity())
             }
             _ => {
-                let away = reach * between(rng, 1.8, 3.5);
+                let away = if far { between(rng, 6e3, 14e3) } else { reach * between(rng, 1.8, 3.5) };
                 let around = between(rng, -1.2, 1.2);
                 let at = Vector3::new(away * around.cos(), away * around.sin(), between(rng, 200.0, 900.0));
-                Pose::from_parts(at.into(), UnitQuaternion::from_scaled_axis(direction(rng) * between(rng, 0.0, 3.0)))
+                Pose::from_parts(
+                    at.into(),
+                    UnitQuaternion::from_scaled_axis(direction(rng) * between(rng, 0.0, 3.0)),
+                )
             }
         };
         let arm = Vector3::new(25.0 * normal(rng), 25.0 * normal(rng), between(rng, 40.0, 110.0));
-        let target = Pose::from_parts(arm.into(), UnitQuaternion::from_scaled_axis(direction(rng) * between(rng, 0.0, 1.5)));
-        let sigma_mm = match kind {
-            Kind::Cable => scaled(rng, 0.03, 0.12),
-            _ => scaled(rng, 0.01, 0.05),
-        };
+        let target = Pose::from_parts(
+            arm.into(),
+            UnitQuaternion::from_scaled_axis(direction(rng) * between(rng, 0.0, 1.5)),
+        );
         let zero_mm = if kind == Kind::Cable { between(rng, -50.0, 50.0) } else { 0.0 };
-        Self { kind, place, zero_mm, target, sigma_mm, sigma_rad: sigma_mm / scaled(rng, 100.0, 400.0) }
+        Self { kind, place, zero_mm, target, sigma_mm: 1.0, lever_mm: scaled(rng, 100.0, 400.0) }
     }
 
     /// The ideal reading of a target in the room.
     pub fn ideal(&self, target: &Pose) -> Reading {
         match self.kind {
-            Kind::Cable => {
-                Reading::Cable((target.translation.vector - self.place.translation.vector).norm() + self.zero_mm)
-            }
-            Kind::Position => {
-                Reading::Position(self.place.inverse_transform_point(&Point3::from(target.translation.vector)).coords)
-            }
+            Kind::Cable => Reading::Cable(
+                (target.translation.vector - self.place.translation.vector).norm() + self.zero_mm,
+            ),
+            Kind::Position => Reading::Position(
+                self.place.inverse_transform_point(&Point3::from(target.translation.vector)).coords,
+            ),
             Kind::Pose => Reading::Pose(self.place.inv_mul(target)),
         }
     }
@@ -122,7 +132,7 @@ impl Sensor {
             Reading::Cable(length) => Reading::Cable(length + push.x),
             Reading::Position(at) => Reading::Position(at + push),
             Reading::Pose(pose) => {
-                let turn = Vector3::new(noise[3], noise[4], noise[5]) * self.sigma_rad;
+                let turn = Vector3::new(noise[3], noise[4], noise[5]) * (self.sigma_mm / self.lever_mm);
                 Reading::Pose(Pose::from_parts(
                     (pose.translation.vector + push).into(),
                     UnitQuaternion::from_scaled_axis(turn) * pose.rotation,

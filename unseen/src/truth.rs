@@ -48,7 +48,7 @@ pub enum Meaning {
     Unknown,
 }
 
-/// The names of the diagnosis. One name stands for several families: see [`meaning`].
+/// The names of the diagnosis. One name stands for several families: see [`meanings`].
 ///
 /// A name that is added to the diagnosis is added here, by what its sentence sends a technician to.
 pub const NAMES: [(&str, Family); 41] = [
@@ -99,22 +99,25 @@ pub const NAMES: [(&str, Family); 41] = [
 pub const SOMETHING_ELSE: [&str; 4] =
     ["unexplained", "smooth-correction", "something-else", "small-disturbances"];
 
-/// What a finding says. `thermal-drift` is told of the arm, of the sensor's frame and of a cable's zero: its parameters say which.
-pub fn meaning(effect: &str, parameters: &[String]) -> Meaning {
+/// What a finding says. `thermal-drift` is told of the arm, of the sensor's frame and of a cable's zero, and of several of them in one
+/// finding: its parameters say of which. Each counts as a name of its own.
+pub fn meanings(effect: &str, parameters: &[String]) -> Vec<Meaning> {
     if SOMETHING_ELSE.contains(&effect) {
-        return Meaning::SomethingElse;
+        return vec![Meaning::SomethingElse];
     }
     if effect == "thermal-drift" {
-        let has = |name: &str| parameters.iter().any(|p| p == name);
-        return Meaning::Cause(if has("offset") {
-            Family::Zero
-        } else if has("x") || has("rx") {
-            Family::Frame
-        } else {
-            Family::Thermal
-        });
+        let has = |names: &[&str]| parameters.iter().any(|p| names.contains(&p.as_str()));
+        let told = [
+            (Family::Thermal, has(&["growth", "growth per kelvin"])),
+            (Family::Frame, has(&["x", "y", "z", "rx", "ry", "rz"])),
+            (Family::Zero, has(&["offset"])),
+        ];
+        let families: Vec<Meaning> =
+            told.into_iter().filter(|t| t.1).map(|(family, _)| Meaning::Cause(family)).collect();
+        return if families.is_empty() { vec![Meaning::Cause(Family::Thermal)] } else { families };
     }
-    NAMES.iter().find(|(name, _)| *name == effect).map_or(Meaning::Unknown, |(_, family)| Meaning::Cause(*family))
+    let known = NAMES.iter().find(|(name, _)| *name == effect);
+    vec![known.map_or(Meaning::Unknown, |(_, family)| Meaning::Cause(*family))]
 }
 
 /// Kinds of what is hidden.

@@ -84,11 +84,15 @@ fn dataset(text: &str, convention: AngleConvention, nominal: &Model) -> Result<D
     convention.apply(&rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
 }
 
-/// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`.
+/// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`. A panic is one run without an answer, not the end of all.
 ///
 /// # Errors
 /// What the command line would say.
 pub fn diagnosed(text: &str, robot: &str) -> Result<Reply, String> {
+    std::panic::catch_unwind(|| answer(text, robot)).unwrap_or_else(|_| Err("it panicked".to_owned()))
+}
+
+fn answer(text: &str, robot: &str) -> Result<Reply, String> {
     let start = Instant::now();
     let robot = robots::load(robot).map_err(|error| error.to_string())?;
     let dh = robot.sheet.joints.angles == robots::sheet::Angles::Dh;
@@ -164,28 +168,34 @@ impl Reply {
             Which::Geometry => &self.found.geometric.model,
             Which::Written => &self.model,
         };
-        let condition =
-            Condition { time_h: Some(visit.hours), approach: sides(&visit.q, &visit.before), ..Condition::default() };
+        let condition = Condition {
+            time_h: Some(visit.hours),
+            approach: sides(&visit.q, &visit.before),
+            ..Condition::default()
+        };
         let pose = model.forward(&Vector6::from(visit.q), &condition);
         Pose::from_parts(pose.translation, pose.rotation)
     }
 
-    /// What the extended model, frames and causes of the measurement included, gets wrong on fresh rows of the same
-    /// measurement (RMS, mm): on those rows of a file that are counted.
+    /// What geometry alone and the extended model, each with its frames and causes of the measurement, get wrong on fresh rows of
+    /// the same measurement (RMS, mm): on those rows of a file that are counted.
     ///
     /// # Errors
     /// What the import would say.
-    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<f64, String> {
+    pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<[f64; 2], String> {
         let mut rows = dataset(text, self.convention, &self.sheet)?;
         // A fresh row stands in the measurement where its time does.
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
             row.number = visit.row;
         }
         let observed = prepare(&rows, &self.sheet).observed;
-        let errors = errors_on(&observed, &self.found.extended.model, &self.found.extended.frames);
-        let counted: Vec<f64> =
-            errors.iter().zip(visits).filter(|(_, v)| v.counted).map(|(error, _)| error * error).collect();
-        Ok((counted.iter().sum::<f64>() / counted.len() as f64).sqrt())
+        Ok([&self.found.geometric, &self.found.extended].map(|fit| {
+            let errors = errors_on(&observed, &fit.model, &fit.frames);
+            let counted = errors.iter().zip(visits).filter(|(_, visit)| visit.counted);
+            let (sum, count) =
+                counted.fold((0.0, 0.0), |(sum, n), (error, _)| (sum + error * error, n + 1.0));
+            (sum / count).sqrt()
+        }))
     }
 }
 

@@ -6,9 +6,11 @@
 //! deviations of the noise.
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+use rand::Rng;
 
 use crate::arms::{Pose, Strain};
 use crate::designs::Visit;
+use crate::draw::scaled;
 use crate::hidden::{Hidden, Scene, Shape};
 use crate::sensors::{Kind, Sensor};
 
@@ -103,56 +105,44 @@ fn orthonormal(columns: Vec<DVector<f64>>) -> DMatrix<f64> {
     DMatrix::from_columns(&out)
 }
 
-/// No effect moves readings by more than this (mm, root mean square): an arm so wrong is not measured, it is mended.
-const LARGEST_MM: f64 = 3.0;
+/// The least and greatest worth of an effect, in standard deviations of the noise.
+pub const WORTH: (f64, f64) = (1.0, 20.0);
 
-/// Sets the size of an effect so that it is worth `wanted` standard deviations, and says what it is worth. `None` where it would
-/// have to be larger than any effect is, or shows nothing that geometry does not.
-pub fn sized(scene: &Scene<'_>, hidden: &Hidden, wanted: f64) -> Option<(Hidden, f64)> {
-    match hidden.shape {
-        Shape::Nothing => return Some((hidden.clone(), 0.0)),
-        // Noise beside noise: geometry explains none of it.
-        Shape::Correlated(_) => return Some((hidden.sized(wanted), wanted)),
-        _ => {}
-    }
-    let measure = Measure::of(scene);
-    let goal = wanted * scene.sensor.sigma_mm;
-    let mut size = small(&hidden.shape);
-    let mut seen = measure.sizes(scene, &hidden.sized(size)).1;
-    let mut power = 1.0;
-    for _ in 0..12 {
-        if !(seen > 1e-12) || !seen.is_finite() {
-            return None;
-        }
-        let factor = (goal / seen).powf(1.0 / power).clamp(1e-3, 1e3);
-        let next = size * factor;
-        let (all, rest) = measure.sizes(scene, &hidden.sized(next));
-        if !(all < 50.0 * LARGEST_MM) {
-            return None;
-        }
-        if (factor - 1.0).abs() > 1e-3 {
-            power = ((rest / seen).ln() / factor.ln()).clamp(0.4, 3.0);
-        }
-        (size, seen) = (next, rest);
-        if (seen / goal - 1.0).abs() < 1e-3 {
-            return (all <= LARGEST_MM).then(|| (hidden.sized(size), seen / scene.sensor.sigma_mm));
-        }
-    }
-    None
+/// An effect that was given a size, beside a noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sized {
+    /// The effect.
+    pub hidden: Hidden,
+    /// Standard deviation of a length (mm).
+    pub sigma_mm: f64,
+    /// What the effect is worth beside it.
+    pub worth: f64,
 }
 
-/// A small size of a shape, to begin with.
-fn small(shape: &Shape) -> f64 {
-    use crate::hidden::{arm, sensor};
-    match shape {
-        Shape::Arm(arm::Shape::Hardening { .. } | arm::Shape::DeadBand { .. }) => 1e-6,
-        Shape::Arm(_) => 1e-5,
-        Shape::Sensor(sensor::Shape::Pulley) => 1.0,
-        Shape::Sensor(sensor::Shape::Drum { .. } | sensor::Shape::Catenary { .. }) => 1e-3,
-        Shape::Sensor(sensor::Shape::Refraction { .. }) => 1.0,
-        Shape::Sensor(sensor::Shape::Nest { .. }) | Shape::Drift(_) => 0.01,
-        Shape::Latency(_) => 1e-6,
-        Shape::Unsettled(..) => 1e-5,
-        Shape::Nothing | Shape::Correlated(_) => 1.0,
+/// Draws a size such as workshops meet, and a noise such as the sensor has beside which the effect is worth 1 to 20 of its standard
+/// deviations. `None` where there is none.
+pub fn sized(scene: &Scene<'_>, hidden: &Hidden, rng: &mut impl Rng) -> Option<Sized> {
+    let (low, high) = scene.sensor.kind.noise();
+    match hidden.shape {
+        Shape::Nothing => {
+            return Some(Sized { hidden: hidden.clone(), sigma_mm: scaled(rng, low, high), worth: 0.0 });
+        }
+        // Noise beside noise: geometry explains none of it.
+        Shape::Correlated(_) => {
+            let worth = scaled(rng, WORTH.0, WORTH.1);
+            return Some(Sized { hidden: hidden.sized(worth), sigma_mm: scaled(rng, low, high), worth });
+        }
+        _ => {}
     }
+    let (least, most) = hidden.shape.sizes();
+    // Rather the larger ones: small ones leave only the finest sensors.
+    let size = scaled(rng, least, most).max(scaled(rng, least, most));
+    let hidden = hidden.sized(size);
+    let rest = Measure::of(scene).sizes(scene, &hidden).1;
+    let (least, most) = (WORTH.0.max(rest / high), WORTH.1.min(rest / low));
+    if !(least < most) {
+        return None;
+    }
+    let worth = scaled(rng, least, most);
+    Some(Sized { hidden, sigma_mm: rest / worth, worth })
 }

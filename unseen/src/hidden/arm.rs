@@ -19,24 +19,30 @@ pub enum Shape {
         /// Over time.
         course: Warmth,
     },
-    /// A spring whose stiffness grows with the torque: size · bend · asinh(τ / bend), size in rad/(N m).
+    /// A spring whose stiffness grows with the torque, as asinh(τ / bend); size: what it yields under the largest torque (rad).
     Hardening {
         /// From 0.
         joint: usize,
         /// Torque at which it hardens (N m).
         bend_nm: f64,
+        /// The largest torque of the walk (N m).
+        most_nm: f64,
     },
-    /// A joint that holds up to a torque and yields beyond it, size in rad/(N m).
+    /// A joint that holds up to a torque and yields beyond it; size: what it yields under the largest torque (rad).
     DeadBand {
         /// From 0.
         joint: usize,
         /// The torque (N m).
         band_nm: f64,
+        /// The largest torque of the walk (N m).
+        most_nm: f64,
     },
-    /// A beam; size: 1/(E I) in 1/(N m²).
+    /// A beam; size: the largest sag of its end (mm).
     Bending {
         /// From 0.
         link: usize,
+        /// 1/(E I) in 1/(N m²) for a largest sag of 1 mm.
+        softness: f64,
     },
     /// size · sin(n q + m q' + φ), rad.
     TwoJointGear {
@@ -77,22 +83,28 @@ impl Shape {
         match kind {
             Kind::WarmLinks => (Self::warm(scene, rng), Vec::new()),
             Kind::Hardening => {
-                let joint = one(rng, &[1, 1, 2, 2, 4]);
-                let bend_nm = between(rng, 0.1, 0.3) * most_torque(scene, joint);
-                (Shape::Hardening { joint, bend_nm }, vec![joint + 1])
+                let (joint, most_nm) = loaded(scene, rng);
+                let bend_nm = between(rng, 0.1, 0.3) * most_nm;
+                (Shape::Hardening { joint, bend_nm, most_nm }, vec![joint + 1])
             }
             Kind::DeadBand => {
-                let joint = one(rng, &[1, 1, 2, 2, 4]);
-                let band_nm = between(rng, 0.3, 0.6) * most_torque(scene, joint);
-                (Shape::DeadBand { joint, band_nm }, vec![joint + 1])
+                let (joint, most_nm) = loaded(scene, rng);
+                let band_nm = between(rng, 0.3, 0.6) * most_nm;
+                (Shape::DeadBand { joint, band_nm, most_nm }, vec![joint + 1])
             }
             Kind::Bending => {
                 let (link, joints) = one(rng, &scene.sheet.beams);
-                (Shape::Bending { link }, joints.map(|j| j + 1).to_vec())
+                let sag = |visit: &Visit| scene.arm.beam(&visit.q, link).0.norm();
+                let most = scene.walk.visits.iter().map(sag).fold(0.0, f64::max);
+                (Shape::Bending { link, softness: 1.0 / most }, joints.map(|j| j + 1).to_vec())
             }
             Kind::TwoJointGear => {
                 let joint = rng.random_range(0..6_usize);
-                let other = if joint == 0 || (joint < 5 && rng.random_range(0..2) == 0) { joint + 1 } else { joint - 1 };
+                let other = if joint == 0 || (joint < 5 && rng.random_range(0..2) == 0) {
+                    joint + 1
+                } else {
+                    joint - 1
+                };
                 let orders = [one(rng, &[1.0, 2.0, 3.0]), one(rng, &[-2.0, -1.0, 1.0, 2.0])];
                 let phase = between(rng, 0.0, std::f64::consts::TAU);
                 (Shape::TwoJointGear { joint, other, orders, phase }, vec![joint + 1])
@@ -133,6 +145,18 @@ impl Shape {
         Shape::Warm { shares, course }
     }
 
+    /// The least and greatest size that is met.
+    pub fn sizes(&self) -> (f64, f64) {
+        match self {
+            // 8 K of aluminium to 60 K of steel.
+            Shape::Warm { .. } => (1e-4, 8e-4),
+            Shape::Hardening { .. } | Shape::DeadBand { .. } => (1e-4, 2e-3),
+            Shape::Bending { .. } => (0.03, 0.8),
+            Shape::TwoJointGear { .. } | Shape::ModulatedGear { .. } => (5e-5, 1.5e-3),
+            Shape::LoadedPlay { .. } => (1e-4, 2e-3),
+        }
+    }
+
     /// What it does at a visit.
     pub fn strain(&self, size: f64, arm: &Arm, visit: &Visit) -> Strain {
         let mut out = Strain::default();
@@ -141,16 +165,17 @@ impl Shape {
             Shape::Warm { shares, course } => {
                 out.growth = shares.map(|share| size * share * course.at(visit.hours));
             }
-            Shape::Hardening { joint, bend_nm } => {
-                out.turn[joint] = size * bend_nm * (arm.torques(q)[joint] / bend_nm).asinh();
+            Shape::Hardening { joint, bend_nm, most_nm } => {
+                let yields = |torque: f64| (torque / bend_nm).asinh();
+                out.turn[joint] = size * yields(arm.torques(q)[joint]) / yields(most_nm);
             }
-            Shape::DeadBand { joint, band_nm } => {
+            Shape::DeadBand { joint, band_nm, most_nm } => {
                 let torque = arm.torques(q)[joint];
-                out.turn[joint] = size * (torque - torque.clamp(-band_nm, band_nm));
+                out.turn[joint] = size * (torque - torque.clamp(-band_nm, band_nm)) / (most_nm - band_nm);
             }
-            Shape::Bending { link } => {
+            Shape::Bending { link, softness } => {
                 let (sag, slope) = arm.beam(q, link);
-                out.bend[link] = (sag * size, slope * size);
+                out.bend[link] = (sag * (size * softness), slope * (size * softness));
             }
             Shape::TwoJointGear { joint, other, orders, phase } => {
                 out.turn[joint] = size * (orders[0] * q[joint] + orders[1] * q[other] + phase).sin();
@@ -175,6 +200,13 @@ impl Shape {
         }
         out
     }
+}
+
+/// A joint that carries something, and the most that it carries (N m).
+fn loaded(scene: &Scene<'_>, rng: &mut impl Rng) -> (usize, f64) {
+    let joint = one(rng, &[1, 1, 2, 2, 4]);
+    let most = most_torque(scene, joint);
+    if most > 1.0 { (joint, most) } else { (2, most_torque(scene, 2)) }
 }
 
 fn most_torque(scene: &Scene<'_>, joint: usize) -> f64 {

@@ -60,6 +60,11 @@ impl Shape {
         }
     }
 
+    /// The least and greatest size that is met.
+    pub fn sizes(&self) -> (f64, f64) {
+        (0.03, 1.2)
+    }
+
     /// How the base has moved (mm, rad).
     pub fn base_at(&self, size: f64, hours: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {

@@ -57,6 +57,17 @@ impl Shape {
         }
     }
 
+    /// The least and greatest size that is met.
+    pub fn sizes(&self) -> (f64, f64) {
+        match self {
+            Shape::Pulley => (2.0, 30.0),
+            Shape::Drum { .. } => (2e-4, 2e-3),
+            Shape::Catenary { .. } => (2e-3, 8e-2),
+            Shape::Refraction { .. } => (3.0, 25.0),
+            Shape::Nest { .. } => (0.02, 0.5),
+        }
+    }
+
     /// What the sensor reads without noise.
     pub fn reading(&self, size: f64, sensor: &Sensor, flange: &Pose, target: &Pose) -> Reading {
         let at = target.translation.vector;

@@ -11,7 +11,9 @@ fn warmth_rises_falls_in_the_pause_and_rises_again() {
     assert_eq!(course.at(0.0), 0.0);
     let by_hand = |t: f64| 0.5 * (1.0 - (-t / 0.1_f64).exp()) + 0.5 * (1.0 - (-t).exp());
     assert!((course.at(0.7) - by_hand(0.7)).abs() < 1e-12);
-    assert!(course.at(1.3) < course.at(1.0) && course.at(1.6) < course.at(1.3) && course.at(2.0) > course.at(1.6));
+    assert!(
+        course.at(1.3) < course.at(1.0) && course.at(1.6) < course.at(1.3) && course.at(2.0) > course.at(1.6)
+    );
     for corner in [1.0, 1.6] {
         assert!((course.at(corner + 1e-9) - course.at(corner - 1e-9)).abs() < 1e-6);
     }
@@ -21,7 +23,7 @@ fn warmth_rises_falls_in_the_pause_and_rises_again() {
 /// The wire goes from the entry along the rim and leaves it as a tangent: found again by unrolling it point by point.
 #[test]
 fn the_wire_over_a_pulley_is_as_long_as_when_laid_out_point_by_point() {
-    let (away, radius) = (Vector3::new(900.0, 300.0, 250.0), 20.0);
+    let (away, radius): (Vector3<f64>, f64) = (Vector3::new(900.0, 300.0, 250.0), 20.0);
     let (out, up) = (away.x.hypot(away.y), away.z);
     // The shortest way around the rim from its near side: over all places where the wire may leave.
     let shortest = (0..400_000)

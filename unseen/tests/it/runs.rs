@@ -4,7 +4,7 @@ use truegrind_unseen::case::{Case, Limits};
 use truegrind_unseen::designs::Design;
 use truegrind_unseen::report::{Plan, line, table};
 use truegrind_unseen::score::{Marks, marks, outcome};
-use truegrind_unseen::table::{Format, text};
+use truegrind_unseen::table::text;
 use truegrind_unseen::truth::{Kind, Mark};
 use truegrind_unseen::under_test::diagnosed;
 
@@ -66,7 +66,7 @@ fn without_a_cause_the_written_arm_is_geometrys() {
     let case = (0..20)
         .map(|run| Case::draw(13, Kind::Clean, run, limits))
         .find_map(|case| {
-            let file = text(case.sensor.kind, &case.lines(), Format::default());
+            let file = text(case.sensor.kind, &case.lines(), None);
             let reply = diagnosed(&file, case.sheet.name).unwrap();
             reply.findings.is_empty().then(|| marks(&case, &reply).unwrap())
         })
