@@ -32,6 +32,7 @@ mod marginal;
 mod standing;
 mod stories;
 mod something_else;
+mod written;
 pub mod newton;
 pub mod extension;
 pub mod design;

@@ -403,7 +403,8 @@ fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
     if dataset.sensor == Sensor::Cable {
         out.extend([(Form::Pulley, 1.0), (Form::Drum, 1.0)]);
     } else {
-        out.extend([(Form::Refraction, 1.0), (Form::Nest, 1.0)]);
+        out.push((Form::Refraction, 1.0));
+        out.extend([false, true].map(|second| (Form::Nest { second }, 2.0)));
     }
     out
 }

@@ -57,6 +57,17 @@ impl Cause {
         }
     }
 
+    /// Whether its size is one that nature has: a joint does not yield upwards, a reversal does not overshoot, no cable sags
+    /// upwards.
+    pub fn is_possible(&self) -> bool {
+        match self {
+            Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
+            Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
+            Cause::Measurement(Disturbance { kind: Kind::Sag, values, .. }) => values.iter().all(|v| *v >= 0.0),
+            _ => true,
+        }
+    }
+
     /// Whether two causes would be told to a technician as the same thing: same name, same joints, rows that overlap.
     pub fn same_story(&self, other: &Self) -> bool {
         let rows_meet = match (self.rows(), other.rows()) {

@@ -317,6 +317,14 @@ impl Linear {
 }
 
 impl FullDesign {
+    /// The first `count` parameters after one more step, and their covariance.
+    pub(super) fn estimate(&self, count: usize) -> (Vec<f64>, DMatrix<f64>) {
+        let p = self.x.len();
+        let mut picked = DMatrix::zeros(p, count);
+        (0..count).for_each(|k| picked[(k, k)] = 1.0);
+        (self.x.rows(0, count).iter().copied().collect(), gram(&solved(&self.lower, picked)))
+    }
+
     /// The design of the model without the parameters at `dropped`, by taking directions out of the whole basis.
     ///
     /// With Z = L⁻¹E for the dropped columns E of the identity and ZᵀZ = M Mᵀ, U = Z M⁻ᵀ is orthonormal, the smaller

@@ -16,6 +16,7 @@ use super::standing::Charge;
 use super::stories::{self, Story, Worth};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
+use super::written::written;
 use crate::identification::benefit::benefit;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, frame_parameters};
@@ -207,6 +208,7 @@ pub fn diagnose(
         pool: &left,
         options: &options.selection,
         families,
+        sides_from_order: prepared.sides_from_order,
         raw: &whole.design,
     };
     let trial = charge.tried();
@@ -291,13 +293,19 @@ pub fn diagnose(
         transfers: Vec::new(),
         notes,
     };
+    let of_all = thinned.is_none().then_some(&trial.discrepancy);
+    let written = written(&subject, &extended, &trial.standings, of_all);
+    let mut written_stages = stages;
+    if let Some(fit) = &written {
+        written_stages[2] = validation.stage(fit);
+    }
     let estimated = estimated(
         dataset,
         robot,
         nominal_arm,
         &subject,
-        &extended,
-        &stages,
+        written.as_ref().unwrap_or(&extended),
+        &written_stages,
         &diagnosis,
         &set_aside,
         options,

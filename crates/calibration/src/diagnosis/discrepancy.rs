@@ -194,6 +194,8 @@ pub struct Discrepancy {
     sizes: Vec<f64>,
     /// The functions that carry anything, each column in units of its standard deviation.
     pub columns: DMatrix<f64>,
+    /// Of each column, whether it follows the rows, not the poses.
+    in_time: Vec<bool>,
     /// What each group that carries anything is worth in the readings (mm RMS), largest first.
     pub carried: Vec<(Group, f64)>,
     /// How far all of it moves the reading of each observation (mm).
@@ -229,7 +231,15 @@ impl Discrepancy {
     fn silent(self) -> Self {
         let columns = DMatrix::zeros(self.columns.nrows(), 0);
         let push_mm = vec![0.0; self.push_mm.len()];
-        Self { columns, carried: Vec::new(), push_mm, evidence: 0.0, noise: 1.0, ..self }
+        Self {
+            columns,
+            in_time: Vec::new(),
+            carried: Vec::new(),
+            push_mm,
+            evidence: 0.0,
+            noise: 1.0,
+            ..self
+        }
     }
 
     /// The same where neighbouring rows are correlated by `rho`.
@@ -257,7 +267,7 @@ impl Discrepancy {
         let pure = design.pure(&columns, &projected);
         let left = &design.residual + &pure * &coefficients;
         let mut carried = Vec::new();
-        let mut kept = Vec::new();
+        let (mut kept, mut in_time) = (Vec::new(), Vec::new());
         let mut push_mm = vec![0.0; linear.slopes.mm.len()];
         for ((group, range), size) in functions.groups.iter().zip(&sizes) {
             if size * size <= NOTHING * noise * noise {
@@ -270,6 +280,7 @@ impl Discrepancy {
             carried.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
             push_mm.iter_mut().zip(&lengths).for_each(|(sum, l)| *sum += l);
             kept.extend(range.clone().map(|k| (k, *size)));
+            in_time.extend(range.clone().map(|_| group.in_time()));
         }
         carried.sort_by(|a, b| b.1.total_cmp(&a.1));
         let scaled: Vec<DVector<f64>> =
@@ -284,7 +295,13 @@ impl Discrepancy {
             .chunks(linear.per)
             .map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt())
             .collect();
-        Self { sizes, columns, carried, push_mm, evidence, noise, correlation }
+        Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation }
+    }
+
+    /// The columns that follow the rows.
+    pub fn in_time_columns(&self) -> DMatrix<f64> {
+        let places: Vec<usize> = (0..self.in_time.len()).filter(|&k| self.in_time[k]).collect();
+        self.columns.select_columns(&places)
     }
 
     /// Whether something follows the rows, not the poses.

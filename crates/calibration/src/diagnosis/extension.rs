@@ -315,7 +315,7 @@ fn with_robust_weights(weights: &[Weight], robust_weight: &[f64]) -> Vec<Weight>
 }
 
 /// The causes with the values that the fit gave them.
-fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
+pub(super) fn filled(causes: &[Cause], model: &Model, frames: &Frames) -> Vec<Cause> {
     let first = model.effects.len() - causes.iter().filter(|c| matches!(c, Cause::Arm(_))).count();
     let (mut effect, mut disturbance) = (first, 0);
     causes

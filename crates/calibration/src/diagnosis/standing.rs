@@ -47,6 +47,8 @@ pub struct Standing {
     pub asked: usize,
     /// Halves in which it had another size.
     pub changed: usize,
+    /// Whether nature has such a size, and nothing else that was found says the same of the same rows.
+    pub plausible: bool,
 }
 
 /// Halves in which a cause may fail to come back.
@@ -59,7 +61,7 @@ impl Standing {
     /// Whether it may be called identified, as far as this goes.
     pub fn stands(&self) -> bool {
         let enough = self.asked == 0 || self.came_back + MISSED >= self.asked;
-        self.beside && self.ahead >= AHEAD && enough && self.changed <= MISSED
+        self.beside && self.plausible && self.ahead >= AHEAD && enough && self.changed <= MISSED
     }
 }
 
@@ -96,6 +98,8 @@ pub struct Charge<'a> {
     pub options: &'a Options,
     /// Kinds of candidates.
     pub families: f64,
+    /// Whether the sides from which joints came were taken from the order of the rows.
+    pub sides_from_order: bool,
     /// The design of the fit: what candidates are made of.
     pub raw: &'a Design,
 }
@@ -147,6 +151,13 @@ impl Charge<'_> {
             Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, nominal, self.subject.frames),
         };
         Tried { columns: candidate.columns(raw), candidate: Arc::new(candidate) }
+    }
+
+    /// Sides that were taken from the order of the rows say nothing that a reading before rest does not say too.
+    fn told_otherwise(&self, cause: &Cause) -> bool {
+        self.sides_from_order
+            && cause.name() == "backlash"
+            && self.found.causes.iter().any(|c| c.name() == "unsettled")
     }
 
     fn places(&self, causes: &[usize]) -> Vec<usize> {
@@ -219,6 +230,7 @@ impl Charge<'_> {
             came_back: 0,
             asked: 0,
             changed: 0,
+            plausible: own.candidate.cause.is_possible() && !self.told_otherwise(&own.candidate.cause),
         }
     }
 }

@@ -64,7 +64,8 @@ pub(super) fn told(
     let shifts = stories.iter().filter(|s| is_shift(s)).count();
     if shifts >= MANY_SHIFTS || stories.iter().any(|s| is_shift(s) && drowned(s)) {
         merge(&mut stories, is_shift, worth, |members, worth_mm| {
-            set_up_changed(members, worth_mm, shifts >= MANY_SHIFTS && !members.iter().all(|s| drowned(s)))
+            let steps = shifts >= MANY_SHIFTS && !members.iter().all(drowned);
+            set_up_changed(members, worth_mm, steps, smooth)
         });
     }
     let small = |s: &Story| s.finding.worth_mm.is_some_and(|w| w < SMALL * geometric_mm);
@@ -108,7 +109,7 @@ fn gain(members: &[Story]) -> Gain {
         .unwrap_or(Gain { cv_rmse_before_mm: f64::NAN, cv_rmse_after_mm: f64::NAN })
 }
 
-fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool) -> Finding {
+fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool, smooth: bool) -> Finding {
     let mut sessions: Vec<Session> = members
         .iter()
         .filter_map(|s| {
@@ -121,7 +122,7 @@ fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool) -> Finding {
         })
         .collect();
     sessions.sort_by_key(|s| s.rows);
-    let confidence = if steps && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
+    let confidence = if steps && !smooth && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
         Confidence::Identified
     } else {
         Confidence::Ambiguous

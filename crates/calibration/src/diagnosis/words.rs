@@ -192,7 +192,7 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
         ),
         Form::Pulley => "the cable's length depends on its direction, as over a pulley or through a worn outlet".to_owned(),
         Form::Drum => "the cable's reading is not in proportion to its length, as from a drum wound in layers".to_owned(),
-        Form::Nest => "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned(),
+        Form::Nest { .. } => "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned(),
     }
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::frames::Frames;
 use crate::measurement::dataset::{Dataset, Motion, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
-use crate::measurement::sensor::form::Form;
+use crate::measurement::sensor::form::{Form, second_degree};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
@@ -87,12 +87,15 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
             let (here, before) = (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
             vec![here - before]
         }),
-        Form::Refraction => pushed(&|_, away| vec![model.gravity * (away.norm_squared() * 1e-3)]),
+        Form::Refraction => pushed(&|row, away| {
+            let bend = model.gravity * (away.norm_squared() * 1e-3);
+            // Half way along the beam, in metres above the base.
+            let height = -1e-3 * model.gravity.dot(&(sensor(row) + 0.5 * away));
+            vec![bend, bend * height]
+        }),
         Form::Pulley => pushed(&|_, away| {
             let u = away.normalize();
-            let values =
-                [u.x * u.y, u.y * u.z, u.z * u.x, u.x * u.x - u.y * u.y, 3.0 * u.z * u.z - 1.0];
-            values.map(|v| u * v).to_vec()
+            second_degree(&u).map(|v| u * v).to_vec()
         }),
         Form::Drum => {
             let lengths: Vec<f64> = dataset
@@ -109,12 +112,17 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
                 vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
             })
         }
-        Form::Nest => pushed(&|row, away| {
+        Form::Nest { second } => pushed(&|row, away| {
             let turn = posed.forward(&row.joints).rotation * frames.flange_from_target.rotation;
             let seen = turn.inverse() * away.normalize();
             // All of a matrix times the direction but its trace, which lengthens the beam.
             let places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1)];
-            places.map(|(i, j)| turn * (Vector3::ith(i, 1.0) * seen[j])).to_vec()
+            let mut out = places.map(|(i, j)| turn * (Vector3::ith(i, 1.0) * seen[j])).to_vec();
+            if second {
+                let values = second_degree(&seen);
+                out.extend((0..3).flat_map(|i| values.map(|v| turn * (Vector3::ith(i, 1.0) * v))));
+            }
+            out
         }),
         _ => Vec::new(),
     }

@@ -5,6 +5,8 @@
 //! in their parameters and taken at the data sheet's arm. They stand beside the causes of the arm as rivals, and are left behind
 //! when a model is written.
 
+use nalgebra::Vector3;
+
 /// Which fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -27,14 +29,26 @@ pub enum Form {
         /// The other.
         other: usize,
     },
-    /// A tracker's beam bent in air whose temperature changes with height: the square of the distance, along gravity.
+    /// A tracker's beam bent in air whose temperature changes with height: the square of the distance, along gravity, and its
+    /// change with the height of the beam.
     Refraction,
     /// A cable that is led over a pulley: harmonics of second degree of its direction.
     Pulley,
     /// A cable wound in layers: the square and the cube of its length.
     Drum,
-    /// A target whose centre depends on the direction from which it is seen.
-    Nest,
+    /// A target whose centre depends on the direction from which it is seen: first or second degree in that direction.
+    Nest {
+        /// Whether the second degree takes part.
+        second: bool,
+    },
+}
+
+/// Entries of the matrix that takes the direction of the beam, as the target sees it, to a shift of the target's centre.
+const FIRST: [&str; 8] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"];
+
+/// x y, y z, z x, x² − y² and 3 z² − 1 of a direction: its harmonics of second degree.
+pub fn second_degree(u: &Vector3<f64>) -> [f64; 5] {
+    [u.x * u.y, u.y * u.z, u.z * u.x, u.x * u.x - u.y * u.y, 3.0 * u.z * u.z - 1.0]
 }
 
 impl Form {
@@ -48,7 +62,7 @@ impl Form {
             Form::Refraction => "air-refraction",
             Form::Pulley => "cable-pulley",
             Form::Drum => "cable-drum",
-            Form::Nest => "target-nest",
+            Form::Nest { .. } => "target-nest",
         }
     }
 
@@ -82,10 +96,19 @@ impl Form {
             Form::TwoJointGear { .. } => {
                 listed(&["sine of the sum", "cosine of the sum", "sine of the difference", "cosine of the difference"], "rad")
             }
-            Form::Refraction => listed(&["bend of the beam"], "1/m"),
+            Form::Refraction => {
+                let mut out = listed(&["bend of the beam"], "1/m");
+                out.extend(listed(&["its change with height"], "1/m²"));
+                out
+            }
             Form::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
             Form::Drum => listed(&["square of the length", "cube of the length"], "mm"),
-            Form::Nest => listed(&["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy"], "mm"),
+            Form::Nest { second: false } => listed(&FIRST, "mm"),
+            Form::Nest { second: true } => {
+                let products = ["xy", "yz", "zx", "x² − y²", "3z² − 1"];
+                let of_axes = ["x", "y", "z"].iter().flat_map(|axis| products.map(|p| format!("{axis}: {p}")));
+                listed(&FIRST, "mm").into_iter().chain(of_axes.map(|name| (name, "mm"))).collect()
+            }
         }
     }
 
@@ -99,7 +122,7 @@ impl Form {
             Form::TwoJointGear { .. } => 3e-4,
             Form::Refraction => 5e-6,
             Form::Pulley | Form::Drum => 0.5,
-            Form::Nest => 0.05,
+            Form::Nest { .. } => 0.05,
         }
     }
 }

@@ -12,8 +12,9 @@ use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Body, Joints, Limits, Model};
 use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_calibration::identification::calibration::{Calibration, Frames, Weight};
-use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use truegrind_calibration::measurement::sensor::form::Form;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
 use truegrind_math::se3::{Pose, pose_from_vector};
@@ -88,6 +89,7 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
                 readout_mm: None,
                 condition,
                 anchor,
+                motion: Some(Box::new(Motion { step: joints * 0.3, rate_per_h: Some(joints * 700.0) })),
                 session: None,
                 other: Vec::new(),
             }
@@ -128,7 +130,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
     let of_pose = [Form::Stiffness { joint: 1 }, Form::TwoJointGear { joint: 2, other: 3 }];
     let of_sensor = match sensor {
         Sensor::Cable => [Form::Pulley, Form::Drum],
-        _ => [Form::Refraction, Form::Nest],
+        _ => [Form::Refraction, Form::Nest { second: true }],
     };
     let of_motion = [Form::Latency, Form::LastStep, Form::SlowReading];
     let forms = of_pose.into_iter().chain(of_sensor).chain(of_motion);

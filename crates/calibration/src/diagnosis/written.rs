@@ -1,0 +1,59 @@
+//! The arm that is handed on to compensation: geometry and the causes of the arm that stood the trial, beside what the
+//! measurement suffered.
+//!
+//! A cause of the arm that is not certain moves real programs, so it stays out; geometry takes what it can of it. What wandered
+//! while the rows were taken is fitted beside the arm and left behind, whatever it was: it widens the arm's covariance and no
+//! longer bends its links.
+
+use super::cause::Cause;
+use super::design::Linear;
+use super::discrepancy::Discrepancy;
+use super::extension::{Extended, Freedom, Subject, fit, filled};
+use super::standing::Standing;
+
+/// The fit whose arm is written; `None` where it is the extended one. `discrepancy` is that of the same rows.
+pub(super) fn written(
+    subject: &Subject<'_>,
+    extended: &Extended,
+    standings: &[Standing],
+    discrepancy: Option<&Discrepancy>,
+) -> Option<Extended> {
+    let certain = |(k, cause): (usize, &Cause)| {
+        matches!(cause, Cause::Measurement(_)) || standings.get(k).is_none_or(Standing::stands)
+    };
+    let kept: Vec<Cause> = extended
+        .causes
+        .iter()
+        .enumerate()
+        .filter(|&(k, cause)| certain((k, cause)))
+        .map(|(_, cause)| cause.clone())
+        .collect();
+    let wandered = discrepancy.filter(|d| d.in_time());
+    if kept.len() == extended.causes.len() && wandered.is_none() {
+        return None;
+    }
+    let kept = fit(subject, &kept, Freedom::All, Some(extended));
+    match wandered {
+        Some(wandered) => Some(beside(subject, &kept, wandered).unwrap_or(kept)),
+        None => Some(kept),
+    }
+}
+
+/// The fit with what wandered free beside it, by one step: it is small against what is linear.
+fn beside(subject: &Subject<'_>, fit: &Extended, wandered: &Discrepancy) -> Option<Extended> {
+    let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
+    let linear = Linear::of(subject, fit);
+    let whole = linear
+        .beside(&wandered.in_time_columns())
+        .filtered(wandered.correlation, &numbers, wandered.noise)
+        .whole();
+    let (x, covariance) = whole.estimate(fit.x.len());
+    if !x.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let (model, frames) = fit.task.apply(&x);
+    let mut out = fit.clone();
+    out.estimate.x.clone_from(&x);
+    out.estimate.covariance = Some(covariance);
+    Some(Extended { causes: filled(&fit.causes, &model, &frames), x, model, frames, ..out })
+}
