@@ -15,7 +15,11 @@
 //! 7. [`validation`]: held-out errors by refits of all stages; [`held`]: those of candidates, steps and rivals to first order.
 //! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
 //!    explains; rounding and contradicting columns; what the rows cannot show.
-//! 9. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
+//! 9. [`discrepancy`] with [`marginal`]: what no cause describes, as random functions beside the causes. `standing`: a cause is
+//!    identified only if it wins beside those and comes back in [`halves`] of the rows.
+//! 10. `stories`: one finding for each story, ranked by what it is worth; `something_else`: what is left; `written`: the arm
+//!    for compensation.
+//! 11. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
 //! Products and factors of large matrices are in `algebra`.
 //!
@@ -26,9 +30,9 @@ pub mod cause;
 pub mod catalogue;
 mod algebra;
 mod correlated;
-mod discrepancy;
-mod halves;
-mod marginal;
+pub mod discrepancy;
+pub mod halves;
+pub mod marginal;
 mod standing;
 mod stories;
 mod something_else;

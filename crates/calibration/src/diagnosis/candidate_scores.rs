@@ -123,7 +123,12 @@ impl<'a> CandidateScores<'a> {
                 found.into_iter().map(|interval| {
                     let (from, to) = (dataset.rows[interval.from].number, dataset.rows[interval.to].number);
                     let disturbance = Disturbance::new(shift.kind.clone(), Course::Rows { from, to });
-                    let candidate = Candidate::measurement(disturbance, dataset, self.subject.nominal, self.subject.frames);
+                    let candidate = Candidate::measurement(
+                        disturbance,
+                        dataset,
+                        self.subject.nominal,
+                        self.subject.frames,
+                    );
                     Candidate { tried, ..candidate }
                 })
             })

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::cause::Cause;
+use super::cause::{Cause, MAP_KNOTS};
 use super::design::Design;
 use super::extension::Subject;
 use crate::identification::calibration::{Frames, rotations, shifts};
@@ -115,7 +115,12 @@ impl Candidate {
     }
 
     /// A candidate of the measurement.
-    pub fn measurement(disturbance: Disturbance, dataset: &Dataset, nominal: &Model, frames: &Frames) -> Self {
+    pub fn measurement(
+        disturbance: Disturbance,
+        dataset: &Dataset,
+        nominal: &Model,
+        frames: &Frames,
+    ) -> Self {
         let course: Vec<f64> = dataset.rows.iter().map(|r| disturbance.course.at(r)).collect();
         let push = |along| Regressor::Push { along, course: course.clone() };
         let regressors = match &disturbance.kind {
@@ -227,8 +232,6 @@ impl Columns {
 const COUPLINGS: [(usize, usize); 10] =
     [(3, 4), (3, 5), (4, 5), (4, 3), (5, 4), (5, 3), (1, 2), (2, 1), (2, 3), (0, 1)];
 
-/// Knots of an error map over a turn: a smooth curve.
-pub const MAP_KNOTS: usize = 24;
 /// Maps that follow the periods of a reducer's stages, tried where lines of the joint stand out within their reach: knots, and
 /// the highest order that they follow, for which a cubic spline needs nearly two and a half knots.
 pub const FINE: [(usize, usize); 2] = [(72, 30), (144, 60)];
@@ -371,7 +374,8 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
             }
         }
     }
-    let forms = forms(dataset, &columns).into_iter().map(|(form, tried)| (Kind::Form(form), Course::Always, tried));
+    let forms =
+        forms(dataset, &columns).into_iter().map(|(form, tried)| (Kind::Form(form), Course::Always, tried));
     list.into_iter()
         .chain(forms)
         .map(|(kind, course, tried)| Candidate {

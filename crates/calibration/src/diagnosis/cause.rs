@@ -13,6 +13,9 @@ pub enum Cause {
     Measurement(Disturbance),
 }
 
+/// Knots of an error map over a turn: a smooth curve.
+pub const MAP_KNOTS: usize = 24;
+
 impl Cause {
     /// The contract name.
     pub fn name(&self) -> &'static str {
@@ -63,9 +66,32 @@ impl Cause {
         match self {
             Cause::Arm(Effect::JointCompliance(c)) => c.compliance_rad_per_nm >= 0.0,
             Cause::Arm(Effect::Backlash(b)) => b.play_rad >= 0.0,
-            Cause::Measurement(Disturbance { kind: Kind::Sag, values, .. }) => values.iter().all(|v| *v >= 0.0),
+            Cause::Measurement(Disturbance { kind: Kind::Sag, values, .. }) => {
+                values.iter().all(|v| *v >= 0.0)
+            }
             _ => true,
         }
+    }
+
+    /// Whether it changes slowly over the joint angles, as what a fault that nobody has described does to a reading may too.
+    pub fn is_smooth(&self) -> bool {
+        match self {
+            Cause::Arm(Effect::GearMap(map)) => map.knots_rad.len() <= MAP_KNOTS,
+            Cause::Arm(effect) => {
+                !matches!(effect, Effect::Backlash(_) | Effect::GearTransmission(_) | Effect::ThermalDrift(_))
+            }
+            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(_) => false,
+        }
+    }
+
+    /// Whether it is a fault of the sensor of which only the shape is known, not the law.
+    pub fn is_roughly_described(&self) -> bool {
+        let form = match self {
+            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form,
+            _ => return false,
+        };
+        !form.is_of_the_arm()
     }
 
     /// Whether two causes would be told to a technician as the same thing: same name, same joints, rows that overlap.

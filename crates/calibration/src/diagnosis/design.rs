@@ -222,7 +222,8 @@ impl Linear {
             return self.clone();
         }
         let whitened = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.per) / noise;
-        let residual = whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
+        let residual =
+            whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
         self.with_rows(whitened(&self.rows.transpose()).transpose(), residual)
     }
 

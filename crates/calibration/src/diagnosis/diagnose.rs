@@ -217,6 +217,7 @@ pub fn diagnose(
         &trial.standings,
         &trial.discrepancy,
         &Worth::new(&searched, &found, &whole.design),
+        &found.causes,
         stages[1].fitted.rmse,
     );
     if smoothed.is_some() {
@@ -265,6 +266,7 @@ pub fn diagnose(
     for (place, story) in stories.iter().enumerate() {
         story.causes.iter().for_each(|&k| finding_of_cause[k] = place);
     }
+    let certain = stories::certain(&stories, &trial.standings);
     let (findings, pictures) = stories.into_iter().map(|s| (s.finding, s.picture)).unzip();
     let mut diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
@@ -294,7 +296,7 @@ pub fn diagnose(
         notes,
     };
     let of_all = thinned.is_none().then_some(&trial.discrepancy);
-    let written = written(&subject, &extended, &trial.standings, of_all);
+    let written = written(&subject, &extended, &certain, of_all);
     let mut written_stages = stages;
     if let Some(fit) = &written {
         written_stages[2] = validation.stage(fit);

@@ -108,7 +108,8 @@ impl Functions {
         out.push(Group::ScaleInTime, &single(&slopes.by_scale), &courses, per);
         out.push(Group::GrowthInTime, &single(&slopes.by_growth), &courses, per);
         out.push(Group::LoadInTime, &loads(dataset, subject.nominal, slopes, per), &courses, per);
-        let reading = if dataset.sensor == Sensor::Cable { single(&slopes.by_zero) } else { frame[..3].to_vec() };
+        let reading =
+            if dataset.sensor == Sensor::Cable { single(&slopes.by_zero) } else { frame[..3].to_vec() };
         for (group, reach) in [Group::CoarseField, Group::FineField].into_iter().zip(REACH_RAD) {
             out.push(group, &reading, &features(dataset, reach), per);
         }
@@ -231,15 +232,7 @@ impl Discrepancy {
     fn silent(self) -> Self {
         let columns = DMatrix::zeros(self.columns.nrows(), 0);
         let push_mm = vec![0.0; self.push_mm.len()];
-        Self {
-            columns,
-            in_time: Vec::new(),
-            carried: Vec::new(),
-            push_mm,
-            evidence: 0.0,
-            noise: 1.0,
-            ..self
-        }
+        Self { columns, in_time: Vec::new(), carried: Vec::new(), push_mm, evidence: 0.0, noise: 1.0, ..self }
     }
 
     /// The same where neighbouring rows are correlated by `rho`.
@@ -260,7 +253,7 @@ impl Discrepancy {
         let Variances { sizes, noise, evidence, coefficients } = marginal::variances(
             &projected.information,
             &projected.gradient,
-            &functions.groups,
+            &functions.groups.iter().map(|(_, range)| range.clone()).collect::<Vec<_>>(),
             (square, freedom),
             before.map(|b| b.sizes.as_slice()),
         );
@@ -273,8 +266,9 @@ impl Discrepancy {
             if size * size <= NOTHING * noise * noise {
                 continue;
             }
-            let part = functions.columns.columns(range.start, range.len())
-                * coefficients.rows(range.start, range.len());
+            // What links and frames would take over is not its own.
+            let own = if rho == 0.0 { &pure } else { &functions.columns };
+            let part = own.columns(range.start, range.len()) * coefficients.rows(range.start, range.len());
             let lengths: Vec<f64> = linear.slopes.mm.iter().zip(part.iter()).map(|(mm, v)| mm * v).collect();
             let square: f64 = lengths.iter().map(|l| l * l).sum();
             carried.push((*group, (square / linear.observations.max(1) as f64).sqrt()));
@@ -285,17 +279,18 @@ impl Discrepancy {
         carried.sort_by(|a, b| b.1.total_cmp(&a.1));
         let scaled: Vec<DVector<f64>> =
             kept.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
-        let columns = if scaled.is_empty() {
-            DMatrix::zeros(design.rows(), 0)
-        } else {
-            DMatrix::from_columns(&scaled)
-        };
+        let columns =
+            if scaled.is_empty() { DMatrix::zeros(design.rows(), 0) } else { DMatrix::from_columns(&scaled) };
         let correlation = if rho == 0.0 { correlation(&left, linear.per, numbers) } else { rho };
-        let push_mm = push_mm
-            .chunks(linear.per)
-            .map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt())
-            .collect();
+        let push_mm =
+            push_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
         Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation }
+    }
+
+    /// What depends on the pose alone is worth so much (mm RMS).
+    pub fn field_mm(&self) -> f64 {
+        let fields = self.carried.iter().filter(|(group, _)| !group.in_time());
+        fields.map(|(_, mm)| mm * mm).sum::<f64>().sqrt()
     }
 
     /// The columns that follow the rows.

@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::catalogue::{Candidate, Columns, MAP_KNOTS};
-use super::cause::Cause;
+use super::catalogue::{Candidate, Columns};
+use super::cause::{Cause, MAP_KNOTS};
 use super::design::FullDesign;
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Finding, Gain, Step};

@@ -29,7 +29,8 @@ pub fn halves(dataset: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let n = dataset.rows.len();
     let path = is_path(dataset);
     for pair in 0..HALVES as u64 / 2 - 1 {
-        let sides = if path { alternate(&poses, n, pair as usize) } else { random(&poses, seed.wrapping_add(pair)) };
+        let sides =
+            if path { alternate(&poses, n, pair as usize) } else { random(&poses, seed.wrapping_add(pair)) };
         out.extend(both(&poses, &sides));
     }
     out.extend(both(&poses, &sides_of_joint_space(dataset, &poses)));

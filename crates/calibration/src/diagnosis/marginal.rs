@@ -11,7 +11,6 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::algebra::{back_and_forth, factored, solved};
-use super::discrepancy::Group;
 
 /// Rounds of renewal: variances that go to nothing do so slowly, and are cut off by [`GONE`].
 const ROUNDS: usize = 30;
@@ -39,7 +38,7 @@ pub struct Variances {
 pub fn variances(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
-    groups: &[(Group, Range<usize>)],
+    groups: &[Range<usize>],
     (square, freedom): (f64, f64),
     start: Option<&[f64]>,
 ) -> Variances {
@@ -56,7 +55,7 @@ pub fn variances(
         let mut spent = 0.0;
         let mut moved = 0.0_f64;
         coefficients = state.coefficients(groups, &sizes);
-        for (g, (_, range)) in groups.iter().enumerate() {
+        for (g, range) in groups.iter().enumerate() {
             if sizes[g] == 0.0 {
                 continue;
             }
@@ -67,7 +66,8 @@ pub fn variances(
             moved = moved.max((next / sizes[g] - 1.0).abs());
             sizes[g] = if next < GONE * noise2.sqrt() { 0.0 } else { next };
         }
-        let left = square + 2.0 * gradient.dot(&coefficients) + (information * &coefficients).dot(&coefficients);
+        let left =
+            square + 2.0 * gradient.dot(&coefficients) + (information * &coefficients).dot(&coefficients);
         noise2 = (left / (nu - spent).max(0.05 * nu)).max(1e-12);
         if moved < SETTLED {
             break;
@@ -99,13 +99,13 @@ impl State {
     fn of(
         information: &DMatrix<f64>,
         gradient: &DVector<f64>,
-        groups: &[(Group, Range<usize>)],
+        groups: &[Range<usize>],
         sizes: &[f64],
         noise2: f64,
     ) -> Option<Self> {
         let m = gradient.len();
         let mut size = vec![0.0; m];
-        for ((_, range), s) in groups.iter().zip(sizes) {
+        for (range, s) in groups.iter().zip(sizes) {
             size[range.clone()].fill(*s);
         }
         let kept: Vec<usize> = (0..m).filter(|&k| size[k] > 0.0).collect();
@@ -130,9 +130,9 @@ impl State {
         Some(out)
     }
 
-    fn coefficients(&self, groups: &[(Group, Range<usize>)], sizes: &[f64]) -> DVector<f64> {
+    fn coefficients(&self, groups: &[Range<usize>], sizes: &[f64]) -> DVector<f64> {
         let mut out = self.unit.clone();
-        for ((_, range), s) in groups.iter().zip(sizes) {
+        for (range, s) in groups.iter().zip(sizes) {
             out.rows_mut(range.start, range.len()).apply(|v| *v *= s);
         }
         out

@@ -6,9 +6,9 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::halves::is_path;
 use crate::identification::fit::Observed;
 use crate::identification::rounding::{NotFused, ReadoutFusion, fuse_readout, logged_covariance};
-use super::halves::is_path;
 use crate::measurement::dataset::{Dataset, Motion};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};

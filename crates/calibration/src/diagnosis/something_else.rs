@@ -49,7 +49,9 @@ impl Left<'_> {
             ));
         }
         let floor = self.floor_mm.filter(|floor| rmse > ABOVE_FLOOR * floor)?;
-        Some(format!("{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"))
+        Some(format!(
+            "{rmse:.3} mm RMS against a floor of {floor:.3} mm, without a pattern: noise of sensor or arm"
+        ))
     }
 
     /// What it is like, largest part first.

@@ -34,7 +34,7 @@ use crate::measurement::sensor::disturbance::{Course, Disturbance};
 
 /// How a cause stood the trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
+pub(super) struct Standing {
     /// Whether it carries itself beside what no cause describes.
     pub beside: bool,
     /// Natural logarithm of its p-value there, corrected for trials.
@@ -59,7 +59,7 @@ const AHEAD: f64 = 6.0;
 
 impl Standing {
     /// Whether it may be called identified, as far as this goes.
-    pub fn stands(&self) -> bool {
+    pub(super) fn stands(&self) -> bool {
         let enough = self.asked == 0 || self.came_back + MISSED >= self.asked;
         self.beside && self.plausible && self.ahead >= AHEAD && enough && self.changed <= MISSED
     }
@@ -71,11 +71,14 @@ const OVERLAP: f64 = 0.8;
 /// A size that differs by less than this share is the same.
 const CHANGED: f64 = 0.5;
 
+/// Fall of χ² in all rows, beside geometry alone, below which a candidate is selected in no half.
+const SOME: f64 = 15.0;
+
 /// Non-centrality in a half from which the half can tell of a cause.
 const TELLING: f64 = 15.0;
 
 /// What the trial of all accepted causes came to.
-pub struct Trial {
+pub(super) struct Trial {
     /// One for each cause.
     pub standings: Vec<Standing>,
     /// What no cause describes, beside those that stood.
@@ -83,7 +86,7 @@ pub struct Trial {
 }
 
 /// What is tried: the final fit, linearised, with its causes.
-pub struct Charge<'a> {
+pub(super) struct Charge<'a> {
     /// The rows.
     pub subject: &'a Subject<'a>,
     /// The fit.
@@ -112,7 +115,7 @@ struct Tried {
 
 impl Charge<'_> {
     /// Tries all causes.
-    pub fn tried(&self) -> Trial {
+    pub(super) fn tried(&self) -> Trial {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
         let raw = self.raw;
@@ -120,12 +123,7 @@ impl Charge<'_> {
             self.found.causes.par_iter().map(|cause| self.tried_cause(cause, raw)).collect();
         let (mut standings, out, discrepancy) = self.beside(&functions, &own, &numbers);
         if !own.is_empty() {
-            let pool: Vec<Tried> = self
-                .pool
-                .par_iter()
-                .filter(|s| s.candidate.cause.rows().is_none())
-                .map(|s| Tried { columns: s.candidate.columns(raw), candidate: Arc::clone(&s.candidate) })
-                .collect();
+            let pool = self.pool(&discrepancy, &numbers);
             let halves = halves(&self.subject.observed.dataset, self.options.seed);
             let told: Vec<Vec<Option<(bool, bool)>>> = halves
                 .par_iter()
@@ -142,6 +140,31 @@ impl Charge<'_> {
             }
         }
         Trial { standings, discrepancy }
+    }
+
+    /// Candidates that explain anything of what geometry leaves; the others are selected in no half.
+    fn pool(&self, discrepancy: &Discrepancy, numbers: &[usize]) -> Vec<Tried> {
+        let all: Vec<Tried> = self
+            .pool
+            .par_iter()
+            .filter(|s| s.candidate.cause.rows().is_none())
+            .map(|s| Tried { columns: s.candidate.columns(self.raw), candidate: Arc::clone(&s.candidate) })
+            .collect();
+        let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
+        let every: Vec<usize> = (0..self.found.causes.len()).collect();
+        let linear = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise);
+        let design = linear.design(&self.places(&every));
+        let columns: Vec<DMatrix<f64>> =
+            all.par_iter().map(|t| filter(&t.columns, rho, numbers, linear.per) / noise).collect();
+        let projected = design.project_all(&columns);
+        all.into_iter()
+            .zip(projected)
+            .filter(|(t, p)| {
+                let candidate = &t.candidate;
+                score_projected(p, &candidate.cause.sizes(), candidate.tried).gain > SOME
+            })
+            .map(|(t, _)| t)
+            .collect()
     }
 
     fn tried_cause(&self, cause: &Cause, raw: &Design) -> Tried {
@@ -309,7 +332,8 @@ impl<'a> Half<'a> {
         // The kind in all rows, not only in its own.
         let always = Disturbance::new(disturbance.kind.clone(), Course::Always);
         let (dataset, nominal) = (&self.charge.subject.observed.dataset, self.charge.subject.nominal);
-        let everywhere = Candidate::measurement(always, dataset, nominal, self.charge.subject.frames).columns(self.charge.raw);
+        let everywhere = Candidate::measurement(always, dataset, nominal, self.charge.subject.frames)
+            .columns(self.charge.raw);
         let everywhere = self.columns(&everywhere);
         let Some(strip) = Strip::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
             return score.evidence > 0.0;

@@ -49,6 +49,7 @@ pub(super) fn told(
     standings: &[Standing],
     discrepancy: &Discrepancy,
     worth: &Worth,
+    causes: &[Cause],
     geometric_mm: f64,
 ) -> Vec<Story> {
     for story in &mut stories {
@@ -58,6 +59,7 @@ pub(super) fn told(
         }
         story.finding.worth_mm = Some(worth.of(&story.causes));
     }
+    overshadow(&mut stories, standings, discrepancy, worth, causes);
     let smooth = discrepancy.in_time();
     let is_shift = |s: &Story| s.finding.rows.is_some();
     let drowned = |s: &Story| smooth && s.causes.iter().all(|&k| !standings[k].beside);
@@ -74,6 +76,41 @@ pub(super) fn told(
     }
     stories
 }
+
+/// Smooth causes of the arm that are worth less than what nothing describes, or than a fault of the sensor that is only
+/// roughly described, may be parts of those: they are not certain.
+fn overshadow(
+    stories: &mut [Story],
+    standings: &[Standing],
+    discrepancy: &Discrepancy,
+    worth: &Worth,
+    causes: &[Cause],
+) {
+    let rough = (0..causes.len())
+        .filter(|&k| causes[k].is_roughly_described() && standings[k].stands())
+        .map(|k| worth.of(&[k]))
+        .fold(discrepancy.field_mm(), f64::max);
+    for story in stories {
+        let smooth = story.causes.iter().all(|&k| causes[k].is_smooth());
+        if smooth && story.finding.worth_mm.is_some_and(|mm| mm < rough) {
+            story.finding.confidence = Confidence::Ambiguous;
+        }
+    }
+}
+
+/// Of each cause whether it is certain enough to move programs.
+pub(super) fn certain(stories: &[Story], standings: &[Standing]) -> Vec<bool> {
+    let mut out: Vec<bool> = standings.iter().map(Standing::stands).collect();
+    for story in stories.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
+        if story.finding.confidence == Confidence::Ambiguous {
+            story.causes.iter().for_each(|&k| out[k] = false);
+        }
+    }
+    out
+}
+
+/// What small disturbances are called together.
+const SMALL_DISTURBANCES: &str = "small-disturbances";
 
 /// Puts findings in the order of what they are worth; those without a number come last, as they were.
 pub(super) fn rank(stories: &mut [Story]) {
@@ -122,11 +159,12 @@ fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool, smooth: bool) -
         })
         .collect();
     sessions.sort_by_key(|s| s.rows);
-    let confidence = if steps && !smooth && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
-        Confidence::Identified
-    } else {
-        Confidence::Ambiguous
-    };
+    let confidence =
+        if steps && !smooth && members.iter().any(|s| s.finding.confidence == Confidence::Identified) {
+            Confidence::Identified
+        } else {
+            Confidence::Ambiguous
+        };
     Finding {
         effect: "setup-change".to_owned(),
         cause: if steps {
@@ -152,7 +190,7 @@ fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool, smooth: bool) -
 
 fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
     Finding {
-        effect: "small-disturbances".to_owned(),
+        effect: SMALL_DISTURBANCES.to_owned(),
         cause: format!(
             "{} small disturbance{}, together {worth_mm:.4} mm: too little to send anybody to a part",
             members.len(),
@@ -173,7 +211,7 @@ fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
         worth_mm: Some(worth_mm),
         sessions: Vec::new(),
         alternatives: Vec::new(),
-        remedy: words::remedy("small-disturbances").to_owned(),
+        remedy: words::remedy(SMALL_DISTURBANCES).to_owned(),
     }
 }
 
@@ -197,9 +235,10 @@ impl Worth {
                         Candidate::arm(effect.clone(), dataset, nominal),
                         effect.parameters().iter().map(|p| p.value).collect::<Vec<_>>(),
                     ),
-                    Cause::Measurement(d) => {
-                        (Candidate::measurement(d.clone(), dataset, nominal, subject.frames), d.values.clone())
-                    }
+                    Cause::Measurement(d) => (
+                        Candidate::measurement(d.clone(), dataset, nominal, subject.frames),
+                        d.values.clone(),
+                    ),
                 };
                 let push = candidate.columns(raw) * nalgebra::DVector::from_vec(values);
                 push.iter().zip(&raw.slopes.mm).map(|(v, mm)| v * mm).collect()

@@ -176,13 +176,18 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
             1e3 * value.abs()
         ),
         Form::LastStep => {
-            format!("readings were taken before the arm stood still: {:.2} % of the last step was still to come", 100.0 * value.abs())
+            format!(
+                "readings were taken before the arm stood still: {:.2} % of the last step was still to come",
+                100.0 * value.abs()
+            )
         }
         Form::SlowReading => format!(
             "readings were taken before the sensor had settled: {:.2} % of the way from the last one was still to come",
             100.0 * value.abs()
         ),
-        Form::Stiffness { .. } => format!("joint {joint} does not yield in proportion to its torque: its spring hardens, or has play"),
+        Form::Stiffness { .. } => format!(
+            "joint {joint} does not yield in proportion to its torque: its spring hardens, or has play"
+        ),
         Form::TwoJointGear { other, .. } => {
             format!("the error of joint {joint} depends on its own angle and on that of joint {}", other + 1)
         }
@@ -190,9 +195,17 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
             "the tracker's beam is bent: {:.3} mm at 3 m, in proportion to the square of the distance, as by air that is warmer above than below",
             9e3 * value.abs()
         ),
-        Form::Pulley => "the cable's length depends on its direction, as over a pulley or through a worn outlet".to_owned(),
-        Form::Drum => "the cable's reading is not in proportion to its length, as from a drum wound in layers".to_owned(),
-        Form::Nest { .. } => "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned(),
+        Form::Pulley => {
+            "the cable's length depends on its direction, as over a pulley or through a worn outlet"
+                .to_owned()
+        }
+        Form::Drum => {
+            "the cable's reading is not in proportion to its length, as from a drum wound in layers"
+                .to_owned()
+        }
+        Form::Nest { .. } => {
+            "the target's centre depends on the direction from which it is seen: nest or reflector".to_owned()
+        }
     }
 }
 
@@ -216,7 +229,9 @@ pub fn pattern(cause: &Cause) -> String {
         "latency" => "the residual follows the speed of the joints".to_owned(),
         "unsettled" => "the residual points back to the pose before".to_owned(),
         "joint-stiffness" => format!("the residual turned to joint {joint} follows powers of its torque"),
-        "gear-two-joints" => format!("the residual turned to joint {joint} swings with the angles of two joints"),
+        "gear-two-joints" => {
+            format!("the residual turned to joint {joint} swings with the angles of two joints")
+        }
         "air-refraction" => "the residual grows up or down with the square of the distance".to_owned(),
         "cable-pulley" => "the residual follows the direction of the cable".to_owned(),
         "cable-drum" => "the residual follows powers of the cable's length".to_owned(),
@@ -265,9 +280,15 @@ pub fn remedy(effect: &str) -> &'static str {
         "joint-stiffness" => {
             "measure this joint with and without load, approached under the same torque; the model that is written has its linear part"
         }
-        "gear-two-joints" => "measure both joints over their whole range, one at a time and together; look at the cable that crosses them",
-        "air-refraction" => "measure at even temperature and from near, or with the tracker at the height of the arm",
-        "cable-pulley" => "look at outlet and pulley; measure with the cable in one direction as far as possible",
+        "gear-two-joints" => {
+            "measure both joints over their whole range, one at a time and together; look at the cable that crosses them"
+        }
+        "air-refraction" => {
+            "measure at even temperature and from near, or with the tracker at the height of the arm"
+        }
+        "cable-pulley" => {
+            "look at outlet and pulley; measure with the cable in one direction as far as possible"
+        }
         "cable-drum" => "check the cable sensor against a length standard over its whole range",
         "target-nest" => "turn the target towards the sensor; check its nest and exchange the reflector",
         "cable-sag" => "raise the cable's tension or shorten the distance",

@@ -8,24 +8,26 @@
 use super::cause::Cause;
 use super::design::Linear;
 use super::discrepancy::Discrepancy;
-use super::extension::{Extended, Freedom, Subject, fit, filled};
-use super::standing::Standing;
+use super::extension::{Extended, Freedom, Subject, filled, fit};
+use crate::measurement::sensor::disturbance::Kind;
 
-/// The fit whose arm is written; `None` where it is the extended one. `discrepancy` is that of the same rows.
+/// The fit whose arm is written; `None` where it is the extended one. `certain` says it of each cause that was tried, and
+/// `discrepancy` is that of the same rows.
 pub(super) fn written(
     subject: &Subject<'_>,
     extended: &Extended,
-    standings: &[Standing],
+    certain: &[bool],
     discrepancy: Option<&Discrepancy>,
 ) -> Option<Extended> {
-    let certain = |(k, cause): (usize, &Cause)| {
-        matches!(cause, Cause::Measurement(_)) || standings.get(k).is_none_or(Standing::stands)
-    };
     let kept: Vec<Cause> = extended
         .causes
         .iter()
         .enumerate()
-        .filter(|&(k, cause)| certain((k, cause)))
+        .filter(|&(k, cause)| match cause {
+            // What no arm can carry is left to what it can.
+            Cause::Measurement(d) => !matches!(d.kind, Kind::Form(form) if form.is_of_the_arm()),
+            Cause::Arm(_) => certain.get(k) != Some(&false),
+        })
         .map(|(_, cause)| cause.clone())
         .collect();
     let wandered = discrepancy.filter(|d| d.in_time());

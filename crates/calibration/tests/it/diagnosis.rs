@@ -6,5 +6,6 @@ mod simulator;
 #[path = "diagnosis/scenarios.rs"]
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod scenarios;
+mod certain;
 mod found;
 mod parts;

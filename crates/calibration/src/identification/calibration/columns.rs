@@ -180,7 +180,8 @@ impl Columns {
     ) {
         let last = dataset.rows.len().saturating_sub(1);
         for (index, disturbance) in frames.disturbances.iter().enumerate() {
-            for (parameter, rotation) in rotations(&disturbance.kind, dataset, start).into_iter().enumerate() {
+            for (parameter, rotation) in rotations(&disturbance.kind, dataset, start).into_iter().enumerate()
+            {
                 let course = &self.courses[index];
                 let rotation: [Option<Vec<f64>>; 6] =
                     rotation.map(|r| r.map(|r| (0..padded).map(|i| course[i] * r[i.min(last)]).collect()));

@@ -84,7 +84,8 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
     match form {
         Form::SlowReading => pushed(&|row, _| {
             let Some(motion) = &row.motion else { return vec![Vector3::zeros()] };
-            let (here, before) = (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
+            let (here, before) =
+                (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
             vec![here - before]
         }),
         Form::Refraction => pushed(&|row, away| {

@@ -75,6 +75,11 @@ impl Form {
         }
     }
 
+    /// Whether it is a fault of the arm, which no model carries so far, and not of the measurement.
+    pub fn is_of_the_arm(self) -> bool {
+        matches!(self, Form::Stiffness { .. } | Form::TwoJointGear { .. })
+    }
+
     /// Whether it turns joints; the others shift the sensor.
     pub fn turns(self) -> bool {
         matches!(self, Form::Latency | Form::LastStep | Form::Stiffness { .. } | Form::TwoJointGear { .. })
@@ -93,9 +98,15 @@ impl Form {
                 out.extend(listed(&["cube of the torque"], "rad/(N m)³"));
                 out
             }
-            Form::TwoJointGear { .. } => {
-                listed(&["sine of the sum", "cosine of the sum", "sine of the difference", "cosine of the difference"], "rad")
-            }
+            Form::TwoJointGear { .. } => listed(
+                &[
+                    "sine of the sum",
+                    "cosine of the sum",
+                    "sine of the difference",
+                    "cosine of the difference",
+                ],
+                "rad",
+            ),
             Form::Refraction => {
                 let mut out = listed(&["bend of the beam"], "1/m");
                 out.extend(listed(&["its change with height"], "1/m²"));
@@ -106,7 +117,8 @@ impl Form {
             Form::Nest { second: false } => listed(&FIRST, "mm"),
             Form::Nest { second: true } => {
                 let products = ["xy", "yz", "zx", "x² − y²", "3z² − 1"];
-                let of_axes = ["x", "y", "z"].iter().flat_map(|axis| products.map(|p| format!("{axis}: {p}")));
+                let of_axes =
+                    ["x", "y", "z"].iter().flat_map(|axis| products.map(|p| format!("{axis}: {p}")));
                 listed(&FIRST, "mm").into_iter().chain(of_axes.map(|name| (name, "mm"))).collect()
             }
         }

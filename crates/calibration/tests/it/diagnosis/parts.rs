@@ -179,7 +179,7 @@ fn a_refit_by_one_step_is_a_refit() {
         for (index, cause) in fitted.causes.iter().enumerate() {
             let candidate = match cause.clone() {
                 Cause::Arm(effect) => Candidate::arm(effect, dataset, subject.nominal),
-                Cause::Measurement(d) => Candidate::measurement(d, dataset, subject.nominal),
+                Cause::Measurement(d) => Candidate::measurement(d, dataset, subject.nominal, subject.frames),
             };
             let (columns, sizes) = (candidate.columns(&design), cause.sizes());
             let without = held.without(&fitted.places(index));

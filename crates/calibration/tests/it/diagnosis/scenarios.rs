@@ -192,10 +192,8 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
     let sure = |f: &&Finding| f.confidence == Confidence::Identified;
     let identified: Vec<bool> =
         hidden.iter().map(|h| findings.iter().filter(sure).any(|f| matches(h, f, setup.rows))).collect();
-    let strange: Vec<&Finding> = findings
-        .iter()
-        .filter(|f| !hidden.iter().any(|h| accounts(h, f, setup.rows, &setup.log)))
-        .collect();
+    let strange: Vec<&Finding> =
+        findings.iter().filter(|f| !hidden.iter().any(|h| accounts(h, f, setup.rows, &setup.log))).collect();
     let wrong_identified = strange.iter().copied().filter(|f| sure(&f)).count();
     let wrong = strange.into_iter().map(told).collect();
     let mut truth: Vec<Cause> = hidden.iter().filter_map(cause).collect();

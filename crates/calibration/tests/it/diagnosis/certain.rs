@@ -1,0 +1,218 @@
+//! What may be called identified: what wins beside what nobody has described, comes back in halves of the rows, and is of a
+//! size that nature has. Here stand disturbances that the catalogue does not hold, or holds as one story of several.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::backlash::Backlash;
+use truegrind_arm::effect::compliance::Compliance;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::robots;
+use truegrind_calibration::diagnosis::cause::Cause;
+use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
+use truegrind_calibration::diagnosis::halves::{HALVES, halves, is_path};
+use truegrind_calibration::diagnosis::marginal::variances;
+use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+
+use super::scenarios::frames;
+use super::simulator::{Hidden, Log, Setup, run};
+
+fn arm() -> Model {
+    robots::load("abb-irb-120").unwrap().model
+}
+
+fn setup(sensor: Sensor, rows: usize, seed: u64) -> Setup {
+    Setup { sensor, rows, sigma_mm: 0.03, dirty: true, seed, log: Log::default() }
+}
+
+fn diagnosed(dataset: &Dataset) -> Diagnosed {
+    let arm = arm();
+    diagnose(dataset, "arm", &arm, &frames(dataset, &arm), &Options::default(), &|_| {}).unwrap()
+}
+
+fn identified(found: &Diagnosed) -> Vec<&Finding> {
+    found.diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).collect()
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Adds noise whose value is `rho` times that of the row before.
+fn correlate(dataset: &mut Dataset, rho: f64, sigma_mm: f64, seed: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut state = Vector3::zeros();
+    for row in dataset.rows.iter_mut() {
+        let fresh = Vector3::from_fn(|_, _| normal(&mut rng));
+        state = state * rho + fresh * (sigma_mm * (1.0 - rho * rho).sqrt());
+        match &mut row.reading {
+            Reading::Cable(length) => *length += state.x,
+            Reading::Position(p) => *p += state,
+            Reading::Pose(_) => {}
+        }
+    }
+}
+
+/// A smooth path of an arm like the data sheet's, read `delay_s` too late by a tracker at the base.
+fn path(delay_s: f64, rows: usize) -> Dataset {
+    let (arm, mut rng) = (arm(), ChaCha8Rng::seed_from_u64(5));
+    let target = nalgebra::Point3::new(20.0, -30.0, 80.0);
+    let joints = |t: f64| {
+        Joints::from_fn(|j, _| {
+            let k = j as f64;
+            0.5 * (0.11 * t * (1.0 + 0.31 * k) + k).sin()
+                + 0.35 * (0.23 * t * (1.0 + 0.17 * k) + 2.0 * k).cos()
+        })
+    };
+    let rows: Vec<Row> = (0..rows)
+        .map(|number| {
+            let t = 0.25 * number as f64;
+            let at = (arm.forward(&joints(t - delay_s), &Condition::default()) * target).coords;
+            let noise = Vector3::from_fn(|_, _| 0.02 * normal(&mut rng));
+            let mut row = Row::new(number, joints(t), Reading::Position(at + noise));
+            row.condition.time_h = Some(t / 3600.0);
+            row
+        })
+        .collect();
+    Dataset::new("path.csv", Sensor::Position, rows)
+}
+
+#[test]
+fn readings_that_resemble_the_one_before_are_no_cause() {
+    for (sensor, seed) in [(Sensor::Position, 31), (Sensor::Cable, 32), (Sensor::Position, 33)] {
+        let mut dataset = run(&arm(), &[], &setup(sensor, 300, seed)).dataset;
+        correlate(&mut dataset, 0.8, 0.08, seed);
+        let found = diagnosed(&dataset);
+        let named: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
+        assert!(named.is_empty(), "{sensor:?} {seed}: {named:?}");
+    }
+}
+
+#[test]
+fn a_reading_that_is_late_is_told_with_its_delay() {
+    let dataset = path(0.02, 400);
+    assert!(is_path(&dataset));
+    let found = diagnosed(&dataset);
+    let late = &found.diagnosis.findings[0];
+    assert_eq!((late.effect.as_str(), late.confidence), ("latency", Confidence::Identified));
+    let delay = &late.parameters[0];
+    assert_eq!(delay.unit, "s");
+    assert!((delay.value.abs() - 0.02).abs() < 4.0 * delay.sigma.unwrap() + 1e-4, "{delay:?}");
+    assert!(late.worth_mm.unwrap() > 0.1, "{:?}", late.worth_mm);
+    assert!(found.estimated.model.effects.is_empty(), "a fault of the measurement is left behind");
+}
+
+#[test]
+fn many_shifts_are_one_story_with_a_table() {
+    let shift = |from, to, x| Hidden::Frame { from, to, mm: [x, 0.5 * x, -x] };
+    let hidden = [shift(50, 109, 0.9), shift(150, 209, -0.8), shift(260, 299, 1.1)];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 300, 34)).dataset);
+    let shifts = found.diagnosis.findings.iter().filter(|f| f.rows.is_some()).count();
+    assert_eq!(shifts, 0, "each shift on its own");
+    let story = found.diagnosis.findings.iter().find(|f| f.effect == "setup-change").unwrap();
+    assert!(story.sessions.len() >= 3, "{:?}", story.sessions);
+    assert!(story.sessions.windows(2).all(|s| s[0].rows <= s[1].rows));
+    assert_eq!(found.pictures.len(), found.diagnosis.findings.len());
+    assert!(found.finding_of_cause.iter().all(|&place| place < found.diagnosis.findings.len()));
+}
+
+#[test]
+fn findings_come_in_the_order_of_what_they_are_worth() {
+    let hidden = [
+        Hidden::Gear { joint: 0, order: 1.0, peak_rad: 0.0006, phase: 0.3 },
+        Hidden::Gear { joint: 1, order: 2.0, peak_rad: 0.002, phase: 1.0 },
+    ];
+    let found = diagnosed(&run(&arm(), &hidden, &setup(Sensor::Position, 300, 35)).dataset);
+    let worth: Vec<f64> = found.diagnosis.findings.iter().filter_map(|f| f.worth_mm).collect();
+    assert!(worth.len() >= 2 && worth.windows(2).all(|w| w[0] >= w[1]), "{worth:?}");
+    assert_eq!(found.diagnosis.findings[0].joints, Some(vec![2]));
+}
+
+#[test]
+fn what_is_not_certain_does_not_move_programs() {
+    let hidden = [Hidden::Gear { joint: 2, order: 1.0, peak_rad: 0.0015, phase: 0.7 }];
+    let mut dataset = run(&arm(), &hidden, &setup(Sensor::Position, 300, 36)).dataset;
+    correlate(&mut dataset, 0.9, 0.1, 36);
+    let found = diagnosed(&dataset);
+    let sure = |effect: &Effect| {
+        identified(&found)
+            .iter()
+            .any(|f| f.effect == effect.name() && f.joints == effect.joint().map(|j| vec![j + 1]))
+    };
+    let written = &found.estimated.model.effects;
+    assert!(written.iter().all(sure), "{written:?}");
+    assert!(written.iter().any(|e| e.joint() == Some(2)), "the gear is certain: {written:?}");
+}
+
+#[test]
+fn nature_has_no_joint_that_yields_upwards() {
+    let compliance =
+        |size| Cause::Arm(Effect::JointCompliance(Compliance { joint: 1, compliance_rad_per_nm: size }));
+    let play = |size| Cause::Arm(Effect::Backlash(Backlash { joint: 1, play_rad: size }));
+    let sag = |size| {
+        Cause::Measurement(Disturbance { values: vec![size], ..Disturbance::new(Kind::Sag, Course::Always) })
+    };
+    for of in [&compliance as &dyn Fn(f64) -> Cause, &play, &sag] {
+        assert!(of(1e-5).is_possible() && !of(-1e-5).is_possible());
+    }
+}
+
+#[test]
+fn halves_are_complements_and_keep_repeated_poses_together() {
+    let mut rows: Vec<Row> =
+        run(&arm(), &[], &setup(Sensor::Cable, 60, 37)).dataset.rows.iter().cloned().collect();
+    let again: Vec<Row> = rows.iter().take(20).cloned().collect();
+    rows.extend(again);
+    for (number, row) in rows.iter_mut().enumerate() {
+        row.number = number;
+    }
+    let dataset = Dataset::new("twice.csv", Sensor::Cable, rows);
+    assert!(!is_path(&dataset));
+    let all = halves(&dataset, 3);
+    assert_eq!(all.len(), HALVES);
+    assert_eq!(all, halves(&dataset, 3));
+    for pair in all.chunks(2) {
+        let mut both = pair.concat();
+        both.sort_unstable();
+        assert_eq!(both, (0..80).collect::<Vec<_>>());
+        assert!(pair.iter().all(|half| half.len() > 25), "{} and {}", pair[0].len(), pair[1].len());
+        assert!((0..20).all(|i| pair[0].contains(&i) == pair[0].contains(&(i + 60))));
+    }
+}
+
+#[test]
+fn variances_are_those_from_which_coefficients_were_drawn() {
+    let mut rng = ChaCha8Rng::seed_from_u64(38);
+    let (n, m) = (2000, 80);
+    let columns = DMatrix::from_fn(n, m, |_, _| normal(&mut rng));
+    // The first group pushes by 0.5, the second not at all; noise 2.
+    let drawn = DVector::from_fn(m, |k, _| if k < 40 { 0.5 * normal(&mut rng) } else { 0.0 });
+    let residual: DVector<f64> = -(&columns * &drawn) + DVector::from_fn(n, |_, _| 2.0 * normal(&mut rng));
+    let found = variances(
+        &(columns.transpose() * &columns),
+        &columns.tr_mul(&residual),
+        &[0..40, 40..80],
+        (residual.norm_squared(), n as f64),
+        None,
+    );
+    assert!((found.sizes[0] - 0.5).abs() < 0.15, "{:?}", found.sizes);
+    assert!(found.sizes[1] < 0.06, "{:?}", found.sizes);
+    assert!((found.noise - 2.0).abs() < 0.1, "{}", found.noise);
+    assert!(found.evidence > 100.0, "{}", found.evidence);
+    assert!((&found.coefficients - &drawn).norm() < 0.5 * drawn.norm());
+    let nothing = DVector::from_fn(n, |_, _| 2.0 * normal(&mut rng));
+    let none = variances(
+        &(columns.transpose() * &columns),
+        &columns.tr_mul(&nothing),
+        &[0..40, 40..80],
+        (nothing.norm_squared(), n as f64),
+        None,
+    );
+    assert!(none.evidence < 6.0, "{}", none.evidence);
+}
