@@ -31,9 +31,22 @@ pub struct Sheet {
     pub centre: [[f64; 3]; 6],
     /// Lowest and highest angle of each joint where poses are drawn (deg).
     pub room_deg: [[f64; 2]; 6],
-    /// Links that are long beams: the link, and the joints whose yielding looks like its bending, all from 0.
-    pub beams: [(usize, [usize; 2]); 2],
+    /// Upper arm and forearm.
+    pub beams: [Beam; 2],
 }
+
+/// A part of an arm that is a long beam.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Beam {
+    /// The body, from 0.
+    pub body: usize,
+    /// Joints whose yielding looks like its bending, from 1.
+    pub joints: [usize; 2],
+    /// Links of the data sheet that it is made of, from 1.
+    pub links: &'static [usize],
+}
+
+const UPPER_ARM: Beam = Beam { body: 1, joints: [2, 3], links: &[2] };
 
 /// The arms.
 pub const SHEETS: [Sheet; 3] = [
@@ -64,7 +77,7 @@ pub const SHEETS: [Sheet; 3] = [
             [-100.0, 100.0],
             [-150.0, 150.0],
         ],
-        beams: [(1, [1, 2]), (3, [2, 4])],
+        beams: [UPPER_ARM, Beam { body: 3, joints: [3, 5], links: &[3, 4] }],
     },
     Sheet {
         name: "universal-robots-ur10",
@@ -93,7 +106,7 @@ pub const SHEETS: [Sheet; 3] = [
             [-140.0, 140.0],
             [-160.0, 160.0],
         ],
-        beams: [(1, [1, 2]), (2, [2, 3])],
+        beams: [UPPER_ARM, Beam { body: 2, joints: [3, 4], links: &[3] }],
     },
     Sheet {
         name: "staubli-tx60",
@@ -122,7 +135,7 @@ pub const SHEETS: [Sheet; 3] = [
             [-105.0, 105.0],
             [-160.0, 160.0],
         ],
-        beams: [(1, [1, 2]), (3, [2, 4])],
+        beams: [UPPER_ARM, Beam { body: 3, joints: [3, 5], links: &[3, 4] }],
     },
 ];
 

@@ -10,7 +10,7 @@ use rand::Rng;
 use crate::arms::{Angles, Arm, Pose, Sheet, Strain};
 use crate::designs::{Visit, Walk};
 use crate::sensors::{Reading, Sensor};
-use crate::truth::{Kind, Truth};
+use crate::truth::{Kind, Parts, Truth};
 
 /// The shape of an effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,8 +75,8 @@ pub struct Scene<'a> {
 impl Hidden {
     /// Draws the shape of a kind, at size 1.
     pub fn draw(kind: Kind, scene: &Scene<'_>, rng: &mut impl Rng) -> Self {
-        let (shape, joints) = match kind {
-            Kind::Clean => (Shape::Nothing, Vec::new()),
+        let (shape, parts) = match kind {
+            Kind::Clean => (Shape::Nothing, Parts::default()),
             Kind::WarmLinks
             | Kind::Hardening
             | Kind::DeadBand
@@ -84,23 +84,23 @@ impl Hidden {
             | Kind::TwoJointGear
             | Kind::ModulatedGear
             | Kind::LoadedPlay => {
-                let (shape, joints) = arm::Shape::draw(kind, scene, rng);
-                (Shape::Arm(shape), joints)
+                let (shape, parts) = arm::Shape::draw(kind, scene, rng);
+                (Shape::Arm(shape), parts)
             }
             Kind::Pulley | Kind::Drum | Kind::Catenary | Kind::Refraction | Kind::Nest => {
-                (Shape::Sensor(sensor::Shape::draw(kind, scene, rng)), Vec::new())
+                (Shape::Sensor(sensor::Shape::draw(kind, scene, rng)), Parts::default())
             }
-            Kind::Drift => (Shape::Drift(drift::Shape::readings(scene, rng)), Vec::new()),
-            Kind::Settling => (Shape::Drift(drift::Shape::base(scene, rng)), Vec::new()),
-            Kind::Latency => (Shape::Latency(crate::draw::between(rng, 0.0, 0.5)), Vec::new()),
+            Kind::Drift => (Shape::Drift(drift::Shape::readings(scene, rng)), Parts::default()),
+            Kind::Settling => (Shape::Drift(drift::Shape::base(scene, rng)), Parts::default()),
+            Kind::Latency => (Shape::Latency(crate::draw::between(rng, 0.0, 0.5)), Parts::default()),
             Kind::Unsettled => {
                 let shares = std::array::from_fn(|_| crate::draw::between(rng, 0.0, 1.0).powi(2));
-                (Shape::Unsettled(shares, crate::draw::between(rng, 0.3, 1.5)), Vec::new())
+                (Shape::Unsettled(shares, crate::draw::between(rng, 0.3, 1.5)), Parts::default())
             }
-            Kind::Correlated => (Shape::Correlated(crate::draw::between(rng, 0.7, 0.97)), Vec::new()),
+            Kind::Correlated => (Shape::Correlated(crate::draw::between(rng, 0.7, 0.97)), Parts::default()),
         };
         let families = kind.families(scene.sensor.kind);
-        Self { shape, size: 1.0, truth: Truth { kind, families, joints } }
+        Self { shape, size: 1.0, truth: Truth { kind, families, parts } }
     }
 
     /// The same at another size.

@@ -122,7 +122,7 @@ pub fn setting(case: &Case) -> Setting {
         design: case.walk.design,
         rows: case.walk.visits.len(),
         worth: case.worth,
-        joints: case.hidden.truth.joints.clone(),
+        joints: case.hidden.truth.parts.joints.clone(),
     }
 }
 

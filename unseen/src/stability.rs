@@ -6,7 +6,7 @@ use crate::case::Case;
 use crate::draw::Purpose;
 use crate::score::{Setting, setting};
 use crate::table::{Line, text};
-use crate::truth::Kind;
+use crate::truth::{Kind, Meaning, meanings};
 use crate::under_test::{Finding, diagnosed};
 
 /// A change that should change nothing.
@@ -69,7 +69,7 @@ impl Change {
 pub struct Stability {
     /// What it was.
     pub setting: Setting,
-    /// Identified findings of the rows as they are.
+    /// Identified causes of the rows as they are; that something is left without a name is none.
     pub plain: Vec<Finding>,
     /// Those after each change, and whether they are the same.
     pub changed: Vec<(Change, Vec<Finding>, bool)>,
@@ -79,7 +79,8 @@ pub struct Stability {
 
 fn identified(file: &str, robot: &str) -> Result<Vec<Finding>, String> {
     let all = diagnosed(file, robot)?.findings;
-    Ok(all.into_iter().filter(|finding| finding.identified).collect())
+    let named = |f: &Finding| f.identified && meanings(&f.effect, &f.parameters) != [Meaning::SomethingElse];
+    Ok(all.into_iter().filter(named).collect())
 }
 
 /// Diagnoses a case as it is and after each change.

@@ -161,15 +161,31 @@ pub enum Kind {
     Settling,
 }
 
-/// Who may be told of a kind, and who must.
+/// Parts of an arm that have something, from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Parts {
+    /// Joints.
+    pub joints: Vec<usize>,
+    /// Links of the data sheet.
+    pub links: Vec<usize>,
+}
+
+impl Parts {
+    /// One joint, from 0.
+    pub fn joint(joint: usize) -> Self {
+        Self { joints: vec![joint + 1], links: Vec::new() }
+    }
+}
+
+/// What is true of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Truth {
     /// What was hidden.
     pub kind: Kind,
     /// Families that are true of it.
     pub families: Vec<Family>,
-    /// Joints that have it, from 1; empty where no joint has.
-    pub joints: Vec<usize>,
+    /// Parts that have it.
+    pub parts: Parts,
 }
 
 /// What one finding is worth.
@@ -285,7 +301,8 @@ impl Kind {
 }
 
 impl Truth {
-    /// Marks a finding: its meaning and its joints, from 1. Of a coupling, driver and driven joint, the driven one counts.
+    /// Marks a finding: its meaning and the numbers that it has for joints. Of a coupling, driver and driven joint, the driven one
+    /// counts; where links grow or bend the numbers are those of links.
     pub fn mark(&self, effect: &str, meaning: Meaning, joints: Option<&[usize]>) -> Mark {
         let family = match meaning {
             Meaning::SomethingElse => return Mark::None,
@@ -300,6 +317,8 @@ impl Truth {
             Some(joints) => joints,
             None => &[],
         };
-        if told.iter().all(|joint| self.joints.contains(joint)) { Mark::True } else { Mark::WrongJoint }
+        let of_links = family == Family::Thermal || effect.starts_with("link-");
+        let have = if of_links { &self.parts.links } else { &self.parts.joints };
+        if told.iter().all(|part| have.contains(part)) { Mark::True } else { Mark::WrongJoint }
     }
 }

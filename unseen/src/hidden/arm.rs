@@ -7,7 +7,7 @@ use super::warmth::Warmth;
 use crate::arms::{Angles, Arm, Strain};
 use crate::designs::Visit;
 use crate::draw::{between, one};
-use crate::truth::Kind;
+use crate::truth::{Kind, Parts};
 
 /// The shape of an effect of the arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,25 +78,26 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Draws one, and the joints (from 1) that have it.
-    pub fn draw(kind: Kind, scene: &Scene<'_>, rng: &mut impl Rng) -> (Self, Vec<usize>) {
+    /// Draws one, and the parts that have it.
+    pub fn draw(kind: Kind, scene: &Scene<'_>, rng: &mut impl Rng) -> (Self, Parts) {
         match kind {
-            Kind::WarmLinks => (Self::warm(scene, rng), Vec::new()),
+            Kind::WarmLinks => Self::warm(scene, rng),
             Kind::Hardening => {
                 let (joint, most_nm) = loaded(scene, rng);
                 let bend_nm = between(rng, 0.1, 0.3) * most_nm;
-                (Shape::Hardening { joint, bend_nm, most_nm }, vec![joint + 1])
+                (Shape::Hardening { joint, bend_nm, most_nm }, Parts::joint(joint))
             }
             Kind::DeadBand => {
                 let (joint, most_nm) = loaded(scene, rng);
                 let band_nm = between(rng, 0.3, 0.6) * most_nm;
-                (Shape::DeadBand { joint, band_nm, most_nm }, vec![joint + 1])
+                (Shape::DeadBand { joint, band_nm, most_nm }, Parts::joint(joint))
             }
             Kind::Bending => {
-                let (link, joints) = one(rng, &scene.sheet.beams);
-                let sag = |visit: &Visit| scene.arm.beam(&visit.q, link).0.norm();
+                let beam = one(rng, &scene.sheet.beams);
+                let sag = |visit: &Visit| scene.arm.beam(&visit.q, beam.body).0.norm();
                 let most = scene.walk.visits.iter().map(sag).fold(0.0, f64::max);
-                (Shape::Bending { link, softness: 1.0 / most }, joints.map(|j| j + 1).to_vec())
+                let parts = Parts { joints: beam.joints.to_vec(), links: beam.links.to_vec() };
+                (Shape::Bending { link: beam.body, softness: 1.0 / most }, parts)
             }
             Kind::TwoJointGear => {
                 let joint = rng.random_range(0..6_usize);
@@ -107,7 +108,7 @@ impl Shape {
                 };
                 let orders = [one(rng, &[1.0, 2.0, 3.0]), one(rng, &[-2.0, -1.0, 1.0, 2.0])];
                 let phase = between(rng, 0.0, std::f64::consts::TAU);
-                (Shape::TwoJointGear { joint, other, orders, phase }, vec![joint + 1])
+                (Shape::TwoJointGear { joint, other, orders, phase }, Parts::joint(joint))
             }
             Kind::ModulatedGear => {
                 let joint = rng.random_range(0..6);
@@ -119,17 +120,17 @@ impl Shape {
                     place: between(rng, low, high).to_radians(),
                     narrow: between(rng, 1.0, 4.0),
                 };
-                (shape, vec![joint + 1])
+                (shape, Parts::joint(joint))
             }
             _ => {
                 let joint = one(rng, &[1, 2, 2, 3, 4]);
                 let friction_nm = between(rng, 0.1, 0.35) * most_torque(scene, joint);
-                (Shape::LoadedPlay { joint, friction_nm }, vec![joint + 1])
+                (Shape::LoadedPlay { joint, friction_nm }, Parts::joint(joint))
             }
         }
     }
 
-    fn warm(scene: &Scene<'_>, rng: &mut impl Rng) -> Self {
+    fn warm(scene: &Scene<'_>, rng: &mut impl Rng) -> (Self, Parts) {
         let length = scene.walk.length_h();
         let mut shares = [0.0; 6];
         for share in &mut shares {
@@ -142,7 +143,10 @@ impl Shape {
             quick: between(rng, 0.3, 0.7),
             pause: scene.walk.pause,
         };
-        Shape::Warm { shares, course }
+        // A link without a length does not grow.
+        let long = |i: &usize| scene.sheet.links[*i][0] != 0.0 || scene.sheet.links[*i][2] != 0.0;
+        let links = (0..6).filter(|i| shares[*i] > 0.0 && long(i)).map(|i| i + 1).collect();
+        (Shape::Warm { shares, course }, Parts { joints: Vec::new(), links })
     }
 
     /// The least and greatest size that is met.

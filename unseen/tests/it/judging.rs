@@ -9,7 +9,7 @@ use truegrind_unseen::sensors::Kind as Measures;
 use truegrind_unseen::shape::distance;
 use truegrind_unseen::stability::same;
 use truegrind_unseen::statistics::{quantile, wilson};
-use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, SOMETHING_ELSE, Truth, meanings};
+use truegrind_unseen::truth::{Family, Kind, Mark, Meaning, NAMES, Parts, SOMETHING_ELSE, Truth, meanings};
 use truegrind_unseen::under_test::Finding;
 
 #[test]
@@ -42,7 +42,7 @@ fn a_thermal_drift_is_of_what_its_parameters_move() {
 
 #[test]
 fn a_joint_that_has_nothing_is_false_and_an_unknown_name_too() {
-    let truth = Truth { kind: Kind::TwoJointGear, families: vec![Family::Gear], joints: vec![3] };
+    let truth = Truth { kind: Kind::TwoJointGear, families: vec![Family::Gear], parts: Parts::joint(2) };
     let mark = |effect: &str, joints: Option<&[usize]>| truth.mark(effect, meanings(effect, &[])[0], joints);
     assert_eq!(mark("gear-transmission", Some(&[3])), Mark::True);
     assert_eq!(mark("gear-transmission", Some(&[2])), Mark::WrongJoint);
@@ -55,12 +55,35 @@ fn a_joint_that_has_nothing_is_false_and_an_unknown_name_too() {
     assert_eq!(mark("unexplained", None), Mark::None);
 }
 
+/// A bending link is told as the yielding of a joint beside it, or by the link's own number; a warm link by the link's.
+#[test]
+fn links_are_told_by_their_own_numbers() {
+    let parts = Parts { joints: vec![3, 5], links: vec![3, 4] };
+    let bends = Truth { kind: Kind::Bending, families: vec![Family::Compliance], parts: parts.clone() };
+    let warm = Truth { kind: Kind::WarmLinks, families: vec![Family::Thermal], parts };
+    let mark = |truth: &Truth, effect: &str, part: usize| {
+        truth.mark(effect, meanings(effect, &[])[0], Some(&[part]))
+    };
+    assert_eq!(
+        [3, 4, 5].map(|part| mark(&bends, "joint-compliance", part)),
+        [Mark::True, Mark::WrongJoint, Mark::True]
+    );
+    assert_eq!(
+        [3, 4, 5].map(|part| mark(&bends, "link-bending", part)),
+        [Mark::True, Mark::True, Mark::WrongJoint]
+    );
+    assert_eq!(
+        [3, 4, 5].map(|part| mark(&warm, "link-growth", part)),
+        [Mark::True, Mark::True, Mark::WrongJoint]
+    );
+}
+
 /// Where nothing is hidden no name is true, whatever it is.
 #[test]
 fn noise_has_no_true_name_of_a_part() {
     for kind in [Kind::Clean, Kind::Correlated] {
         assert!(!kind.has_a_part());
-        let truth = Truth { kind, families: kind.families(Measures::Position), joints: Vec::new() };
+        let truth = Truth { kind, families: kind.families(Measures::Position), parts: Parts::default() };
         for (name, family) in NAMES {
             let right = truth.mark(name, meanings(name, &[])[0], None) == Mark::True;
             assert_eq!(right, kind == Kind::Correlated && family == Family::Noise, "{name}");
