@@ -18,6 +18,7 @@ use super::computation::{Common, on_threads};
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
+use super::naming;
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::{StatedArguments, numbers};
@@ -126,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
+    arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: a plan has no picture; `truegrind view POSES.mod --robot R` shows its program");
     }

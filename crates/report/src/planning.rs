@@ -9,7 +9,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
 use truegrind_planning::poses::drive::reading;
 use truegrind_planning::poses::power::Decidable;
-use truegrind_planning::poses::schedule::Purpose;
+use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
 use truegrind_planning::poses::{Plan, Wanted};
 
 /// Rows on a page; all are in the CSV file.
@@ -36,7 +36,7 @@ pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
     }
     columns.push(Column::text("note", "Note"));
     let mut table = Table::new("Rows to measure", columns);
-    for (number, row) in plan.rows.iter().enumerate() {
+    for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
         let pose = &plan.poses[row.pose];
         let mut cells: Vec<Cell> = vec![number.into(), (row.pose + 1).into(), row.purpose.word().into()];
         cells.extend(pose.joints.iter().map(|q| Cell::from(q.to_degrees())));

@@ -84,7 +84,7 @@ impl Snapshot {
         let rows = |s: &DMatrix<f64>| s.row_iter().map(|r| r.iter().copied().collect()).collect();
         Self {
             x: recursion.x.as_slice().to_vec(),
-            root: recursion.root().map(rows).unwrap_or_default(),
+            root: recursion.root().as_ref().map(rows).unwrap_or_default(),
             before,
         }
     }

@@ -3,7 +3,7 @@
 //! Joint targets say joints, so the nominal arm of the controller and the real one agree on them; no tool or work object
 //! is involved.
 
-use super::schedule::Row;
+use super::schedule::{FIRST_ROW, Row};
 use super::{Plan, Wanted, rows};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
@@ -56,7 +56,7 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
         wait_s,
     };
     let mut steps = Vec::with_capacity(2 * plan.rows.len());
-    for (number, row) in plan.rows.iter().enumerate() {
+    for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
         let said = comment(plan, wanted, row, number);
         steps.push(step(&row.approach_from, drive.travel_mm_s, Some(said), None));
         steps.push(step(&plan.poses[row.pose].joints, drive.approach_mm_s, None, Some(drive.settle_s)));
@@ -72,7 +72,8 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
             ),
             "Checked: joint limits, singularities, cable. Not checked: collisions with anything in the cell."
                 .to_owned(),
-            "Run it slowly first. Take one reading at each WaitTime, in this order.".to_owned(),
+            "Run it slowly first. Take one reading at each WaitTime, in this order; rows count as in a spreadsheet with its header."
+                .to_owned(),
         ],
         tool: (
             "tool0".to_owned(),

@@ -93,6 +93,9 @@ impl Purpose {
     }
 }
 
+/// The first row to measure as a spreadsheet counts it: the header stands in row 1.
+pub const FIRST_ROW: usize = 2;
+
 /// A row to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
