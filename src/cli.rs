@@ -7,6 +7,7 @@ mod computation;
 mod ending;
 mod defect;
 mod terminal;
+mod colour;
 mod files;
 mod inputs;
 mod outputs;

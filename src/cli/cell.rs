@@ -59,7 +59,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("no motion is in these programs: there is no tool and no work object to ask for");
     }
     let made = skeleton(&asking, robot.as_ref().map(|robot| robot.sheet.name.as_str()));
-    let mut batch = Batch::sparing(read.iter().flat_map(|programs| programs.files.iter().map(|(path, _)| path)));
+    let mut batch =
+        Batch::sparing(read.iter().flat_map(|programs| programs.files.iter().map(|(path, _)| path)));
     batch.add(&arguments.output, made.text);
     batch.write()?;
     let said = match made.open {
@@ -67,6 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         1 => "1 value to fill in, marked \"?\"".to_owned(),
         open => format!("{open} values to fill in, marked \"?\""),
     };
-    tell(format_args!("written to {}: {said}; then: truegrind compensate … --cell", arguments.output.display()));
+    tell(format_args!(
+        "written to {}: {said}; then: truegrind compensate … --cell",
+        arguments.output.display()
+    ));
     Ok(Ending::Done)
 }

@@ -107,7 +107,11 @@ impl CellArguments {
             None => Cell::default(),
         };
         if let (Some(path), [first, rest @ ..]) = (&self.cell, cell.open.as_slice()) {
-            let more = if rest.is_empty() { String::new() } else { format!(" (and {} more)", rest.len()) };
+            let more = match rest.len() {
+                0 => String::new(),
+                1 => "; 1 more entry is open".to_owned(),
+                more => format!("; {more} more entries are open"),
+            };
             bail!("{}: not filled in yet: {first}{more}", path.display());
         }
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
@@ -159,6 +163,11 @@ const LARGEST_PAYLOAD_KG: f64 = 3000.0;
 
 /// Arguments of `compensate`.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "NC programs (G-code, Heidenhain) leave to the control where tool and work offset lie and what A, B and C mean. \
+    `truegrind cell PROGRAM… -o cell.toml` writes the file that says it, to be filled in; docs/nc.md has one complete example \
+    each for Fanuc style, 840D, LinuxCNC and Heidenhain."
+)]
 pub(super) struct Arguments {
     /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
@@ -571,7 +580,8 @@ fn rewritten(
     }
     if let Some(corrector) = shop.corrector {
         belonging::made_for(programs, &corrector.arm.robot, &corrector.arm.nominal)?;
-        let found: Vec<String> = shop.surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
+        let found: Vec<String> =
+            shop.surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
         if !found.is_empty() {
             bail!("{}: {}", programs.name(), found.join("; "));
         }

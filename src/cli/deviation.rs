@@ -17,8 +17,8 @@ use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
 use truegrind::surfaces::SurfaceFile;
 
-use super::compensate::{CellArguments, agreed, say_unused};
 use super::belonging;
+use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
 use super::defect::isolated;
 use super::ending::Ending;

@@ -48,11 +48,14 @@ pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<Ending> {
     batch.add(folder.join("truegrind.1"), page(&command)?);
     for verb in command.get_subcommands() {
         let name = format!("truegrind-{}", verb.get_name());
-        let whole = verb.clone().name(name.clone()).bin_name(name.replace('-', " "));
-        batch.add(folder.join(format!("{name}.1")), page(&whole)?);
+        batch.add(folder.join(format!("{name}.1")), page(verb)?);
     }
     batch.write()?;
-    tell(format_args!("written to {}: read one with `man {}`", folder.display(), folder.join("truegrind.1").display()));
+    tell(format_args!(
+        "written to {}: read one with `man {}`",
+        folder.display(),
+        folder.join("truegrind.1").display()
+    ));
     Ok(Ending::Done)
 }
 

@@ -38,9 +38,12 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
-    naming::rapid_or_nc(&arguments.output)?;
     let robot = inputs::robot(&arguments.robot)?;
     let file = surface(&arguments.surface)?;
+    // An output that is an input is told as such first.
+    files::expect(&arguments.surface)?;
+    Batch::check(&[], &[&arguments.output])?;
+    naming::rapid_or_nc(&arguments.output)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
     let ending = arguments.output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());

@@ -127,11 +127,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
-    arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: a plan has no picture; `truegrind view POSES.mod --robot R` shows its program");
     }
     let robot = inputs::robot(&arguments.robot)?;
+    Batch::check(&inputs_of, &targets)?;
+    arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
     let sensor = match arguments.sensor {
         SensorArgument::Cable => Sensor::Cable,
         SensorArgument::Position => Sensor::Position,

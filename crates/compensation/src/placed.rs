@@ -22,16 +22,14 @@ pub fn misplaced(listing: &Listing, surface: &SurfaceFile) -> Vec<String> {
     }
     if surface.work_object.origin == Some(Origin::Metrology) {
         let stated = &surface.work_object;
-        let means =
-            |object: &&WorkObject| named(listing, &object.name, object.place.is_some(), &stated.name);
+        let means = |object: &&WorkObject| named(listing, &object.name, object.place.is_some(), &stated.name);
         // A displacement was never part of the place.
         let undisplaced = |object: &WorkObject| {
             let value = object.value.as_ref().ok()?;
             let whole = value.user_frame.pose() * value.object_frame.pose();
             Some(object.displacement.map_or(whole, |frame| whole * frame.pose().inverse()))
         };
-        let places: Vec<Pose> =
-            listing.work_objects.iter().filter(means).filter_map(undisplaced).collect();
+        let places: Vec<Pose> = listing.work_objects.iter().filter(means).filter_map(undisplaced).collect();
         add(fault("work_object", &stated.name, &stated.base_from_work_object, &places));
     }
     out

@@ -58,15 +58,18 @@ pub fn skeleton(programs: &[Asking<'_>], robot: Option<&str>) -> Skeleton {
         moved_axes(program.listing, &mut axes);
     }
     let convention = programs.iter().any(|program| {
-        program.listing.motions.iter().any(|motion| motion.reason() == Some(Reason::Convention))
+        let targets = program.listing.motions.iter().flat_map(|motion| &motion.targets);
+        targets.map(|target| &target.value).any(|value| *value == Err(Reason::Convention))
     });
     let mut out = Writer { text: String::new(), open: 0 };
     out.head(programs, robot, convention);
-    for ((is_tool, _), named) in found.iter().rev() {
-        out.frame(*is_tool, named);
+    for is_tool in [true, false] {
+        found
+            .iter()
+            .filter(|((kind, _), _)| *kind == is_tool)
+            .for_each(|(_, named)| out.frame(is_tool, named));
     }
-    for (axis, letter) in ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]) {
-        let _ = axis;
+    for (_, letter) in ('a'..='f').enumerate().filter(|(axis, _)| axes[*axis]) {
         out.line("", "");
         out.line("[[external]]", "an external axis that targets move");
         out.line(&format!("axis = \"{letter}\""), "");
@@ -87,7 +90,9 @@ fn note(program: &Asking<'_>, motion: &Motion, found: &mut BTreeMap<Key, Named>)
         (false, object.name.as_str(), told)
     });
     for (is_tool, name, told) in tool.into_iter().chain(object) {
-        if ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own)) {
+        // The controller's own, and what a control calls no tool (G49).
+        let own = ["tool0", "wobj0"].iter().any(|own| name.eq_ignore_ascii_case(own));
+        if own || is_tool && program.language == Language::Nc && !name.starts_with(['T', 't']) {
             continue;
         }
         let key = match program.language {
@@ -128,13 +133,13 @@ struct Writer {
 }
 
 /// Where the comments of a line begin.
-const COLUMN: usize = 34;
+const COLUMN: usize = 32;
 
 impl Writer {
     fn line(&mut self, key: &str, comment: &str) {
         let _ = match comment {
             "" => writeln!(self.text, "{key}"),
-            comment => writeln!(self.text, "{key:COLUMN$}# {comment}"),
+            comment => writeln!(self.text, "{key:COLUMN$}  # {comment}"),
         };
     }
 
@@ -153,11 +158,15 @@ impl Writer {
         let _ = writeln!(
             self.text,
             "# The cell of {}: where its tools and work objects lie, and how that is known.\n\
-             # Replace every \"?\"; before that nothing is corrected with this file. What stands behind # is optional.\n",
+             # Replace every \"?\"; before that nothing is corrected with this file. What stands behind # is optional.\n\
+             # An origin is \"metrology\" where the numbers are true as they stand (CAD, measured), and \"taught\" where\n\
+             # they come from points that the arm touched before it was calibrated.\n",
             names.replace(['\n', '\r'], " ")
         );
         match robot {
-            Some(robot) => self.line(&format!("robot = {}", quoted(robot)), "a model of another robot is refused"),
+            Some(robot) => {
+                self.line(&format!("robot = {}", quoted(robot)), "a model of another robot is refused")
+            }
             None => self.line("# robot = \"abb-irb-120\"", "with it a model of another robot is refused"),
         }
         if convention {
@@ -172,8 +181,10 @@ impl Writer {
             (false, Language::Rapid) => ("wobj", "work object"),
             (false, Language::Nc) => ("wobj", "work offset"),
         };
-        let motions = if named.motions == 1 { "1 motion".to_owned() } else { format!("{} motions", named.motions) };
-        let uses = format!("{motions}, first in {}, line {}", named.first.0, named.first.1).replace(['\n', '\r'], " ");
+        let motions =
+            if named.motions == 1 { "1 motion".to_owned() } else { format!("{} motions", named.motions) };
+        let uses = format!("{motions}, first in {}, line {}", named.first.0, named.first.1)
+            .replace(['\n', '\r'], " ");
         self.line("", "");
         if let (Language::Rapid, Err(reason)) = (named.language, named.told) {
             let remedy = match reason {
@@ -184,17 +195,24 @@ impl Writer {
             return;
         }
         self.line(&format!("[[{kind}]]"), &uses);
-        let called = named.label.as_ref().map_or_else(String::new, |label| format!("a comment calls it {label}"));
+        let called =
+            named.label.as_ref().map_or_else(String::new, |label| format!("a comment calls it {label}"));
         self.line(&format!("name = {}", quoted(&named.name)), &called.replace(['\n', '\r'], " "));
-        self.ask("origin", "metrology (its numbers are true: CAD, measured) | taught (with the arm)");
+        self.ask("origin", "metrology | taught");
         let place = if is_tool { "the tool's tip on the flange" } else { "its zero in the robot's base" };
         match named.told {
             Ok(told) => {
                 let Frame { position_mm: p, quaternion: q } = Frame::from_pose(&told);
                 self.line(
                     &format!(
-                        "# the program says where it is: [{:.3}, {:.3}, {:.3}] mm, turned by [{:.6}, {:.6}, {:.6}, {:.6}]",
-                        p[0], p[1], p[2], q[0], q[1], q[2], q[3]
+                        "# the program has it at [{}, {}, {}] mm, turned by [{}, {}, {}, {}]",
+                        short(p[0], 3),
+                        short(p[1], 3),
+                        short(p[2], 3),
+                        short(q[0], 6),
+                        short(q[1], 6),
+                        short(q[2], 6),
+                        short(q[3], 6)
                     ),
                     "",
                 );
@@ -205,12 +223,19 @@ impl Writer {
             }
         }
         if is_tool {
-            self.line("# teaching_deg = [[…], […], […], […]]", "taught: joints (°) of 4 or more poses about one point");
+            self.line("# teaching_deg = [[…], […], […], […]]", "taught: 4 or more poses about one point (°)");
         } else {
             self.line("# taught_with = \"NAME\"", "taught: the tool that touched its points");
-            self.line("# teaching_deg = [[…], […], […]]", "taught: joints (°) at two points on x and one on y");
+            self.line("# teaching_deg = [[…], […], […]]", "taught: two points on x, one on y (°)");
         }
     }
+}
+
+/// A number without the zeros that say nothing.
+fn short(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// A basic string of TOML.

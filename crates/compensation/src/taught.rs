@@ -199,7 +199,7 @@ pub(super) struct Teaching<'a> {
     pub(super) nominal: &'a PreparedModel<'a>,
     pub(super) estimated: &'a PreparedModel<'a>,
     pub(super) stated: Stated<'a>,
-    listing: &'a Listing,
+    pub(super) listing: &'a Listing,
     /// [`Teaching::tools`], once they were asked for.
     known: OnceCell<Tools<'a>>,
 }

@@ -224,10 +224,7 @@ fn draft(
     let object = &file.work_object;
     Draft {
         name: file.name.clone(),
-        comments: vec![
-            heading(&file.name, robot, points.len()),
-            UNCORRECTED.to_owned(),
-        ],
+        comments: vec![heading(&file.name, robot, points.len()), UNCORRECTED.to_owned()],
         tool: (
             file.tool.name.clone(),
             ToolValue {

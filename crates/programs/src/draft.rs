@@ -56,7 +56,8 @@ pub fn heading(surface: &str, robot: &str, targets: usize) -> String {
 /// ```
 pub fn robot_of(source: &[u8]) -> Option<&str> {
     const LINES: usize = 20;
-    let mut lines = source.split(|&byte| byte == b'\n').take(LINES).filter_map(|line| std::str::from_utf8(line).ok());
+    let mut lines =
+        source.split(|&byte| byte == b'\n').take(LINES).filter_map(|line| std::str::from_utf8(line).ok());
     lines.find_map(|line| {
         let said = line.trim_start_matches(['!', ';', '(', ' ', '\t']).strip_prefix(PATH)?;
         let (robot, targets) = said.split_once(ROBOT)?.1.rsplit_once(", ")?;

@@ -542,6 +542,8 @@ pub struct Listing {
     pub zones: Vec<Zone>,
     /// Routines that hold motions.
     pub routines: Vec<Routine>,
+    /// Whether it is of NC programs, which know tools by number and work offsets.
+    pub numbered: bool,
     /// Motions that call a program which does not stand in their file (NC).
     pub outside: Vec<u32>,
     /// What could not be read.
@@ -629,7 +631,8 @@ pub const UNCORRECTED: &str = "Written for the nominal arm: run truegrind compen
 /// Whether a comment is that one, in whichever signs a language puts comments.
 pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
     let said = comment.trim_ascii_start();
-    let said = said.strip_prefix(b"!").or_else(|| said.strip_prefix(b";")).or_else(|| said.strip_prefix(b"("));
+    let said =
+        said.strip_prefix(b"!").or_else(|| said.strip_prefix(b";")).or_else(|| said.strip_prefix(b"("));
     let said = said.unwrap_or(comment).trim_ascii();
     let said = said.strip_suffix(b")").unwrap_or(said).trim_ascii_end();
     said.eq_ignore_ascii_case(UNCORRECTED.as_bytes())
@@ -721,7 +724,7 @@ reasons! {
         /// The tool's value is not known.
         ToolUnknown => "the value of the tool is not known",
         /// The work object's value is not known.
-        WorkObjectUnknown => "the value of the work object is not known",
+        WorkObjectUnknown => "where the work object or work offset lies is not known",
         /// The program assigns the tool.
         ToolAssigned => "the tool is or may be assigned while the program runs",
         /// The program assigns the work object.

@@ -178,8 +178,7 @@ pub fn locate(
             weigh(Form::Jump, jump_gradient[k] - jump_cross[k], jump[(k, k)], own);
             // With one pose left both forms are the same.
             if since + 1 < n {
-                let (square, own) =
-                    (2.0 * triangle[k] - drift_square[k], of_drift.column(k).norm_squared());
+                let (square, own) = (2.0 * triangle[k] - drift_square[k], of_drift.column(k).norm_squared());
                 weigh(Form::Drift, drift_gradient[k] - drift_cross[k], square, own);
             }
         }

@@ -69,7 +69,9 @@ fn expected(key: &str) -> &'static str {
             "write \"metrology\" (its numbers are true: CAD, a measuring machine, a tracker) or \"taught\" (with the arm, before it \
              was calibrated)"
         }
-        "position_mm" => "write where it lies, [x, y, z] in mm: a tool on the flange, a work object in the robot's base",
+        "position_mm" => {
+            "write where it lies, [x, y, z] in mm: a tool on the flange, a work object in the robot's base"
+        }
         "quaternion_wxyz" => "write how it is turned, [w, x, y, z], or remove the line where it is not",
         "teaching_deg" => "write the joint angles (°) of the teaching points, or remove the line",
         "taught_with" => "write the name of the tool that touched the teaching points, or remove the line",

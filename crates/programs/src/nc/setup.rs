@@ -109,8 +109,7 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     let words: Vec<&str> = head.split_ascii_whitespace().skip(1).collect();
     let Some(what) = words.first().map(|what| what.to_ascii_lowercase()) else { return Ok(None) };
     if what == "angles" {
-        let expected =
-            || format!("`truegrind angles` with one of {}: what A, B and C mean", Angles::words());
+        let expected = || format!("`truegrind angles` with one of {}: what A, B and C mean", Angles::words());
         let [_, angles] = words[..] else { return Err(expected()) };
         return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or_else(expected);
     }

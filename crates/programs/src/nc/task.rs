@@ -160,7 +160,7 @@ impl<'s> Task<'s> {
             trees,
             dialects,
             angles: Vec::new(),
-            listing: Listing::default(),
+            listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             written: Vec::new(),
         };
@@ -342,7 +342,7 @@ impl<'t, 's> Lister<'t, 's> {
             programs: BTreeSet::new(),
             targets: BTreeSet::new(),
             anywhere: false,
-            listing: Listing::default(),
+            listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             written: Vec::new(),
             instructions: BTreeMap::new(),

@@ -143,7 +143,9 @@ const TITLES: usize = 20;
 /// The first row with a joint's name in it (a title may stand above), else the first row with anything in it.
 fn header_row(rows: &[Line]) -> Option<usize> {
     let names_a_joint = |line: &Line| {
-        line.cells.iter().any(|c| LETTERS.iter().any(|letter| joint_number(&c.to_string(), *letter).is_some()))
+        line.cells
+            .iter()
+            .any(|c| LETTERS.iter().any(|letter| joint_number(&c.to_string(), *letter).is_some()))
     };
     rows.iter()
         .take(TITLES)

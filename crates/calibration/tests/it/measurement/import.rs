@@ -32,7 +32,7 @@ fn columns_in_any_order_with_others_between() {
         assert!((row.joints[j].to_degrees() - 10.0 * (j + 1) as f64).abs() < 1e-12);
     }
     assert_eq!(row.reading, Reading::Cable(500.25));
-    assert_eq!((row.number, row.line), (0, 2));
+    assert_eq!((row.number, row.line), (2, 2));
     assert_eq!(row.condition.time_h, Some(0.5));
     assert_eq!(row.condition.approach, [0, -1, 0, 0, 0, 0]);
     assert_eq!(row.session.as_deref(), Some("monday"));
