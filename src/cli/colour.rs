@@ -5,14 +5,17 @@ use std::io::IsTerminal;
 
 use truegrind::report::status::Status;
 
-use super::terminal::dumb;
-
 /// Whether a stream gets colour: never where NO_COLOR says something, always where CLICOLOR_FORCE does, else on a terminal
 /// that is not dumb.
 pub(super) fn on(stream: &impl IsTerminal) -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let forced = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| !value.is_empty() && value != "0");
     !set("NO_COLOR") && (forced || stream.is_terminal() && !dumb())
+}
+
+/// Whether the terminal knows nothing but lines.
+pub(super) fn dumb() -> bool {
+    std::env::var_os("TERM").is_some_and(|term| term == "dumb")
 }
 
 /// The text with its judgements (`[ok]`, `[warning]`, `[failed]`) in colour.

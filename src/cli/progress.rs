@@ -5,7 +5,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use truegrind::report::format::visible;
 
-use super::terminal::dumb;
+use super::colour::dumb;
 
 /// A piece of work that takes a while. Nothing is shown where stderr is no terminal.
 pub(super) struct Work(ProgressBar);

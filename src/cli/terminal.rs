@@ -62,11 +62,6 @@ pub(super) fn tell_lines(text: &str) {
     let _ = std::io::stderr().write_all(visible::text(text).as_bytes());
 }
 
-/// Whether the terminal knows nothing but lines.
-pub(super) fn dumb() -> bool {
-    std::env::var_os("TERM").is_some_and(|term| term == "dumb")
-}
-
 /// Columns of the terminal, 100 where there is none.
 pub(super) fn width() -> usize {
     let stated = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
