@@ -224,3 +224,86 @@ fn the_skeleton_of_a_cell_loads_and_is_refused_until_it_is_filled_in() {
     let (code, _, err) = truegrind(at, &["cell", "empty.nc", "-o", "none.toml"]);
     assert!(code == 2 && err.contains("no motion"), "{err}");
 }
+
+/// A plan keeps links and target above the mounting plane and out of what is stated, at every stop and on every way between
+/// them; the ways are walked here through the written program, with an arm that this test puts together from the data sheet.
+#[test]
+fn a_plan_keeps_above_the_floor_and_out_of_boxes() {
+    use truegrind::arm::condition::Condition;
+    use truegrind::arm::model::Joints;
+
+    let dir = folder();
+    let at = dir.path();
+    let base = [
+        "plan",
+        "--robot",
+        "abb-irb-120",
+        "--sensor",
+        "position",
+        "--poses",
+        "30",
+        "--touched-point",
+        "30,0,60",
+        "--candidates",
+        "400",
+    ];
+    let corners = [[250.0, -700.0, 0.0], [700.0, -100.0, 500.0]];
+    let stated = ["--keep-out", "700,-100,0,250,-700,500", "--link-radius", "40", "--sensor-frame", "0,0,0"];
+    let (code, out, err) = truegrind(at, &[&base[..], &stated, &["-o", "poses.mod"]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("above z = 0 mm and out of the box") && out.contains("40 mm"), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 100), "{out}");
+    let text = fs::read_to_string(at.join("poses.mod")).unwrap();
+    assert!(text.contains("above z = 0 mm and out of the box"), "{text}");
+    let stops: Vec<Joints> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("MoveAbsJ [[")?.split_once(']'))
+        .map(|(angles, _)| {
+            let angles: Vec<f64> =
+                angles.split(',').map(|angle| angle.parse::<f64>().unwrap().to_radians()).collect();
+            Joints::from_column_slice(&angles)
+        })
+        .collect();
+    assert!(stops.len() > 60, "{}", stops.len());
+    let arm = truegrind::robots::load("abb-irb-120").unwrap().model;
+    let still = Condition::default();
+    let posed = arm.at_condition(&still);
+    let clear = |joints: &Joints| {
+        let frames = posed.frames(joints);
+        let flange = frames.last() * arm.flange;
+        let touched = flange * nalgebra::Point3::new(30.0, 0.0, 60.0);
+        let mut points: Vec<nalgebra::Vector3<f64>> =
+            frames.origin.iter().map(|origin| nalgebra::Vector3::from(*origin)).collect();
+        points.extend([flange.translation.vector, touched.coords]);
+        (1..points.len() - 1).all(|k| {
+            (0..=40).all(|step| {
+                let point = points[k].lerp(&points[k + 1], f64::from(step) / 40.0);
+                let away = nalgebra::Vector3::from_fn(|axis, _| {
+                    (corners[0][axis] - point[axis]).max(point[axis] - corners[1][axis]).max(0.0)
+                });
+                // Half the radius is what the wrist has; the way is sampled elsewhere than in the plan.
+                point.z > 15.0 && away.norm() > 15.0
+            })
+        })
+    };
+    for way in stops.windows(2) {
+        for step in 0..=60 {
+            let joints = way[0].lerp(&way[1], f64::from(step) / 60.0);
+            assert!(clear(&joints), "{:?} to {:?} at {step}", way[0], way[1]);
+        }
+    }
+    // Without the box poses do go there: the check is what keeps them out.
+    let (_, _, err) = truegrind(at, &[&base[..], &["-o", "free.mod"]].concat());
+    assert!(at.join("free.mod").exists(), "{err}");
+    for (wrong, words) in [
+        (&["--keep-out", "1,2,3"][..], ["--keep-out", "two corners"]),
+        (&["--keep-out", "0,0,0,0,1,1"], ["--keep-out", "two corners"]),
+        (&["--link-radius", "-3"], ["--link-radius", "0 or more"]),
+        (&["--floor", "nan"], ["--floor", "mm"]),
+        (&["--keep-out=-900,-900,-900,900,900,900"], ["box to keep out of", "smaller"]),
+    ] {
+        let (code, _, err) = truegrind(at, &[&base[..], wrong, &["-o", "none.mod"]].concat());
+        assert!(code == 2 && words.iter().all(|word| err.contains(word)), "{wrong:?}: {err}");
+        assert!(!at.join("none.mod").exists());
+    }
+}

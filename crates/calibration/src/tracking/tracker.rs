@@ -226,14 +226,15 @@ impl Tracker {
         }
         let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
         let (observed, _) = observe(&fresh, &self.begun.nominal, false);
-        let seen = self.seen(&observed);
+        let mut seen = self.seen(&observed);
         let mut task = self.task(&seen);
         let mut alarms = Vec::new();
         for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = row.condition;
             let alarm = self.pose(&task, at, seen[at].clone());
             if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
-                // Its frames are others now.
+                // Its frames are others now, and with them what rounded angles cost.
+                seen = self.seen(&observed);
                 task = self.task(&seen);
             }
             alarms.extend(alarm);

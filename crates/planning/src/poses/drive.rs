@@ -135,7 +135,7 @@ pub fn checked(plan: &Plan) -> String {
         stops => format!(", with {stops} stops on the way"),
     };
     format!(
-        "links ({:.0} mm round) and target stay {floor}{and}{boxes} at every pose and on every way between them{passed}",
+        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{passed}",
         space.radius_mm
     )
 }

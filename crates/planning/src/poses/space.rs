@@ -59,7 +59,7 @@ impl<'a> Watch<'a> {
             let (a, b, radius) = (&points[segment], &points[segment + 1], radius(segment));
             // The end of the column stands where it stands.
             let above = self.space.floor_mm.is_none_or(|floor| b.z - radius >= floor);
-            above && self.space.boxes_mm.iter().all(|corners| to_box(a, b, corners) >= radius)
+            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, radius))
         })
     }
 
@@ -83,6 +83,9 @@ impl<'a> Watch<'a> {
 
     /// Sides from which a pose can be approached, and from the opposite ones: `first` where they will do.
     pub(super) fn sides(&self, pose: &Joints, first: [i8; 6]) -> Option<[i8; 6]> {
+        if !self.stands_clear(pose) {
+            return None;
+        }
         // The opposite sides are looked at together with them.
         let others = (0..1 << 5).map(|bits: u8| {
             std::array::from_fn(|joint| if joint < 5 && bits >> joint & 1 == 1 { 1 } else { -1 })
@@ -119,15 +122,26 @@ const WRIST: usize = 4;
 const MOST_STOPS: usize = 200;
 const MOST_PAIRS: usize = 2000;
 
+/// Whether a capsule keeps off a box. Most are told by their middles.
+fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {
+    let middle = (a + b) * 0.5;
+    let away = outside(&middle, corners);
+    if away >= radius + 0.5 * (b - a).norm() {
+        return true;
+    }
+    away >= radius && to_box(a, b, corners) >= radius
+}
+
+/// Distance of a point from a box (mm), 0 inside.
+fn outside(point: &Vector3<f64>, [low, high]: &[[f64; 3]; 2]) -> f64 {
+    Vector3::from_fn(|k, _| (low[k] - point[k]).max(point[k] - high[k]).max(0.0)).norm()
+}
+
 /// Distance of a segment from a box (mm), 0 inside. The distance of a point that runs along the segment is convex, so its
 /// least value is found by cutting off thirds.
-fn to_box(a: &Vector3<f64>, b: &Vector3<f64>, [low, high]: &[[f64; 3]; 2]) -> f64 {
+fn to_box(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2]) -> f64 {
     const CUTS: usize = 48;
-    let at = |t: f64| {
-        let point = a + (b - a) * t;
-        let outside = Vector3::from_fn(|k, _| (low[k] - point[k]).max(point[k] - high[k]).max(0.0));
-        outside.norm()
-    };
+    let at = |t: f64| outside(&(a + (b - a) * t), corners);
     let (mut from, mut to) = (0.0, 1.0);
     for _ in 0..CUTS {
         let (first, second) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
