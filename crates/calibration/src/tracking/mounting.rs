@@ -122,14 +122,15 @@ impl Tracker {
             root.row_mut(k).fill(0.0);
             room[k] = if self.parameters[k].unit() == "mm" { ROOM_MM } else { ROOM_RAD };
         }
+        // As the state says it, to the bit: a track that was stopped goes on from there.
         match found.what {
             Mounted::Target => {
-                self.frames.flange_from_target = found.place;
                 self.state.flange_from_target = vector_from_pose(&found.place);
+                self.frames.flange_from_target = pose_from_vector(&self.state.flange_from_target);
             }
             Mounted::Sensor => {
-                self.frames.base_from_sensor = found.place;
                 self.state.base_from_sensor = vector_from_pose(&found.place);
+                self.frames.base_from_sensor = pose_from_vector(&self.state.base_from_sensor);
             }
         }
         self.recursion = Recursion::from_root(x, root);
