@@ -7,6 +7,7 @@ mod computation;
 mod ending;
 mod defect;
 mod terminal;
+mod colour;
 mod files;
 mod inputs;
 mod outputs;
@@ -23,6 +24,10 @@ mod compare;
 mod track;
 mod path;
 mod programs;
+mod naming;
+mod belonging;
+mod cell;
+mod manual;
 mod compensate;
 mod deviation;
 mod demo;
@@ -31,7 +36,7 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use self::ending::Ending;
 
@@ -63,6 +68,8 @@ enum Verb {
     Track(track::Arguments),
     /// A surface to a grinding program: RAPID, or NC by the ending of the output (.nc, .mpf).
     Path(path::Arguments),
+    /// The cell file that programs ask for, with every tool and frame that they name, to be filled in.
+    Cell(cell::Arguments),
     /// Rewrite programs so that the estimated arm follows them.
     Compensate(compensate::Arguments),
     /// How far programs are off under a model; nothing is rewritten.
@@ -70,6 +77,10 @@ enum Verb {
     /// Show in Rerun what any of the above wrote.
     #[cfg(feature = "visual")]
     View(view::Arguments),
+    /// The script with which a shell completes verbs and options: bash, zsh, fish, elvish, powershell.
+    Completions(manual::Completions),
+    /// The man page; with -o the pages of all verbs.
+    Man(manual::Man),
 }
 
 /// Runs the command line.
@@ -110,9 +121,12 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Track(arguments) => track::run(&arguments),
         Verb::Path(arguments) => path::run(&arguments),
+        Verb::Cell(arguments) => cell::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),
         #[cfg(feature = "visual")]
         Verb::View(arguments) => view::run(&arguments),
+        Verb::Completions(arguments) => manual::completions(&arguments, Cli::command()),
+        Verb::Man(arguments) => manual::man(&arguments, Cli::command()),
     }
 }

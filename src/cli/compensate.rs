@@ -15,6 +15,8 @@ use truegrind::compensation::compensate::{Compensated, compensate};
 use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::payload::Loads;
+use truegrind::compensation::placed::misplaced;
+use truegrind::compensation::reach::none_in_reach;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan};
 use truegrind::compensation::taught::contradictions;
 use truegrind::compensation::untouched::untouched;
@@ -29,12 +31,14 @@ use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::status::Status as Judged;
 use truegrind::surfaces::SurfaceFile;
 
+use super::belonging;
 use super::computation::{Common, on_threads};
 use super::defect::isolated;
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
 use super::inputs::NamedModel;
+use super::naming;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
@@ -102,6 +106,14 @@ impl CellArguments {
             })?,
             None => Cell::default(),
         };
+        if let (Some(path), [first, rest @ ..]) = (&self.cell, cell.open.as_slice()) {
+            let more = match rest.len() {
+                0 => String::new(),
+                1 => "; 1 more entry is open".to_owned(),
+                more => format!("; {more} more entries are open"),
+            };
+            bail!("{}: not filled in yet: {first}{more}", path.display());
+        }
         let surface = self.surface.as_deref().map(super::path::surface).transpose()?;
         let cell = match &surface {
             Some(surface) => cell.with_surface(surface)?,
@@ -134,12 +146,16 @@ pub(super) fn say_unused<'u>(
     }
 }
 
-/// Nothing is corrected or judged where the cell file and the program contradict each other.
-pub(super) fn agreed(listing: &Listing, cell: &Cell, nominal: &Model) -> anyhow::Result<()> {
-    match contradictions(listing, cell, nominal).as_slice() {
-        [] => Ok(()),
-        found => bail!("{}", found.join("; ")),
-    }
+/// Nothing is corrected or judged where cell file or surface file and the program contradict each other.
+pub(super) fn agreed(
+    listing: &Listing,
+    cell: &Cell,
+    surface: Option<&SurfaceFile>,
+    nominal: &Model,
+) -> anyhow::Result<()> {
+    let mut found = contradictions(listing, cell, nominal);
+    found.extend(surface.iter().flat_map(|surface| misplaced(listing, surface)));
+    if found.is_empty() { Ok(()) } else { bail!("{}", found.join("; ")) }
 }
 
 /// No robot carries more.
@@ -147,6 +163,11 @@ const LARGEST_PAYLOAD_KG: f64 = 3000.0;
 
 /// Arguments of `compensate`.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "NC programs (G-code, Heidenhain) leave to the control where tool and work offset lie and what A, B and C mean. \
+    `truegrind cell PROGRAM… -o cell.toml` writes the file that says it, to be filled in; docs/nc.md has one complete example \
+    each for Fanuc style, 840D, LinuxCNC and Heidenhain."
+)]
 pub(super) struct Arguments {
     /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
@@ -293,6 +314,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--rrd: the nominal arm has no deviation to show: give an estimated arm");
     }
     let (cell, surface, condition) = arguments.cell.read(corrector.map(|c| c.arm))?;
+    belonging::cell_is_of(&cell, &robot, &nominal)?;
     let options = Options {
         emit: match arguments.emit {
             EmitArgument::Targets => Emit::Targets,
@@ -556,6 +578,14 @@ fn rewritten(
     if marked.iter().all(|marked| *marked) {
         return Ok(nothing_left(notes));
     }
+    if let Some(corrector) = shop.corrector {
+        belonging::made_for(programs, &corrector.arm.robot, &corrector.arm.nominal)?;
+        let found: Vec<String> =
+            shop.surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
+        if !found.is_empty() {
+            bail!("{}: {}", programs.name(), found.join("; "));
+        }
+    }
     let used = Some(Used::by(listing, &shop.cell));
     let options = Options { loads: shop.arguments.cell.loads(&program), ..shop.options.clone() };
     let Compensated { plan: mut planned, rewritten } = match shop.corrector {
@@ -572,6 +602,15 @@ fn rewritten(
             rewritten: program.rewrite(&[], &RewriteOptions::default())?,
         },
     };
+    if let (Some(motions), Some(corrector)) = (none_in_reach(&planned), shop.corrector) {
+        bail!(
+            "{}: {motions} motions and hardly one in reach of {} ({}): the program is another robot's, or its tool and work \
+             object are not where it is told (--cell); give the model of the robot that runs it",
+            programs.name(),
+            corrector.arm.robot,
+            corrector.model
+        );
+    }
     if marked.contains(&true) {
         // Modules of one task, some corrected before. What carries no mark has nothing to correct, or was left out then.
         let open =
@@ -652,6 +691,9 @@ fn outputs_of(
     };
     let several = several || programs.files.len() > 1;
     if !several && !output.is_dir() {
+        if let [(source, bytes)] = programs.files.as_slice() {
+            naming::like_its_source(output, source, bytes)?;
+        }
         return Ok(vec![Some(output.clone())]);
     }
     if output == Path::new("-") {

@@ -17,6 +17,7 @@ use truegrind::report::deviation as view;
 use truegrind::report::document::Document;
 use truegrind::surfaces::SurfaceFile;
 
+use super::belonging;
 use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
 use super::defect::isolated;
@@ -158,7 +159,11 @@ impl Shop<'_> {
         let original = self.originals.map(|original| original.task(self.setup));
         for runner in self.runners {
             for program in original.iter().chain([&task]) {
-                agreed(program.listing(), self.cell, &runner.nominal)?;
+                agreed(program.listing(), self.cell, surface, &runner.nominal)?;
+            }
+            if let Some(robot) = &runner.robot {
+                belonging::cell_is_of(self.cell, robot, &runner.nominal)?;
+                belonging::made_for(&programs, robot, &runner.nominal)?;
             }
         }
         let name = match &job.under {

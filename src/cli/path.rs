@@ -9,12 +9,14 @@ use truegrind::programs::nc;
 use truegrind::programs::nc::dialect::Dialect;
 use truegrind::programs::nc::orientation::Angles;
 use truegrind::programs::rapid::writer;
+use truegrind::programs::reading::Language;
 use truegrind::robots::Robot;
 use truegrind::surfaces::SurfaceFile;
 
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
+use super::naming;
 use super::programs::angles;
 use super::terminal::tell;
 
@@ -38,6 +40,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Batch::check(&[&arguments.surface], &[&arguments.output])?;
     let robot = inputs::robot(&arguments.robot)?;
     let file = surface(&arguments.surface)?;
+    // An output that is an input is told as such first.
+    files::expect(&arguments.surface)?;
+    Batch::check(&[], &[&arguments.output])?;
+    naming::rapid_or_nc(&arguments.output)?;
     let mut path = toolpath(&file, &robot.model, &robot.sheet.name)?;
     path.draft.named_targets = !arguments.inline;
     let ending = arguments.output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -46,6 +52,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         Some("mpf" | "spf") => nc::writer::write(&path.draft, Dialect::Siemens, angles_of(&robot))?,
         Some("ngc" | "h") => bail!(
             "{}: programs of this control are read and rewritten, not written anew; name a .mod, .nc or .mpf file",
+            arguments.output.display()
+        ),
+        _ if Language::by_name(&files::name(&arguments.output)) == Some(Language::Nc) => bail!(
+            "{}: which control it is for, the ending does not say; name a .mod (RAPID), .nc (Fanuc style) or .mpf (840D) file",
             arguments.output.display()
         ),
         _ => writer::write(&path.draft)?,

@@ -10,6 +10,7 @@ use truegrind::planning::poses::design::Index;
 use truegrind::planning::poses::drive::{Drive, draft};
 use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
+use truegrind::planning::poses::space::Space;
 use truegrind::planning::poses::{Options, Wanted, plan, rival};
 use truegrind::programs::rapid::writer;
 use truegrind::report::planning as view;
@@ -18,6 +19,7 @@ use super::computation::{Common, on_threads};
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
+use super::naming;
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::{StatedArguments, numbers};
@@ -80,6 +82,17 @@ pub(super) struct Arguments {
     /// stated.
     #[arg(long, value_name = "MM")]
     clearance: Option<f64>,
+    /// A box that neither links nor target enter, at poses and on the ways between them: two corners in the base, x,y,z,x,y,z (mm).
+    /// May be repeated.
+    #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
+    keep_out: Vec<String>,
+    /// Height in the base that nothing goes below (mm): the mounting plane; the floor where the arm stands on a pedestal.
+    #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
+    floor: f64,
+    /// How thick the links are taken to be, as the radius about the lines between the joints (mm). A twelfth of the reach unless
+    /// stated.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    link_radius: Option<f64>,
     /// Distance that joints keep from their limits (°); at least that of the approach.
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     margin: f64,
@@ -130,6 +143,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--rrd: a plan has no picture; `truegrind view POSES.mod --robot R` shows its program");
     }
     let robot = inputs::robot(&arguments.robot)?;
+    Batch::check(&inputs_of, &targets)?;
+    arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
     let sensor = match arguments.sensor {
         SensorArgument::Cable => Sensor::Cable,
         SensorArgument::Position => Sensor::Position,
@@ -171,6 +186,28 @@ const MOST_POSES: usize = 2000;
 
 /// And no choice is better for more than this.
 const MOST_CANDIDATES: usize = 100_000;
+
+/// What the arm must not enter.
+fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
+    let mut boxes_mm = Vec::new();
+    for text in &arguments.keep_out {
+        match numbers("--keep-out", text)?[..] {
+            [a, b, c, d, e, f] if a != d && b != e && c != f => {
+                boxes_mm.push([[a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)]]);
+            }
+            _ => bail!("--keep-out {text}: expected two corners of a box, x,y,z,x,y,z (mm)"),
+        }
+    }
+    if !arguments.floor.is_finite() {
+        bail!("--floor {}: expected a height in mm", arguments.floor);
+    }
+    let radius_mm = arguments.link_radius.unwrap_or(reach_mm / 12.0);
+    if !(0.0..=reach_mm).contains(&radius_mm) {
+        bail!("--link-radius {radius_mm}: expected 0 or more, and less than the reach of {reach_mm:.0} mm");
+    }
+    let approach_rad = arguments.approach.to_radians();
+    Ok(Space { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
+}
 
 fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
     let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
@@ -235,6 +272,7 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
         (_, Some(_)) => bail!("--clearance is for a cable; a tracker's line of sight is not checked"),
         (_, None) => None,
     };
+    let space = space(arguments, reach_mm)?;
     let questions = match &arguments.diagnosis {
         None => Vec::new(),
         Some(path) => {
@@ -264,6 +302,7 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
             box_mm,
             distance_mm,
             clearance_mm,
+            space,
         },
         visits: Visits {
             repeats: arguments.repeats,

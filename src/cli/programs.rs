@@ -293,7 +293,7 @@ pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
     };
     Setup {
         dialect: None,
-        angles: orientation.and_then(angles),
+        angles: cell.angles().or_else(|| orientation.and_then(angles)),
         tools: frames(&cell.tool),
         frames: frames(&cell.wobj),
     }

@@ -5,13 +5,17 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use truegrind::report::format::visible;
 
+use super::colour::dumb;
+
 /// A piece of work that takes a while. Nothing is shown where stderr is no terminal.
 pub(super) struct Work(ProgressBar);
 
 impl Work {
     /// Starts a spinner with a message.
     pub(super) fn start(message: impl Into<String>) -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        // A dumb terminal shows each turn of a spinner as a line of its own.
+        let target = if dumb() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(None, target);
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
             bar.set_style(style);
         }

@@ -9,12 +9,18 @@ use std::io::{IsTerminal, Write};
 use anyhow::Context;
 use truegrind::report::format::visible;
 
+use super::colour;
+
 /// Prints a result. A reader that has seen enough (`| head`) is no fault.
 ///
 /// # Errors
 /// Where stdout cannot be written, such as to a full disk.
 pub(super) fn say(text: impl AsRef<[u8]>) -> anyhow::Result<()> {
-    print(visible::bytes(text.as_ref()).as_bytes())
+    let shown = visible::bytes(text.as_ref());
+    if colour::on(&std::io::stdout()) {
+        return print(colour::judged(&shown).as_bytes());
+    }
+    print(shown.as_bytes())
 }
 
 /// Hands a file over to stdout: byte by byte as it is, or made visible where somebody looks at it.
@@ -46,7 +52,9 @@ pub(super) fn tell(text: impl Display) {
         text.truncate(cut);
         text += &format!("… ({more} more characters)");
     }
-    tell_lines(&format!("{}\n", visible::text(&text).replace('\n', "\n  ")));
+    let text = visible::text(&text).replace('\n', "\n  ");
+    let text = if colour::on(&std::io::stderr()) { colour::message(&text) } else { text };
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Lines for stderr that have their form already. Nobody reads them where it is closed.

@@ -209,7 +209,7 @@ impl Track<'_> {
             taking.as_secs_f64() * 1e6 / fresh as f64
         ));
         self.write(&tracker, fresh, &alarms)?;
-        Ok(failed || !alarms.is_empty())
+        Ok(failed || !alarms.is_empty() || tracker.mostly_set_aside())
     }
 
     /// Where the last run left off.

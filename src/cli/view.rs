@@ -21,6 +21,7 @@ use truegrind::pictures::{self, MeasuredScene, PathScene, Recording};
 use truegrind::programs::motion::MotionKind;
 use truegrind::programs::reading::Language;
 
+use super::belonging;
 use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
 use super::ending::Ending;
@@ -283,7 +284,12 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
     };
     let robot = arguments.robot.as_deref().or(knowledge.map(|k| k.robot.as_str()));
     let task = programs.task(&programs::setup(&cell, robot));
-    agreed(task.listing(), &cell, &nominal)?;
+    agreed(task.listing(), &cell, surface.as_ref(), &nominal)?;
+    if let Some(robot) = robot {
+        let name = inputs::robot(robot).map_or_else(|_| robot.to_owned(), |robot| robot.sheet.name);
+        belonging::cell_is_of(&cell, &name, &nominal)?;
+        belonging::made_for(&programs, &name, &nominal)?;
+    }
     say_unused([&Some(Used::by(task.listing(), &cell))], &cell, surface.as_ref());
     let program = programs.name();
     let acting =

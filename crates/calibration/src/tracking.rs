@@ -17,6 +17,11 @@
 //! ([`locate`]). Parameters that explain it nearly as well are named as alternatives: a sensor that was
 //! knocked and a joint that lost its zero can look the same. Lone accidents have no say.
 //!
+//! **Mounted anew, and bursts.** Before that, poses that were set aside one after the other are asked where each of them puts
+//! target and sensor ([`mounting`]): where they agree on a place far from the old one, it was taken off and put on again, which
+//! is one alarm, and the track goes on from there. Where nothing explains them they are a burst of outliers: one alarm for all
+//! of them, until poses fit again.
+//!
 //! **After an alarm.** The filter goes back to where the history began, what moved gets room (three times a jump; the
 //! process noise of a drift), and the history is taken in again: nothing is lost, and the model follows within a few
 //! poses ([`alarm`]).
@@ -27,8 +32,8 @@
 //! **A stop.** [`state`] holds every bit that matters, so that a track that was stopped anywhere and goes on ends in the same
 //! bits as one that was not.
 //!
-//! **Shapes.** p parameters; a pose has 1, 3 or 6 rows. A pose costs one row evaluation with derivatives, p³ for the
-//! process noise and p² for each row.
+//! **Shapes.** p parameters, k of which drift; a pose has 1, 3 or 6 rows. A pose costs one row evaluation with derivatives, k³
+//! for the process noise and p² for each row. An alarm costs p³, and p² for each row of the history.
 //!
 //! **Source and departures.** rls-2025 keeps its arm accurate by RLS without forgetting, which stops listening; process
 //! noise and alarm are ours. Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
@@ -38,6 +43,7 @@
 //! resumption to the bit, also of a process that was killed.
 
 pub mod alarm;
+mod mounting;
 mod bounds;
 mod error;
 pub mod locate;

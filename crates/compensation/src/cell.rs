@@ -22,6 +22,12 @@
 //! axis = "a"
 //! carries = "base"               # base | other
 //! ```
+//!
+//! Before the first table may stand `robot = "abb-irb-120"`, the robot of the programs, which a model must be of, and
+//! `angles = "wpr"`, what A, B and C of NC programs mean. A value may be `"?"`: it is still to
+//! be filled in, and nothing is corrected before it is ([`Cell::open`]).
+
+mod open;
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -32,6 +38,7 @@ use thiserror::Error;
 pub use super::taught::{taught_frame, taught_tcp};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{FARTHEST_MM, Listing, Tool, WorkObject};
+use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup;
 use truegrind_surfaces::SurfaceFile;
 use truegrind_surfaces::file::Origin;
@@ -147,6 +154,12 @@ pub enum CellError {
         points: usize,
         /// The sum of the squares.
         work: usize,
+    },
+    /// A convention of angles that is none.
+    #[error("angles = \"{found}\": expected one of {}", Angles::words())]
+    Angles {
+        /// What stands there.
+        found: String,
     },
     /// Not TOML, or a key that is missing, misspelt or of the wrong type.
     #[error("not a cell file: {0}")]
@@ -291,6 +304,13 @@ impl CellAxis {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
+    /// The robot of the programs, by its name in the catalogue or in its robot file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
+    /// What A, B and C of NC programs mean, by its word ([`Angles`]); it goes before what robot file and
+    /// comments of the programs say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angles: Option<String>,
     /// Tools.
     #[serde(default)]
     pub tool: Vec<CellFrame>,
@@ -300,6 +320,9 @@ pub struct Cell {
     /// External axes.
     #[serde(default)]
     pub external: Vec<CellAxis>,
+    /// Entries that say `"?"`, one sentence each: they are to be filled in.
+    #[serde(skip)]
+    pub open: Vec<String>,
 }
 
 impl Cell {
@@ -320,7 +343,10 @@ impl Cell {
     /// # Errors
     /// [`CellError`], with key and reason.
     pub fn from_toml(text: &str) -> Result<Self, CellError> {
-        let cell: Self = toml::from_str(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        let cell = open::read(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
+            return Err(CellError::Angles { found: found.clone() });
+        }
         for (kind, frames) in [("tool", &cell.tool), ("wobj", &cell.wobj)] {
             let mut stated: HashMap<String, &CellFrame> = HashMap::new();
             for frame in frames {
@@ -363,7 +389,7 @@ impl Cell {
             ("wobj", &mut self.wobj, &object.name, object.origin),
         ] {
             let Some(origin) = origin.map(FrameOrigin::from) else { continue };
-            match frames.iter().find(|frame| frame.name.eq_ignore_ascii_case(name)) {
+            match frames.iter().find(|frame| setup::same(&frame.name, name)) {
                 Some(stated) if stated.origin != origin => {
                     return Err(CellError::Contradicted {
                         kind,
@@ -377,6 +403,11 @@ impl Cell {
             }
         }
         Ok(self)
+    }
+
+    /// What A, B and C of NC programs mean, where the file says it.
+    pub fn angles(&self) -> Option<Angles> {
+        self.angles.as_deref().and_then(Angles::of)
     }
 
     /// What an external axis carries, by its place in a target.

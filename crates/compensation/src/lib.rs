@@ -1,7 +1,8 @@
 //! From an estimated arm and a program to a program that the real arm runs right.
 //!
 //! - [`cell`]: where tools and work objects come from; [`taught`]: those that were taught, under a better arm;
-//!   [`mounting`]: the two of a motion, as told and as they are.
+//!   [`mounting`]: the two of a motion, as told and as they are; [`placed`]: where a surface file puts them; [`reach`]: whether the
+//!   arm is the program's at all; [`skeleton`]: the cell file that programs ask for.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`compensate`]: the main job, from a program that was read to its new bytes.
 //! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
@@ -15,6 +16,9 @@ pub mod deviation;
 pub mod cell;
 pub mod mounting;
 pub mod taught;
+pub mod placed;
+pub mod reach;
+pub mod skeleton;
 pub mod payload;
 pub mod why;
 pub mod rewrite;

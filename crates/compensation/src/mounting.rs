@@ -133,22 +133,21 @@ fn object_note(
     with: &Mounts<'_>,
 ) -> Option<String> {
     let name = &object.name;
+    let what = if with.teaching.listing.numbered { "work offset" } else { "work object" };
     match with.teaching.stated.object(object) {
         Some(frame) if frame.origin == FrameOrigin::Metrology => None,
         Some(_) if found.taught.is_some() => {
             let shift = (real.object.translation.vector - told.object.translation.vector).norm();
             let turn = real.object.rotation.angle_to(&told.object.rotation).to_degrees();
-            Some(format!(
-                "work object {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"
-            ))
+            Some(format!("{what} {name} was taught: re-evaluated, it moves by {shift:.3} mm and {turn:.4}°"))
         }
         Some(_) => Some(format!(
-            "work object {name} was taught, but its teaching points are not given: taken as it stands; {}",
+            "{what} {name} was taught, but its teaching points are not given: taken as it stands; {}",
             object_estimate(told, with)
         )),
         None if built_in(name) => None,
         None => Some(format!(
-            "work object {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
+            "{what} {name}: origin not stated, taken as metrology (true as it stands in the robot's base); {}",
             object_estimate(told, with)
         )),
     }

@@ -58,11 +58,18 @@ pub(super) fn open_notes(listing: &Listing, solved: &SolvedTargets, unchecked: &
         ));
     }
     if let Some(lines) = lines_of(listing, &solved.guessed) {
-        out.push(format!(
-            "{} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
-             which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})",
-            solved.guessed.len()
-        ));
+        let count = solved.guessed.len();
+        out.push(if listing.numbered {
+            format!(
+                "where the arm stands before {count} of the motions the text does not tell, and no NC word states the \
+                 configuration: the most usual one is taken, unchecked ({lines})"
+            )
+        } else {
+            format!(
+                "{count} of the motions go, unchecked, to the configuration next to where the arm stands (ConfL \\Off, ConfJ \\Off), \
+                 which the text does not tell there: the one that keeps to the stated quarters best is taken ({lines})"
+            )
+        });
     }
     out
 }

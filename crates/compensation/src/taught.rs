@@ -19,7 +19,7 @@ use truegrind_programs::motion::{Listing, Tool, ToolValue, WorkObject, WorkObjec
 use truegrind_programs::nc::setup;
 
 /// What programs round away when they write a frame, and constructions of the same frame may differ by (mm, rad).
-const WRITTEN: Apart = Apart { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
+pub(super) const WRITTEN: Apart = Apart { mm: 0.1, rad: 0.02 * std::f64::consts::PI / 180.0 };
 /// However coarsely the teaching joints are written, a told frame that is farther away is not theirs (mm, rad).
 const MOST: Apart = Apart { mm: 5.0, rad: std::f64::consts::PI / 180.0 };
 /// Controllers show joint angles with two decimals at least (°): coarser ones are not taken for rounded.
@@ -29,20 +29,20 @@ const ALIKE: f64 = 1e-3;
 
 /// Distance of two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Apart {
-    mm: f64,
-    rad: f64,
+pub(super) struct Apart {
+    pub(super) mm: f64,
+    pub(super) rad: f64,
 }
 
 impl Apart {
-    fn of(one: &Pose, other: &Pose) -> Self {
+    pub(super) fn of(one: &Pose, other: &Pose) -> Self {
         Self {
             mm: (one.translation.vector - other.translation.vector).norm(),
             rad: one.rotation.angle_to(&other.rotation),
         }
     }
 
-    fn within(self, bound: Apart) -> bool {
+    pub(super) fn within(self, bound: Apart) -> bool {
         self.mm <= bound.mm && self.rad <= bound.rad
     }
 }
@@ -199,14 +199,20 @@ pub(super) struct Teaching<'a> {
     pub(super) nominal: &'a PreparedModel<'a>,
     pub(super) estimated: &'a PreparedModel<'a>,
     pub(super) stated: Stated<'a>,
-    listing: &'a Listing,
+    pub(super) listing: &'a Listing,
     /// [`Teaching::tools`], once they were asked for.
     known: OnceCell<Tools<'a>>,
 }
 
-/// What the cell file says of tools and work objects and this program does not bear out, one sentence each; nothing may
-/// be corrected before it is put right. `nominal` is the arm that the controller computes with.
+/// What the cell file says of tools and work objects and this program does not bear out, what it leaves open, and what the
+/// program's own comments on them misstate, one sentence each; nothing may be corrected before it is put right. `nominal` is the arm that the controller computes with.
 pub fn contradictions(listing: &Listing, cell: &Cell, nominal: &Model) -> Vec<String> {
+    let told = listing.misstated.iter().map(ToString::to_string);
+    let unusable: Vec<String> =
+        cell.open.iter().map(|entry| format!("cell file: {entry}")).chain(told).collect();
+    if !unusable.is_empty() {
+        return unusable;
+    }
     let condition = Condition::default();
     let arm = nominal.at_condition(&condition);
     let teaching = Teaching::of(&arm, &arm, cell, listing);
@@ -289,7 +295,7 @@ fn explained(rounded: Apart, scatter_mm: f64) -> Apart {
     }
 }
 
-fn list(position: &Vector3<f64>) -> String {
+pub(super) fn list(position: &Vector3<f64>) -> String {
     format!("[{:.3}, {:.3}, {:.3}]", position.x, position.y, position.z)
 }
 

@@ -208,11 +208,11 @@ impl fmt::Display for Why {
             ),
             Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
             Why::Corner { mm } if !mm.is_finite() => {
-                f.write_str("the arm cannot follow the rounded corner before it: make the zone smaller")
+                f.write_str("the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)")
             }
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
             Why::Corner { mm } => {
-                write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: make the zone smaller")
+                write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)")
             }
             Why::CircleKept => f.write_str(
                 "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \

@@ -18,6 +18,7 @@ pub mod ekf;
 pub mod ukf;
 pub mod ukf_vslm;
 pub mod pf;
+mod ordered;
 pub mod rls;
 
 use nalgebra::{DMatrix, DVector};

@@ -1,6 +1,7 @@
 //! What to measure: poses that tell most of an arm, in an order that tells effects from each other, as a program.
 //!
 //! - [`candidate`]: poses that the arm reaches and the sensor sees, drawn at random; [`sight`]: a cable past the arm;
+//!   [`space`]: what it must not enter;
 //! - [`rows`]: what a reading at a pose tells of every parameter;
 //! - [`design`]: which of the candidates to take;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
@@ -13,6 +14,7 @@ mod options;
 mod wanted;
 pub mod candidate;
 pub mod sight;
+pub mod space;
 pub mod rows;
 pub mod design;
 pub mod schedule;
@@ -31,7 +33,8 @@ use self::design::{Design, Index};
 use self::power::Decidable;
 use self::rows::Told;
 use self::schedule::Row;
-use truegrind_arm::model::Model;
+use self::space::Space;
+use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_calibration::identification::fit::frame_parameters;
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
@@ -56,6 +59,8 @@ pub struct Plan {
     pub passed: Passed,
     /// What the rows can decide.
     pub decidable: Vec<Decidable>,
+    /// What was kept out of, at every pose and on every way.
+    pub space: Space,
 }
 
 /// How much a set of poses tells.
@@ -79,7 +84,7 @@ pub enum PlanError {
     /// Too few poses are allowed.
     #[error(
         "{found} of {drawn} random poses are allowed, expected at least {wanted} to choose from ({passed}): widen the box, \
-         the cable's range or the joint margin"
+         the cable's range or the joint margin, lower the floor or make the boxes to keep out of smaller"
     )]
     TooFew {
         /// Allowed.
@@ -90,6 +95,17 @@ pub enum PlanError {
         wanted: usize,
         /// What the others failed.
         passed: Passed,
+    },
+    /// No way from a pose to the next stays clear.
+    #[error(
+        "no way was found from pose {from} to pose {to} that keeps out of the boxes and above the floor: make the boxes to keep \
+         out of smaller, or plan with another --seed"
+    )]
+    NoWay {
+        /// The pose before, from 1.
+        from: usize,
+        /// The pose, from 1.
+        to: usize,
     },
     /// The sensor is a cable of which no outlet is stated.
     #[error("a cable needs the place of its outlet: state where in the base it comes out")]
@@ -143,12 +159,15 @@ pub fn plan(wanted: &Wanted<'_>, options: &Options) -> Result<Plan, PlanError> {
     let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
 
     let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
-    let (poses, rows) = schedule::schedule(wanted, poses, &visits, &options.bounds, options.seed);
+    let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
+    let (poses, rows) = schedule::schedule(wanted, poses, &visits, &options.bounds, &known, options.seed)
+        .map_err(|(from, to)| PlanError::NoWay { from, to })?;
     let measured = schedule::data(&rows, &poses);
     let final_told = rows::told(wanted, &parameters, &measured, &[], options);
     let sigmas = final_told.sigmas().ok_or(PlanError::NotFinite)?;
     let decidable = power::decidable(wanted, &parameters, &measured, options);
-    Ok(Plan { poses, rows, parameters, sigmas, quality, passed, decidable })
+    let space = options.bounds.space.clone();
+    Ok(Plan { poses, rows, parameters, sigmas, quality, passed, decidable, space })
 }
 
 /// What is fitted: links, then frames.

@@ -43,6 +43,6 @@ pub fn taught_cell(
             taught_with: Some(tool.to_owned()),
             ..CellFrame::of(work_object, FrameOrigin::Taught)
         }],
-        external: Vec::new(),
+        ..Cell::default()
     })
 }

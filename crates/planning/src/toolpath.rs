@@ -11,8 +11,10 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_math::se3::Pose;
-use truegrind_programs::draft::{Draft, Step};
-use truegrind_programs::motion::{Frame, MotionKind, RobTarget, TargetValue, ToolValue, WorkObjectValue};
+use truegrind_programs::draft::{Draft, Step, heading};
+use truegrind_programs::motion::{
+    Frame, MotionKind, RobTarget, TargetValue, ToolValue, UNCORRECTED, WorkObjectValue,
+};
 use truegrind_surfaces::path::{PathPoint, PointKind};
 use truegrind_surfaces::{SurfaceError, SurfaceFile};
 
@@ -222,10 +224,7 @@ fn draft(
     let object = &file.work_object;
     Draft {
         name: file.name.clone(),
-        comments: vec![
-            format!("Path over surface {} for {robot}, {} targets.", file.name, points.len()),
-            "Written for the nominal arm: run truegrind compensate before grinding.".to_owned(),
-        ],
+        comments: vec![heading(&file.name, robot, points.len()), UNCORRECTED.to_owned()],
         tool: (
             file.tool.name.clone(),
             ToolValue {

@@ -39,3 +39,31 @@ pub struct Step {
     /// Time at rest after it (s).
     pub wait_s: Option<f64>,
 }
+
+/// The comment that says of a path which robot it was made for.
+pub fn heading(surface: &str, robot: &str, targets: usize) -> String {
+    format!("{PATH}{surface}{ROBOT}{robot}, {targets} targets.")
+}
+
+/// The robot that a program says it was made for, in the [`heading`] among its first lines.
+///
+/// ```
+/// use truegrind_programs::draft::{heading, robot_of};
+///
+/// let file = format!("%\nO0001\n({})\nG90 G21\n", heading("blade", "abb-irb-120", 321));
+/// assert_eq!(robot_of(file.as_bytes()), Some("abb-irb-120"));
+/// assert_eq!(robot_of(b"(a path for lunch, 3 targets.)\n"), None);
+/// ```
+pub fn robot_of(source: &[u8]) -> Option<&str> {
+    const LINES: usize = 20;
+    let mut lines =
+        source.split(|&byte| byte == b'\n').take(LINES).filter_map(|line| std::str::from_utf8(line).ok());
+    lines.find_map(|line| {
+        let said = line.trim_start_matches(['!', ';', '(', ' ', '\t']).strip_prefix(PATH)?;
+        let (robot, targets) = said.split_once(ROBOT)?.1.rsplit_once(", ")?;
+        targets.contains(" targets.").then_some(robot)
+    })
+}
+
+const PATH: &str = "Path over surface ";
+const ROBOT: &str = " for ";

@@ -542,12 +542,36 @@ pub struct Listing {
     pub zones: Vec<Zone>,
     /// Routines that hold motions.
     pub routines: Vec<Routine>,
+    /// Whether it is of NC programs, which know tools by number and work offsets.
+    pub numbered: bool,
     /// Motions that call a program which does not stand in their file (NC).
     pub outside: Vec<u32>,
     /// What could not be read.
     pub opaque: Vec<OpaqueRegion>,
     /// The marks of earlier compensations, per file.
     pub marks: Vec<Option<Mark>>,
+    /// Comments that state something for the correction (`truegrind angles …`) and cannot be used: nothing may be corrected
+    /// before they are put right.
+    pub misstated: Vec<Misstated>,
+}
+
+/// A comment that states something for the correction, and does not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misstated {
+    /// Name of its file.
+    pub file: String,
+    /// Its line, from 1.
+    pub line: u32,
+    /// The comment as it stands there.
+    pub text: String,
+    /// What was expected.
+    pub expected: String,
+}
+
+impl fmt::Display for Misstated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: line {}: {}: expected {}", self.file, self.line, self.text, self.expected)
+    }
 }
 
 impl Listing {
@@ -599,6 +623,19 @@ impl Listing {
     pub fn zone(&self, motion: &Motion) -> Option<&Zone> {
         motion.zone.and_then(|index| self.zones.get(index as usize))
     }
+}
+
+/// What a program that was made for the nominal arm says of itself in a comment; the line goes when the program is corrected.
+pub const UNCORRECTED: &str = "Written for the nominal arm: run truegrind compensate before grinding.";
+
+/// Whether a comment is that one, in whichever signs a language puts comments.
+pub(crate) fn says_uncorrected(comment: &[u8]) -> bool {
+    let said = comment.trim_ascii_start();
+    let said =
+        said.strip_prefix(b"!").or_else(|| said.strip_prefix(b";")).or_else(|| said.strip_prefix(b"("));
+    let said = said.unwrap_or(comment).trim_ascii();
+    let said = said.strip_suffix(b")").unwrap_or(said).trim_ascii_end();
+    said.eq_ignore_ascii_case(UNCORRECTED.as_bytes())
 }
 
 /// The comment line that says that a file was compensated, by which version, with which model.
@@ -687,7 +724,7 @@ reasons! {
         /// The tool's value is not known.
         ToolUnknown => "the value of the tool is not known",
         /// The work object's value is not known.
-        WorkObjectUnknown => "the value of the work object is not known",
+        WorkObjectUnknown => "where the work object or work offset lies is not known",
         /// The program assigns the tool.
         ToolAssigned => "the tool is or may be assigned while the program runs",
         /// The program assigns the work object.

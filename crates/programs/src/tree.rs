@@ -12,6 +12,17 @@ use std::ops::Range;
 
 use crate::motion::{OpaqueReason, Span};
 
+/// A range with the blanks before it and its line end, where it has the line to itself; else as it is.
+pub(crate) fn whole_line(source: &[u8], range: Range<usize>) -> Range<usize> {
+    let before = source[..range.start].iter().rposition(|byte| !matches!(byte, b' ' | b'\t'));
+    let after = source[range.end..].iter().position(|byte| !matches!(byte, b' ' | b'\t' | b'\r'));
+    let begins = before.is_none_or(|at| source[at] == b'\n');
+    match after.map(|at| range.end + at) {
+        Some(at) if begins && source[at] == b'\n' => before.map_or(0, |at| at + 1)..at + 1,
+        _ => range,
+    }
+}
+
 /// A node: what it is, how many nodes it and its descendants are, which tokens they cover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Node<N> {

@@ -1,5 +1,7 @@
 //! Many programs in one run: one row per program, the sum, and the programs that could not be done.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyFigure, Verdict};
@@ -8,6 +10,7 @@ use super::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::Status as Fate;
 use truegrind_compensation::rewrite::Plan;
 use truegrind_compensation::undeclared::undeclared;
+use truegrind_compensation::why::Why;
 use truegrind_programs::motion::Listing;
 
 /// What became of one program.
@@ -54,6 +57,8 @@ pub struct Row {
     pub after_mm: Option<f64>,
     /// Why it failed, or what to know about it.
     pub note: Option<String>,
+    /// Why most of what was refused, else flagged or left, was so, with its share.
+    pub reason: Option<String>,
 }
 
 impl Row {
@@ -78,12 +83,23 @@ impl Row {
             before_mm: before.reduce(f64::max),
             after_mm: after.reduce(f64::max),
             note: undeclared_note(listing),
+            reason: most_usual(plan),
         }
     }
 
     /// The row of a program that nothing was worked out for.
     pub fn without(file: String, ended: Ended, note: Option<String>) -> Row {
-        Row { file, output: None, ended, motions: [0; 5], opaque: 0, before_mm: None, after_mm: None, note }
+        Row {
+            file,
+            output: None,
+            ended,
+            motions: [0; 5],
+            opaque: 0,
+            before_mm: None,
+            after_mm: None,
+            note,
+            reason: None,
+        }
     }
 
     /// Nothing rewritten must not look like done.
@@ -111,6 +127,41 @@ fn undeclared_note(listing: &Listing) -> Option<String> {
     let names: Vec<&str> = all.iter().take(NAMED).map(|one| one.name.as_str()).collect();
     let more = if all.len() > NAMED { " and more" } else { "" };
     (!names.is_empty()).then(|| format!("declared in no file: {}{more}", names.join(", ")))
+}
+
+/// The reason that most motions of a program were refused for, else flagged, else left, with how many.
+fn most_usual(plan: &Plan) -> Option<String> {
+    [(Fate::Refused, "refused"), (Fate::Flagged, "flagged"), (Fate::Left, "left")].into_iter().find_map(
+        |(fate, word)| {
+            let reasons = plan
+                .outcomes
+                .iter()
+                .filter(|outcome| outcome.status == fate)
+                .filter_map(|outcome| outcome.reason);
+            let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+            reasons
+                .filter(|why| *why != Why::Same)
+                .for_each(|why| *counts.entry(why.kind()).or_default() += 1);
+            let (reason, count) = counts.into_iter().max_by_key(|(_, count)| *count)?;
+            Some(format!("{count} {word}: {reason}"))
+        },
+    )
+}
+
+/// The worst first: what failed, what is not rewritten, what is refused, flagged and left most of, what is farthest off.
+fn worst_first(rows: &[Row]) -> Vec<Row> {
+    let mut rows = rows.to_vec();
+    let rank = |row: &Row| match row.ended {
+        Ended::Failed => 0,
+        Ended::Unchanged if row.motions[0] > 0 => 1,
+        Ended::Changed => 2,
+        Ended::Already => 3,
+        Ended::Unchanged => 4,
+    };
+    let doubtful = |row: &Row| std::cmp::Reverse((row.motions[3], row.motions[2], row.motions[4]));
+    let far = |row: &Row| row.before_mm.unwrap_or(0.0);
+    rows.sort_by(|a, b| (rank(a), doubtful(a)).cmp(&(rank(b), doubtful(b))).then(far(b).total_cmp(&far(a))));
+    rows
 }
 
 /// One row per program.
@@ -143,7 +194,7 @@ pub fn table(rows: &[Row]) -> Table {
             row.after_mm.into(),
             row.opaque.into(),
             row.output.clone().into(),
-            row.note.clone().into(),
+            row.note.clone().or_else(|| row.reason.clone()).into(),
         ]);
         table.push(cells);
     }
@@ -171,7 +222,7 @@ pub fn sum(rows: &[Row]) -> String {
 pub fn summary(rows: &[Row]) -> Document {
     let mut page = Document::new(title(rows));
     page.push(verdict(rows));
-    let mut table = table(rows);
+    let mut table = table(&worst_first(rows));
     // In a terminal only columns in which something stands.
     for column in (0..table.columns.len()).rev() {
         if table.rows.iter().all(|row| row[column] == Cell::Missing) {
@@ -199,7 +250,7 @@ pub fn document(rows: &[Row]) -> Document {
         KeyFigure::new("Predicted remainder", largest(|row| row.after_mm), 4, "mm")
             .note("largest of the rewritten motions"),
     ]);
-    page.push(table(rows).excerpt(ROWS));
+    page.push(table(&worst_first(rows)).excerpt(ROWS));
     page
 }
 

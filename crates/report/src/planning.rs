@@ -7,9 +7,9 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::parameter::Parameter;
 use truegrind_calibration::measurement::dataset::Reading;
-use truegrind_planning::poses::drive::reading;
+use truegrind_planning::poses::drive::{checked, reading};
 use truegrind_planning::poses::power::Decidable;
-use truegrind_planning::poses::schedule::Purpose;
+use truegrind_planning::poses::schedule::{FIRST_ROW, Purpose};
 use truegrind_planning::poses::{Plan, Wanted};
 
 /// Rows on a page; all are in the CSV file.
@@ -36,7 +36,7 @@ pub fn table(plan: &Plan, wanted: &Wanted<'_>) -> Table {
     }
     columns.push(Column::text("note", "Note"));
     let mut table = Table::new("Rows to measure", columns);
-    for (number, row) in plan.rows.iter().enumerate() {
+    for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
         let pose = &plan.poses[row.pose];
         let mut cells: Vec<Cell> = vec![number.into(), (row.pose + 1).into(), row.purpose.word().into()];
         cells.extend(pose.joints.iter().map(|q| Cell::from(q.to_degrees())));
@@ -157,6 +157,10 @@ fn verdict(plan: &Plan) -> Verdict {
         let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
         reasons.push(format!("not decided at the usual size: {}{tail}", names.join(", ")));
     }
+    reasons.push(format!(
+        "checked: {}; the way to the first pose and anything else in the cell are not",
+        checked(plan)
+    ));
     let rough = plan.rows.iter().filter(|row| row.rough_way).count();
     if rough > 0 {
         reasons.push(format!("{rough} times the cable has to be unhooked on the way"));
@@ -184,8 +188,8 @@ pub fn document(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Document {
         KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm"),
     ]);
     page.paragraph(
-        "No program can know what stands in the cell: collisions are not checked. Run the program slowly first, then take one \
-         reading at every stop, in the order of the rows.",
+        "No program can know what else stands in the cell: state it as boxes (--keep-out). Run the program slowly first, then take \
+         one reading at every row, in their order.",
     );
     page.push(effect_table(plan));
     page.heading(2, "Rows");
@@ -210,6 +214,7 @@ pub fn json(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Value {
                 "approach": row.approach,
                 "anchor": pose.anchor,
                 "t_h": row.time_h,
+                "stops_deg": row.stops.iter().map(|q| q.map(f64::to_degrees).as_slice().to_vec()).collect::<Vec<_>>(),
                 "expected": match reading(plan, wanted, row) {
                     Some(Reading::Cable(length)) => json!(length),
                     Some(Reading::Position(p)) => json!([p.x, p.y, p.z]),

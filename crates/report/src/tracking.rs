@@ -78,7 +78,21 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
         1 => (Status::Warning, format!("{fresh} new poses taken in, one change noticed")),
         n => (Status::Warning, format!("{fresh} new poses taken in, {n} changes noticed")),
     };
-    page.push(Verdict::new(status, headline, alarms.iter().map(ToString::to_string)));
+    let mut reasons: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+    let (status, headline) = if tracker.mostly_set_aside() {
+        reasons.insert(
+            0,
+            format!(
+                "{} of {} poses were set aside since they fit neither the arm nor a change that was found: the model follows the \
+                 rest alone; look at the sensor and its target, or begin a new track",
+                state.accidents, state.poses
+            ),
+        );
+        (Status::Bad, format!("{headline}; too many poses do not fit"))
+    } else {
+        (status, headline)
+    };
+    page.push(Verdict::new(status, headline, reasons));
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
     let mean = (!nis.is_empty()).then(|| nis.iter().sum::<f64>() / nis.len() as f64);
     page.push(vec![

@@ -29,6 +29,10 @@ pub enum Course {
     Jump,
     /// Steadily, and it may go on.
     Drift,
+    /// Taken off and put on again elsewhere.
+    Mounted,
+    /// Readings that are far off and agree with no one change.
+    Burst,
 }
 
 /// A change that was noticed.
@@ -83,6 +87,25 @@ fn shown(unit: &str) -> (f64, &str) {
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (scale, unit) = shown(&self.unit);
+        if self.course == Course::Burst {
+            return write!(
+                f,
+                "the {} readings from row {} of {} on are far off and agree with no one change: they are set aside, and so is what \
+                 follows until readings fit again; look at the target, the line of sight and the poses",
+                self.poses, self.since_row, self.since_file
+            );
+        }
+        if self.course == Course::Mounted {
+            write!(
+                f,
+                "{} was mounted anew at row {} of {}: moved by {:.1} mm",
+                self.parameter, self.since_row, self.since_file, self.shift
+            )?;
+            if let Some(turn) = self.parts.first() {
+                write!(f, " and turned by {:.2}°", turn.shift.to_degrees())?;
+            }
+            return write!(f, "; {} poses agree on it, and the track goes on from there", self.poses);
+        }
         if self.parameter.is_empty() {
             return write!(
                 f,
@@ -93,7 +116,7 @@ impl fmt::Display for Alarm {
             );
         }
         let verb = match self.course {
-            Course::Open => "moved",
+            Course::Open | Course::Mounted | Course::Burst => "moved",
             Course::Jump => "jumped",
             Course::Drift => "has drifted",
         };

@@ -12,16 +12,18 @@
 //! the best single parameter where it is the more surprising if nothing had moved ([`surprise`]), and that by far
 //! ([`CLEARLY`]): what a model does not hold is smooth in the joints, and six numbers follow it where one cannot.
 //!
-//! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w.
+//! The sums of a drift are sums of those of a jump: B_s = B_{s+1} + A_s, and Σ w² = 2 Σ w(w + 1)/2 − Σ w. With CCᵀ = P⁻¹ + A
+//! the product C⁻¹B is carried along in place of B, since B(:,k)ᵀ M B(:,l) is what its columns k and l make: a pose costs its
+//! rows times p², and nothing costs p³ more than once.
 //!
-//! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n p³ operations.
+//! **Shapes.** n poses of m rows, p parameters: J is nm × p, column-major. n m p² + p³ operations.
 //!
 //! **Source and departures.** Willsky and Jones, "A generalized likelihood ratio approach to the detection and estimation
 //! of jumps in linear systems", IEEE TAC 21, 1976, with the drift beside the jump.
 //!
 //! **Checked against** least squares that has the change as one parameter more.
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 use truegrind_math::distribution::ln_gamma;
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
@@ -116,29 +118,36 @@ pub fn locate(
     let j = DMatrix::from_column_slice(n * per, p, jacobian);
     let r = DVector::from_column_slice(residuals);
     let whole = j.tr_mul(&j);
-    let m = (covariance.clone().cholesky()?.inverse() + whole).cholesky()?.inverse();
-    let mg = &m * j.tr_mul(&r);
+    let factor = (covariance.clone().cholesky()?.inverse() + whole).cholesky()?;
+    let mg = factor.solve(&j.tr_mul(&r));
+    let rooted = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
+    let towards = &j * &mg;
     let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
     // Sums from the end: of a jump (weights 1), of a drift (weights 1, 2, …), and Σ w(w + 1)/2 on the diagonal.
-    let (mut jump, mut drift) = (DMatrix::zeros(p, p), DMatrix::zeros(p, p));
+    let mut jump = DMatrix::zeros(p, p);
+    let (mut of_jump, mut of_drift) = (DMatrix::zeros(p, p), DMatrix::zeros(p, p));
+    let (mut jump_cross, mut drift_cross) = (DVector::zeros(p), DVector::zeros(p));
     let (mut jump_gradient, mut drift_gradient) = (DVector::zeros(p), DVector::zeros(p));
-    let mut triangle = DVector::zeros(p);
+    let (mut drift_square, mut triangle) = (DVector::zeros(p), DVector::zeros(p));
     let mut together: Option<Together> = None;
     for since in (0..n).rev() {
         let rows = j.rows(since * per, per);
-        jump += rows.tr_mul(&rows);
-        jump_gradient += rows.tr_mul(&r.rows(since * per, per));
-        drift += &jump;
+        jump.gemm_tr(1.0, &rows, &rows, 1.0);
+        of_jump.gemm(1.0, &rooted.columns(since * per, per), &rows, 1.0);
+        of_drift += &of_jump;
+        jump_gradient.gemv_tr(1.0, &rows, &r.rows(since * per, per), 1.0);
         drift_gradient += &jump_gradient;
-        triangle += drift.diagonal();
-        let (of_jump, of_drift) = (&m * &jump, &m * &drift);
+        jump_cross.gemv_tr(1.0, &rows, &towards.rows(since * per, per), 1.0);
+        drift_cross += &jump_cross;
+        drift_square += jump.diagonal();
+        triangle += &drift_square;
         for (index, group) in groups.iter().enumerate() {
             let at = |a: usize| group.members[a].0;
             let d = group.members.len();
-            let left = DVector::from_fn(d, |a, _| jump_gradient[at(a)] - jump.column(at(a)).dot(&mg));
+            let left = DVector::from_fn(d, |a, _| jump_gradient[at(a)] - jump_cross[at(a)]);
             let information = DMatrix::from_fn(d, d, |a, b| {
                 let own = if a == b { 1.0 / (group.members[a].1 * group.members[a].1) } else { 0.0 };
-                jump[(at(a), at(b))] - jump.column(at(a)).dot(&of_jump.column(at(b))) + own
+                jump[(at(a), at(b))] - of_jump.column(at(a)).dot(&of_jump.column(at(b))) + own
             });
             let Some(factor) = information.cholesky() else { continue };
             let shifts = factor.solve(&left);
@@ -151,8 +160,7 @@ pub fn locate(
             }
         }
         for k in 0..p {
-            let mut weigh = |form: Form, cross: DVectorView<'_, f64>, h: f64, square: f64, own: f64| {
-                let left = h - cross.dot(&mg);
+            let mut weigh = |form: Form, left: f64, square: f64, own: f64| {
                 let seen = square - own;
                 // A change that the history hardly sees says nothing.
                 if !(seen > 1e-9 * square) {
@@ -166,13 +174,12 @@ pub fn locate(
                     *place = Some(Change { parameter: k, since, form, shift, sigma, ratio });
                 }
             };
-            let column = jump.column(k);
-            weigh(Form::Jump, column, jump_gradient[k], jump[(k, k)], column.dot(&of_jump.column(k)));
+            let own = of_jump.column(k).norm_squared();
+            weigh(Form::Jump, jump_gradient[k] - jump_cross[k], jump[(k, k)], own);
             // With one pose left both forms are the same.
             if since + 1 < n {
-                let column = drift.column(k);
-                let square = 2.0 * triangle[k] - drift[(k, k)];
-                weigh(Form::Drift, column, drift_gradient[k], square, column.dot(&of_drift.column(k)));
+                let (square, own) = (2.0 * triangle[k] - drift_square[k], of_drift.column(k).norm_squared());
+                weigh(Form::Drift, drift_gradient[k] - drift_cross[k], square, own);
             }
         }
     }

@@ -1,15 +1,15 @@
 //! The model that a track writes: the one it began with, moved to where the filter stands, with its covariance.
 
 use super::tracker::Tracker;
-use crate::identification::calibration::Calibration;
+use crate::identification::calibration::{Calibration, Frames};
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Verdict};
+use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
 impl Tracker {
-    /// The model as it stands now.
-    pub fn model(&self) -> Estimated {
-        let x = self.recursion.x.as_slice();
+    /// The arm and the sensor's frames as they stand now.
+    pub(super) fn standing(&self) -> (Model, Frames) {
         let task = Calibration::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
             &self.begun.model,
@@ -18,7 +18,13 @@ impl Tracker {
             &[],
             &[],
         );
-        let (model, _) = task.apply(x);
+        task.apply(self.recursion.x.as_slice())
+    }
+
+    /// The model as it stands now.
+    pub fn model(&self) -> Estimated {
+        let x = self.recursion.x.as_slice();
+        let (model, _) = self.standing();
         let arm = self.begun.order.len();
         let whole = self.recursion.covariance();
         let covariance = whole.view((0, 0), (arm, arm)).into_owned();

@@ -24,6 +24,9 @@ const REACH_RAD: f64 = 0.05;
 impl Tracker {
     /// Looks at the window, and where it is out of bounds finds out what moved.
     pub(super) fn alarm(&mut self) -> Option<Alarm> {
+        if self.state.burst_since > 0 {
+            return self.in_a_burst();
+        }
         let window = self.state.options.window.max(1);
         let history = &self.state.history;
         // The window never reaches back behind the first poses, which place the sensor.
@@ -47,6 +50,10 @@ impl Tracker {
             return None;
         }
         self.state.pending_since = 0;
+        if let Some(alarm) = self.mounted_anew() {
+            return Some(alarm);
+        }
+        let history = &self.state.history;
         let groups = self.groups();
         let found = self.what_moved(&groups)?;
         let ratio = found.together.as_ref().map_or(found.best.ratio, |t| t.ratio);
@@ -60,6 +67,9 @@ impl Tracker {
         };
         let all: f64 = (history.len() - window..history.len()).map(measured).sum();
         if !(ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
+            if self.set_aside_in_a_row() > SETTLE {
+                return Some(self.burst([sum, bound], ratio));
+            }
             let alarm = Alarm {
                 noticed_file: last.file.clone(),
                 noticed_row: last.row,
@@ -116,6 +126,49 @@ impl Tracker {
         }
         self.reopen(&found, &groups);
         Some(alarm)
+    }
+
+    /// Readings that are far off, one after the other, and that no change explains: one alarm for all of them.
+    fn burst(&mut self, window_nis: [f64; 2], ratio: f64) -> Alarm {
+        let history = &self.state.history;
+        let run = self.set_aside_in_a_row().max(1);
+        let (first, last) = (&history[history.len() - run], &history[history.len() - 1]);
+        let alarm = Alarm {
+            noticed_file: last.file.clone(),
+            noticed_row: last.row,
+            since_file: first.file.clone(),
+            since_row: first.row,
+            since_time_h: first.time_h,
+            parameter: String::new(),
+            unit: String::new(),
+            course: Course::Burst,
+            shift: 0.0,
+            sigma: 0.0,
+            poses: run,
+            ratio,
+            alternatives: Vec::new(),
+            window_nis,
+            parts: Vec::new(),
+        };
+        self.state.burst_since = self.state.poses;
+        alarm
+    }
+
+    /// While a burst goes on nothing more is said, unless what follows agrees on a new place of target or sensor; it is over
+    /// once so many poses fit again as it takes to settle.
+    fn in_a_burst(&mut self) -> Option<Alarm> {
+        let run = self.set_aside_in_a_row();
+        if run > 0 {
+            return (run % SETTLE == 0).then(|| self.mounted_anew()).flatten();
+        }
+        let bound = accident_bound(self.rows_per_pose());
+        let fitting = self.state.history.iter().rev().take_while(|seen| seen.nis <= bound).count();
+        if fitting >= SETTLE {
+            self.state.burst_since = 0;
+            // The poses of the burst are not complained of again.
+            self.state.quiet_until = self.state.poses + self.state.options.window;
+        }
+        None
     }
 
     /// Writes into an alarm what moved as a whole.

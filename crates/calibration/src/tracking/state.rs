@@ -22,7 +22,7 @@ pub const SCHEMA: &str = "truegrind.track/1";
 pub struct Seen {
     /// File it came from.
     pub file: String,
-    /// Data row in that file, from 0.
+    /// Its row, as the spreadsheet counts.
     pub row: usize,
     /// Time, where logged (h).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -84,7 +84,7 @@ impl Snapshot {
         let rows = |s: &DMatrix<f64>| s.row_iter().map(|r| r.iter().copied().collect()).collect();
         Self {
             x: recursion.x.as_slice().to_vec(),
-            root: recursion.root().map(rows).unwrap_or_default(),
+            root: recursion.root().as_ref().map(rows).unwrap_or_default(),
             before,
         }
     }
@@ -138,6 +138,9 @@ pub struct State {
     /// Number of poses when the window left its bounds, while what moved is waited for; 0 otherwise.
     #[serde(default)]
     pub pending_since: usize,
+    /// Number of poses when a burst of outliers was noticed, while it goes on; 0 otherwise.
+    #[serde(default)]
+    pub burst_since: usize,
     /// Files and rows taken in.
     pub consumed: Vec<Consumed>,
     /// Changes noticed so far.

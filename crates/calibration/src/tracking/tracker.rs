@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::alarm::Alarm;
+use super::alarm::{Alarm, Course};
 use super::bounds::accident_bound;
 use super::error::TrackError;
 use super::options::Options;
@@ -147,6 +147,7 @@ impl Tracker {
             region: model.region.clone(),
             quiet_until: 0,
             pending_since: 0,
+            burst_since: 0,
             consumed: Vec::new(),
             alarms: Vec::new(),
             history: Vec::new(),
@@ -225,12 +226,18 @@ impl Tracker {
         }
         let fresh = dataset.subset(&(from..dataset.rows.len()).collect::<Vec<_>>());
         let (observed, _) = observe(&fresh, &self.begun.nominal, false);
-        let seen = self.seen(&observed);
-        let task = self.task(&seen);
+        let mut seen = self.seen(&observed);
+        let mut task = self.task(&seen);
         let mut alarms = Vec::new();
-        for (at, (row, seen)) in observed.dataset.rows.iter().zip(seen).enumerate() {
+        for (at, row) in observed.dataset.rows.iter().enumerate() {
             self.condition = row.condition;
-            alarms.extend(self.pose(&task, at, seen));
+            let alarm = self.pose(&task, at, seen[at].clone());
+            if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
+                // Its frames are others now, and with them what rounded angles cost.
+                seen = self.seen(&observed);
+                task = self.task(&seen);
+            }
+            alarms.extend(alarm);
         }
         let consumed = Consumed {
             file: dataset.file.clone(),
@@ -364,6 +371,11 @@ impl Tracker {
         &self.begun.robot
     }
 
+    /// Whether so many poses were set aside that the track says little: more than one in ten.
+    pub fn mostly_set_aside(&self) -> bool {
+        self.state.accidents > FEW_ACCIDENTS && 10 * self.state.accidents > self.state.poses
+    }
+
     /// What must be saved.
     pub fn state(&self) -> &State {
         &self.state
@@ -390,6 +402,9 @@ impl Tracker {
         self.task(&self.seen(&observed))
     }
 }
+
+/// Accidents that say nothing of a track.
+const FEW_ACCIDENTS: usize = 5;
 
 /// First poses that leave so many times what the model left on held-out rows, and more than so many mm, are no noise.
 const FOREIGN: f64 = 5.0;

@@ -100,8 +100,8 @@ fn a_joint_that_lost_its_zero_is_named_with_its_size_and_its_pose() {
         alarm.parameter == "link3.theta" || alarm.alternatives.contains(&"link3.theta".to_owned()),
         "{alarm}"
     );
-    assert!(alarm.since_row.abs_diff(70) <= 2, "{alarm}");
-    assert!(alarm.noticed_row <= 80, "{alarm}");
+    assert!(alarm.since_row.abs_diff(72) <= 2, "{alarm}");
+    assert!(alarm.noticed_row <= 82, "{alarm}");
     assert!((alarm.shift.to_degrees() - 0.05).abs() < 0.01, "{alarm}");
     assert!(alarm.course != Course::Drift, "{alarm}");
     // The model has followed, and says what happened.
@@ -126,7 +126,7 @@ fn a_sensor_that_was_knocked_is_named_as_a_whole() {
     assert_eq!(alarms.len(), 1, "{alarms:#?}");
     let alarm = &alarms[0];
     assert_eq!(alarm.parameter, "the sensor against the arm's base", "{alarm}");
-    assert!(alarm.since_row.abs_diff(70) <= 1 && alarm.parts.len() == 6, "{alarm:#?}");
+    assert!(alarm.since_row.abs_diff(72) <= 1 && alarm.parts.len() == 6, "{alarm:#?}");
     assert!((alarm.shift - shift.norm()).abs() < 0.03, "{alarm}");
     assert!(alarm.to_string().contains("sensor."), "{alarm}");
     // The arm's own parameters are what they would be without the knock: joints 2 to 5, since no sensor tells the first
@@ -395,4 +395,100 @@ fn what_cannot_be_tracked_is_said() {
     let error = Tracker::resume(model(), state, "state.toml").unwrap_err();
     assert!(error.to_string().contains("truegrind.track/9"), "{error}");
     assert!(State::from_toml("x = 1").is_err());
+}
+
+/// The recipe with another target and another kind of sensor.
+fn measured_with(seed: u64, from: &str, to: &str) -> Dataset {
+    let text = RECIPE.replace(from, to);
+    assert_ne!(text, RECIPE);
+    let mut recipe = Recipe::parse(&text, "track.toml").unwrap();
+    recipe.seed = seed;
+    let simulation = recipe.simulate(nominal).unwrap();
+    import::read("day.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap()
+}
+
+/// A track over `before` rows of one measurement and the rest of another.
+fn spliced(first: &Dataset, second: &Dataset, before: usize) -> Dataset {
+    let mut out = first.clone();
+    for i in before..out.rows.len() {
+        out.rows[i] = second.rows[i].clone();
+    }
+    out
+}
+
+/// A target that is taken off and put on again lies anywhere, turned by any angle: that is one alarm, and the poses after
+/// it are taken in. The class: a change that no linearisation reaches, complained of window after window.
+#[test]
+fn a_target_that_was_mounted_anew_is_one_alarm_and_the_track_goes_on() {
+    const POINT: &str = "reflector_mm = [38.2, 12.6, 61.3]";
+    const KIND: &str = "kind = \"position\"\nframe = { position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }\nreflector_mm = [38.2, 12.6, 61.3]\n[noise]\nsigma_mm = 0.015";
+    let pose = |target: &str| {
+        let frame = "frame = { position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }";
+        format!("kind = \"pose\"\n{frame}\ntarget = {target}\n[noise]\nsigma_mm = 0.015\nsigma_deg = 0.003")
+    };
+    let before = pose("{ position_mm = [38.2, 12.6, 61.3], wxyz = [1.0, 0.0, 0.0, 0.0] }");
+    let turned = pose(
+        "{ position_mm = [-20.0, 35.0, 61.3], wxyz = [0.7071067811865476, 0.0, 0.0, 0.7071067811865476] }",
+    );
+    for (first, second, turn_deg) in [
+        (measured(2, None), measured_with(2, POINT, "reflector_mm = [-20.0, 35.0, 61.3]"), None),
+        (measured_with(2, KIND, &before), measured_with(2, KIND, &turned), Some(90.0)),
+    ] {
+        let dataset = spliced(&first, &second, 70);
+        let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+        let alarms = tracker.take(&dataset).unwrap();
+        let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+        assert_eq!(alarms.len(), 1, "{said:#?}");
+        assert_eq!((alarms[0].course, alarms[0].since_row), (Course::Mounted, 72), "{said:#?}");
+        assert_eq!(alarms[0].parameter, "the touched point");
+        assert!((alarms[0].shift - 62.4).abs() < 0.5, "{said:#?}");
+        let turn = alarms[0].parts.first().map(|part| part.shift.to_degrees());
+        assert_eq!(turn.is_some(), turn_deg.is_some(), "{said:#?}");
+        assert!(turn.zip(turn_deg).is_none_or(|(found, told)| (found - told).abs() < 0.1), "{said:#?}");
+        assert!(said[0].contains("mounted anew at row 72 of day.csv"), "{said:#?}");
+        assert!(
+            tracker.state().accidents <= 2 && !tracker.mostly_set_aside(),
+            "{}",
+            tracker.state().accidents
+        );
+        // A stop among the poses that were set aside changes no bit.
+        let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
+        let mut parts = Tracker::begin(model(), "hash", &rows(40), &Options::default()).unwrap();
+        for n in [40, 74, 76, 90, 120] {
+            parts.take(&rows(n)).unwrap();
+            let text = parts.state().to_toml().unwrap();
+            parts = Tracker::resume(model(), State::from_toml(&text).unwrap(), "state.toml").unwrap();
+        }
+        let [whole, parts] = [&tracker, &parts].map(|track| track.state().to_toml().unwrap());
+        let apart = whole.lines().zip(parts.lines()).position(|(one, other)| one != other);
+        assert!(whole == parts, "line {apart:?}");
+    }
+}
+
+/// Readings that are far off one after the other and agree on nothing are a burst: one alarm, nothing moves, and what fits
+/// again is taken in. A track of which a quarter was set aside does not end as a healthy one.
+#[test]
+fn a_burst_of_outliers_is_one_alarm_and_no_change() {
+    let mut dataset = measured(2, None);
+    let calm = dataset.clone();
+    let other = measured(7, None);
+    for at in 60..92 {
+        dataset.rows[at].reading = other.rows[at].reading;
+    }
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
+    let alarms = tracker.take(&dataset).unwrap();
+    let said: Vec<String> = alarms.iter().map(ToString::to_string).collect();
+    assert_eq!(alarms.len(), 1, "{said:#?}");
+    assert_eq!((alarms[0].course, alarms[0].since_row), (Course::Burst, 62), "{said:#?}");
+    assert_eq!(tracker.state().accidents, 32);
+    assert!(tracker.mostly_set_aside());
+    let mut undisturbed = Tracker::begin(model(), "hash", &calm, &Options::default()).unwrap();
+    undisturbed.take(&calm).unwrap();
+    assert!(!undisturbed.mostly_set_aside());
+    // Joints 2 to 5, which a sensor tells from its frame and from the touched point.
+    let (after, calm) = (tracker.model(), undisturbed.model());
+    for joint in 1..5 {
+        let off = (after.model.links[joint].theta_rad - calm.model.links[joint].theta_rad).to_degrees();
+        assert!(off.abs() < 0.01, "joint {}: {off}", joint + 1);
+    }
 }

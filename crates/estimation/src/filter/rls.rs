@@ -32,7 +32,8 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Estimate, Termination};
-use crate::filter::{entry, finish, prior_state, symmetrise};
+use crate::filter::ordered::Ordered;
+use crate::filter::{entry, finish, prior_state};
 use crate::least_squares::damped::inverse_of_normal;
 use crate::objective::Objective;
 use crate::problem::{NormalEquations, Problem, observations};
@@ -102,86 +103,111 @@ impl Options {
 pub struct Recursion {
     /// The parameters.
     pub x: DVector<f64>,
-    memory: Memory,
-    /// P or S, as `memory` says.
-    matrix: DMatrix<f64>,
+    kept: Kept,
+}
+
+/// What is kept of the covariance P.
+#[derive(Debug, Clone, PartialEq)]
+enum Kept {
+    /// P itself.
+    Covariance(DMatrix<f64>),
+    /// Any S with SSᵀ = P.
+    Root(DMatrix<f64>),
+    /// A triangular one, once parameters drift.
+    Ordered(Ordered),
 }
 
 impl Recursion {
     /// Begins with `x` and its covariance; `None` where the square-root form is asked for and the covariance is
     /// not positive definite.
     pub fn new(x: DVector<f64>, covariance: DMatrix<f64>, memory: Memory) -> Option<Self> {
-        let matrix = match memory {
-            Memory::Covariance => covariance,
-            Memory::SquareRoot => covariance.cholesky()?.unpack(),
+        let kept = match memory {
+            Memory::Covariance => Kept::Covariance(covariance),
+            Memory::SquareRoot => Kept::Root(covariance.cholesky()?.unpack()),
         };
-        Some(Self { x, memory, matrix })
+        Some(Self { x, kept })
     }
 
     /// Goes on in square-root form from a state and the root S of its covariance, as [`Recursion::root`] gave it.
     pub fn from_root(x: DVector<f64>, root: DMatrix<f64>) -> Self {
-        Self { x, memory: Memory::SquareRoot, matrix: root }
+        Self { x, kept: Kept::Root(root) }
     }
 
     /// S of the square-root form, to be saved without a loss of bits; `None` in the other.
-    pub fn root(&self) -> Option<&DMatrix<f64>> {
-        (self.memory == Memory::SquareRoot).then_some(&self.matrix)
+    pub fn root(&self) -> Option<DMatrix<f64>> {
+        match &self.kept {
+            Kept::Covariance(_) => None,
+            Kept::Root(root) => Some(root.clone()),
+            Kept::Ordered(ordered) => Some(ordered.root()),
+        }
     }
 
     /// The covariance P.
     pub fn covariance(&self) -> DMatrix<f64> {
-        match self.memory {
-            Memory::Covariance => self.matrix.clone(),
-            Memory::SquareRoot => &self.matrix * self.matrix.transpose(),
+        match &self.kept {
+            Kept::Covariance(covariance) => covariance.clone(),
+            Kept::Root(root) => root * root.transpose(),
+            Kept::Ordered(ordered) => {
+                let root = ordered.root();
+                &root * root.transpose()
+            }
         }
     }
 
     /// Takes in one row: derivatives `a` and residual `e` at the present `x`. Gives the variance ϕ + aᵀPa that
     /// the residual was expected to have.
     pub fn update(&mut self, a: &DVector<f64>, e: f64, forgetting: f64) -> f64 {
-        match self.memory {
-            Memory::Covariance => {
-                let pa = &self.matrix * a;
+        match &mut self.kept {
+            Kept::Covariance(covariance) => {
+                let pa = &*covariance * a;
                 let d = forgetting + a.dot(&pa);
                 self.x.axpy(-e / d, &pa, 1.0);
                 // Written out as in eq. 14, which also keeps P exactly symmetric.
-                for (mut column, right) in self.matrix.column_iter_mut().zip(pa.iter()) {
+                for (mut column, right) in covariance.column_iter_mut().zip(pa.iter()) {
                     column.iter_mut().zip(pa.iter()).for_each(|(entry, left)| *entry -= left * right / d);
                 }
                 if forgetting != 1.0 {
-                    self.matrix /= forgetting;
+                    *covariance /= forgetting;
                 }
                 d
             }
-            Memory::SquareRoot => {
-                let f = self.matrix.tr_mul(a);
+            Kept::Root(root) => {
+                let f = root.tr_mul(a);
                 let d = forgetting + f.norm_squared();
-                let sf = &self.matrix * &f;
+                let sf = &*root * &f;
                 self.x.axpy(-e / d, &sf, 1.0);
-                self.matrix.ger(-1.0 / (d + (forgetting * d).sqrt()), &sf, &f, 1.0);
+                root.ger(-1.0 / (d + (forgetting * d).sqrt()), &sf, &f, 1.0);
                 if forgetting != 1.0 {
-                    self.matrix /= forgetting.sqrt();
+                    *root /= forgetting.sqrt();
                 }
+                d
+            }
+            Kept::Ordered(ordered) => {
+                let (d, pa) = ordered.update(a, forgetting);
+                self.x.axpy(-e / d, &pa, 1.0);
                 d
             }
         }
     }
 
-    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`; the square root is made
-    /// anew (p³). Not finite sigmas leave everything as it was.
+    /// Lets each parameter drift by a normal step of standard deviation `sigma[k]`. A square root becomes triangular the first
+    /// time that these parameters drift (p³); after that it costs the cube of how many do. Not finite sigmas leave everything
+    /// as it was.
+    ///
+    /// # Panics
+    /// Where `sigma` has not one entry for each parameter.
     pub fn predict(&mut self, sigma: &[f64]) {
-        let mut covariance = self.covariance();
-        for (k, sigma) in sigma.iter().enumerate().take(self.x.len()) {
-            covariance[(k, k)] += sigma * sigma;
+        assert_eq!(sigma.len(), self.x.len(), "one standard deviation for each parameter");
+        if let Kept::Covariance(covariance) = &mut self.kept {
+            sigma.iter().enumerate().for_each(|(k, sigma)| covariance[(k, k)] += sigma * sigma);
+            return;
         }
-        symmetrise(&mut covariance);
-        match self.memory {
-            Memory::Covariance => self.matrix = covariance,
-            Memory::SquareRoot => {
-                if let Some(factor) = covariance.cholesky() {
-                    self.matrix = factor.unpack();
-                }
-            }
+        let fits = matches!(&self.kept, Kept::Ordered(ordered) if ordered.fits(sigma));
+        if !fits && let Some(root) = self.root() {
+            self.kept = Kept::Ordered(Ordered::of(&root, sigma));
+        }
+        if let Kept::Ordered(ordered) = &mut self.kept {
+            ordered.drift(sigma);
         }
     }
 }

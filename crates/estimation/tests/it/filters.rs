@@ -149,6 +149,42 @@ fn forgetting_follows_a_change() {
     assert!((recursion.covariance()[(0, 0)] - 10.0).abs() < 1e-12);
 }
 
+/// Where only some parameters drift, the triangular root says what the covariance itself says, whichever of them drift and
+/// though that changes on the way; and a root that is saved and read again goes on to the same bits.
+#[test]
+fn a_root_of_which_some_parameters_drift_is_the_covariance() {
+    let p = 9;
+    let mut rng = 7_u64;
+    let mut random = || {
+        rng = rng.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (rng >> 33) as f64 / 2f64.powi(31) - 0.5
+    };
+    let start = DMatrix::from_fn(p, p, |i, j| if i == j { 4.0 } else { 0.3 / (1.0 + (i + j) as f64) });
+    let begun = |memory| rls::Recursion::new(DVector::zeros(p), start.clone(), memory).unwrap();
+    let (mut plain, mut root) = (begun(rls::Memory::Covariance), begun(rls::Memory::SquareRoot));
+    for step in 0..120 {
+        let drifting = |k: usize| if step < 60 { k % 3 == 1 } else { k < 2 };
+        let sigma: Vec<f64> =
+            (0..p).map(|k| if drifting(k) { 0.05 + 0.01 * k as f64 } else { 0.0 }).collect();
+        plain.predict(&sigma);
+        root.predict(&sigma);
+        let a = DVector::from_fn(p, |_, _| 3.0 * random());
+        let (e, forgetting) = (random(), if step % 7 == 0 { 0.98 } else { 1.0 });
+        let [one, other] = [&mut plain, &mut root].map(|recursion| recursion.update(&a, e, forgetting));
+        assert!((one - other).abs() < 1e-10 * one, "step {step}: {one} {other}");
+        if step == 40 {
+            let again = rls::Recursion::from_root(root.x.clone(), root.root().unwrap());
+            let mut stopped = again;
+            let mut going = root.clone();
+            stopped.predict(&sigma);
+            going.predict(&sigma);
+            assert_eq!(stopped.root(), going.root());
+        }
+    }
+    assert!((&plain.x - &root.x).amax() < 1e-9, "{} {}", plain.x, root.x);
+    assert!((plain.covariance() - root.covariance()).amax() < 1e-10);
+}
+
 #[test]
 fn on_a_curved_problem_filters_come_close() {
     let problem = curved(200, 0.3, 1);

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::blank::blank;
 use super::sight::clearance_mm;
+use super::space::{Space, Watch};
 use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::Inverse;
@@ -29,6 +30,8 @@ pub struct Bounds {
     pub distance_mm: Option<[f64; 2]>,
     /// Distance that a cable keeps from the lines between the joints (mm); `None` does not look.
     pub clearance_mm: Option<f64>,
+    /// What the arm must not enter.
+    pub space: Space,
 }
 
 impl Default for Bounds {
@@ -39,6 +42,7 @@ impl Default for Bounds {
             box_mm: None,
             distance_mm: None,
             clearance_mm: None,
+            space: Space::default(),
         }
     }
 }
@@ -69,6 +73,8 @@ pub struct Passed {
     pub distance: usize,
     /// The cable too near to a link.
     pub hidden: usize,
+    /// A link or the touched point where it must not be, at the pose or beside it.
+    pub blocked: usize,
 }
 
 impl fmt::Display for Passed {
@@ -76,8 +82,8 @@ impl fmt::Display for Passed {
         write!(
             f,
             "{} too near to a singularity, {} outside the box, {} too near to or too far from the sensor, {} with the \
-             cable too near to a link",
-            self.singular, self.outside, self.distance, self.hidden
+             cable too near to a link, {} with the arm below the floor or in a box to keep out of",
+            self.singular, self.outside, self.distance, self.hidden, self.blocked
         )
     }
 }
@@ -96,6 +102,7 @@ pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (V
     let inverse = Inverse::new(wanted.nominal, &Condition::default(), wanted.nominal);
     let mut out: Vec<Candidate> = Vec::with_capacity(count);
     let mut passed = Passed::default();
+    let watch = Watch::of(wanted, &bounds.space);
     let anchors = if wanted.sensor == Sensor::Cable { wanted.frames.outlets_mm.len() } else { 1 };
     while out.len() < count && passed.drawn < DRAWS_PER_CANDIDATE * count.max(20) {
         passed.drawn += 1;
@@ -132,6 +139,10 @@ pub fn draw(wanted: &Wanted<'_>, bounds: &Bounds, count: usize, seed: u64) -> (V
             && clearance_mm(&frames, &origin, &touched.coords, FREE_MM) < wanted
         {
             passed.hidden += 1;
+            continue;
+        }
+        if watch.sides(&joints, [1; 6]).is_none() {
+            passed.blocked += 1;
             continue;
         }
         out.push(Candidate { joints, touched_mm: touched.coords, singularity, anchor });

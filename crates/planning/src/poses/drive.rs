@@ -3,7 +3,7 @@
 //! Joint targets say joints, so the nominal arm of the controller and the real one agree on them; no tool or work object
 //! is involved.
 
-use super::schedule::Row;
+use super::schedule::{FIRST_ROW, Row};
 use super::{Plan, Wanted, rows};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
@@ -56,8 +56,11 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
         wait_s,
     };
     let mut steps = Vec::with_capacity(2 * plan.rows.len());
-    for (number, row) in plan.rows.iter().enumerate() {
+    for (number, row) in (FIRST_ROW..).zip(&plan.rows) {
         let said = comment(plan, wanted, row, number);
+        for stop in &row.stops {
+            steps.push(step(stop, drive.travel_mm_s, Some("on the way, to keep clear".to_owned()), None));
+        }
         steps.push(step(&row.approach_from, drive.travel_mm_s, Some(said), None));
         steps.push(step(&plan.poses[row.pose].joints, drive.approach_mm_s, None, Some(drive.settle_s)));
     }
@@ -70,9 +73,10 @@ pub fn draft(plan: &Plan, wanted: &Wanted<'_>, drive: &Drive) -> Draft {
                 plan.poses.len(),
                 drive.robot
             ),
-            "Checked: joint limits, singularities, cable. Not checked: collisions with anything in the cell."
+            format!("Checked: joint limits, singularities, cable; {}.", checked(plan)),
+            "Not checked: the way to the first pose, and anything else in the cell.".to_owned(),
+            "Run it slowly first. Take one reading at each WaitTime, in this order; rows count as in a spreadsheet with its header."
                 .to_owned(),
-            "Run it slowly first. Take one reading at each WaitTime, in this order.".to_owned(),
         ],
         tool: (
             "tool0".to_owned(),
@@ -109,6 +113,31 @@ fn comment(plan: &Plan, wanted: &Wanted<'_>, row: &Row, number: usize) -> String
         text.push_str("; on the way here the cable leaves its range or nears a link: unhook it");
     }
     text
+}
+
+/// What was kept out of, in words.
+pub fn checked(plan: &Plan) -> String {
+    let space = &plan.space;
+    let boxes = match space.boxes_mm.len() {
+        0 => String::new(),
+        1 => "out of the box".to_owned(),
+        count => format!("out of the {count} boxes"),
+    };
+    let floor = space.floor_mm.map_or(String::new(), |floor| format!("above z = {floor} mm"));
+    let and = if floor.is_empty() || boxes.is_empty() { "" } else { " and " };
+    if floor.is_empty() && boxes.is_empty() {
+        return "not where the arm is in the cell".to_owned();
+    }
+    let stops: usize = plan.rows.iter().map(|row| row.stops.len()).sum();
+    let passed = match stops {
+        0 => String::new(),
+        1 => ", with 1 stop on the way".to_owned(),
+        stops => format!(", with {stops} stops on the way"),
+    };
+    format!(
+        "links (as capsules of {:.0} mm radius) and target stay {floor}{and}{boxes} at every pose and on every way between them{passed}",
+        space.radius_mm
+    )
 }
 
 /// What the sensor will read of the nominal arm.

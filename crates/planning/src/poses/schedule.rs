@@ -17,6 +17,7 @@ use super::blank::blank;
 use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
 use super::rival::{Question, asks};
 use super::sight::clearance_mm;
+use super::space::Watch;
 use super::wanted::Wanted;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
@@ -93,6 +94,9 @@ impl Purpose {
     }
 }
 
+/// The first row to measure as a spreadsheet counts it: the header stands in row 1.
+pub const FIRST_ROW: usize = 2;
+
 /// A row to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -108,16 +112,20 @@ pub struct Row {
     pub time_h: f64,
     /// Whether a cable leaves its range or comes too near to a link on the way here.
     pub rough_way: bool,
+    /// Joints (rad) that are passed on the way here, where the straight one would enter what is kept out of.
+    pub stops: Vec<Joints>,
 }
 
-/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited.
+/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited, or two poses, from 1,
+/// between which no way is clear.
 pub(super) fn schedule(
     wanted: &Wanted<'_>,
     poses: Vec<Candidate>,
     visits: &Visits,
     bounds: &Bounds,
+    known: &[Joints],
     seed: u64,
-) -> (Vec<Candidate>, Vec<Row>) {
+) -> Result<(Vec<Candidate>, Vec<Row>), (usize, usize)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006f_7264_6572);
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.shuffle(&mut random);
@@ -126,6 +134,13 @@ pub(super) fn schedule(
     let count = poses.len();
     let sides: Vec<[i8; 6]> =
         poses.iter().map(|_| std::array::from_fn(|_| if random.random_bool(0.5) { 1 } else { -1 })).collect();
+    let watch = Watch::of(wanted, &bounds.space);
+    // Every candidate has such sides.
+    let sides: Vec<[i8; 6]> = poses
+        .iter()
+        .zip(sides)
+        .map(|(pose, sides)| watch.sides(&pose.joints, sides).unwrap_or(sides))
+        .collect();
     // Pose and purpose, with the sides of the pose or the other ones.
     let other = visits.both_sides.min(count);
     let mut list: Vec<(usize, Purpose)> = Vec::new();
@@ -166,14 +181,21 @@ pub(super) fn schedule(
             purpose,
             time_h: number as f64 * visits.seconds_per_row / 3600.0,
             rough_way: false,
+            stops: Vec::new(),
         }
     });
     let mut rows: Vec<Row> = posed_rows.collect();
     for k in 1..rows.len() {
         let (from, to) = (poses[rows[k - 1].pose].joints, rows[k].approach_from);
-        rows[k].rough_way = !clear(wanted, bounds, &from, &to, poses[rows[k].pose].anchor);
+        let numbers = (rows[k - 1].pose + 1, rows[k].pose + 1);
+        let stops = watch.stops(&from, &to, known);
+        rows[k].stops = stops.ok_or(numbers)?;
+        let places: Vec<Joints> =
+            std::iter::once(from).chain(rows[k].stops.iter().copied()).chain([to]).collect();
+        let anchor = poses[rows[k].pose].anchor;
+        rows[k].rough_way = !places.windows(2).all(|way| clear(wanted, bounds, &way[0], &way[1], anchor));
     }
-    (poses, rows)
+    Ok((poses, rows))
 }
 
 /// The same order with poses put off that are not reached clearly from the one before.

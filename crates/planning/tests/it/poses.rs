@@ -198,7 +198,7 @@ fn the_program_goes_to_every_pose_and_reads_back_byte_for_byte() {
     }
     let text = String::from_utf8(program).unwrap();
     assert_eq!(text.matches("WaitTime 2;").count(), found.rows.len());
-    assert!(text.contains("! row 0: pose 1 (geometry), from "), "{}", &text[..800]);
+    assert!(text.contains("! row 2: pose 1 (geometry), from "), "{}", &text[..800]);
 }
 
 /// Cost that is left when the readings of an arm with `effect` are fitted by geometry and frames alone: half the

@@ -4,10 +4,13 @@
 //! cuts may be corrected in part, on a line of its own after the lines with which
 //! a file begins (tape start, program number, `BEGIN PGM`).
 
+use std::ops::Range;
+
 use super::dialect::Dialect;
 use super::syntax::{NcTree, Syntax};
 use super::token::Token;
-use crate::motion::Mark;
+use crate::motion::{Mark, says_uncorrected};
+use crate::tree::whole_line;
 
 /// The mark of a file, where it has one.
 pub fn find(tree: &NcTree<'_>) -> Option<Mark> {
@@ -18,6 +21,13 @@ pub fn find(tree: &NcTree<'_>) -> Option<Mark> {
 pub fn token(tree: &NcTree<'_>) -> Option<u32> {
     let mut tokens = 0..tree.len() as u32;
     tokens.find(|&token| tree.kind(token) == Some(Token::Comment) && read(tree.text(token)).is_some())
+}
+
+/// The lines that say that the program is still to be corrected.
+pub(super) fn uncorrected(tree: &NcTree<'_>) -> Vec<Range<usize>> {
+    let comments = (0..tree.len() as u32).filter(|&token| tree.kind(token) == Some(Token::Comment));
+    let meant = comments.filter(|&token| says_uncorrected(tree.text(token)));
+    meant.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 
 /// Reads a comment as a mark.

@@ -33,11 +33,17 @@ impl Angles {
         }
     }
 
+    /// Every convention.
+    pub const ALL: [Angles; 4] = [Angles::Abc, Angles::Wpr, Angles::Rxyz, Angles::RotationVector];
+
     /// The convention of that word.
     pub fn of(text: &str) -> Option<Angles> {
-        [Angles::Abc, Angles::Wpr, Angles::Rxyz, Angles::RotationVector]
-            .into_iter()
-            .find(|angles| angles.text().eq_ignore_ascii_case(text))
+        Angles::ALL.into_iter().find(|angles| angles.text().eq_ignore_ascii_case(text))
+    }
+
+    /// The words that there are, for messages.
+    pub fn words() -> String {
+        Angles::ALL.map(Angles::text).join(", ")
     }
 
     /// The rotation of three angles (°).

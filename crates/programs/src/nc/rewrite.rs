@@ -117,6 +117,9 @@ impl Task<'_> {
             let mut file = FileEdits { edits, unmarked: false };
             if let Some(mark) = options.mark.as_ref().filter(|_| !file.edits.is_empty()) {
                 let comment = mark::text(mark, dialect);
+                for line in mark::uncorrected(tree) {
+                    file.edits.replace(line, b"");
+                }
                 match mark::token(tree) {
                     Some(old) => file.edits.replace(tree.range(old, old + 1), comment.as_bytes()),
                     None => {

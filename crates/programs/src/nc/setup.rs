@@ -93,8 +93,9 @@ pub(super) struct Stated {
     pub(super) frame: Frame,
 }
 
-/// Reads a comment as a statement of a frame, tool or convention; an error where it begins as one and cannot be read.
-pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, ()> {
+/// Reads a comment as a statement of a frame, tool or convention; where it begins as one and cannot be read, what was
+/// expected.
+pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, String> {
     // Nearly every comment is turned away here.
     let text = comment.trim_ascii();
     let text = text.strip_prefix(b";").or_else(|| text.strip_prefix(b"(")).unwrap_or(text).trim_ascii();
@@ -108,18 +109,28 @@ pub(super) fn statement(comment: &[u8]) -> Result<Option<Statement>, ()> {
     let words: Vec<&str> = head.split_ascii_whitespace().skip(1).collect();
     let Some(what) = words.first().map(|what| what.to_ascii_lowercase()) else { return Ok(None) };
     if what == "angles" {
-        let [_, angles] = words[..] else { return Err(()) };
-        return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or(());
+        let expected = || format!("`truegrind angles` with one of {}: what A, B and C mean", Angles::words());
+        let [_, angles] = words[..] else { return Err(expected()) };
+        return Angles::of(angles).map(|angles| Some(Statement::Angles(angles))).ok_or_else(expected);
     }
     if !matches!(&*what, "tool" | "frame") {
-        return Ok(None);
+        // A slip of the pen would be passed over as any comment.
+        let meant = ["angles", "tool", "frame"].into_iter().find(|word| what.starts_with(&word[..3]));
+        let known = "`truegrind angles …`, `truegrind tool …` or `truegrind frame …`";
+        return meant.map_or(Ok(None), |_| Err(known.to_owned()));
     }
+    let expected = || {
+        let (number, name) = if what == "tool" { ("T1", "tGrind") } else { ("G54", "wPart") };
+        format!(
+            "`truegrind {what} {number} {name} [[x,y,z],[q1,q2,q3,q4]]`: number, name, place in mm, unit quaternion"
+        )
+    };
     let (number, name) = match words[1..] {
         [number, name] => (number.to_owned(), name),
         [first, second, name] => (format!("{first} {second}"), name),
-        _ => return Err(()),
+        _ => return Err(expected()),
     };
-    let stated = Stated { number, name: name.to_owned(), frame: frame(tail).ok_or(())? };
+    let stated = Stated { number, name: name.to_owned(), frame: frame(tail).ok_or_else(expected)? };
     Ok(Some(if what == "tool" { Statement::Tool(stated) } else { Statement::Frame(stated) }))
 }
 

@@ -29,7 +29,9 @@ use super::parser::parse;
 use super::setup::{self, Setup, Stated, Statement, held, statement};
 use super::syntax::{Belongs, NcTree, Word};
 use super::token::Token;
-use crate::motion::{Frame, Listing, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool};
+use crate::motion::{
+    Frame, Listing, Misstated, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
+};
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -158,7 +160,7 @@ impl<'s> Task<'s> {
             trees,
             dialects,
             angles: Vec::new(),
-            listing: Listing::default(),
+            listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             written: Vec::new(),
         };
@@ -171,6 +173,8 @@ impl<'s> Task<'s> {
             lister.written = std::mem::take(&mut task.written);
             lister.file();
             task.angles.push(lister.angles);
+            let open = lister.listing.misstated.iter_mut().filter(|comment| comment.file.is_empty());
+            open.for_each(|comment| comment.file.clone_from(&task.names[file]));
             let Lister { listing, events, written, .. } = lister;
             (task.listing, task.events, task.written) = (listing, events, written);
         }
@@ -338,7 +342,7 @@ impl<'t, 's> Lister<'t, 's> {
             programs: BTreeSet::new(),
             targets: BTreeSet::new(),
             anywhere: false,
-            listing: Listing::default(),
+            listing: Listing { numbered: true, ..Listing::default() },
             events: Vec::new(),
             written: Vec::new(),
             instructions: BTreeMap::new(),
@@ -437,7 +441,10 @@ impl<'t, 's> Lister<'t, 's> {
                 Ok(Some(Statement::Tool(stated))) => tools.push((token, stated)),
                 Ok(Some(Statement::Frame(stated))) => frames.push((token, stated)),
                 Ok(None) => {}
-                Err(()) => self.unread_comment(token),
+                Err(expected) => {
+                    self.unread_comment(token);
+                    self.misstated(token, expected);
+                }
             }
         }
         let tool = |(name, frame): &(String, Frame)| {
@@ -484,6 +491,13 @@ impl<'t, 's> Lister<'t, 's> {
             found.remove(name);
         }
         found
+    }
+
+    fn misstated(&mut self, token: u32, expected: String) {
+        let text = String::from_utf8_lossy(self.tree.text(token)).trim().to_owned();
+        // The file is named where all are read.
+        let (file, line) = (String::new(), self.place(token).line);
+        self.listing.misstated.push(Misstated { file, line, text, expected });
     }
 
     /// A comment that was meant for this program and cannot be used is listed, not passed over.

@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use super::syntax::{RapidTree, Syntax, node_kind, parts, token_kind, tokens_of};
 use super::token::Token;
-use crate::motion::Mark;
+use crate::motion::{Mark, says_uncorrected};
+use crate::tree::whole_line;
 
 /// The mark of a file, where it has one: the first comment of this form.
 pub fn find(tree: &RapidTree<'_>) -> Option<Mark> {
@@ -36,6 +37,16 @@ pub fn token_in(tree: &RapidTree<'_>, tokens: Range<u32>) -> Option<u32> {
         let mut comments = comments.map(|(token, _)| token as u32);
         comments.find(|&token| read(tree.text(token)).is_some())
     })
+}
+
+/// The lines among some tokens that say that the program is still to be corrected: the comment with the blanks before it
+/// and its line end, where it has the line to itself.
+pub(super) fn uncorrected(tree: &RapidTree<'_>, tokens: Range<u32>) -> Vec<Range<usize>> {
+    let first = tokens.start as usize;
+    let kinds = (first..).zip(&tree.kinds()[first..tokens.end as usize]);
+    let comments = kinds.filter(|(_, kind)| **kind == Token::Comment).map(|(token, _)| token as u32);
+    let meant = comments.filter(|&token| says_uncorrected(tree.text(token)));
+    meant.map(|token| whole_line(tree.source(), tree.range(token, token + 1))).collect()
 }
 
 /// Reads a comment as a mark.

@@ -71,11 +71,12 @@ fn marks(tree: &RapidTree<'_>, edits: &Edits, comment: &[u8]) -> Edits {
         let tokens = if modules.len() == 1 { 0..tree.len() as u32 } else { node.first..node.end };
         let (place, begins_line) = mark::place(tree, module);
         let end = mark::line_end(tree.source());
-        match mark::token_in(tree, tokens) {
+        match mark::token_in(tree, tokens.clone()) {
             Some(old) => replace(&mut marks, old),
             None if begins_line => marks.insert(place, &[comment, end].concat()),
             None => marks.insert(place, &[end, comment, end].concat()),
         }
+        mark::uncorrected(tree, tokens).into_iter().for_each(|line| marks.replace(line, b""));
     }
     if marks.is_empty()
         && let Some(old) = mark::token(tree)

@@ -12,8 +12,9 @@ use crate::table::{Alignment, Table};
 const NARROWEST_TEXT: usize = 12;
 const GAP: usize = 2;
 
-/// The table as lines of at most `width` characters. Where it is wider, columns of words are shortened with `…`; where
-/// that does not suffice, the table continues below with its first column repeated.
+/// The table as lines of at most `width` characters. Where it is wider, folders that all paths of a column share are left
+/// out, then columns of words are shortened with `…`, but names never so far that two of them look the same; where that does
+/// not suffice, the table continues below with its first column repeated.
 pub fn table(table: &Table, width: usize) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
@@ -22,10 +23,16 @@ pub fn table(table: &Table, width: usize) -> String {
     let columns = 0..table.columns.len();
     let heading: Vec<String> = table.columns.iter().map(|column| flat(&column.label())).collect();
     let rows = (0..table.rows.len()).map(|row| columns.clone().map(|c| flat(&table.shown(row, c))).collect());
-    let lines: Vec<Vec<String>> = std::iter::once(heading).chain(rows).collect();
-    let mut widths: Vec<usize> =
-        columns.map(|c| lines.iter().map(|line| length(&line[c])).max().unwrap_or(0)).collect();
-    shrink(table, &mut widths, width);
+    let mut lines: Vec<Vec<String>> = std::iter::once(heading).chain(rows).collect();
+    let widest = |lines: &[Vec<String>]| -> Vec<usize> {
+        columns.clone().map(|c| lines.iter().map(|line| length(&line[c])).max().unwrap_or(0)).collect()
+    };
+    let mut widths = widest(&lines);
+    if total(widths.iter().copied()) > width {
+        columns.clone().for_each(|column| leave_out_folders(&mut lines[1..], column));
+        widths = widest(&lines);
+    }
+    shrink(table, &mut widths, width, distinct_from(&lines[1..], width));
     for block in blocks(&widths, width) {
         if !text.is_empty() && block.first() == Some(&0) && block.get(1).is_some_and(|&second| second > 1) {
             text.push('\n');
@@ -135,15 +142,62 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
 }
 
 /// Takes characters from the widest column of words until the table fits or no such column can give any.
-fn shrink(table: &Table, widths: &mut [usize], width: usize) {
+fn shrink(table: &Table, widths: &mut [usize], width: usize, names: usize) {
+    let whole = widths.to_vec();
+    let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
     while total(widths.iter().copied()) > width {
+        let least = |c: usize| if c == 0 { names.max(NARROWEST_TEXT) } else { NARROWEST_TEXT };
         let widest = (0..widths.len())
-            .filter(|&c| table.columns[c].alignment() == Alignment::Left && widths[c] > NARROWEST_TEXT)
+            .filter(|&c| words(c) && widths[c] > least(c))
             .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
         match widest {
             Some(column) => widths[column] -= 1,
-            None => return,
+            // It goes on below in any case: then nothing is gained by cutting more than the widest.
+            None => {
+                let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
+                (0..widths.len())
+                    .filter(|&c| words(c))
+                    .for_each(|c| widths[c] = whole[c].min(most.max(widths[c])));
+                return;
+            }
         }
+    }
+}
+
+/// The least width of the first column at which two different cells look different, at most what leaves room for others.
+fn distinct_from(rows: &[Vec<String>], width: usize) -> usize {
+    let most = width.saturating_sub(width / 3);
+    let names: Vec<&str> = rows.iter().filter_map(|row| row.first()).map(String::as_str).collect();
+    let different = |width: Option<usize>| {
+        let shown = names
+            .iter()
+            .map(|name| width.map_or_else(|| (*name).to_owned(), |w| fit(name, w, Alignment::Left)));
+        shown.collect::<std::collections::BTreeSet<String>>().len()
+    };
+    let all = different(None);
+    (NARROWEST_TEXT..most).find(|&width| different(Some(width)) == all).unwrap_or(most)
+}
+
+/// Leaves out the folders that all paths of a column begin with.
+fn leave_out_folders(rows: &mut [Vec<String>], column: usize) {
+    // A folder of a few letters is shorter than what says that it was left out.
+    const WORTH: usize = 4;
+    let absent = |cell: &str| cell == "–" || cell == "⋮";
+    let paths: Vec<&str> = rows.iter().map(|row| row[column].as_str()).filter(|cell| !absent(cell)).collect();
+    let Some((first, rest)) = paths.split_first().filter(|(_, rest)| !rest.is_empty()) else { return };
+    let shared = rest.iter().fold(first.len(), |shared, path| {
+        shared.min(first.bytes().zip(path.bytes()).take_while(|(a, b)| a == b).count())
+    });
+    let Some(folders) = first.as_bytes()[..shared].iter().rposition(|byte| matches!(byte, b'/' | b'\\'))
+    else {
+        return;
+    };
+    // Words with a stroke between them are no path.
+    if folders < WORTH || paths.iter().any(|path| path.contains(": ")) {
+        return;
+    }
+    for row in rows.iter_mut().filter(|row| !absent(&row[column])) {
+        row[column].replace_range(..folders, "…");
     }
 }
 

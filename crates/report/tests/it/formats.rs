@@ -197,6 +197,48 @@ proptest! {
     }
 }
 
+/// Names are never cut where they tell things apart: not robots, nor programs in folders, on a terminal of 80 columns.
+#[test]
+fn names_that_tell_things_apart_are_not_cut_until_they_look_the_same() {
+    let columns = || {
+        let mut out = vec![Column::text("file", "Program")];
+        out.extend((0..5).map(|i| Column::number(format!("n{i}"), format!("figure {i}"), "mm", 3)));
+        out.push(Column::text("note", "Note"));
+        out
+    };
+    let row = |name: &str| -> Vec<Cell> {
+        let numbers = (0..5).map(|i| Cell::Number(f64::from(i)));
+        std::iter::once(name.into())
+            .chain(numbers)
+            .chain(["a reason that is told in some more words".into()])
+            .collect()
+    };
+    let robots = [
+        "universal-robots-ur10e-high-payload",
+        "universal-robots-ur10e-high-speed",
+        "universal-robots-ur10e",
+    ];
+    let programs =
+        ["customers/of-this-year/parts/blade-left.mod", "customers/of-this-year/parts/blade-right.mod"];
+    for names in [&robots[..], &programs[..]] {
+        let mut table = Table::new("", columns());
+        names.iter().for_each(|name| table.push(row(name)));
+        for width in [80, 100, 120] {
+            let text = terminal::table(&table, width);
+            assert!(text.lines().all(|line| line.chars().count() <= width), "{text}");
+            let first: Vec<&str> =
+                text.lines().skip(2).take(names.len()).map(|line| line.split("  ").next().unwrap()).collect();
+            let distinct: std::collections::BTreeSet<&&str> = first.iter().collect();
+            assert_eq!(distinct.len(), names.len(), "{text}");
+        }
+    }
+    // Folders that all share say nothing; what differs is there whole.
+    let mut table = Table::new("", columns());
+    programs.iter().for_each(|name| table.push(row(name)));
+    let text = terminal::table(&table, 80);
+    assert!(text.contains("…/blade-left.mod") && text.contains("…/blade-right.mod"), "{text}");
+}
+
 #[test]
 fn a_wide_table_goes_on_below_with_its_first_column() {
     let mut table =

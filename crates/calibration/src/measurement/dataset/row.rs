@@ -29,7 +29,8 @@ pub struct Motion {
 /// One measured pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Index of the data row in the file, from 0 at the first row below the header.
+    /// What the row is called where people read of it: its line in a file that was read, counted as the spreadsheet counts;
+    /// an index where there is no file.
     pub number: usize,
     /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
     pub line: usize,

@@ -57,6 +57,8 @@ impl Columns {
             .map(|(i, cell)| (cell.to_string(), i))
             .collect();
         let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
+        let letter = joint_letter(&found);
+        let is_known = |name: &str| is_known(name, letter);
         let mut by_name = BTreeMap::new();
         for (name, index) in &named {
             let doubled = by_name.insert(name.as_str(), *index).is_some();
@@ -67,7 +69,7 @@ impl Columns {
             }
         }
         for name in by_name.keys() {
-            if let Some(joint) = joint_number(name).filter(|j| *j > 6) {
+            if let Some(joint) = joint_number(name, letter).filter(|j| *j > 6) {
                 let place = Place { column: Some((*name).into()), ..place };
                 return Err(ImportError::TooManyJoints { place, joint });
             }
@@ -76,14 +78,14 @@ impl Columns {
         let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_known(n)).collect();
 
         let missing: Vec<String> = (1..=6)
-            .map(|j| format!("q{j}"))
+            .map(|j| format!("{letter}{j}"))
             .filter(|name| get(name).is_none())
             .map(|name| describe_missing(&name, &unused))
             .collect();
         if !missing.is_empty() {
             return Err(ImportError::MissingColumns { place, missing, found });
         }
-        let joints = std::array::from_fn(|j| get(&format!("q{}", j + 1)).unwrap_or_default());
+        let joints = std::array::from_fn(|j| get(&format!("{letter}{}", j + 1)).unwrap_or_default());
 
         let (sensor, reading) = sensor_columns(&get, &place, &unused, &found)?;
         let mut notes = Vec::new();
@@ -140,7 +142,11 @@ const TITLES: usize = 20;
 
 /// The first row with a joint's name in it (a title may stand above), else the first row with anything in it.
 fn header_row(rows: &[Line]) -> Option<usize> {
-    let names_a_joint = |line: &Line| line.cells.iter().any(|c| joint_number(&c.to_string()).is_some());
+    let names_a_joint = |line: &Line| {
+        line.cells
+            .iter()
+            .any(|c| LETTERS.iter().any(|letter| joint_number(&c.to_string(), *letter).is_some()))
+    };
     rows.iter()
         .take(TITLES)
         .position(names_a_joint)
@@ -204,16 +210,27 @@ const OPTIONAL: [&str; 12] = [
     "L",
 ];
 
-fn is_known(name: &str) -> bool {
+/// How headers call a joint: `q1`, as here, or `J1`, as controllers show it.
+const LETTERS: [char; 2] = ['q', 'J'];
+
+/// Which of them this header means: the first of which it has a joint, else the first.
+fn joint_letter(found: &[String]) -> char {
+    let names = |letter: char| {
+        found.iter().any(|name| joint_number(name, letter).is_some_and(|joint| (1..=6).contains(&joint)))
+    };
+    LETTERS.into_iter().find(|letter| names(*letter)).unwrap_or(LETTERS[0])
+}
+
+fn is_known(name: &str, letter: char) -> bool {
     OPTIONAL.contains(&name)
         || POSITION.contains(&name)
         || QUATERNION.contains(&name)
         || ["x", "y", "z"].contains(&name)
-        || joint_number(name).is_some()
+        || joint_number(name, letter).is_some()
 }
 
-fn joint_number(name: &str) -> Option<usize> {
-    let digits = name.strip_prefix('q')?;
+fn joint_number(name: &str, letter: char) -> Option<usize> {
+    let digits = name.strip_prefix(letter)?;
     (digits.len() <= 2 && digits.bytes().all(|b| b.is_ascii_digit()))
         .then(|| digits.parse().ok())?
         .filter(|n| *n > 0)

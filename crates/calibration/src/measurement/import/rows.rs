@@ -29,7 +29,7 @@ pub(super) fn dataset(
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
     let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
-    for (number, line) in lines.chain(further.map(|line| line.map(Cow::Owned))).enumerate() {
+    for line in lines.chain(further.map(|line| line.map(Cow::Owned))) {
         let line: Cow<'_, Line> = line?;
         let line = line.as_ref();
         let extra = line.cells.iter().skip(columns.width).filter(|c| !c.is_empty()).count();
@@ -46,7 +46,7 @@ pub(super) fn dataset(
         let widest = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
         unnamed = unnamed.max((0..widest).filter(|&i| !headed(i) && !line.cells[i].is_empty()).count());
         as_text += line.cells.iter().filter(|c| matches!(c, Cell::Number { as_text: true, .. })).count();
-        rows.push(reader.row(number, line, columns)?);
+        rows.push(reader.row(line, columns)?);
     }
     if rows.is_empty() {
         return Err(ImportError::Empty { place: reader.place() });
@@ -173,7 +173,7 @@ impl Reader<'_> {
         }
     }
 
-    fn row(&self, number: usize, line: &Line, columns: &Columns) -> Result<Row, ImportError> {
+    fn row(&self, line: &Line, columns: &Columns) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
         for (q, &column) in joints.iter_mut().zip(&columns.joints) {
             let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
@@ -248,7 +248,7 @@ impl Reader<'_> {
         let kept = kept.map_or(0, |last| last + 1);
         let text = |i: usize| line.cells.get(i).map(Cell::to_string).unwrap_or_default();
         Ok(Row {
-            number,
+            number: line.number,
             line: line.number,
             joints,
             reading,
@@ -318,7 +318,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
             "q1 to q6",
             format!("no angle exceeds {largest_deg:.3}: these look like radians"),
             "degrees",
-            "convert the angles to degrees, or allow odd units if the arm really moved so little",
+            "convert the angles to degrees, or allow odd units (--allow-odd-units) if the arm really moved so little",
         );
     }
     let Some(spread_mm) = spread(rows) else { return Ok(()) };
@@ -331,7 +331,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
                 "the readings span {spread_mm:.4} while joints turn by {spread_deg:.0}°: these look like metres"
             ),
             "millimetres",
-            "multiply the readings by 1000, or allow odd units if the sensor really saw so little",
+            "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the sensor really saw so little",
         );
     }
     let readout = |r: &Row| r.readout_mm;
@@ -343,7 +343,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
                 "no coordinate of the controller's read-out exceeds {largest:.3}: these look like metres"
             ),
             "millimetres",
-            "multiply the read-out by 1000, or allow odd units if the read-out is right",
+            "multiply the read-out by 1000, or allow odd units (--allow-odd-units) if the read-out is right",
         );
     }
     Ok(())

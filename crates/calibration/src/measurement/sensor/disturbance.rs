@@ -61,7 +61,7 @@ impl Kind {
 pub enum Course {
     /// Everywhere alike.
     Always,
-    /// From one row to another, by data row from 0, both included.
+    /// From one row to another, by their numbers, both included.
     Rows {
         /// First data row.
         from: usize,

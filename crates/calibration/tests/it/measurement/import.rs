@@ -32,7 +32,7 @@ fn columns_in_any_order_with_others_between() {
         assert!((row.joints[j].to_degrees() - 10.0 * (j + 1) as f64).abs() < 1e-12);
     }
     assert_eq!(row.reading, Reading::Cable(500.25));
-    assert_eq!((row.number, row.line), (0, 2));
+    assert_eq!((row.number, row.line), (2, 2));
     assert_eq!(row.condition.time_h, Some(0.5));
     assert_eq!(row.condition.approach, [0, -1, 0, 0, 0, 0]);
     assert_eq!(row.session.as_deref(), Some("monday"));
@@ -135,7 +135,7 @@ fn faults_are_named_with_place_and_remedy() {
         (wide("q1,q2,q3,q4,Q5,q6,L"), vec!["found `Q5`, expected q5"]),
         (wide("q1,q2,q3,q4,qq5,q6,L"), vec!["found `qq5`, expected q5"]),
         (wide("q1,q2,q3,q4,J5,q6,L"), vec!["found `J5`, expected q5"]),
-        (wide("J1,J2,J3,J4,J5,J6,L"), vec!["found `J1`, expected q1", "found `J6`, expected q6"]),
+        (wide("A1,A2,A3,A4,A5,A6,L"), vec!["found `A1`, expected q1", "found `A6`, expected q6"]),
         (wide("q1,q2,q3,q4,q5,q6"), vec!["no sensor's column", "L (cable length)", "measured_x"]),
         (wide("q1,q2,q3,q4,q5,q6,l"), vec!["found `l`, did you mean L?"]),
         (

@@ -156,7 +156,7 @@ fn a_title_above_blank_rows_below_and_columns_without_a_header() {
     blank_below.extend([Blank, Number(7.0)]);
     let rows = vec![vec![Text("IRB 120, hall 3")], vec![], header(), row(500.0), vec![Blank; 7], blank_below];
     let data = read(&workbook(&[("Sheet1", 3, rows)]), None).unwrap();
-    assert_eq!(data.rows.iter().map(|r| (r.number, r.line)).collect::<Vec<_>>(), [(0, 6), (2, 8)]);
+    assert_eq!(data.rows.iter().map(|r| (r.number, r.line)).collect::<Vec<_>>(), [(6, 6), (8, 8)]);
     assert!(data.notes.iter().any(|n| n == "2 column(s) without a header skipped"), "{:?}", data.notes);
     assert!(data.notes.iter().any(|n| n == "1 blank row(s) skipped"), "{:?}", data.notes);
 }

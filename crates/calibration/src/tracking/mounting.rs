@@ -1,0 +1,245 @@
+//! A target or a sensor that was mounted anew: poses that were all set aside, and agree with one other place.
+//!
+//! What was knocked lies near where it lay and is found as parameters that moved ([`super::locate`]). What was taken off and
+//! put on again lies anywhere, often turned by a quarter, where no linearisation holds. So the poses that were set aside one
+//! after the other say each by itself where the target (or the sensor) would be; where they agree, to what readings scatter
+//! by, it is there. Poses that do not agree are a burst of outliers.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+use super::alarm::{Alarm, Course, Part};
+use super::bounds::accident_bound;
+use super::state::{Seen, Snapshot, reach};
+use super::tracker::Tracker;
+use crate::identification::calibration::Frames;
+use crate::measurement::registration::points;
+use truegrind_arm::model::Joints;
+use truegrind_arm::parameter::Parameter;
+use truegrind_estimation::filter::rls::Recursion;
+use truegrind_math::se3::{Pose, pose_from_vector, vector_from_pose};
+
+/// So many poses set aside one after the other are no lone accidents.
+const FEWEST: usize = 6;
+/// Places agree within so many standard deviations of a reading.
+const AGREE: f64 = 6.0;
+/// What lies within this of where it lay was knocked, not mounted anew (mm, rad).
+const KNOCKED_MM: f64 = 10.0;
+const KNOCKED_RAD: f64 = 0.05;
+/// How far the new place may still be off (mm, rad).
+const ROOM_MM: f64 = 1.0;
+const ROOM_RAD: f64 = 0.005;
+
+/// What was mounted anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mounted {
+    Target,
+    Sensor,
+}
+
+/// A place that poses agree on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Agreed {
+    what: Mounted,
+    place: Pose,
+    /// Root mean square of what the places of single poses differ from it by (mm).
+    scatter_mm: f64,
+    poses: usize,
+}
+
+impl Tracker {
+    /// Poses at the end of the history that were set aside without one between them that was not.
+    pub(super) fn set_aside_in_a_row(&self) -> usize {
+        let bound = accident_bound(self.rows_per_pose());
+        self.state.history.iter().rev().take_while(|seen| !(seen.nis <= bound)).count()
+    }
+
+    /// Where the latest poses agree that target or sensor was mounted anew: the alarm, with the track going on from there.
+    pub(super) fn mounted_anew(&mut self) -> Option<Alarm> {
+        let run = self.set_aside_in_a_row();
+        if run < FEWEST || self.state.sensor == "cable" {
+            return None;
+        }
+        let history = &self.state.history;
+        let poses: Vec<Seen> = history[history.len() - run..].to_vec();
+        let (found, old) = self.agreed(&poses)?;
+        let alarm = alarm_of(&found, &old, &poses, self.rows_per_pose());
+        self.go_on_from(&found, poses);
+        Some(alarm)
+    }
+
+    /// The place that the poses agree on, and where it was.
+    fn agreed(&self, poses: &[Seen]) -> Option<(Agreed, Pose)> {
+        let (model, frames) = self.standing();
+        let flanges: Vec<Pose> =
+            poses.iter().map(|seen| model.forward(&Joints::from(seen.joints), &seen.condition)).collect();
+        let near = Near {
+            mm: AGREE * self.state.sigma_mm * 3f64.sqrt(),
+            rad: AGREE * self.state.sigma_rad.max(1e-5) * 3f64.sqrt(),
+        };
+        let (target, sensor) = if self.state.sensor == "pose" {
+            let readings: Vec<Pose> = poses.iter().filter_map(pose_of).collect();
+            if readings.len() != poses.len() {
+                return None;
+            }
+            let each = |place: &dyn Fn(&Pose, &Pose) -> Pose| -> Vec<Pose> {
+                flanges.iter().zip(&readings).map(|(flange, reading)| place(flange, reading)).collect()
+            };
+            let target = each(&|flange, reading| flange.inverse() * frames.base_from_sensor * reading);
+            let sensor = each(&|flange, reading| flange * frames.flange_from_target * reading.inverse());
+            (near.middle(&target), near.middle(&sensor))
+        } else {
+            of_points(poses, &flanges, &frames, &near)
+        };
+        let candidates = [
+            (Mounted::Target, target, frames.flange_from_target),
+            (Mounted::Sensor, sensor, frames.base_from_sensor),
+        ];
+        let far = |place: &Pose, old: &Pose| {
+            (place.translation.vector - old.translation.vector).norm() > KNOCKED_MM
+                || place.rotation.angle_to(&old.rotation) > KNOCKED_RAD
+        };
+        let all = candidates.into_iter().filter_map(|(what, found, old)| {
+            let (place, scatter_mm, poses) = found?;
+            far(&place, &old).then_some((Agreed { what, place, scatter_mm, poses }, old))
+        });
+        all.min_by(|(a, _), (b, _)| a.scatter_mm.total_cmp(&b.scatter_mm))
+    }
+
+    /// Puts the place in, with what is known of the rest kept, and takes the poses in again.
+    fn go_on_from(&mut self, found: &Agreed, poses: Vec<Seen>) {
+        let members: Vec<usize> = (0..self.parameters.len())
+            .filter(|&k| match self.parameters[k] {
+                Parameter::Target(_) => found.what == Mounted::Target,
+                Parameter::SensorFrame(_) => found.what == Mounted::Sensor,
+                _ => false,
+            })
+            .collect();
+        let Some(mut root) = self.recursion.root() else { return };
+        let mut x = self.recursion.x.clone();
+        let mut room = vec![0.0; x.len()];
+        for &k in &members {
+            x[k] = 0.0;
+            root.row_mut(k).fill(0.0);
+            room[k] = if self.parameters[k].unit() == "mm" { ROOM_MM } else { ROOM_RAD };
+        }
+        // As the state says it, to the bit: a track that was stopped goes on from there.
+        match found.what {
+            Mounted::Target => {
+                self.state.flange_from_target = vector_from_pose(&found.place);
+                self.frames.flange_from_target = pose_from_vector(&self.state.flange_from_target);
+            }
+            Mounted::Sensor => {
+                self.state.base_from_sensor = vector_from_pose(&found.place);
+                self.frames.base_from_sensor = pose_from_vector(&self.state.base_from_sensor);
+            }
+        }
+        self.recursion = Recursion::from_root(x, root);
+        self.recursion.predict(&room);
+        let task = self.task(&poses);
+        for (at, seen) in poses.iter().enumerate() {
+            if !self.update(&task, at).set_aside {
+                self.state.accidents = self.state.accidents.saturating_sub(1);
+                reach(&mut self.state.region, &seen.joints);
+            }
+        }
+        // What came before the change is settled.
+        self.state.history.clear();
+        let snapshot = Snapshot::of(&self.recursion, 0);
+        (self.state.reference, self.state.middle) = (snapshot.clone(), snapshot);
+        (self.state.pending_since, self.state.burst_since) = (0, 0);
+    }
+}
+
+/// The alarm that says so.
+fn alarm_of(found: &Agreed, old: &Pose, poses: &[Seen], per: usize) -> Alarm {
+    let (first, last) = (&poses[0], &poses[poses.len() - 1]);
+    let many = (found.poses.max(1) as f64).sqrt();
+    Alarm {
+        noticed_file: last.file.clone(),
+        noticed_row: last.row,
+        since_file: first.file.clone(),
+        since_row: first.row,
+        since_time_h: first.time_h,
+        parameter: match found.what {
+            Mounted::Target => "the touched point".to_owned(),
+            Mounted::Sensor => "the sensor against the arm's base".to_owned(),
+        },
+        unit: "mm".to_owned(),
+        course: Course::Mounted,
+        shift: (found.place.translation.vector - old.translation.vector).norm(),
+        sigma: found.scatter_mm / many,
+        poses: poses.len(),
+        ratio: 0.0,
+        alternatives: Vec::new(),
+        window_nis: [0.0; 2],
+        // A point has no turn.
+        parts: (per == 6 || found.what == Mounted::Sensor)
+            .then(|| Part {
+                parameter: "turn".to_owned(),
+                unit: "rad".to_owned(),
+                shift: found.place.rotation.angle_to(&old.rotation),
+                sigma: 0.0,
+            })
+            .into_iter()
+            .collect(),
+    }
+}
+
+fn pose_of(seen: &Seen) -> Option<Pose> {
+    let [x, y, z, a, b, c] = seen.reading.as_slice() else { return None };
+    Some(pose_from_vector(&[*x, *y, *z, *a, *b, *c]))
+}
+
+type Found = Option<(Pose, f64, usize)>;
+
+/// Target and sensor from readings that are points.
+fn of_points(poses: &[Seen], flanges: &[Pose], frames: &Frames, near: &Near) -> (Found, Found) {
+    let readings: Vec<Point3<f64>> = poses
+        .iter()
+        .filter_map(|seen| <[f64; 3]>::try_from(seen.reading.as_slice()).ok())
+        .map(|[x, y, z]| Point3::new(x, y, z))
+        .collect();
+    if readings.len() != poses.len() {
+        return (None, None);
+    }
+    let pairs = flanges.iter().zip(&readings);
+    let on_flange: Vec<Pose> = pairs
+        .map(|(flange, reading)| {
+            let point = flange.inverse() * (frames.base_from_sensor * reading);
+            Pose::from_parts(point.coords.into(), frames.flange_from_target.rotation)
+        })
+        .collect();
+    let target = Point3::from(frames.flange_from_target.translation.vector);
+    let in_base: Vec<Vector3<f64>> = flanges.iter().map(|flange| (flange * target).coords).collect();
+    let read: Vec<Vector3<f64>> = readings.iter().map(|point| point.coords).collect();
+    let sensor = points(&in_base, &read).filter(|found| found.rmse_mm <= near.mm);
+    (near.middle(&on_flange), sensor.map(|found| (found.base_from_sensor, found.rmse_mm, poses.len())))
+}
+
+/// How near places lie that are one.
+struct Near {
+    mm: f64,
+    rad: f64,
+}
+
+impl Near {
+    /// The middle of places of which four in five agree, their scatter (mm), and how many they are.
+    fn middle(&self, places: &[Pose]) -> Found {
+        let agrees = |a: &Pose, b: &Pose| {
+            (a.translation.vector - b.translation.vector).norm() <= self.mm
+                && a.rotation.angle_to(&b.rotation) <= self.rad
+        };
+        let count = |place: &Pose| places.iter().filter(|other| agrees(place, other)).count();
+        let best = places.iter().max_by_key(|place| count(place))?;
+        let own: Vec<&Pose> = places.iter().filter(|other| agrees(best, other)).collect();
+        if own.len() < FEWEST || 5 * own.len() < 4 * places.len() {
+            return None;
+        }
+        let share = 1.0 / own.len() as f64;
+        let mean = own.iter().map(|place| place.translation.vector).sum::<Vector3<f64>>() * share;
+        let turns = own.iter().map(|place| (best.rotation.inverse() * place.rotation).scaled_axis());
+        let turn = best.rotation * UnitQuaternion::from_scaled_axis(turns.sum::<Vector3<f64>>() * share);
+        let square = own.iter().map(|place| (place.translation.vector - mean).norm_squared()).sum::<f64>();
+        Some((Pose::from_parts(mean.into(), turn), (square * share).sqrt(), own.len()))
+    }
+}

@@ -1,0 +1,156 @@
+//! What the arm must not enter: what lies below its mounting plane, and boxes.
+//!
+//! Links are capsules: the lines between the origins of neighbouring joint frames, to the flange and on to the touched
+//! point, with one radius; from the wrist on with half of it. The first of them, the column on the base, never moves and
+//! is left out.
+
+use nalgebra::{Point3, Vector3};
+
+use super::wanted::Wanted;
+use truegrind_arm::condition::Condition;
+use truegrind_arm::model::{Joints, PreparedModel};
+
+/// What the arm must not enter, in its base.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Space {
+    /// Nothing goes below this height (mm); `None` does not look.
+    pub floor_mm: Option<f64>,
+    /// Boxes that nothing enters: lower and upper corner (mm).
+    pub boxes_mm: Vec<[[f64; 3]; 2]>,
+    /// Radius of the links (mm).
+    pub radius_mm: f64,
+    /// How far from a pose its approach begins, in every joint (rad).
+    pub approach_rad: f64,
+}
+
+/// The arm that must not enter it.
+#[derive(Debug)]
+pub(super) struct Watch<'a> {
+    space: &'a Space,
+    wanted: &'a Wanted<'a>,
+    arm: PreparedModel<'a>,
+}
+
+/// The largest step of a joint between two looks at a way (rad).
+const STEP_RAD: f64 = 0.05;
+
+impl<'a> Watch<'a> {
+    pub(super) fn of(wanted: &'a Wanted<'a>, space: &'a Space) -> Self {
+        Self { space, wanted, arm: wanted.nominal.at_condition(&Condition::default()) }
+    }
+
+    /// Whether there is anything to look for.
+    pub(super) fn looks(&self) -> bool {
+        self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty()
+    }
+
+    /// Whether the arm stands clear with these joints.
+    pub(super) fn stands_clear(&self, joints: &Joints) -> bool {
+        if !self.looks() {
+            return true;
+        }
+        let frames = self.arm.frames(joints);
+        let flange = frames.last() * self.wanted.nominal.flange;
+        let touched = flange * Point3::from(self.wanted.frames.flange_from_target.translation.vector);
+        let origins = frames.origin.iter().map(|origin| Vector3::from(*origin));
+        let points: Vec<Vector3<f64>> = origins.chain([flange.translation.vector, touched.coords]).collect();
+        let radius = |segment: usize| self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
+        (1..points.len() - 1).all(|segment| {
+            let (a, b, radius) = (&points[segment], &points[segment + 1], radius(segment));
+            // The end of the column stands where it stands.
+            let above = self.space.floor_mm.is_none_or(|floor| b.z - radius >= floor);
+            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, radius))
+        })
+    }
+
+    /// Whether it stays clear while all joints run evenly from one place to another.
+    pub(super) fn way_is_clear(&self, from: &Joints, to: &Joints) -> bool {
+        if !self.looks() {
+            return true;
+        }
+        let steps = ((to - from).amax() / STEP_RAD).ceil().max(1.0);
+        (0..=steps as usize).all(|k| self.stands_clear(&from.lerp(to, k as f64 / steps)))
+    }
+
+    /// Whether a pose can be approached from these sides, and from the opposite ones.
+    pub(super) fn both_sides_clear(&self, pose: &Joints, sides: &[i8; 6]) -> bool {
+        [1.0, -1.0].iter().all(|sign| {
+            let begin =
+                Joints::from_fn(|i, _| pose[i] + sign * f64::from(sides[i]) * self.space.approach_rad);
+            self.way_is_clear(&begin, pose)
+        })
+    }
+
+    /// Sides from which a pose can be approached, and from the opposite ones: `first` where they will do.
+    pub(super) fn sides(&self, pose: &Joints, first: [i8; 6]) -> Option<[i8; 6]> {
+        if !self.stands_clear(pose) {
+            return None;
+        }
+        // The opposite sides are looked at together with them.
+        let others = (0..1 << 5).map(|bits: u8| {
+            std::array::from_fn(|joint| if joint < 5 && bits >> joint & 1 == 1 { 1 } else { -1 })
+        });
+        std::iter::once(first).chain(others).find(|sides| self.both_sides_clear(pose, sides))
+    }
+
+    /// Stops between two places that make the way clear, taken from these: none, one or two. `None` where they do not.
+    pub(super) fn stops(&self, from: &Joints, to: &Joints, known: &[Joints]) -> Option<Vec<Joints>> {
+        if self.way_is_clear(from, to) {
+            return Some(Vec::new());
+        }
+        let length = |a: &Joints, b: &Joints| (a - b).amax();
+        let mut near: Vec<&Joints> = known.iter().collect();
+        near.sort_by(|a, b| (length(from, a) + length(a, to)).total_cmp(&(length(from, b) + length(b, to))));
+        near.truncate(MOST_STOPS);
+        let reached: Vec<&Joints> =
+            near.iter().copied().filter(|stop| self.way_is_clear(from, stop)).collect();
+        let leaving: Vec<&Joints> = near.iter().copied().filter(|stop| self.way_is_clear(stop, to)).collect();
+        if let Some(stop) = reached.iter().find(|stop| leaving.contains(stop)) {
+            return Some(vec![**stop]);
+        }
+        let pairs = reached.iter().flat_map(|first| leaving.iter().map(move |second| (*first, *second)));
+        let found =
+            pairs.into_iter().take(MOST_PAIRS).find(|(first, second)| self.way_is_clear(first, second));
+        found.map(|(first, second)| vec![*first, *second])
+    }
+}
+
+/// The first segment of the wrist.
+const WRIST: usize = 4;
+
+/// Stops that are tried for a way, and pairs of them.
+const MOST_STOPS: usize = 200;
+const MOST_PAIRS: usize = 2000;
+
+/// Whether a capsule keeps off a box. Most are told by their middles.
+fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {
+    let middle = (a + b) * 0.5;
+    let away = outside(&middle, corners);
+    if away >= radius + 0.5 * (b - a).norm() {
+        return true;
+    }
+    away >= radius && to_box(a, b, corners) >= radius
+}
+
+/// Distance of a point from a box (mm), 0 inside.
+fn outside(point: &Vector3<f64>, [low, high]: &[[f64; 3]; 2]) -> f64 {
+    Vector3::from_fn(|k, _| (low[k] - point[k]).max(point[k] - high[k]).max(0.0)).norm()
+}
+
+/// Distance of a segment from a box (mm), 0 inside. The distance of a point that runs along the segment is convex, so its
+/// least value is found by cutting off thirds.
+fn to_box(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2]) -> f64 {
+    const CUTS: usize = 48;
+    let at = |t: f64| outside(&(a + (b - a) * t), corners);
+    let (mut from, mut to) = (0.0, 1.0);
+    for _ in 0..CUTS {
+        let (first, second) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
+        // Inside the box both are 0, and any place will do.
+        if at(first) <= at(second) {
+            to = second;
+        } else {
+            from = first;
+        }
+    }
+    at(0.5 * (from + to)).min(at(0.0)).min(at(1.0))
+}

@@ -1,0 +1,67 @@
+//! `truegrind completions SHELL` and `truegrind man`: what shells and `man` know, from the same arguments as `--help`.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{Args, Command};
+use clap_complete::Shell;
+
+use super::ending::Ending;
+use super::files::{self, Batch};
+use super::terminal::{hand_over, tell};
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// The shell that shall complete verbs and options.
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub(super) struct Man {
+    /// A folder for the pages of all verbs: truegrind.1, truegrind-compensate.1 and so on; without it the first one is printed.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+}
+
+/// Prints the script of a shell.
+pub(super) fn completions(arguments: &Completions, mut command: Command) -> anyhow::Result<Ending> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command, "truegrind", &mut script);
+    hand_over(&script)?;
+    Ok(Ending::Done)
+}
+
+/// Prints the first page, or writes all of them.
+pub(super) fn man(arguments: &Man, command: Command) -> anyhow::Result<Ending> {
+    // Built, so that every verb has what holds for all.
+    let mut command = command.disable_help_subcommand(true);
+    command.build();
+    let Some(folder) = &arguments.output else {
+        hand_over(&page(&command)?)?;
+        return Ok(Ending::Done);
+    };
+    files::make_folder(folder)?;
+    let mut batch = Batch::default();
+    batch.add(folder.join("truegrind.1"), page(&command)?);
+    for verb in command.get_subcommands() {
+        let name = format!("truegrind-{}", verb.get_name());
+        batch.add(folder.join(format!("{name}.1")), page(verb)?);
+    }
+    batch.write()?;
+    tell(format_args!(
+        "written to {}: read one with `man {}`",
+        folder.display(),
+        folder.join("truegrind.1").display()
+    ));
+    Ok(Ending::Done)
+}
+
+fn page(command: &Command) -> anyhow::Result<Vec<u8>> {
+    let mut out = Vec::new();
+    let made = clap_mangen::Man::new(command.clone()).section("1").render(&mut out);
+    made.context("the man page cannot be made")?;
+    Ok(out)
+}

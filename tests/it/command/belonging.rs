@@ -1,0 +1,309 @@
+//! Files that belong together: cell, surface, program, model, and the name of what is written.
+//!
+//! The class: a run that goes through although what it was given speaks of different things (another robot, another place of
+//! the work object, another language), and whose result looks like a correction.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+
+use super::{folder, truegrind};
+
+const POSES: &str = include_str!("../../data/irb120-tracker.csv");
+const BLADE: &str = include_str!("../../../surfaces/blade.toml");
+
+/// A folder with a model, and the program of the shipped surface.
+fn shop() -> TempDir {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), POSES).unwrap();
+    fs::write(at.join("blade.toml"), BLADE).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(code < 2, "{err}");
+    for name in ["blade.mod", "blade.nc", "blade.mpf"] {
+        let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", name]);
+        assert_eq!(code, 0, "{err}");
+    }
+    dir
+}
+
+/// Runs `compensate` to be refused: exit code 2, nothing written, all of `words` in the message.
+fn refused(at: &Path, arguments: &[&str], words: &[&str]) {
+    let (code, out, err) = truegrind(at, &[&["compensate"], arguments].concat());
+    assert_eq!(code, 2, "{arguments:?}: {out}{err}");
+    for word in words {
+        assert!(err.contains(word), "{arguments:?}: `{word}` is not in: {err}");
+    }
+}
+
+#[test]
+fn a_corrected_file_no_longer_says_that_it_is_to_be_corrected() {
+    let dir = shop();
+    let at = dir.path();
+    for name in ["blade.mod", "blade.nc", "blade.mpf"] {
+        let before = fs::read_to_string(at.join(name)).unwrap();
+        assert_eq!(before.matches("run truegrind compensate before grinding").count(), 1, "{name}");
+        let out = format!("out-{name}");
+        let (code, _, err) = truegrind(at, &["compensate", name, "--model", "model.toml", "-o", &out]);
+        assert!(code < 2, "{name}: {err}");
+        let after = fs::read_to_string(at.join(&out)).unwrap();
+        assert!(
+            !after.contains("before grinding") && after.contains("truegrind 0."),
+            "{name}: {}",
+            &after[..600]
+        );
+        // The line went whole: one line less, and the mark instead.
+        assert_eq!(
+            after.lines().filter(|line| line.trim().is_empty()).count(),
+            before.lines().filter(|line| line.trim().is_empty()).count(),
+            "{name}"
+        );
+        assert!(after.contains("Path over surface blade for abb-irb-120"), "{name}");
+    }
+}
+
+#[test]
+fn a_model_of_another_robot_is_refused_as_such() {
+    let dir = shop();
+    let at = dir.path();
+    // The program says for which robot it was made.
+    for name in ["blade.mod", "blade.nc"] {
+        let other = fs::read_to_string(at.join(name)).unwrap().replace("abb-irb-120", "hsr-jr605");
+        let file = format!("other-{name}");
+        fs::write(at.join(&file), other).unwrap();
+        refused(
+            at,
+            &[&file, "--model", "model.toml", "-o", &format!("out-{name}")],
+            &["hsr-jr605", "abb-irb-120", &file],
+        );
+        let (code, _, err) = truegrind(at, &["deviation", &file, "--model", "model.toml"]);
+        assert!(code == 2 && err.contains("hsr-jr605"), "{err}");
+    }
+    // The cell file does.
+    fs::write(at.join("cell.toml"), "robot = \"hsr-jr605\"\n").unwrap();
+    refused(
+        at,
+        &["blade.mod", "--model", "model.toml", "--cell", "cell.toml", "-o", "out.mod"],
+        &["cell file", "hsr-jr605", "abb-irb-120"],
+    );
+    fs::write(at.join("cell.toml"), "robot = \"ABB-IRB-120\"\n").unwrap();
+    let (code, _, err) = truegrind(
+        at,
+        &["compensate", "blade.mod", "--model", "model.toml", "--cell", "cell.toml", "-o", "out.mod"],
+    );
+    assert!(code < 2, "{err}");
+    // Nobody says it, but the arm reaches nothing of it.
+    let far = "MODULE Far\nPROC main()\nCONFIG".replace(
+        "CONFIG",
+        &(0..8)
+            .map(|k| {
+                format!(
+                    "MoveL [[2400,{},900],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;\n",
+                    10 * k
+                )
+            })
+            .collect::<String>(),
+    ) + "ENDPROC\nENDMODULE\n";
+    fs::write(at.join("far.mod"), far).unwrap();
+    refused(
+        at,
+        &["far.mod", "--model", "model.toml", "-o", "out-far.mod"],
+        &["8 motions", "abb-irb-120", "another robot"],
+    );
+    assert!(!at.join("out-far.mod").exists());
+}
+
+/// What a surface file says from metrology is true: a program that tells the controller something else is wrong, or the file is.
+#[test]
+fn a_surface_from_metrology_and_the_frames_of_the_program_agree() {
+    let dir = shop();
+    let at = dir.path();
+    for (from, to, words) in [
+        (
+            "position_mm = [420, 0, 250]",
+            "position_mm = [421, 0, 250]",
+            ["work_object \"wobjBlade\"", "1.00 mm", "421.000", "420.000"],
+        ),
+        (
+            "rpy_deg = [0, 0, 0]",
+            "rpy_deg = [0, 0, 1]",
+            ["work_object \"wobjBlade\"", "1.000°", "metrology", "taught"],
+        ),
+        (
+            "position_mm = [0, 0, 120]",
+            "position_mm = [0, 0, 119]",
+            ["tool \"tSpindle\"", "1.00 mm", "119.000", "120.000"],
+        ),
+    ] {
+        let moved = BLADE.replace(from, to);
+        assert_ne!(moved, BLADE);
+        fs::write(at.join("moved.toml"), &moved).unwrap();
+        for program in ["blade.mod", "blade.nc"] {
+            let (_, ending) = program.split_once('.').unwrap();
+            let out = format!("out.{ending}");
+            refused(at, &[program, "--model", "model.toml", "--surface", "moved.toml", "-o", &out], &words);
+            assert!(!at.join(out).exists());
+        }
+        // A place that was taught is the controller's.
+        fs::write(at.join("moved.toml"), moved.replace("\"metrology\"", "\"taught\"")).unwrap();
+        let (code, _, err) = truegrind(
+            at,
+            &["compensate", "blade.mod", "--model", "model.toml", "--surface", "moved.toml", "--dry-run"],
+        );
+        assert!(code < 2, "{err}");
+    }
+}
+
+#[test]
+fn an_output_is_called_what_it_is() {
+    let dir = shop();
+    let at = dir.path();
+    for name in ["out.src", "out.script", "out.txt", "out.pgf"] {
+        refused(at, &["blade.mod", "--model", "model.toml", "-o", name], &[name, ".mod", ".nc"]);
+        let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", name]);
+        assert!(code == 2 && err.contains(".mod") && err.contains(".mpf"), "{err}");
+        let (code, _, err) =
+            truegrind(at, &["plan", "--robot", "abb-irb-120", "--sensor", "position", "-o", name]);
+        assert!(code == 2 && err.contains(".mod"), "{err}");
+        assert!(!at.join(name).exists());
+    }
+    // Another language, another control.
+    refused(
+        at,
+        &["blade.mod", "--model", "model.toml", "-o", "out.nc"],
+        &["not translated", "RAPID", ".mod"],
+    );
+    refused(at, &["blade.nc", "--model", "model.toml", "-o", "out.mod"], &["not translated", "NC", ".nc"]);
+    let (code, _, err) = truegrind(at, &["path", "blade.toml", "--robot", "abb-irb-120", "-o", "out.gcode"]);
+    assert!(code == 2 && err.contains(".mpf"), "{err}");
+    // As its source, whatever that is called; and where nothing is said.
+    fs::copy(at.join("blade.mod"), at.join("blade.txt")).unwrap();
+    for (from, to) in [("blade.txt", "out.txt"), ("blade.mod", "out"), ("blade.mod", "out.MODX")] {
+        let (code, _, err) = truegrind(at, &["compensate", from, "--model", "model.toml", "-o", to]);
+        assert!(code < 2 && at.join(to).exists(), "{from} to {to}: {err}");
+    }
+}
+
+/// The skeleton of a cell names every tool and frame of the programs, loads, and is refused until it is filled in.
+#[test]
+fn the_skeleton_of_a_cell_loads_and_is_refused_until_it_is_filled_in() {
+    let dir = shop();
+    let at = dir.path();
+    let arguments = ["cell", "blade.mod", "blade.nc", "-o", "cell.toml", "--robot", "abb-irb-120"];
+    let (code, _, err) = truegrind(at, &arguments);
+    assert!(code == 0 && err.contains("cell.toml"), "{err}");
+    let text = fs::read_to_string(at.join("cell.toml")).unwrap();
+    for name in ["\"T1\"", "\"G54\"", "\"tSpindle\"", "\"wobjBlade\"", "robot = \"abb-irb-120\""] {
+        assert!(text.contains(name), "{name}: {text}");
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let read = truegrind::compensation::cell::Cell::from_toml(&text).unwrap();
+    assert_eq!((read.tool.len(), read.wobj.len()), (2, 2), "{text}");
+    assert_eq!(read.open.len(), text.lines().filter(|line| line.contains("= \"?\"")).count(), "{text}");
+    refused(
+        at,
+        &["blade.mod", "--model", "model.toml", "--cell", "cell.toml", "-o", "out.mod"],
+        &["cell.toml", "T1", "origin = \"?\"", "metrology"],
+    );
+    // Filled in one after the other: each entry is named in its turn, in the end there is none.
+    let mut open = text;
+    while let Some((before, after)) = open.split_once("origin = \"?\"") {
+        open = format!("{before}origin = \"metrology\"{after}");
+        fs::write(at.join("cell.toml"), &open).unwrap();
+        let (code, _, err) = truegrind(
+            at,
+            &["compensate", "blade.mod", "--model", "model.toml", "--cell", "cell.toml", "--dry-run"],
+        );
+        assert_eq!(code == 2, open.contains("= \"?\""), "{err}");
+    }
+    let (code, _, err) = truegrind(at, &["cell", "blade.mod", "-o", "cell.txt"]);
+    assert!(code == 2 && err.contains(".toml"), "{err}");
+    fs::write(at.join("empty.nc"), "%\nO1\nG90\nM30\n%\n").unwrap();
+    let (code, _, err) = truegrind(at, &["cell", "empty.nc", "-o", "none.toml"]);
+    assert!(code == 2 && err.contains("no motion"), "{err}");
+}
+
+/// A plan keeps links and target above the mounting plane and out of what is stated, at every stop and on every way between
+/// them; the ways are walked here through the written program, with an arm that this test puts together from the data sheet.
+#[test]
+fn a_plan_keeps_above_the_floor_and_out_of_boxes() {
+    use truegrind::arm::condition::Condition;
+    use truegrind::arm::model::Joints;
+
+    let dir = folder();
+    let at = dir.path();
+    let base = [
+        "plan",
+        "--robot",
+        "abb-irb-120",
+        "--sensor",
+        "position",
+        "--poses",
+        "30",
+        "--touched-point",
+        "30,0,60",
+        "--candidates",
+        "400",
+    ];
+    let corners = [[250.0, -700.0, 0.0], [700.0, -100.0, 500.0]];
+    let stated = ["--keep-out", "700,-100,0,250,-700,500", "--link-radius", "40", "--sensor-frame", "0,0,0"];
+    let (code, out, err) = truegrind(at, &[&base[..], &stated, &["-o", "poses.mod"]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("above z = 0 mm and out of the box") && out.contains("40 mm"), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 100), "{out}");
+    let text = fs::read_to_string(at.join("poses.mod")).unwrap();
+    assert!(text.contains("above z = 0 mm and out of the box"), "{text}");
+    let stops: Vec<Joints> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("MoveAbsJ [[")?.split_once(']'))
+        .map(|(angles, _)| {
+            let angles: Vec<f64> =
+                angles.split(',').map(|angle| angle.parse::<f64>().unwrap().to_radians()).collect();
+            Joints::from_column_slice(&angles)
+        })
+        .collect();
+    assert!(stops.len() > 60, "{}", stops.len());
+    let arm = truegrind::robots::load("abb-irb-120").unwrap().model;
+    let still = Condition::default();
+    let posed = arm.at_condition(&still);
+    let clear = |joints: &Joints| {
+        let frames = posed.frames(joints);
+        let flange = frames.last() * arm.flange;
+        let touched = flange * nalgebra::Point3::new(30.0, 0.0, 60.0);
+        let mut points: Vec<nalgebra::Vector3<f64>> =
+            frames.origin.iter().map(|origin| nalgebra::Vector3::from(*origin)).collect();
+        points.extend([flange.translation.vector, touched.coords]);
+        (1..points.len() - 1).all(|k| {
+            (0..=40).all(|step| {
+                let point = points[k].lerp(&points[k + 1], f64::from(step) / 40.0);
+                let away = nalgebra::Vector3::from_fn(|axis, _| {
+                    (corners[0][axis] - point[axis]).max(point[axis] - corners[1][axis]).max(0.0)
+                });
+                // Half the radius is what the wrist has; the way is sampled elsewhere than in the plan.
+                point.z > 15.0 && away.norm() > 15.0
+            })
+        })
+    };
+    for way in stops.windows(2) {
+        for step in 0..=60 {
+            let joints = way[0].lerp(&way[1], f64::from(step) / 60.0);
+            assert!(clear(&joints), "{:?} to {:?} at {step}", way[0], way[1]);
+        }
+    }
+    // Without the box poses do go there: the check is what keeps them out.
+    let (_, _, err) = truegrind(at, &[&base[..], &["-o", "free.mod"]].concat());
+    assert!(at.join("free.mod").exists(), "{err}");
+    for (wrong, words) in [
+        (&["--keep-out", "1,2,3"][..], ["--keep-out", "two corners"]),
+        (&["--keep-out", "0,0,0,0,1,1"], ["--keep-out", "two corners"]),
+        (&["--link-radius", "-3"], ["--link-radius", "0 or more"]),
+        (&["--floor", "nan"], ["--floor", "mm"]),
+        (&["--keep-out=-900,-900,-900,900,900,900"], ["box to keep out of", "smaller"]),
+    ] {
+        let (code, _, err) = truegrind(at, &[&base[..], wrong, &["-o", "none.mod"]].concat());
+        assert!(code == 2 && words.iter().all(|word| err.contains(word)), "{wrong:?}: {err}");
+        assert!(!at.join("none.mod").exists());
+    }
+}

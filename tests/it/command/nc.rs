@@ -1,0 +1,200 @@
+//! The page for who has NC programs and has never read the source.
+//!
+//! The class: documentation that rots. The files and the commands of the page are taken from the page, and run as they
+//! stand there.
+
+use std::fs;
+
+use super::{folder, truegrind};
+
+const PAGE: &str = include_str!("../../../docs/nc.md");
+const POSES: &str = include_str!("../../data/irb120-tracker.csv");
+
+/// The blocks of the page: what stands behind the fence (`nc face.nc`), and the text.
+fn blocks() -> Vec<(&'static str, String)> {
+    let mut out: Vec<(&str, String)> = Vec::new();
+    let mut open: Option<(&str, String)> = None;
+    for line in PAGE.lines() {
+        match (line.strip_prefix("```"), open.take()) {
+            (Some(_), Some(block)) => out.push(block),
+            (Some(head), None) => open = Some((head, String::new())),
+            (None, Some((head, text))) => open = Some((head, text + line + "\n")),
+            (None, None) => {}
+        }
+    }
+    out
+}
+
+/// Words of RAPID, which nobody who reads this page knows.
+const RAPID: [&str; 16] = [
+    "robtarget",
+    "jointtarget",
+    "MoveL",
+    "MoveJ",
+    "MoveC",
+    "MoveAbsJ",
+    "wobjdata",
+    "tooldata",
+    "loaddata",
+    "PROC",
+    "ConfL",
+    "ConfJ",
+    "PDisp",
+    "CRobT",
+    "RAPID",
+    "WaitTime",
+];
+
+fn speaks_no_rapid(what: &str, text: &str) {
+    let words = |text: &str| -> Vec<String> {
+        text.split(|c: char| !c.is_alphanumeric()).map(str::to_owned).collect()
+    };
+    let found: Vec<String> = words(text).into_iter().filter(|word| RAPID.contains(&word.as_str())).collect();
+    assert!(found.is_empty(), "{what}: {found:?} in\n{text}");
+}
+
+#[test]
+fn every_example_of_the_page_runs_as_it_stands_there() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), POSES).unwrap();
+    let blocks = blocks();
+    for (head, text) in &blocks {
+        if let Some((_, file)) = head.split_once(' ').filter(|(_, file)| file.contains('.')) {
+            fs::write(at.join(file), text).unwrap();
+        }
+    }
+    let filled_in = fs::read_to_string(at.join("cell.toml")).unwrap();
+    let mut corrected = 0;
+    for (_, commands) in blocks.iter().filter(|(head, _)| *head == "sh") {
+        for command in commands.lines() {
+            let words: Vec<&str> = command.split_whitespace().collect();
+            let (code, out, err) = truegrind(at, &words[1..]);
+            assert!(code == 0 || code == 1, "{command}: {code}\n{out}\n{err}");
+            if words[1] == "cell" {
+                let (_, shown) = blocks.iter().find(|(head, _)| *head == "toml skeleton").unwrap();
+                assert_eq!(
+                    fs::read_to_string(at.join("cell.toml")).unwrap(),
+                    *shown,
+                    "the skeleton of the page"
+                );
+                // Not filled in, it is refused, and the entry is named.
+                let (code, _, err) = truegrind(
+                    at,
+                    &["compensate", "face.nc", "--model", "model.toml", "--cell", "cell.toml", "--dry-run"],
+                );
+                assert_eq!(code, 2, "{err}");
+                assert!(err.contains("cell.toml") && err.contains("tool \"T1\": origin = \"?\""), "{err}");
+                fs::write(at.join("cell.toml"), &filled_in).unwrap();
+            }
+            if words[1] == "compensate" {
+                assert!(out.contains("6 motions: 6 changed"), "{command}: {out}\n{err}");
+                speaks_no_rapid(command, &format!("{out}{err}"));
+                let output = fs::read_to_string(at.join(words[words.len() - 1])).unwrap();
+                assert!(output.contains("truegrind 0."), "{command}: no mark in {output}");
+                corrected += 1;
+            }
+        }
+    }
+    assert_eq!(corrected, 4, "one for each control");
+    // The list of verbs leads there, and so does the help of the verb.
+    let (_, help, _) = truegrind(at, &["compensate", "--help"]);
+    assert!(help.contains("docs/nc.md"), "{help}");
+}
+
+/// What is said of NC programs, on the terminal and on every page, is said in words of NC.
+#[test]
+fn no_message_about_nc_speaks_rapid() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), POSES).unwrap();
+    let (code, _, err) =
+        truegrind(at, &["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    assert!(code < 2, "{err}");
+    let programs = [
+        ("fanuc.nc", include_str!("../../../programs/fanuc.nc")),
+        ("siemens.mpf", include_str!("../../../programs/siemens.mpf")),
+        ("linuxcnc.ngc", include_str!("../../../programs/linuxcnc.ngc")),
+        ("heidenhain.h", include_str!("../../../programs/heidenhain.h")),
+        ("states.nc", include_str!("../../../programs/states.nc")),
+    ];
+    for (name, text) in programs {
+        fs::write(at.join(name), text).unwrap();
+        // Once with what its comments say, once without.
+        let bare: String =
+            text.lines().filter(|line| !line.contains("truegrind")).map(|l| format!("{l}\n")).collect();
+        fs::write(at.join(format!("bare-{name}")), bare).unwrap();
+        for name in [name.to_owned(), format!("bare-{name}")] {
+            for circles in ["keep", "segments"] {
+                let arguments = [
+                    "compensate",
+                    &name,
+                    "--model",
+                    "model.toml",
+                    "--dry-run",
+                    "--circles",
+                    circles,
+                    "--md",
+                    "page.md",
+                    "--html",
+                    "page.html",
+                    "--json",
+                    "page.json",
+                    "--csv",
+                    "page.csv",
+                ];
+                let (code, out, err) = truegrind(at, &arguments);
+                assert!(code < 2, "{name}: {err}");
+                speaks_no_rapid(&name, &format!("{out}{err}"));
+                for page in ["page.md", "page.html", "page.json", "page.csv"] {
+                    speaks_no_rapid(
+                        &format!("{page} of {name}"),
+                        &fs::read_to_string(at.join(page)).unwrap(),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A comment that is meant for the correction and cannot be used is an error with its line, not a comment like any other.
+#[test]
+fn comments_that_misstate_are_errors_with_their_line() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), POSES).unwrap();
+    let (_, _, err) = truegrind(at, &["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml"]);
+    let program = "%\nO1\n(COMMENT)\nG90 G21\nG1 X1. Y1. Z1. F100.\nM30\n";
+    for (comment, words) in [
+        ("(truegrind angles zyx)", ["line 3", "wpr", "rotation-vector"]),
+        ("(truegrind angle wpr)", ["line 3", "truegrind angles", "(truegrind angle wpr)"]),
+        ("(truegrind angles)", ["line 3", "wpr", "abc"]),
+        ("(truegrind tool T1 tGrind [[0,0,150]])", ["line 3", "truegrind tool T1", "quaternion"]),
+        ("(truegrind frame G54 [[0,0,150],[1,0,0,0]])", ["line 3", "truegrind frame G54", "quaternion"]),
+    ] {
+        fs::write(at.join("in.nc"), program.replace("(COMMENT)", comment)).unwrap();
+        for verb in [
+            &["compensate", "in.nc", "--model", "model.toml", "-o", "out.nc"][..],
+            &["deviation", "in.nc", "--model", "model.toml"],
+        ] {
+            let (code, _, said) = truegrind(at, verb);
+            assert_eq!(code, 2, "{comment}: {said}{err}");
+            assert!(
+                words.iter().all(|word| said.contains(word)) && said.contains("in.nc"),
+                "{comment}: {said}"
+            );
+        }
+        assert!(!at.join("out.nc").exists());
+    }
+    // The same word in the cell file.
+    fs::write(at.join("in.nc"), program).unwrap();
+    fs::write(at.join("cell.toml"), "angles = \"zyx\"\n").unwrap();
+    let (code, _, said) = truegrind(
+        at,
+        &["compensate", "in.nc", "--model", "model.toml", "--cell", "cell.toml", "-o", "out.nc"],
+    );
+    assert!(
+        code == 2 && said.contains("cell.toml") && said.contains("zyx") && said.contains("wpr"),
+        "{said}"
+    );
+}
