@@ -36,6 +36,11 @@ const SAMPLE_MM: f64 = 25.0;
 const SAMPLE_RAD: f64 = 0.1;
 /// No path has more samples.
 const MOST_SAMPLES: usize = 64;
+/// A path that is shorter has one sample (mm, rad): its joints hardly depart from a parabola.
+const SHORT_MM: f64 = 5.0;
+const SHORT_RAD: f64 = 0.02;
+/// How often a path is sampled four times as densely, where its samples do not agree on where a joint turns.
+const REFINEMENTS: u32 = 3;
 
 /// A joint that goes farther between neighbouring samples comes past a singularity (rad).
 const MOST_STEP_RAD: f64 = 0.6;
@@ -212,19 +217,14 @@ pub(super) fn courses(
     mounting: &dyn Fn(usize) -> Mounting,
     doubted: &[[bool; 6]],
 ) -> Vec<Course> {
-    let mut samples = Samples::default();
-    for (stop, before) in stops.iter().zip(before) {
-        let from = before.and_then(|m| stops.get(m as usize));
-        samples.of(from, stop, mounting);
-    }
-    let passed = samples.passed(nominal);
     let half = play_rad.map(|play| 0.5 * play.abs());
+    let (ways, passes) = sampled(stops, before, nominal, &half, mounting);
     let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
         let from = before[m].map(|b| b as usize).filter(|b| *b < m);
         let mut track = from.and_then(|b| tracks[b]);
-        let mut course = Course { turns: Vec::new(), end: [0; 6], passes: samples.passes[m] };
+        let mut course = Course { turns: Vec::new(), end: [0; 6], passes: passes[m] };
         match stop {
             Stop::Lost => track = None,
             Stop::Stays => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
@@ -240,10 +240,8 @@ pub(super) fn courses(
                 here.iter_mut().for_each(|t| t.since = 0.0);
                 let mut way: Vec<(f64, Joints)> = Vec::new();
                 way.extend(start.map(|joints| (0.0, joints)));
-                match &passed[m] {
-                    Some(joints) => {
-                        way.extend(samples.range(m).map(|k| samples.shares[k]).zip(joints.clone()))
-                    }
+                match &ways[m] {
+                    Some(samples) => way.extend(samples),
                     // The arm cannot go along the path: how it comes to the end is not known.
                     None => {
                         here = std::array::from_fn(|j| Track::unknown(reached.joints[j], half[j]));
@@ -263,6 +261,75 @@ pub(super) fn courses(
         }
         tracks.push(track);
         out.push(course);
+    }
+    out
+}
+
+/// The joints at places between the ends of a motion, by its share.
+type Sampled = Vec<(f64, Joints)>;
+
+/// The samples of all motions, none where the arm cannot go along, and at which share each circle point is passed. Where
+/// every other sample tells of other turns than all of them there are too few, and more are taken.
+fn sampled(
+    stops: &[Stop<'_>],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    half: &[f64; 6],
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> (Vec<Option<Sampled>>, Vec<f64>) {
+    let start = |m: usize| before[m].and_then(|from| stops.get(from as usize));
+    let mut samples = Samples::default();
+    for (m, stop) in stops.iter().enumerate() {
+        samples.of(start(m), stop, 1, mounting);
+    }
+    let mut ways = samples.passed(nominal);
+    let settled = |m: &usize, way: &Option<Sampled>| match (start(*m), &stops[*m], way) {
+        (Some(Stop::At(from)), Stop::At(to), Some(way)) => agrees(&from.joints, way, &to.joints, half),
+        _ => true,
+    };
+    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &ways[*m])).collect();
+    for refinement in 1..=REFINEMENTS {
+        let mut finer = Samples::default();
+        for &m in &rough {
+            finer.of(start(m), &stops[m], 4_usize.pow(refinement), mounting);
+        }
+        for (&m, way) in rough.iter().zip(finer.passed(nominal)) {
+            ways[m] = way;
+        }
+        rough.retain(|m| !settled(m, &ways[*m]));
+    }
+    (ways, samples.passes)
+}
+
+/// Whether every other sample of a way tells of the same turns as all of them, for joints with play.
+fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
+    if way.len() < 3 {
+        return true;
+    }
+    (0..6).filter(|&joint| half[joint] > 0.0).all(|joint| {
+        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let all: Vec<(f64, f64)> =
+            [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
+        let half: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
+        directions(&all) == directions(&half)
+    })
+}
+
+/// In which directions a joint goes in turn.
+fn directions(way: &[(f64, f64)]) -> Vec<i8> {
+    let mut out: Vec<i8> = Vec::new();
+    let mut farthest = way[0].1;
+    for k in 1..way.len() {
+        for (_, angle) in turning_point(way, k).into_iter().chain([way[k]]) {
+            let gone = angle - farthest;
+            let direction = if gone > 0.0 { 1 } else { -1 };
+            if out.last() == Some(&direction) {
+                farthest = angle;
+            } else if gone.abs() > DEAD_BAND_RAD {
+                out.push(direction);
+                farthest = angle;
+            }
+        }
     }
     out
 }
@@ -427,7 +494,14 @@ impl Samples {
         begin..self.ends[motion]
     }
 
-    fn of(&mut self, from: Option<&Stop<'_>>, stop: &Stop<'_>, mounting: &dyn Fn(usize) -> Mounting) {
+    /// The samples of one motion, so many times as densely as motions are sampled at first.
+    fn of(
+        &mut self,
+        from: Option<&Stop<'_>>,
+        stop: &Stop<'_>,
+        density: usize,
+        mounting: &dyn Fn(usize) -> Mounting,
+    ) {
         let mut passes = 0.5;
         if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
             && to.ways().0
@@ -446,7 +520,7 @@ impl Samples {
             if let Some(curve) = curve {
                 passes = to.via.map_or(passes, |via| curve.passes(&via));
                 let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
-                let pieces = pieces(curve.length_mm(), turn);
+                let pieces = (density * pieces(curve.length_mm(), turn)).min(MOST_SAMPLES);
                 for k in 1..pieces {
                     let s = k as f64 / pieces as f64;
                     self.shares.push(s);
@@ -464,7 +538,7 @@ impl Samples {
     }
 
     /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along.
-    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Vec<Joints>>> {
+    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Sampled>> {
         let of = |motion: usize| {
             let [start, end] = &self.ends_rad[motion];
             let flanges = &self.flanges[self.range(motion)];
@@ -473,11 +547,11 @@ impl Samples {
             }
             let mut out = Vec::with_capacity(flanges.len());
             let mut last = *start;
-            for reached in nominal.reach_path(flanges, start) {
+            for (k, reached) in self.range(motion).zip(nominal.reach_path(flanges, start)) {
                 let joints = reached.ok()?.joints;
                 let steady = (joints - last).amax() < MOST_STEP_RAD;
                 last = joints;
-                steady.then(|| out.push(joints))?;
+                steady.then(|| out.push((self.shares[k], joints)))?;
             }
             ((end - last).amax() < MOST_STEP_RAD).then_some(out)
         };
@@ -495,8 +569,12 @@ impl Samples {
     }
 }
 
-/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way.
+/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way; four and an even number where
+/// every other sample must tell the same.
 fn pieces(length_mm: f64, turn_rad: f64) -> usize {
+    if length_mm < SHORT_MM && turn_rad < SHORT_RAD {
+        return 2;
+    }
     let wanted = (length_mm / SAMPLE_MM).max(turn_rad / SAMPLE_RAD).ceil();
-    (wanted as usize).clamp(2, MOST_SAMPLES)
+    (wanted as usize).next_multiple_of(2).clamp(4, MOST_SAMPLES)
 }

@@ -8,6 +8,7 @@
 mod again;
 mod arcs;
 mod ends;
+mod long;
 mod origins;
 mod pen;
 mod slots;
@@ -98,6 +99,17 @@ impl Task<'_> {
                 if let Some(index) = wanted.remove(&motion) {
                     outcomes[index] = Outcome::Refused(Reason::WrongShape);
                     again = true;
+                }
+            }
+            if !again {
+                for edits in &mut edits {
+                    edits.sort()?;
+                }
+                for motion in self.too_long(&edits, &wanted) {
+                    if let Some(index) = wanted.remove(&motion) {
+                        outcomes[index] = Outcome::Refused(Reason::LineTooLong);
+                        again = true;
+                    }
                 }
             }
             if !again {
