@@ -41,6 +41,8 @@ const SHORT_MM: f64 = 5.0;
 const SHORT_RAD: f64 = 0.02;
 /// How often a path is sampled four times as densely, where its samples do not agree on where a joint turns.
 const REFINEMENTS: u32 = 3;
+/// No path that is sampled so has more samples.
+const MOST_REFINED: usize = 256;
 
 /// A joint that goes farther between neighbouring samples comes past a singularity (rad).
 const MOST_STEP_RAD: f64 = 0.6;
@@ -301,7 +303,8 @@ fn sampled(
     (ways, samples.passes)
 }
 
-/// Whether every other sample of a way tells of the same turns as all of them, for joints with play.
+/// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
+/// end.
 fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
     if way.len() < 3 {
         return true;
@@ -310,24 +313,41 @@ fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) 
         let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
         let all: Vec<(f64, f64)> =
             [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
-        let half: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
-        directions(&all) == directions(&half)
+        let other: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
+        let [fine, coarse] = [last_slope(&all), last_slope(&other)];
+        // What a turn could come to that lies between the last two samples.
+        let hidden = 0.5 * (fine - coarse).abs() * (1.0 - all[all.len() - 2].0);
+        let certain = (fine - coarse).abs() < 0.5 * fine.abs() || hidden < 0.1 * DEAD_BAND_RAD;
+        let [all, other] = [turns(&all), turns(&other)];
+        let alike = |((one, at), (other, near)): (&(i8, f64), &(i8, f64))| {
+            one == other && (at - near).abs() < 0.5 * DEAD_BAND_RAD
+        };
+        certain && all.len() == other.len() && all.iter().zip(&other).all(alike)
     })
 }
 
-/// In which directions a joint goes in turn.
-fn directions(way: &[(f64, f64)]) -> Vec<i8> {
-    let mut out: Vec<i8> = Vec::new();
+/// How fast a joint goes at the end of a way (rad per share), by the parabola through its last three samples.
+fn last_slope(way: &[(f64, f64)]) -> f64 {
+    let [.., a, b, c] = way else { return 0.0 };
+    let (first, last) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    last + (last - first) / (c.0 - a.0) * (c.0 - b.0)
+}
+
+/// In which directions a joint goes in turn, and how far each time.
+fn turns(way: &[(f64, f64)]) -> Vec<(i8, f64)> {
+    let mut out: Vec<(i8, f64)> = Vec::new();
     let mut farthest = way[0].1;
     for k in 1..way.len() {
         for (_, angle) in turning_point(way, k).into_iter().chain([way[k]]) {
             let gone = angle - farthest;
             let direction = if gone > 0.0 { 1 } else { -1 };
-            if out.last() == Some(&direction) {
-                farthest = angle;
-            } else if gone.abs() > DEAD_BAND_RAD {
-                out.push(direction);
-                farthest = angle;
+            match out.last_mut() {
+                Some((last, at)) if *last == direction => (*at, farthest) = (angle, angle),
+                _ if gone.abs() > DEAD_BAND_RAD => {
+                    out.push((direction, angle));
+                    farthest = angle;
+                }
+                _ => {}
             }
         }
     }
@@ -520,7 +540,7 @@ impl Samples {
             if let Some(curve) = curve {
                 passes = to.via.map_or(passes, |via| curve.passes(&via));
                 let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
-                let pieces = (density * pieces(curve.length_mm(), turn)).min(MOST_SAMPLES);
+                let pieces = (density * pieces(curve.length_mm(), turn)).min(MOST_REFINED);
                 for k in 1..pieces {
                     let s = k as f64 / pieces as f64;
                     self.shares.push(s);

@@ -186,7 +186,10 @@ impl Comparison<'_> {
                 if original_byte(edits, motion.at.1).is_some() {
                     break;
                 }
-                courses[1].go(motion);
+                let reached = courses[1].go(motion);
+                if motion.monitored && reached.iter().any(|point| point.joints.is_none() && !point.adrift) {
+                    self.wrong(0, "inserted", format!("no joints in the written configuration: {motion:?}"));
+                }
                 found = new.next();
             }
             match (old, found) {

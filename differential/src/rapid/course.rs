@@ -141,13 +141,16 @@ impl<'a> Course<'a> {
             }
         };
         let mut passed = false;
+        let passing = self.passing(motion, points);
         for (share, q) in way.iter().chain([&(1.0, end)]) {
-            self.links.go(q);
             // The circle point, which is passed on the way.
-            if count > 1 && !passed && *share >= self.passing(motion, points) {
+            if count > 1 && !passed && *share >= passing {
                 passed = true;
-                (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
+                let via = points[0].joints.unwrap_or(*q);
+                self.links.go(&via);
+                (points[0].behind, points[0].flanks) = (self.links.behind(&via), self.links.flanks(&via));
             }
+            self.links.go(q);
         }
         let last = &mut points[count - 1];
         (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, State};
+use super::super::machine::{Group, OF_TOOL, State};
 use super::super::orientation::Angles;
 use super::super::setup::{self, held};
 use super::super::syntax::{Belongs, Word};
@@ -159,15 +159,24 @@ impl Lister<'_, '_> {
             };
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
             let value = self.worth(word).0.ok().filter(|_| self.counts_in_mm());
-            let frame = value.map(|value| {
-                let mut frame = self.tool_value(&tool).unwrap_or(Frame::IDENTITY);
+            // What the control holds of a tool that nobody has stated is not known: each length until it is said.
+            let held = match (self.state.tools.of(&tool), self.tool_value(&tool)) {
+                (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
+                (None, Err(Reason::ToolUnknown)) => {
+                    Some(Frame { position_mm: [f64::NAN; 3], ..Frame::IDENTITY })
+                }
+                _ => None,
+            };
+            // The tool that is in keeps its lengths until it is called again.
+            let open = self.state.doubt(OF_TOOL).is_some() || self.state.tool == tool;
+            let frame = value.zip(held).filter(|_| !open).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
                 frame
             });
             self.state.tools.set(&tool, frame);
             self.found.assigns.1 = true;
             self.tool_index.clear();
-            if self.state.tool == tool {
+            if open {
                 self.lose_position();
             }
         } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
@@ -356,6 +365,8 @@ impl Lister<'_, '_> {
     /// The tool of a name, as the program, the setup or a comment states it.
     pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
         match self.state.tools.of(name) {
+            // A length of it has not been said yet.
+            Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),
