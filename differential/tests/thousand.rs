@@ -18,7 +18,7 @@ fn a_thousand_corrected_executions_of_each_language_agree() {
 /// Programs in which original and correction once disagreed: units, shifts, tools and increments in doubt where ways meet; a
 /// shift of G92 under radius compensation; a whole circle with play; a joint that seemed to turn near the end of a line; a
 /// tool taught at poses whose least squares came out wrong.
-const ONCE_WRONG: [(Dialect, u64); 19] = [
+const ONCE_WRONG: [(Dialect, u64); 22] = [
     (Dialect::Fanuc, 1_001_909),
     (Dialect::Fanuc, 1_001_375),
     (Dialect::Fanuc, 1_018_769),
@@ -37,7 +37,10 @@ const ONCE_WRONG: [(Dialect, u64); 19] = [
     (Dialect::Rapid, 2011),
     (Dialect::Rapid, 2773),
     (Dialect::Rapid, 7860),
+    (Dialect::Rapid, 1_000_129),
     (Dialect::Rapid, 1_000_647),
+    (Dialect::Rapid, 1_001_171),
+    (Dialect::Rapid, 1_001_813),
 ];
 
 #[test]

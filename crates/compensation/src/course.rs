@@ -99,19 +99,14 @@ pub(super) struct Course {
     pub(super) turns: Vec<(f64, Sides)>,
     /// At the end.
     pub(super) end: Sides,
-    /// At which share of the way the circle point is passed.
-    pub(super) passes: f64,
+    /// At the circle point, where there is one.
+    pub(super) via: Sides,
 }
 
 impl Course {
-    /// The sides at a share of the way.
-    pub(super) fn at(&self, s: f64) -> Sides {
-        self.turns.iter().rev().find(|(from, _)| *from <= s).map_or(self.end, |turn| turn.1)
-    }
-
     /// The side of a joint is not known.
     fn forget(&mut self, joint: usize) {
-        self.end[joint] = 0;
+        (self.end[joint], self.via[joint]) = (0, 0);
         self.turns.iter_mut().for_each(|(_, sides)| sides[joint] = 0);
     }
 }
@@ -226,7 +221,7 @@ pub(super) fn courses(
     for (m, stop) in stops.iter().enumerate() {
         let from = before[m].map(|b| b as usize).filter(|b| *b < m);
         let mut track = from.and_then(|b| tracks[b]);
-        let mut course = Course { turns: Vec::new(), end: [0; 6], passes: passes[m] };
+        let mut course = Course { turns: Vec::new(), end: [0; 6], via: [0; 6] };
         match stop {
             Stop::Lost => track = None,
             Stop::Stays => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
@@ -250,6 +245,7 @@ pub(super) fn courses(
                         way.clear();
                     }
                 }
+                course.via = passing(here, reached, &way, passes[m]);
                 (course.turns, here) = arrive(here, reached, &way);
                 course.end = here.map(|t| t.side);
                 for joint in (0..6).filter(|&joint| doubted.get(m).is_some_and(|doubted| doubted[joint])) {
@@ -400,6 +396,37 @@ fn arrive(start: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)]) -> (T
     (turns, end)
 }
 
+/// On which flank each link lies where the circle point is passed: on none of them while a joint that has turned before it
+/// takes up its play.
+fn passing(mut tracks: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)], passes: f64) -> Sides {
+    if reached.via.is_none() {
+        return [0; 6];
+    }
+    let mut sides = [0; 6];
+    for (joint, track) in tracks.iter_mut().enumerate() {
+        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let angles: Vec<(f64, f64)> = inner.chain([(1.0, reached.joints[joint])]).collect();
+        let after = angles.iter().position(|(share, _)| *share >= passes).unwrap_or(angles.len() - 1);
+        for k in 0..after {
+            for (share, angle) in turning_point(&angles, k).into_iter().chain([angles[k]]) {
+                track.go(angle, share);
+            }
+        }
+        let Some(before) = after.checked_sub(1).map(|k| angles[k]) else {
+            sides[joint] = track.flank(angles[after].1);
+            continue;
+        };
+        if let Some((share, angle)) = turning_point(&angles, after).filter(|(share, _)| *share <= passes) {
+            track.go(angle, share);
+        }
+        let (from, to) = (before, angles[after]);
+        let motor = from.1 + (to.1 - from.1) * (passes - from.0) / (to.0 - from.0).max(f64::EPSILON);
+        track.take(motor);
+        sides[joint] = track.flank(motor);
+    }
+    sides
+}
+
 /// From which side a link comes to its end that goes along a way as was meant; `None` where it does not turn on the way.
 fn side_of_link(begin: &Track, way: &[(f64, Joints)], joint: usize, motor: f64, link: f64) -> Option<i8> {
     if begin.half == 0.0 || way.is_empty() {
@@ -479,7 +506,7 @@ fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)], reached: &Reached<'_>)
 /// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
 fn turning_point(way: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
     let first = match k {
-        _ if way.len() < 3 => return None,
+        _ if way.len() < 3 || k == 0 => return None,
         1 => 0,
         _ => k - 2,
     };

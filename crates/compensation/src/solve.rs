@@ -391,7 +391,7 @@ impl Work<'_> {
         for (m, course) in sides.iter().enumerate() {
             for target in self.first[m]..self.first[m + 1] {
                 let sides: Sides = match self.asked[target].target.role {
-                    Role::Via => course.at(course.passes),
+                    Role::Via => course.via,
                     Role::To => course.end,
                 };
                 out.push(arms.acting.place(sides, load(m)));
