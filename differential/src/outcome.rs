@@ -73,6 +73,9 @@ pub struct Tally {
     pub unreachable: usize,
     /// Executed motions that could not be judged, because what the arm does there hangs on less than can be told.
     pub open: usize,
+    /// Executed motions that were changed and flagged since they rest on a configuration that is not checked, where the arm
+    /// comes in another one. Not among the corrected.
+    pub guessed: usize,
     /// Corrected executions that are off by more than numbers are written to, and by no more than the report states for them.
     pub stated: usize,
     /// What is wrong.
@@ -89,6 +92,7 @@ impl Tally {
         self.refused += other.refused;
         self.unreachable += other.unreachable;
         self.open += other.open;
+        self.guessed += other.guessed;
         self.stated += other.stated;
         self.disagreements.extend(other.disagreements);
     }

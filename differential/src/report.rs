@@ -84,9 +84,8 @@ pub fn one(dialect: Dialect, seed: u64, features: Features) -> String {
 /// Counts in a line.
 pub fn line(name: &str, tally: &Tally, seconds: f64) -> String {
     format!(
-        "{name}: {} programs, {} motions run, {} corrected, {} left, {} refused, {} out of reach, {} open, {} within what is stated, {} \
-         disagreements, \
-         {seconds:.1} s",
+        "{name}: {} programs, {} motions run, {} corrected, {} left, {} refused, {} out of reach, {} open, {} on a guess that is \
+         flagged, {} within what is stated, {} disagreements, {seconds:.1} s",
         tally.programs,
         tally.executed,
         tally.corrected,
@@ -94,6 +93,7 @@ pub fn line(name: &str, tally: &Tally, seconds: f64) -> String {
         tally.refused,
         tally.unreachable,
         tally.open,
+        tally.guessed,
         tally.stated,
         tally.disagreements.len()
     )

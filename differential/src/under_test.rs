@@ -10,6 +10,7 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::Status as Became;
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::rewrite::{self, Circles, Emit};
+use truegrind::compensation::why::Why;
 use truegrind::programs::motion::Mark;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::Program;
@@ -69,6 +70,8 @@ pub struct Row {
     pub sigma_mm: Option<f64>,
     /// Stated distance of the path from the intended one (mm); none where it is not checked.
     pub bend_mm: Option<f64>,
+    /// Whether it is flagged since it rests on a configuration that the controller does not check.
+    pub guessed: bool,
 }
 
 /// Bytes that were replaced.
@@ -182,6 +185,7 @@ pub fn corrected_task(
             after_mm: outcome.after_mm,
             sigma_mm: outcome.sigma_mm,
             bend_mm: outcome.bend_mm,
+            guessed: outcome.reason == Some(Why::OpenStart),
         });
     }
     Ok(out)
@@ -198,6 +202,7 @@ fn refused(files: &[(&str, &[u8])], program: &Program<'_>, reason: &str) -> Corr
         after_mm: None,
         sigma_mm: None,
         bend_mm: None,
+        guessed: false,
     });
     let same = |(_, bytes): &(&str, &[u8])| CorrectedFile { bytes: bytes.to_vec(), edits: Vec::new() };
     CorrectedTask { files: files.iter().map(same).collect(), rows: rows.collect() }

@@ -60,6 +60,18 @@ impl Circle {
         }
     }
 
+    /// How far the decimals that are written leave the centre of the told circle open where the motion states its radius
+    /// (mm). h² = r² − c²/4 of its distance h from the chord c is known to 2 r δ then: near half a turn, where h is small, h
+    /// is known to far less than δ.
+    pub(super) fn open_centre_mm(&self, decimals: u8) -> f64 {
+        let Some(arc) = self.told.arc() else { return 0.0 };
+        let open = 2.0 * arc.radius * 0.1_f64.powi(i32::from(decimals));
+        let height = (arc.radius * (0.5 * arc.sweep).cos()).abs();
+        let square = height * height;
+        let nearer = height - (square - open).max(0.0).sqrt();
+        nearer.max((square + open).sqrt() - height)
+    }
+
     /// Targets between the ends such that straight pieces keep to the intended arc within the tolerance, and the
     /// distance that is left; `None` where that is not reached.
     pub(super) fn pieces(

@@ -36,6 +36,13 @@ const SAMPLE_MM: f64 = 25.0;
 const SAMPLE_RAD: f64 = 0.1;
 /// No path has more samples.
 const MOST_SAMPLES: usize = 64;
+/// A path that is shorter has one sample (mm, rad): its joints hardly depart from a parabola.
+const SHORT_MM: f64 = 5.0;
+const SHORT_RAD: f64 = 0.02;
+/// How often a path is sampled four times as densely, where its samples do not agree on where a joint turns.
+const REFINEMENTS: u32 = 3;
+/// No path that is sampled so has more samples.
+const MOST_REFINED: usize = 256;
 
 /// A joint that goes farther between neighbouring samples comes past a singularity (rad).
 const MOST_STEP_RAD: f64 = 0.6;
@@ -92,19 +99,14 @@ pub(super) struct Course {
     pub(super) turns: Vec<(f64, Sides)>,
     /// At the end.
     pub(super) end: Sides,
-    /// At which share of the way the circle point is passed.
-    pub(super) passes: f64,
+    /// At the circle point, where there is one.
+    pub(super) via: Sides,
 }
 
 impl Course {
-    /// The sides at a share of the way.
-    pub(super) fn at(&self, s: f64) -> Sides {
-        self.turns.iter().rev().find(|(from, _)| *from <= s).map_or(self.end, |turn| turn.1)
-    }
-
     /// The side of a joint is not known.
     fn forget(&mut self, joint: usize) {
-        self.end[joint] = 0;
+        (self.end[joint], self.via[joint]) = (0, 0);
         self.turns.iter_mut().for_each(|(_, sides)| sides[joint] = 0);
     }
 }
@@ -212,19 +214,14 @@ pub(super) fn courses(
     mounting: &dyn Fn(usize) -> Mounting,
     doubted: &[[bool; 6]],
 ) -> Vec<Course> {
-    let mut samples = Samples::default();
-    for (stop, before) in stops.iter().zip(before) {
-        let from = before.and_then(|m| stops.get(m as usize));
-        samples.of(from, stop, mounting);
-    }
-    let passed = samples.passed(nominal);
     let half = play_rad.map(|play| 0.5 * play.abs());
+    let (ways, passes) = sampled(stops, before, nominal, &half, mounting);
     let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
         let from = before[m].map(|b| b as usize).filter(|b| *b < m);
         let mut track = from.and_then(|b| tracks[b]);
-        let mut course = Course { turns: Vec::new(), end: [0; 6], passes: samples.passes[m] };
+        let mut course = Course { turns: Vec::new(), end: [0; 6], via: [0; 6] };
         match stop {
             Stop::Lost => track = None,
             Stop::Stays => course.end = track.map_or([0; 6], |track| track.map(|t| t.side)),
@@ -240,16 +237,15 @@ pub(super) fn courses(
                 here.iter_mut().for_each(|t| t.since = 0.0);
                 let mut way: Vec<(f64, Joints)> = Vec::new();
                 way.extend(start.map(|joints| (0.0, joints)));
-                match &passed[m] {
-                    Some(joints) => {
-                        way.extend(samples.range(m).map(|k| samples.shares[k]).zip(joints.clone()))
-                    }
+                match &ways[m] {
+                    Some(samples) => way.extend(samples),
                     // The arm cannot go along the path: how it comes to the end is not known.
                     None => {
                         here = std::array::from_fn(|j| Track::unknown(reached.joints[j], half[j]));
                         way.clear();
                     }
                 }
+                course.via = passing(here, reached, &way, passes[m]);
                 (course.turns, here) = arrive(here, reached, &way);
                 course.end = here.map(|t| t.side);
                 for joint in (0..6).filter(|&joint| doubted.get(m).is_some_and(|doubted| doubted[joint])) {
@@ -263,6 +259,93 @@ pub(super) fn courses(
         }
         tracks.push(track);
         out.push(course);
+    }
+    out
+}
+
+/// The joints at places between the ends of a motion, by its share.
+type Sampled = Vec<(f64, Joints)>;
+
+/// The samples of all motions, none where the arm cannot go along, and at which share each circle point is passed. Where
+/// every other sample tells of other turns than all of them there are too few, and more are taken.
+fn sampled(
+    stops: &[Stop<'_>],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    half: &[f64; 6],
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> (Vec<Option<Sampled>>, Vec<f64>) {
+    let start = |m: usize| before[m].and_then(|from| stops.get(from as usize));
+    let mut samples = Samples::default();
+    for (m, stop) in stops.iter().enumerate() {
+        samples.of(start(m), stop, 1, mounting);
+    }
+    let mut ways = samples.passed(nominal);
+    let settled = |m: &usize, way: &Option<Sampled>| match (start(*m), &stops[*m], way) {
+        (Some(Stop::At(from)), Stop::At(to), Some(way)) => agrees(&from.joints, way, &to.joints, half),
+        _ => true,
+    };
+    let mut rough: Vec<usize> = (0..stops.len()).filter(|m| !settled(m, &ways[*m])).collect();
+    for refinement in 1..=REFINEMENTS {
+        let mut finer = Samples::default();
+        for &m in &rough {
+            finer.of(start(m), &stops[m], 4_usize.pow(refinement), mounting);
+        }
+        for (&m, way) in rough.iter().zip(finer.passed(nominal)) {
+            ways[m] = way;
+        }
+        rough.retain(|m| !settled(m, &ways[*m]));
+    }
+    (ways, samples.passes)
+}
+
+/// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
+/// end.
+fn agrees(start: &Joints, way: &[(f64, Joints)], end: &Joints, half: &[f64; 6]) -> bool {
+    if way.len() < 3 {
+        return true;
+    }
+    (0..6).filter(|&joint| half[joint] > 0.0).all(|joint| {
+        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let all: Vec<(f64, f64)> =
+            [(0.0, start[joint])].into_iter().chain(inner).chain([(1.0, end[joint])]).collect();
+        let other: Vec<(f64, f64)> = all.iter().copied().step_by(2).collect();
+        let [fine, coarse] = [last_slope(&all), last_slope(&other)];
+        // What a turn could come to that lies between the last two samples.
+        let hidden = 0.5 * (fine - coarse).abs() * (1.0 - all[all.len() - 2].0);
+        let certain = (fine - coarse).abs() < 0.5 * fine.abs() || hidden < 0.1 * DEAD_BAND_RAD;
+        let [all, other] = [turns(&all), turns(&other)];
+        let alike = |((one, at), (other, near)): (&(i8, f64), &(i8, f64))| {
+            one == other && (at - near).abs() < 0.5 * DEAD_BAND_RAD
+        };
+        certain && all.len() == other.len() && all.iter().zip(&other).all(alike)
+    })
+}
+
+/// How fast a joint goes at the end of a way (rad per share), by the parabola through its last three samples.
+fn last_slope(way: &[(f64, f64)]) -> f64 {
+    let [.., a, b, c] = way else { return 0.0 };
+    let (first, last) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    last + (last - first) / (c.0 - a.0) * (c.0 - b.0)
+}
+
+/// In which directions a joint goes in turn, and how far each time.
+fn turns(way: &[(f64, f64)]) -> Vec<(i8, f64)> {
+    let mut out: Vec<(i8, f64)> = Vec::new();
+    let mut farthest = way[0].1;
+    for k in 1..way.len() {
+        for (_, angle) in turning_point(way, k).into_iter().chain([way[k]]) {
+            let gone = angle - farthest;
+            let direction = if gone > 0.0 { 1 } else { -1 };
+            match out.last_mut() {
+                Some((last, at)) if *last == direction => (*at, farthest) = (angle, angle),
+                _ if gone.abs() > DEAD_BAND_RAD => {
+                    out.push((direction, angle));
+                    farthest = angle;
+                }
+                _ => {}
+            }
+        }
     }
     out
 }
@@ -311,6 +394,37 @@ fn arrive(start: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)]) -> (T
         }
     }
     (turns, end)
+}
+
+/// On which flank each link lies where the circle point is passed: on none of them while a joint that has turned before it
+/// takes up its play.
+fn passing(mut tracks: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)], passes: f64) -> Sides {
+    if reached.via.is_none() {
+        return [0; 6];
+    }
+    let mut sides = [0; 6];
+    for (joint, track) in tracks.iter_mut().enumerate() {
+        let inner = way.iter().map(|(share, joints)| (*share, joints[joint]));
+        let angles: Vec<(f64, f64)> = inner.chain([(1.0, reached.joints[joint])]).collect();
+        let after = angles.iter().position(|(share, _)| *share >= passes).unwrap_or(angles.len() - 1);
+        for k in 0..after {
+            for (share, angle) in turning_point(&angles, k).into_iter().chain([angles[k]]) {
+                track.go(angle, share);
+            }
+        }
+        let Some(before) = after.checked_sub(1).map(|k| angles[k]) else {
+            sides[joint] = track.flank(angles[after].1);
+            continue;
+        };
+        if let Some((share, angle)) = turning_point(&angles, after).filter(|(share, _)| *share <= passes) {
+            track.go(angle, share);
+        }
+        let (from, to) = (before, angles[after]);
+        let motor = from.1 + (to.1 - from.1) * (passes - from.0) / (to.0 - from.0).max(f64::EPSILON);
+        track.take(motor);
+        sides[joint] = track.flank(motor);
+    }
+    sides
 }
 
 /// From which side a link comes to its end that goes along a way as was meant; `None` where it does not turn on the way.
@@ -392,7 +506,7 @@ fn follow(tracks: &mut [Track; 6], way: &[(f64, Joints)], reached: &Reached<'_>)
 /// Where between samples k − 1 and k a joint turns: the vertex of a parabola through these two and a neighbour.
 fn turning_point(way: &[(f64, f64)], k: usize) -> Option<(f64, f64)> {
     let first = match k {
-        _ if way.len() < 3 => return None,
+        _ if way.len() < 3 || k == 0 => return None,
         1 => 0,
         _ => k - 2,
     };
@@ -427,7 +541,14 @@ impl Samples {
         begin..self.ends[motion]
     }
 
-    fn of(&mut self, from: Option<&Stop<'_>>, stop: &Stop<'_>, mounting: &dyn Fn(usize) -> Mounting) {
+    /// The samples of one motion, so many times as densely as motions are sampled at first.
+    fn of(
+        &mut self,
+        from: Option<&Stop<'_>>,
+        stop: &Stop<'_>,
+        density: usize,
+        mounting: &dyn Fn(usize) -> Mounting,
+    ) {
         let mut passes = 0.5;
         if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
             && to.ways().0
@@ -446,7 +567,7 @@ impl Samples {
             if let Some(curve) = curve {
                 passes = to.via.map_or(passes, |via| curve.passes(&via));
                 let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
-                let pieces = pieces(curve.length_mm(), turn);
+                let pieces = (density * pieces(curve.length_mm(), turn)).min(MOST_REFINED);
                 for k in 1..pieces {
                     let s = k as f64 / pieces as f64;
                     self.shares.push(s);
@@ -464,7 +585,7 @@ impl Samples {
     }
 
     /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along.
-    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Vec<Joints>>> {
+    fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Sampled>> {
         let of = |motion: usize| {
             let [start, end] = &self.ends_rad[motion];
             let flanges = &self.flanges[self.range(motion)];
@@ -473,11 +594,11 @@ impl Samples {
             }
             let mut out = Vec::with_capacity(flanges.len());
             let mut last = *start;
-            for reached in nominal.reach_path(flanges, start) {
+            for (k, reached) in self.range(motion).zip(nominal.reach_path(flanges, start)) {
                 let joints = reached.ok()?.joints;
                 let steady = (joints - last).amax() < MOST_STEP_RAD;
                 last = joints;
-                steady.then(|| out.push(joints))?;
+                steady.then(|| out.push((self.shares[k], joints)))?;
             }
             ((end - last).amax() < MOST_STEP_RAD).then_some(out)
         };
@@ -495,8 +616,12 @@ impl Samples {
     }
 }
 
-/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way.
+/// Pieces of a path: at least two, so that one sample tells of a joint that turns half way; four and an even number where
+/// every other sample must tell the same.
 fn pieces(length_mm: f64, turn_rad: f64) -> usize {
+    if length_mm < SHORT_MM && turn_rad < SHORT_RAD {
+        return 2;
+    }
     let wanted = (length_mm / SAMPLE_MM).max(turn_rad / SAMPLE_RAD).ceil();
-    (wanted as usize).clamp(2, MOST_SAMPLES)
+    (wanted as usize).next_multiple_of(2).clamp(4, MOST_SAMPLES)
 }

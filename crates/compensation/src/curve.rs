@@ -19,8 +19,9 @@ use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, Switch};
 
-/// Ends of an arc that are nearer than this make it a whole circle (mm).
-pub(super) const CLOSED_MM: f64 = 1e-3;
+/// Ends of an arc that are nearer than this make it a whole circle (mm). Never less than what the writers of NC close: a
+/// corrected whole circle whose ends are so near is written as one, and must be followed as one here.
+pub(super) const CLOSED_MM: f64 = 2e-3;
 
 /// An arc from its start over a point to its end, perhaps rising along its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

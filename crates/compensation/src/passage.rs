@@ -2,7 +2,7 @@
 
 use super::circle::Circle;
 use super::corner::{Ways, corner_bend};
-use super::curve::Curve;
+use super::curve::{CLOSED_MM, Curve};
 use super::rewrite::{Arms, Circles, Emit, Options};
 use super::segment::{Ends, Path, gap, insertions, joint_bend, straight_bend};
 use super::solve::Solved;
@@ -99,7 +99,7 @@ fn circle(
 ) -> Passage {
     let Path { from, to, .. } = path;
     let Some(circle) = Circle::of(from, &via.meant, &via.told, to, motion) else {
-        let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < 1e-3;
+        let closed = gap(&from.meant.translation.vector, &to.meant.translation.vector) < CLOSED_MM;
         let flag = if closed { Why::WholeCircle } else { Why::Bend { mm: f64::INFINITY } };
         return Passage { flag: Some(flag), ..Passage::default() };
     };
@@ -112,9 +112,13 @@ fn circle(
     if may && let Some((before, left)) = circle.pieces(path, arms, options) {
         return Passage { bend_mm: Some(left), before, straight: true, flag: None, courses };
     }
-    let bend = circle.bend(path, arms);
-    let flag = if !(bend <= options.tolerance_mm) {
+    let along = circle.bend(path, arms);
+    let open = if motion.by_radius { circle.open_centre_mm(options.position_decimals) } else { 0.0 };
+    let bend = along + open;
+    let flag = if !(along <= options.tolerance_mm) {
         Some(Why::Bend { mm: bend })
+    } else if !(bend <= options.tolerance_mm) {
+        Some(Why::OpenCentre { mm: open })
     } else {
         segments.then_some(Why::CircleKept)
     };

@@ -22,7 +22,7 @@ use super::notes::{load_notes, open_notes, play_note};
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
 use super::segment::{Ends, Path, middles_off};
-use super::solve::{Solved, SolvedTargets, as_joints, solve_all, take_room};
+use super::solve::{Guess, Solved, SolvedTargets, as_joints, solve_all, take_room};
 use super::speed::{Pace, fastest};
 use super::staying::{obstacle, staying};
 use super::why::Why;
@@ -576,7 +576,9 @@ fn work<'a>(
     // Then the path from the motion before.
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
     (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
-    let mut flag = passage.flag;
+    // What is said of the motion beside this holds for the configuration that was guessed.
+    let guessed = motion.configures && good.iter().any(|s| s.guess != Guess::No);
+    let mut flag = if guessed { Some(Why::OpenStart) } else { passage.flag };
     if let Some(corner) = job.corner(motion, path, &passage, last) {
         outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));
         if !(corner <= options.tolerance_mm) {

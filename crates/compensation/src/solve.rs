@@ -73,6 +73,8 @@ pub(super) struct Solved {
     pub(super) forbidden: Option<Why>,
     /// The condition under which the arm comes there.
     pub(super) place: usize,
+    /// Whether `before` rests on a guess.
+    pub(super) guess: Guess,
 }
 
 impl Solved {
@@ -92,7 +94,7 @@ pub(super) struct SolvedTargets {
     portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     ways: Vec<Way>,
-    /// Motions of which the configuration is not checked and the start not known.
+    /// Motions of which the configuration is not checked and the start not known; not those that go on from there.
     pub(super) guessed: Vec<u32>,
 }
 
@@ -153,8 +155,38 @@ struct Start {
     conf: Configuration,
     /// [`Solved::margins`] before.
     margins: [f64; 3],
-    /// Whether the controller takes the solution next to where the arm stands, which is not known, and there are others.
+    guess: Guess,
+}
+
+/// Whether joints rest on a guess: where no configuration is checked the controller takes the solution next to where the
+/// arm stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Guess {
+    /// They follow from the text.
+    No,
+    /// Where the arm stands is not known, and there are other solutions.
+    Here,
+    /// They go on, unchecked, from joints that were guessed.
+    Before,
+}
+
+/// Joints that are gone on from.
+#[derive(Clone, Copy)]
+struct Near {
+    joints: Joints,
+    /// Whether they rest on a guess.
     guessed: bool,
+}
+
+impl Near {
+    fn of(start: &Start) -> Self {
+        Near { joints: start.joints, guessed: start.guess != Guess::No }
+    }
+
+    /// What the guess is for what goes on from here.
+    fn guess(&self, monitored: Switch) -> Guess {
+        if self.guessed && monitored == Switch::Off { Guess::Before } else { Guess::No }
+    }
 }
 
 /// Works out all targets. `stays`: motions that stay as they are though their targets could be corrected.
@@ -268,7 +300,7 @@ impl Work<'_> {
     /// Motions of which a target was reached by guess.
     fn guessed(&self) -> Vec<u32> {
         let guessed = |m: &usize| {
-            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guessed)
+            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guess == Guess::Here)
         };
         (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
     }
@@ -359,7 +391,7 @@ impl Work<'_> {
         for (m, course) in sides.iter().enumerate() {
             for target in self.first[m]..self.first[m + 1] {
                 let sides: Sides = match self.asked[target].target.role {
-                    Role::Via => course.at(course.passes),
+                    Role::Via => course.via,
                     Role::To => course.end,
                 };
                 out.push(arms.acting.place(sides, load(m)));
@@ -419,7 +451,7 @@ fn starts(
         let previous = listing.motions[motion].previous.map(|p| p as usize);
         let mut near = previous.and_then(|p| {
             let reached = &out[first[p]..first[p + 1]];
-            reached.last().and_then(|start| start.as_ref().ok().map(|s| s.joints))
+            reached.last().and_then(|start| start.as_ref().ok().map(Near::of))
         });
         let run = first[motion]..first[end];
         along(&asked[run.clone()], &mut near, arms, mountings, &mut allowance, &mut out[run]);
@@ -435,7 +467,7 @@ const RUNS: [usize; 2] = [8, 64];
 /// at the joints of the last. `allowance`: for those that have to be searched for.
 fn along(
     asked: &[Asked<'_>],
-    near: &mut Option<Joints>,
+    near: &mut Option<Near>,
     arms: &Arms<'_>,
     mountings: &Mountings,
     allowance: &mut Allowance,
@@ -463,7 +495,7 @@ fn along(
         if at < asked.len() {
             let start = within(allowance, || start(&asked[at], near.as_ref(), arms, mountings));
             match &start {
-                Ok(start) => *near = Some(start.joints),
+                Ok(start) => *near = Some(Near::of(start)),
                 // What goes on from there does not go on from the one before.
                 Err(_) if monitored(asked[at].motion) == Switch::Off => *near = None,
                 Err(_) => {}
@@ -503,21 +535,22 @@ fn wanted(target: &RobTarget) -> Configuration {
 
 /// Goes from `last` along targets as far as they are reached in the configurations that they state; hands back how many
 /// were, and leaves `last` at the joints of the last of them.
-fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
+fn together(told: &[Told<'_>], last: &mut Near, arms: &Arms<'_>, out: &mut [Result<Start, Why>]) -> usize {
     if told.is_empty() {
         return 0;
     }
     let flanges: Vec<Pose> = told.iter().map(|t| t.flange).collect();
     let mut taken = 0;
     // One that has to be searched for is started by itself.
-    for (told, reached) in told.iter().zip(arms.nominal.reach_path_easily(&flanges, last)) {
+    for (told, reached) in told.iter().zip(arms.nominal.reach_path_easily(&flanges, &last.joints)) {
         if told.monitored != Switch::Off && !reached.is_of(&wanted(told.target)) {
             break;
         }
         let (joints, conf, margins) = (reached.joints, reached.configuration, reached.margins());
-        out[taken] =
-            Ok(Start { mounted: told.mounted, meant: told.meant, joints, conf, margins, guessed: false });
-        *last = joints;
+        let guess = last.guess(told.monitored);
+        let start = Start { mounted: told.mounted, meant: told.meant, joints, conf, margins, guess };
+        *last = Near::of(&start);
+        out[taken] = Ok(start);
         taken += 1;
     }
     taken
@@ -526,7 +559,7 @@ fn together(told: &[Told<'_>], last: &mut Joints, arms: &Arms<'_>, out: &mut [Re
 /// One target by itself.
 fn start(
     asked: &Asked<'_>,
-    near: Option<&Joints>,
+    near: Option<&Near>,
     arms: &Arms<'_>,
     mountings: &Mountings,
 ) -> Result<Start, Why> {
@@ -541,11 +574,15 @@ fn start(
             let meant = t.pose();
             let flange = told.flange_for(&meant);
             let monitored = monitored(asked.motion);
-            let joints = configured(&arms.nominal, &flange, &t, monitored, near)?;
+            let joints = configured(&arms.nominal, &flange, &t, monitored, near.map(|near| &near.joints))?;
             let conf = arms.nominal.configuration(&joints);
-            let guessed = monitored == Switch::Off && near.is_none() && arms.nominal.all(&flange).len() > 1;
+            let guess = match near {
+                Some(near) => near.guess(monitored),
+                None if monitored == Switch::Off && arms.nominal.all(&flange).len() > 1 => Guess::Here,
+                None => Guess::No,
+            };
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, conf, margins, guessed })
+            Ok(Start { mounted, meant, joints, conf, margins, guess })
         }
         TargetValue::Joint(t) => {
             let joints = Joints::from_fn(|i, _| t.robot_deg[i].to_radians());
@@ -556,7 +593,7 @@ fn start(
             let meant = told.target_of(&nominal.forward(&joints));
             let conf = arms.nominal.configuration(&joints);
             let margins = arms.nominal.branch_margins(&joints);
-            Ok(Start { mounted, meant, joints, conf, margins, guessed: false })
+            Ok(Start { mounted, meant, joints, conf, margins, guess: Guess::No })
         }
     }
 }
@@ -687,6 +724,7 @@ fn finish(
             sigma_mm: sigmas[k].hypot(in_play_mm),
             in_play_mm,
             place: w.place,
+            guess: w.start.guess,
             outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
             singularity: w.singularity,
             forbidden: None,

@@ -75,19 +75,18 @@ fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<FixedPoin
     if !a.iter().chain(b.iter()).all(|v| v.is_finite()) {
         return None;
     }
-    let svd = a.clone().svd(true, true);
-    if !(svd.singular_values.min() >= ALIKE) {
+    // A = Q R: x = R⁻¹ Qᵀ b, and (Aᵀ A)⁻¹ = R⁻¹ R⁻ᵀ. Not by the singular value decomposition, whose singular vectors come out
+    // wrong by 1e-5 where singular values coincide, as they do here.
+    let qr = a.clone().qr();
+    let r = qr.r();
+    if !(r.singular_values().min() >= ALIKE) {
         return None;
     }
-    let x = svd.solve(&b, 0.0).ok()?;
+    let x = r.solve_upper_triangular(&qr.q().tr_mul(&b))?;
     let freedom = (3 * n).saturating_sub(6).max(1) as f64;
     let variance = (&a * &x - &b).norm_squared() / freedom;
-    let directions = svd.v_t.as_ref()?;
-    let spread = |first: usize| {
-        let of =
-            |k: usize| directions.row(k).columns(first, 3).norm_squared() / svd.singular_values[k].powi(2);
-        (variance * (0..6).map(of).sum::<f64>()).sqrt()
-    };
+    let inverse = r.solve_upper_triangular(&DMatrix::identity(6, 6))?;
+    let spread = |first: usize| (variance * inverse.rows(first, 3).norm_squared()).sqrt();
     Some(FixedPoint {
         on_flange: x.fixed_rows::<3>(0).into_owned(),
         in_base: x.fixed_rows::<3>(3).into_owned(),

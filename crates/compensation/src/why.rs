@@ -68,6 +68,9 @@ pub enum Why {
     OtherBranch,
     /// Nothing tells the controller which configuration to take, and the one that was meant is not the nearest.
     OpenBranch,
+    /// The controller does not check the stated configuration but takes the one next to where the arm stands, which the
+    /// text does not tell: the motion is corrected for the stated one.
+    OpenStart,
     /// The path between two targets leaves the intended one by more than the tolerance.
     Bend {
         /// By how much (mm).
@@ -75,6 +78,11 @@ pub enum Why {
     },
     /// The robot rounds the point before, and the corner leaves the intended one by more than the tolerance.
     Corner {
+        /// By how much (mm).
+        mm: f64,
+    },
+    /// An arc of about half a turn states its radius, whose decimals leave its centre open.
+    OpenCentre {
         /// By how much (mm).
         mm: f64,
     },
@@ -156,6 +164,7 @@ impl Why {
             Why::OtherBranch => "the corrected target lies in another configuration",
             Why::Bend { .. } => "the path between targets leaves the intended one",
             Why::Corner { .. } => "the rounded corner leaves the intended one",
+            Why::OpenCentre { .. } => "told by its radius, the centre of a half circle is left open",
             Why::CircleKept => "the circle stays a circle",
             Why::TooFast { .. } => "a joint turns faster than it can",
             Why::NoCircle => "no circle through its points keeps to the way that was meant",
@@ -164,6 +173,7 @@ impl Why {
             Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
             Why::SingularWay => "the way to it passes too close to a singularity",
             Why::OpenBranch => "which configuration the controller takes is open",
+            Why::OpenStart => "corrected for the stated configuration, which is not checked, from a start that is not known",
             Why::PartOfCut { because, .. } => because,
             Why::Step { .. } => "the step to its neighbour is too large",
             Why::NotCovered { .. } => "no measured pose is near",
@@ -206,6 +216,11 @@ impl fmt::Display for Why {
                 "the controller may take another configuration, since none is stated and another lies as near: state it, or \
                  come nearer before",
             ),
+            Why::OpenStart => f.write_str(
+                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
+                 arm stands, and where it comes from the text does not tell. It is corrected for the stated one, or the one \
+                 that leads on from there: check that, or begin with a joint target",
+            ),
             Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
             Why::Corner { mm } if !mm.is_finite() => {
                 f.write_str("the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)")
@@ -214,6 +229,11 @@ impl fmt::Display for Why {
             Why::Corner { mm } => {
                 write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)")
             }
+            Why::OpenCentre { mm } => write!(
+                f,
+                "an arc of about half a turn that states its radius: the decimals that are written leave its centre open by \
+                 {mm:.3} mm; state the centre instead (I, J, K; CC)"
+            ),
             Why::CircleKept => f.write_str(
                 "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
                  straight pieces keep to it",

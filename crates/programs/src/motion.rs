@@ -425,11 +425,15 @@ pub struct Motion {
     pub insertable: bool,
     /// Whether the language lets a circular motion be replaced by straight ones.
     pub straightens: bool,
+    /// Whether the language lets a target state the configuration of the arm.
+    pub configures: bool,
     /// Whether the control goes as fast as it can (G0, FMAX): on a line or joint by joint, as it is set up.
     pub rapid: bool,
     /// The axis about which a circular motion turns, positively, in the axes of its targets; `None` where its three
     /// points alone say it (RAPID).
     pub axis: Option<[f64; 3]>,
+    /// Whether a circular motion states its radius and no centre: that leaves the centre open near half a turn.
+    pub by_radius: bool,
     /// The modal state in which it runs.
     pub modal: Modal,
     /// Whether it stands in a loop.
@@ -807,6 +811,8 @@ reasons! {
         Unread => "part of the block could not be read",
         /// NC: a word that is not in the tables, in the block or before it.
         UnknownWord => "a word that is not known stands here or before: what it does and sets is not known",
+        /// NC: a control takes lines of so many bytes.
+        LineTooLong => "its line, or one after it that says again what has changed, would become longer than the control takes (512 characters on an 840D, 253 on LinuxCNC)",
         /// NC: the arc after it stays as it is, and starts here.
         BeforeLeftArc => "an arc that stays as it is starts where this ends",
         /// NC: a path that is neither line nor arc stays as it is, and starts here.

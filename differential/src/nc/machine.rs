@@ -83,6 +83,8 @@ pub struct Move {
     pub state: String,
     /// The coordinates of the program in the robot's base; `None` where they are bent or not known.
     pub chain: Option<Pose>,
+    /// The same where what goes there is not the tip, but the centre of a cutter beside it or the axes themselves.
+    pub origin: Option<Pose>,
     /// The tool on the flange.
     pub tool: Option<Pose>,
     /// Where it begins and ends, in the coordinates of the program.
@@ -284,6 +286,7 @@ impl<'s> Machine<'s> {
             mode: self.mode,
             state: self.state(),
             chain: self.chain.filter(|_| follows),
+            origin: self.chain.filter(|_| self.bent.is_empty()),
             tool: self.tool.as_ref().and_then(|name| self.setting.tool(name)),
             from,
             to: self.at,

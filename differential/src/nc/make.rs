@@ -4,6 +4,7 @@
 mod fanuc;
 mod heidenhain;
 mod linuxcnc;
+mod round;
 mod siemens;
 
 use rand::{RngExt, SeedableRng};
@@ -35,7 +36,12 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
         ("T2", plain([20.0, 0.0, 90.0], [0.0; 3])),
         ("T3", plain([0.0, 5.0, 30.0], [0.0, 15.0, 0.0])),
     ];
-    let centre = reached(case);
+    let mut centre = reached(case);
+    if seed >= BORDERS && rng.random_bool(0.2) {
+        // Towards the end of what the arm reaches, and to where it is stretched or folded.
+        let farther = rng.random_range(0.7..1.45);
+        centre = [0, 1, 2].map(|axis| (centre[axis] * if axis < 2 { farther } else { 1.0 }).round());
+    }
     let shifts =
         [[0.0, 0.0, 0.0], [20.0, -30.0, 15.0], [-20.0, 20.0, 10.0], [0.0, 20.0, -10.0], [10.0, 10.0, 20.0]];
     let names: [&str; 5] = match control {
@@ -59,6 +65,9 @@ pub fn setting(seed: u64, control: Control, case: &Case) -> Setting {
         skip: false,
     }
 }
+
+/// From this seed on some programs go to where the arm hardly reaches. Those before are what they always were.
+const BORDERS: u64 = 2_000_000;
 
 /// A place before the arm about which it reaches with tools that point down (mm).
 fn reached(case: &Case) -> [f64; 3] {
@@ -114,6 +123,18 @@ pub fn program(seed: u64, control: Control, setting: &Setting, features: Feature
     let mut text = lines.join("\n");
     text.push('\n');
     if maker.chance(0.1) { text.replace('\n', "\r\n") } else { text }
+}
+
+/// How a control writes its blocks.
+struct Manner {
+    /// Of the blocks that change what holds on, how many set one thing; the others part the way.
+    changes: f64,
+    change: fn(&mut Maker) -> Vec<String>,
+    flow: fn(&mut Maker, f64, u32) -> Vec<String>,
+    full: fn(&mut Maker) -> String,
+    part: fn(&mut Maker) -> String,
+    arc: fn(&mut Maker) -> Vec<String>,
+    restate: fn(&mut Maker) -> Vec<String>,
 }
 
 /// What makes a program.
@@ -241,18 +262,22 @@ impl Maker {
         words.join(" ")
     }
 
-    /// A quarter, half or odd arc in the plane of two axes (0 to 2) from a place: its end and its centre, both counted
-    /// from its start, and whether it goes anticlockwise.
-    fn bow(&mut self) -> ([f64; 2], [f64; 2], bool) {
-        let radius = self.pick(&[5.0, 10.0, 20.0, 12.5]);
-        let from = self.whole(0, 7) * 45.0;
-        let sweep = self.pick(&[90.0, 90.0, 180.0, 45.0, 270.0, -90.0, -90.0, -180.0, -30.0]);
-        let spoke = |degrees: f64| {
-            let (sin, cos) = f64::to_radians(degrees).sin_cos();
-            [radius * cos, radius * sin]
-        };
-        let (start, end) = (spoke(from), spoke(from + sweep));
-        ([end[0] - start[0], end[1] - start[1]], [-start[0], -start[1]], sweep > 0.0)
+    /// A few blocks in the manner of a control.
+    fn block(&mut self, manner: &Manner, depth: u32) -> Vec<String> {
+        let density = self.density;
+        if self.chance(density) {
+            let kind = self.rng_share();
+            if kind < manner.changes || depth > 1 {
+                return (manner.change)(self);
+            }
+            return (manner.flow)(self, kind, depth);
+        }
+        match self.rng_share() {
+            k if k < 0.35 => vec![(manner.full)(self)],
+            k if k < 0.75 => vec![(manner.part)(self)],
+            k if k < 0.92 => (manner.arc)(self),
+            _ => (manner.restate)(self),
+        }
     }
 
     /// Blocks until a program is long enough.
@@ -260,9 +285,7 @@ impl Maker {
         let count = self.rng.random_range(8..28);
         (0..count).flat_map(|_| block(self, 0)).collect()
     }
-}
 
-impl Maker {
     fn rng_share(&mut self) -> f64 {
         self.rng.random_range(0.0..1.0)
     }

@@ -3,7 +3,6 @@
 mod fanuc;
 mod heidenhain;
 mod linuxcnc;
-mod seeds;
 mod siemens;
 
 use super::machine::{Event, Move};

@@ -7,8 +7,12 @@ use super::run::{Goal, Motion, Way};
 use crate::arm::{Arm, Pose, difference};
 use crate::play::Links;
 
-/// Pieces in which a path is followed.
+/// Pieces in which a path is followed where no joint has play.
 const PIECES: usize = 64;
+/// The same where joints have: between two samples a joint may go farther than at both, by an eighth of its acceleration over
+/// the square of their number, and takes its link along. On long arcs joints accelerate by some 10 rad.
+const PIECES_WITH_PLAY: usize = 128;
+const PIECES_OF_ARCS: usize = 640;
 
 /// A joint that would have to go farther from one piece to the next has no way there (rad).
 const FARTHEST: f64 = 0.6;
@@ -107,7 +111,7 @@ impl<'a> Course<'a> {
     fn along(&self, motion: &Motion, points: &mut [Point]) {
         let Some(start) = self.joints else { return };
         let way = self.way(motion, &start, &start, points);
-        if way.len() + 1 < PIECES {
+        if way.len() + 1 < self.pieces(motion) {
             return;
         }
         let passing = self.passing(motion, points);
@@ -127,7 +131,7 @@ impl<'a> Course<'a> {
         let way = match self.joints {
             Some(start) => {
                 let way = self.way(motion, &start, &end, points);
-                if motion.way != Way::Joint && self.last.is_some() && way.len() + 1 < PIECES {
+                if motion.way != Way::Joint && self.last.is_some() && way.len() + 1 < self.pieces(motion) {
                     // The arm cannot go along the path: how it comes to the end is not told.
                     self.links.lose();
                     Vec::new()
@@ -141,16 +145,27 @@ impl<'a> Course<'a> {
             }
         };
         let mut passed = false;
+        let passing = self.passing(motion, points);
         for (share, q) in way.iter().chain([&(1.0, end)]) {
-            self.links.go(q);
             // The circle point, which is passed on the way.
-            if count > 1 && !passed && *share >= self.passing(motion, points) {
+            if count > 1 && !passed && *share >= passing {
                 passed = true;
-                (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
+                let via = points[0].joints.unwrap_or(*q);
+                self.links.go(&via);
+                (points[0].behind, points[0].flanks) = (self.links.behind(&via), self.links.flanks(&via));
             }
+            self.links.go(q);
         }
         let last = &mut points[count - 1];
         (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));
+    }
+
+    fn pieces(&self, motion: &Motion) -> usize {
+        match (self.links.have_play(), motion.way) {
+            (false, _) => PIECES,
+            (true, Way::Arc) => PIECES_OF_ARCS,
+            (true, _) => PIECES_WITH_PLAY,
+        }
     }
 
     /// At which share of an arc its point is passed.
@@ -184,8 +199,9 @@ impl<'a> Course<'a> {
             })
             .flatten();
         let mut near = *start;
-        for k in 1..PIECES {
-            let s = k as f64 / PIECES as f64;
+        let pieces = self.pieces(motion);
+        for k in 1..pieces {
+            let s = k as f64 / pieces as f64;
             let tip = match &circle {
                 Some((arc, turn)) => {
                     let turned = arc.turned(s) * a.rotation * UnitQuaternion::from_scaled_axis(turn * s);

@@ -369,6 +369,29 @@ fn nc_arcs_helices_and_whole_circles_are_checked_and_become_straight_pieces_when
     }
 }
 
+/// The class: what the form of a statement leaves open is not in what is stated of its path. An arc that states its radius has
+/// its centre at h = √(R² − c²/4) from its chord c: to four decimals h is known to √(2 R · 10⁻⁴) on a half circle, 0.11 mm at
+/// 60 mm, and to about as many decimals as R on a quarter.
+#[test]
+fn an_arc_told_by_its_radius_leaves_its_centre_open_near_half_a_turn() {
+    let head = "(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,0],[1,0,0,0]])\n(truegrind frame G54 w [[0,0,0],[1,0,0,0]])\nG90 G17 G54\n";
+    let known = known(&perturbed(12, 0.3));
+    let planned = |body: &str, tolerance_mm: f64| {
+        let source = format!("{head}G1 X440 Y0 Z320 A180 B0 C180 F3000\n{body}\n");
+        let task = truegrind_programs::nc::Task::read(&[("p.ngc", source.as_bytes())], &nc_setup());
+        let options = Options { tolerance_mm, ..Options::default() };
+        let outcome = plan(&task.listing, &known, &Cell::default(), &options).outcomes.remove(1);
+        (outcome.bend_mm.unwrap(), outcome.reason)
+    };
+    let [(centre, _), (radius, wide)] = ["G2 X320 Y0 I-60 J0", "G2 X320 Y0 R60"].map(|body| planned(body, 1.0));
+    let open = (2.0_f64 * 60.0 * 1e-4).sqrt();
+    assert!((radius - centre - open).abs() < 0.01 && wide.is_none(), "{centre} {radius} {wide:?}");
+    let (_, why) = planned("G2 X320 Y0 R60", centre + 0.5 * open);
+    assert!(matches!(why, Some(Why::OpenCentre { mm }) if (mm - open).abs() < 0.01), "{why:?}");
+    let [(centre, _), (radius, _)] = ["G2 X380 Y-60 I-60 J0", "G2 X380 Y-60 R60"].map(|body| planned(body, 1.0));
+    assert!((0.0..3e-4).contains(&(radius - centre)), "{centre} {radius}");
+}
+
 #[test]
 fn an_arc_that_stays_says_its_word_again_after_one_that_became_straight() {
     let head = "(truegrind angles wpr)\n(truegrind tool T0 t [[0,0,0],[1,0,0,0]])\n(truegrind frame G54 w [[0,0,0],[1,0,0,0]])\nG90 G17 G54\n";

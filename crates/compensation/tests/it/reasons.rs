@@ -33,8 +33,12 @@ fn name(why: &Why) -> &'static str {
         Why::SingularWay => "singular way",
         Why::OtherBranch => "other branch",
         Why::OpenBranch => "open branch",
+        // Only where the start is unknown (tests/it/singular.rs).
+        Why::OpenStart => "open start",
         Why::Bend { .. } => "bend",
         Why::Corner { .. } => "corner",
+        // tests/it/path.rs.
+        Why::OpenCentre { .. } => "open centre",
         Why::CircleKept => "circle kept",
         Why::TooFast { .. } => "too fast",
         Why::NoCircle => "no circle",

@@ -435,3 +435,40 @@ fn without_a_stated_configuration_the_nearest_solution_is_the_one_that_was_meant
         assert!(count > 20 && 3 * written > count && open > 0);
     }
 }
+
+/// The class: a solution is taken by guess and nobody is told at which motions. Where the configuration is not checked the
+/// controller goes to the one next to where the arm stands: where that is not known, at the start of a program or behind a
+/// motion that is not known, the stated one is taken, and each motion that rests on it is flagged until one states it and is
+/// checked.
+#[test]
+fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
+    let robot = ARMS[0];
+    let arm = sheet(robot);
+    let joints: Vec<Joints> =
+        (0..6).map(|k| Joints::from_fn(|j, _| 0.3 + 0.05 * f64::from(k) + 0.1 * j as f64)).collect();
+    let line = |k: usize| {
+        let target = target(&forward(&arm, &joints[k]), confdata(&arm, &joints[k]));
+        format!("MoveL {target},v100,fine,tool0;\n")
+    };
+    let text = module(&[
+        "ConfL\\Off;\n".into(),
+        line(0),
+        line(1),
+        "ConfL\\On;\n".into(),
+        line(2),
+        "ConfL\\Off;\n".into(),
+        line(3),
+        "pElsewhere;\n".into(),
+        line(4),
+        "ConfL\\On;\n".into(),
+        line(5),
+    ]);
+    let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &Options::default());
+    let motions = &plan.outcomes;
+    let open: Vec<bool> = motions.iter().map(|o| o.reason == Some(Why::OpenStart)).collect();
+    assert_eq!(open[..4], [true, true, false, false], "{motions:#?}");
+    let targets: Vec<_> = motions.iter().filter(|o| o.before_mm.is_some()).collect();
+    assert_eq!(targets.len(), 6, "{motions:#?}");
+    assert!(targets.iter().all(|o| corrected(o)), "{motions:#?}");
+    assert!(targets[4].reason == Some(Why::OpenStart) && targets[5].reason.is_none(), "{motions:#?}");
+}

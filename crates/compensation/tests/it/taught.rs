@@ -666,3 +666,29 @@ fn numbered_tools_and_offsets_are_found_by_number_and_by_name() {
         assert_eq!(task.listing.opaque.len(), 1, "{wrong}");
     }
 }
+
+/// The class: a linear system that is solved by a decomposition which is not exact where singular values coincide, as those of
+/// orientations about one point do. The TCP of teaching poses is the one of least squares: the residuals r_i = R_i t + p_i − c
+/// sum to nothing, and so do R_iᵀ r_i.
+#[test]
+fn the_tcp_of_teaching_poses_is_that_of_least_squares() {
+    let arm = truegrind_arm::robots::load("abb-irb-2600-12-1.85").unwrap().model;
+    let arm = arm.at_condition(&Condition::default());
+    let mut state = 7_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    for _ in 0..500 {
+        let base = Joints::from_fn(|_, _| next());
+        let poses: Vec<Joints> = (0..6).map(|_| base + Joints::from_fn(|_, _| 0.8 * next())).collect();
+        let Some(tcp) = taught_tcp(&arm, &poses) else { continue };
+        let flanges: Vec<_> = poses.iter().map(|joints| arm.forward(joints)).collect();
+        let tips: Vec<Vector3<f64>> =
+            flanges.iter().map(|flange| (flange * Point3::from(tcp)).coords).collect();
+        let middle = tips.iter().sum::<Vector3<f64>>() / tips.len() as f64;
+        let slope: Vector3<f64> =
+            flanges.iter().zip(&tips).map(|(flange, tip)| flange.rotation.inverse() * (tip - middle)).sum();
+        assert!(slope.norm() < 1e-8 * tips.iter().map(|tip| (tip - middle).norm()).sum::<f64>(), "{slope}");
+    }
+}

@@ -54,8 +54,10 @@ pub(super) enum Group {
     Radius,
     /// G43.4, TRAORI.
     Tip,
-    /// T, H, D and what sets tools.
+    /// T and what else brings tools in.
     Tool,
+    /// G43, G49, H; the edge D of Siemens: which length of the tool counts.
+    Length,
     /// G92, G52.
     Shift,
     // What turns, scales or bends coordinates, each a state of its own: the end of one is not the end of another.
@@ -93,12 +95,26 @@ pub(super) enum Group {
     AxisScale,
     /// A, B, C are counted from elsewhere (G92 A0).
     Rotary,
+    // What matters for some motions only.
+    /// G90.1, G91.1: centres of arcs.
+    Centre,
+    /// ORIRPY, ORIEULER.
+    Rpy,
+    /// ORIROTA, ORIROTR.
+    Spin,
 }
 
-pub(super) const GROUPS: u32 = Group::Rotary as u32 + 1;
+pub(super) const GROUPS: u32 = Group::Spin as u32 + 1;
 
-/// Of all groups, the planes matter for arcs only.
-pub(super) const ALL_BUT_PLANE: u32 = ((1 << GROUPS) - 1) & !(1 << Group::Plane as u32);
+/// What matters for arcs only.
+pub(super) const OF_ARCS: u32 = 1 << Group::Plane as u32 | 1 << Group::Centre as u32;
+
+/// Which tool it is, and which of its lengths counts.
+pub(super) const OF_TOOL: u32 = 1 << Group::Tool as u32 | 1 << Group::Length as u32;
+
+/// What matters for every motion. Rpy and Spin say what certain words mean: those are not known where they are not.
+pub(super) const OF_ALL: u32 =
+    ((1 << GROUPS) - 1) & !(OF_ARCS | 1 << Group::Rpy as u32 | 1 << Group::Spin as u32);
 
 /// Frames that the program itself sets, by name; `None` where what it sets is not known.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -382,6 +398,8 @@ impl State {
         self.pole = [flow; 2];
         self.variables.lose(Reason::UnknownFlow);
         self.uncertain |= !constant & ((1 << GROUPS) - 1);
+        self.rpy_stated &= constant & 1 << Group::Rpy as u32 != 0;
+        self.spin_absolute &= constant & 1 << Group::Spin as u32 != 0;
         self.previous = None;
     }
 
@@ -498,11 +516,10 @@ impl State {
             (Group::Tip, self.tip != other.tip || self.vector_words != other.vector_words),
             (
                 Group::Tool,
-                self.tool != other.tool
-                    || self.length != other.length
-                    || self.own_length != other.own_length
-                    || self.edge != other.edge,
+                self.tool != other.tool || self.own_length != other.own_length || self.edge != other.edge,
             ),
+            (Group::Length, self.length != other.length || self.edge != other.edge),
+            (Group::Centre, self.centre_absolute != other.centre_absolute),
             (Group::Shift, self.shift != other.shift),
         ] {
             if differs {
@@ -516,8 +533,8 @@ impl State {
         if self.kept != other.kept {
             self.kept = None;
         }
-        if (self.centre_absolute, self.feed_per_minute) != (other.centre_absolute, other.feed_per_minute) {
-            self.uncertain |= 1 << Group::Plane as u32;
+        if self.feed_per_minute != other.feed_per_minute {
+            self.feed = Err(Reason::UnknownFlow);
         }
         self.variables.join(&other.variables);
         if self.previous != other.previous {

@@ -8,6 +8,7 @@
 mod again;
 mod arcs;
 mod ends;
+mod long;
 mod origins;
 mod pen;
 mod slots;
@@ -62,42 +63,24 @@ impl Task<'_> {
                 // What is refused now stays, and with it what it hangs on.
                 continue;
             }
-            let mut follower = Follower {
-                task: self,
-                options,
-                edits: &mut edits,
-                now: Now::default(),
-                unfit: Vec::new(),
-                fixed: &fixed,
-            };
-            for event in &self.events {
-                match *event {
-                    Event::Start => follower.now = Now::default(),
-                    Event::Unknown | Event::Join => {
-                        // A shift that is set where the tool stands elsewhere stays where it is.
-                        let Now { straightened, moved, .. } = follower.now;
-                        follower.now = Now { straightened, moved, ..Now::default() };
-                    }
-                    Event::Lost(axes) => follower.now.lose(axes),
-                    Event::Shift { stated, .. } => follower.now.shift_at(stated),
-                    Event::Placed(axes) => follower.now.place(axes),
-                    // Nothing has moved there: the motions that end there stay.
-                    Event::MaybePlaced(_) | Event::Restored | Event::Held { .. } | Event::Jump => {}
-                    Event::Motion(motion) => {
-                        let index = wanted.get(&motion).copied();
-                        let outcome = follower.motion(motion, index.map(|index| &changes[index]));
-                        if let Some(index) = index {
-                            outcomes[index] = outcome;
-                        }
-                    }
-                }
-            }
+            let unfit = self.follow((changes, &wanted), options, &fixed, &mut edits, &mut outcomes);
             // An arc that no circle fits stays, and with it what ends where it starts.
             let mut again = false;
-            for motion in follower.unfit {
+            for motion in unfit {
                 if let Some(index) = wanted.remove(&motion) {
                     outcomes[index] = Outcome::Refused(Reason::WrongShape);
                     again = true;
+                }
+            }
+            if !again {
+                for edits in &mut edits {
+                    edits.sort()?;
+                }
+                for motion in self.too_long(&edits, &wanted) {
+                    if let Some(index) = wanted.remove(&motion) {
+                        outcomes[index] = Outcome::Refused(Reason::LineTooLong);
+                        again = true;
+                    }
                 }
             }
             if !again {
@@ -112,6 +95,52 @@ impl Task<'_> {
                 edits.iter_mut().for_each(|edits| *edits = Edits::new());
             }
         }
+        if wanted.is_empty() {
+            // What the last round wrote was for motions that stay after all.
+            edits.iter_mut().for_each(|edits| *edits = Edits::new());
+        }
+        Ok(Rewritten { files: self.marked(edits, options)?, outcomes })
+    }
+
+    /// Writes all motions in their order: those of `wanted`, and what the others must say again. Hands back the arcs that no
+    /// circle fits.
+    fn follow(
+        &self,
+        (changes, wanted): (&[Change], &HashMap<u32, usize>),
+        options: &RewriteOptions,
+        fixed: &BTreeSet<u32>,
+        edits: &mut Vec<Edits>,
+        outcomes: &mut [Outcome],
+    ) -> Vec<u32> {
+        let mut follower =
+            Follower { task: self, options, edits, now: Now::default(), unfit: Vec::new(), fixed };
+        for event in &self.events {
+            match *event {
+                Event::Start => follower.now = Now::default(),
+                Event::Unknown | Event::Join => {
+                    // A shift that is set where the tool stands elsewhere stays where it is.
+                    let Now { straightened, moved, .. } = follower.now;
+                    follower.now = Now { straightened, moved, ..Now::default() };
+                }
+                Event::Lost(axes) => follower.now.lose(axes),
+                Event::Shift { stated, .. } => follower.now.shift_at(stated),
+                Event::Placed(axes) => follower.now.place(axes),
+                // Nothing has moved there: the motions that end there stay.
+                Event::MaybePlaced(_) | Event::Restored | Event::Held { .. } | Event::Jump => {}
+                Event::Motion(motion) => {
+                    let index = wanted.get(&motion).copied();
+                    let outcome = follower.motion(motion, index.map(|index| &changes[index]));
+                    if let Some(index) = index {
+                        outcomes[index] = outcome;
+                    }
+                }
+            }
+        }
+        follower.unfit
+    }
+
+    /// The edits of each file, with the mark of this version.
+    fn marked(&self, edits: Vec<Edits>, options: &RewriteOptions) -> Result<Vec<FileEdits>, EditError> {
         let mut files = Vec::with_capacity(self.trees.len());
         for ((edits, tree), &dialect) in edits.into_iter().zip(&self.trees).zip(&self.dialects) {
             let mut file = FileEdits { edits, unmarked: false };
@@ -131,7 +160,7 @@ impl Task<'_> {
             file.edits.sort()?;
             files.push(file);
         }
-        Ok(Rewritten { files, outcomes })
+        Ok(files)
     }
 
     fn refusal(&self, motion: &Motion, change: &Change) -> Option<Reason> {

@@ -97,6 +97,8 @@ pub(super) struct Written {
     pub(super) node: u32,
     pub(super) absolute: bool,
     pub(super) unit_mm: f64,
+    /// Whether it is not known that `absolute` holds: ways meet before it.
+    pub(super) counting_open: bool,
     /// Where it starts (mm, shifts included), as far as known.
     pub(super) start: [Option<f64>; 3],
     /// A, B, C (or A2, B2, C2) before it.
@@ -602,7 +604,7 @@ impl<'t, 's> Lister<'t, 's> {
                 // F0 and F-5 go nowhere, and what is too large is read as something else.
                 false => Err(Reason::NumberRange),
             });
-            self.state.feed = feed.map(|feed| feed * self.state.unit_mm / 60.0);
+            self.state.feed = self.in_mm(feed).map(|feed| feed / 60.0);
         }
         self.motion(said, machine);
         self.ends(said);
@@ -663,7 +665,7 @@ impl<'t, 's> Lister<'t, 's> {
             && let Some(index) = said.d
         {
             let edge = self.literal(&said.words[index]).map_or(u32::MAX, |edge| edge.round() as u32);
-            self.tool_is(|state| state.edge = edge);
+            self.length_is(|state| state.edge = edge);
         }
     }
 }

@@ -18,6 +18,7 @@ mod certain;
 mod blocks;
 mod frames;
 mod klartext;
+mod long;
 mod origins;
 mod m_words;
 mod stays;

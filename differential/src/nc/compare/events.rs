@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::Pair;
 use super::follow::{Follower, plane_of};
 use crate::arm::{Pose, difference};
-use crate::nc::arc::{Circle, axes};
+use crate::nc::arc::axes;
 use crate::nc::machine::{Event, Move, Say};
 use crate::outcome::{Dialect, Disagreement, Tally};
 use crate::stated::Stated;
@@ -16,8 +16,6 @@ use crate::under_test::{Row, Status};
 const WRITTEN_MM: f64 = 0.004;
 /// The same for the turn of the tool (rad).
 const WRITTEN_RAD: f64 = 1e-5;
-/// What four decimals leave open of a radius and half a chord together.
-const DECIMALS_MM: f64 = 1e-4;
 /// Between samples the distance of a path is known to this (mm).
 const CHORD_MM: f64 = 0.02;
 /// What is left goes where it went, but for the rounding of words that are said again (mm, °).
@@ -207,7 +205,7 @@ impl Judge<'_> {
         // program was.
         let ends = self.open_before.max(Stated::of(Some(row), &self.pair.case.arm, false).mm);
         let allowed = match row.bend_mm {
-            Some(bend) => bend + ends + CHORD_MM + centre_mm(new),
+            Some(bend) => bend + ends + CHORD_MM,
             None => raw + self.most + CHORD_MM,
         };
         if real > allowed {
@@ -225,7 +223,7 @@ impl Judge<'_> {
     fn left(&mut self, old: &Move, new: &Move, reason: &str) {
         let line = old.line + 1;
         let stated = old.words.place.map(|say| matches!(say, Some(Say::To(_))));
-        if let Some(off) = apart(old.chain, old.to, new.chain, new.to, stated, LEFT_MM) {
+        if let Some(off) = apart(old.origin, old.to, new.origin, new.to, stated, LEFT_MM) {
             return self.wrong(line, "left-moved", format!("{off} ({reason})"));
         }
         for (axis, say) in old.words.turn.iter().enumerate() {
@@ -243,13 +241,13 @@ impl Judge<'_> {
             }
         }
         let bound = 3.0 * self.most + 0.05;
-        if let Some(off) = apart(old.chain, old.to, new.chain, new.to, [true; 3], bound) {
+        if let Some(off) = apart(old.origin, old.to, new.origin, new.to, [true; 3], bound) {
             return self.wrong(line, "left-moved-far", format!("{off} ({reason})"));
         }
         if let (Some(was), Some(now)) = (old.arc, new.arc) {
             let (a, b, _) = axes(plane_of(&old.state));
             let within = std::array::from_fn(|axis| axis == a || axis == b);
-            let moved = apart(old.chain, was.mid, new.chain, now.mid, within, 5e-3);
+            let moved = apart(old.origin, was.mid, new.origin, now.mid, within, 5e-3);
             // What counts from its start, and what the control takes for no circle, goes on from where it starts.
             let whole = stated[a] && stated[b] && (was.radii[0] - was.radii[1]).abs() < 0.02;
             if let Some(off) = moved.filter(|_| whole) {
@@ -261,15 +259,6 @@ impl Judge<'_> {
             self.wrong(line, "left-arc-known", format!("{:?} -> {:?} ({reason})", old.arc, new.arc));
         }
     }
-}
-
-/// How far four decimals of its radius and of its ends leave the centre of an arc open that is said by its radius (mm): on a
-/// half circle by far more than themselves.
-fn centre_mm(done: &Move) -> f64 {
-    let (Some(Circle::Radius(radius)), Some(arc)) = (done.words.circle, done.arc) else { return 0.0 };
-    let (radius, height) = (radius.abs(), (radius * (arc.sweep / 2.0).cos()).abs());
-    let open = DECIMALS_MM * radius;
-    (2.0 * open).sqrt().min(open / height.max(1e-9))
 }
 
 /// How far two places are apart, in the coordinates of the first, if more than `bound` in one of the axes asked for.

@@ -10,7 +10,7 @@ use crate::nc::machine::{Mode, Move};
 use crate::play::{Links, meant_flanks, meant_links};
 
 /// Pieces in which a path is followed.
-const PIECES: u32 = 64;
+const PIECES: u32 = 128;
 
 /// An arm that follows a program.
 pub struct Follower<'c> {

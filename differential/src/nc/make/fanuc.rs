@@ -1,6 +1,6 @@
 //! Fanuc style programs.
 
-use super::Maker;
+use super::{Maker, Manner};
 
 const VARIABLES: [u32; 3] = [100, 101, 102];
 
@@ -60,53 +60,24 @@ fn restate(m: &mut Maker) -> String {
 }
 
 fn arc(m: &mut Maker) -> Vec<String> {
-    let (end, centre, anticlockwise) = m.bow();
-    let word = if anticlockwise { "G3" } else { "G2" };
-    let p = m.place();
-    let (plane, axes, offsets) = m.pick(&[
-        ("G17", [0, 1], ["I", "J"]),
-        ("G17", [0, 1], ["I", "J"]),
-        ("G18", [2, 0], ["K", "I"]),
-        ("G19", [1, 2], ["J", "K"]),
-    ]);
-    let letters = ["X", "Y", "Z"];
-    let mut begin = vec!["G1".to_owned()];
-    let mut block =
-        if plane == "G17" { vec![word.to_owned()] } else { vec![plane.to_owned(), word.to_owned()] };
-    for side in 0..2 {
-        begin.push(m.axis(letters[axes[side]], p[axes[side]]));
-        block.push(m.axis(letters[axes[side]], p[axes[side]] + end[side]));
-    }
+    let round = m.round();
+    let (begin, mut block) = round.words(m);
     let kind = m.whole(0, 9);
     if kind == 0.0 {
         // A whole circle.
         block.truncate(block.len() - 2);
     }
     if (1.0..=3.0).contains(&kind) {
-        let radius = centre[0].hypot(centre[1]);
-        let long = (end[0].hypot(end[1]) - 2.0 * radius).abs() > 1e-6 && is_long(end, centre, anticlockwise);
-        block.push(m.axis("R", if long { -radius } else { radius }));
+        block.push(m.axis("R", round.radius()));
     } else {
         for side in 0..2 {
-            block.push(m.axis(offsets[side], centre[side]));
+            block.push(m.axis(["I", "J", "K"][round.axes[side]], round.centre[side]));
         }
     }
     if kind == 4.0 {
-        // It rises.
-        let across = 3 - axes[0] - axes[1];
-        block.push(m.axis(letters[across], p[across]));
+        block.push(round.rise(m));
     }
-    let mut out = vec![begin.join(" "), block.join(" ")];
-    if plane != "G17" {
-        out.push("G17".to_owned());
-    }
-    out
-}
-
-/// Whether an arc goes more than half round.
-pub(super) fn is_long(end: [f64; 2], centre: [f64; 2], anticlockwise: bool) -> bool {
-    let side = end[0] * centre[1] - end[1] * centre[0];
-    (side > 0.0) != anticlockwise
+    round.blocks(begin, &block)
 }
 
 fn change(m: &mut Maker) -> Vec<String> {
@@ -165,59 +136,56 @@ fn change(m: &mut Maker) -> Vec<String> {
     }
 }
 
+const MANNER: Manner = Manner {
+    changes: 0.72,
+    change,
+    flow,
+    full: |m| {
+        let word = m.pick(&["G1", "G0", "G1"]);
+        full(m, word)
+    },
+    part,
+    arc,
+    restate: |m| vec![restate(m)],
+};
+
 fn block(m: &mut Maker, depth: u32) -> Vec<String> {
-    let density = m.density;
-    if m.chance(density) {
-        let kind = m.rng_share();
-        if kind < 0.72 || depth > 1 {
-            return change(m);
+    m.block(&MANNER, depth)
+}
+
+fn flow(m: &mut Maker, kind: f64, depth: u32) -> Vec<String> {
+    if kind < 0.82 {
+        let label = m.label() + 1000;
+        let mut out = vec![format!(
+            "IF [#{} {} {}.] GOTO {label}",
+            m.pick(&[100, 101]),
+            m.pick(&["GT", "LE", "NE"]),
+            m.pick(&[0, 5])
+        )];
+        for _ in 0..2 {
+            out.extend(block(m, depth + 1));
         }
-        if kind < 0.82 {
-            let label = m.label() + 1000;
-            let mut out = vec![format!(
-                "IF [#{} {} {}.] GOTO {label}",
-                m.pick(&[100, 101]),
-                m.pick(&["GT", "LE", "NE"]),
-                m.pick(&[0, 5])
-            )];
-            for _ in 0..2 {
-                out.extend(block(m, depth + 1));
-            }
-            out.push(format!("N{label} {}", part(m)));
-            return out;
-        }
-        if kind < 0.86 {
-            return vec![
-                format!("IF [#{} LT 6.] THEN #101={}.", m.pick(&VARIABLES), m.pick(&[5, 10])),
-                part(m),
-            ];
-        }
-        if kind < 0.94 && m.loops < 3 {
-            m.loops += 1;
-            let counter = 102 + m.loops;
-            let level = m.loops;
-            let mut out = vec![
-                format!("#{counter}=0"),
-                format!("WHILE [#{counter} LT {}] DO{level}", m.pick(&[0, 1, 2, 3])),
-            ];
-            for _ in 0..2 {
-                out.extend(block(m, depth + 1));
-            }
-            out.push(format!("#{counter}=#{counter}+1"));
-            out.push(format!("END{level}"));
-            m.loops -= 1;
-            return out;
-        }
-        return vec![restate(m)];
+        out.push(format!("N{label} {}", part(m)));
+        return out;
     }
-    let kind = m.rng_share();
-    match kind {
-        k if k < 0.35 => {
-            let word = m.pick(&["G1", "G0", "G1"]);
-            vec![full(m, word)]
-        }
-        k if k < 0.75 => vec![part(m)],
-        k if k < 0.92 => arc(m),
-        _ => vec![restate(m)],
+    if kind < 0.86 {
+        return vec![format!("IF [#{} LT 6.] THEN #101={}.", m.pick(&VARIABLES), m.pick(&[5, 10])), part(m)];
     }
+    if kind < 0.94 && m.loops < 3 {
+        m.loops += 1;
+        let counter = 102 + m.loops;
+        let level = m.loops;
+        let mut out = vec![
+            format!("#{counter}=0"),
+            format!("WHILE [#{counter} LT {}] DO{level}", m.pick(&[0, 1, 2, 3])),
+        ];
+        for _ in 0..2 {
+            out.extend(block(m, depth + 1));
+        }
+        out.push(format!("#{counter}=#{counter}+1"));
+        out.push(format!("END{level}"));
+        m.loops -= 1;
+        return out;
+    }
+    vec![restate(m)]
 }

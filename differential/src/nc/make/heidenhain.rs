@@ -1,7 +1,7 @@
 //! Heidenhain conversational programs.
 
-use super::Maker;
-use super::fanuc::is_long;
+use super::round::radius;
+use super::{Maker, Manner};
 
 pub fn program(m: &mut Maker, head: &str) -> Vec<String> {
     m.inch = m.chance(0.1);
@@ -88,15 +88,12 @@ fn arc(m: &mut Maker) -> Vec<String> {
     let (x, y) = (m.axis("X", p[0]), m.axis("Y", p[1]));
     let mut out = vec![format!("L {x} {y}")];
     let (u, v) = (m.axis("X", p[0] + end[0]), m.axis("Y", p[1] + end[1]));
-    let radius = centre[0].hypot(centre[1]);
-    let half = (end[0].hypot(end[1]) - 2.0 * radius).abs() < 1e-6;
     if m.chance(0.5) {
         let (cx, cy) = (m.axis("X", p[0] + centre[0]), m.axis("Y", p[1] + centre[1]));
         out.push(format!("CC {cx} {cy}"));
         out.push(if m.chance(0.1) { format!("C {x} {y} {sign}") } else { format!("C {u} {v} {sign}") });
     } else {
-        let long = !half && is_long(end, centre, anticlockwise);
-        let r = m.axis("R", if long { -radius } else { radius });
+        let r = m.axis("R", radius(end, centre, anticlockwise));
         out.push(format!("CR {u} {v} {r} {sign}"));
     }
     out
@@ -174,22 +171,10 @@ fn change(m: &mut Maker) -> Vec<String> {
     }
 }
 
+const MANNER: Manner = Manner { changes: 0.75, change, flow, full, part, arc, restate };
+
 fn block(m: &mut Maker, depth: u32) -> Vec<String> {
-    let density = m.density;
-    if m.chance(density) {
-        let kind = m.rng_share();
-        if kind < 0.75 || depth > 1 {
-            return change(m);
-        }
-        return flow(m, kind, depth);
-    }
-    let kind = m.rng_share();
-    match kind {
-        k if k < 0.35 => vec![full(m)],
-        k if k < 0.75 => vec![part(m)],
-        k if k < 0.92 => arc(m),
-        _ => restate(m),
-    }
+    m.block(&MANNER, depth)
 }
 
 fn flow(m: &mut Maker, kind: f64, depth: u32) -> Vec<String> {

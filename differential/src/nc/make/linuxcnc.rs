@@ -1,7 +1,6 @@
 //! LinuxCNC programs.
 
-use super::Maker;
-use super::fanuc::is_long;
+use super::{Maker, Manner};
 
 pub fn program(m: &mut Maker, head: &str) -> Vec<String> {
     let mut out: Vec<String> = head.lines().map(str::to_owned).collect();
@@ -65,47 +64,31 @@ fn restate(m: &mut Maker) -> String {
 }
 
 fn arc(m: &mut Maker) -> Vec<String> {
-    let (end, centre, anticlockwise) = m.bow();
-    let word = if anticlockwise { "G3" } else { "G2" };
-    let p = m.place();
-    let (plane, axes) = m.pick(&[("G17", [0, 1]), ("G17", [0, 1]), ("G18", [2, 0]), ("G19", [1, 2])]);
-    let (letters, offsets) = (["X", "Y", "Z"], ["I", "J", "K"]);
+    let round = m.round();
     let absolute = m.chance(0.15);
-    let mut begin = vec!["G1".to_owned()];
-    let mut block =
-        if plane == "G17" { vec![word.to_owned()] } else { vec![plane.to_owned(), word.to_owned()] };
+    let (begin, mut block) = round.words(m);
     if absolute {
         block.insert(0, "G90.1".to_owned());
-    }
-    for side in 0..2 {
-        begin.push(m.axis(letters[axes[side]], p[axes[side]]));
-        block.push(m.axis(letters[axes[side]], p[axes[side]] + end[side]));
     }
     let kind = m.whole(0, 9);
     if kind == 0.0 && !absolute {
         block.truncate(block.len() - 2);
     }
     if (1.0..=3.0).contains(&kind) {
-        let radius = centre[0].hypot(centre[1]);
-        let long = (end[0].hypot(end[1]) - 2.0 * radius).abs() > 1e-6 && is_long(end, centre, anticlockwise);
-        block.push(m.axis("R", if long { -radius } else { radius }));
+        block.push(m.axis("R", round.radius()));
     } else {
-        for side in 0..2 {
-            let from = if absolute { p[axes[side]] } else { 0.0 };
-            block.push(m.axis(offsets[axes[side]], from + centre[side]));
+        for (side, axis) in round.axes.into_iter().enumerate() {
+            let from = if absolute { round.from[axis] } else { 0.0 };
+            block.push(m.axis(["I", "J", "K"][axis], from + round.centre[side]));
         }
     }
     if kind == 4.0 {
-        let across = 3 - axes[0] - axes[1];
-        block.push(m.axis(letters[across], p[across]));
+        block.push(round.rise(m));
     }
     if kind == 5.0 {
         block.push("P2".to_owned());
     }
-    let mut out = vec![begin.join(" "), block.join(" ")];
-    if plane != "G17" {
-        out.push("G17".to_owned());
-    }
+    let mut out = round.blocks(begin, &block);
     if absolute {
         out.push("G91.1".to_owned());
     }
@@ -176,25 +159,21 @@ fn change(m: &mut Maker) -> Vec<String> {
     }
 }
 
+const MANNER: Manner = Manner {
+    changes: 0.7,
+    change,
+    flow,
+    full: |m| {
+        let word = m.pick(&["G1", "G0", "G1"]);
+        full(m, word)
+    },
+    part,
+    arc,
+    restate: |m| vec![restate(m)],
+};
+
 fn block(m: &mut Maker, depth: u32) -> Vec<String> {
-    let density = m.density;
-    if m.chance(density) {
-        let kind = m.rng_share();
-        if kind < 0.7 || depth > 1 {
-            return change(m);
-        }
-        return flow(m, kind, depth);
-    }
-    let kind = m.rng_share();
-    match kind {
-        k if k < 0.35 => {
-            let word = m.pick(&["G1", "G0", "G1"]);
-            vec![full(m, word)]
-        }
-        k if k < 0.75 => vec![part(m)],
-        k if k < 0.92 => arc(m),
-        _ => vec![restate(m)],
-    }
+    m.block(&MANNER, depth)
 }
 
 fn flow(m: &mut Maker, kind: f64, depth: u32) -> Vec<String> {

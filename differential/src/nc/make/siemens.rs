@@ -1,7 +1,6 @@
 //! Siemens 840D programs.
 
-use super::Maker;
-use super::fanuc::is_long;
+use super::{Maker, Manner};
 
 pub fn program(m: &mut Maker, head: &str) -> Vec<String> {
     let mut out: Vec<String> = head.lines().map(str::to_owned).collect();
@@ -72,55 +71,35 @@ fn restate(m: &mut Maker) -> Vec<String> {
 }
 
 fn arc(m: &mut Maker) -> Vec<String> {
-    let (end, centre, anticlockwise) = m.bow();
-    let word = if anticlockwise { "G3" } else { "G2" };
-    let p = m.place();
-    let (plane, axes) = m.pick(&[("G17", [0, 1]), ("G17", [0, 1]), ("G18", [2, 0]), ("G19", [1, 2])]);
-    let (letters, offsets) = (["X", "Y", "Z"], ["I", "J", "K"]);
-    let mut begin = vec!["G1".to_owned()];
-    let mut block =
-        if plane == "G17" { vec![word.to_owned()] } else { vec![plane.to_owned(), word.to_owned()] };
-    for side in 0..2 {
-        begin.push(m.axis(letters[axes[side]], p[axes[side]]));
-        block.push(m.axis(letters[axes[side]], p[axes[side]] + end[side]));
-    }
+    let round = m.round();
+    let (begin, mut block) = round.words(m);
     let kind = m.whole(0, 11);
     if kind == 0.0 {
         block.truncate(block.len() - 2);
     }
-    let radius = centre[0].hypot(centre[1]);
-    let half = (end[0].hypot(end[1]) - 2.0 * radius).abs() < 1e-6;
-    let long = !half && is_long(end, centre, anticlockwise);
     if (1.0..=3.0).contains(&kind) {
-        let text = m.length(if long { -radius } else { radius });
+        let text = m.length(round.radius());
         block.push(format!("CR={text}"));
     } else if kind == 6.0 {
-        let sine = (end[0].hypot(end[1]) / 2.0 / radius).min(1.0).asin().to_degrees() * 2.0;
-        let angle = if long { 360.0 - sine } else { sine };
-        block.push(format!("AR={angle:.4}"));
+        block.push(format!("AR={:.4}", round.opening()));
     } else {
-        let absolute = kind == 7.0;
-        for side in 0..2 {
-            if absolute {
-                let text = m.length(p[axes[side]] + centre[side]);
-                block.push(format!("{}=AC({text})", offsets[axes[side]]));
+        for (side, axis) in round.axes.into_iter().enumerate() {
+            let offset = ["I", "J", "K"][axis];
+            if kind == 7.0 {
+                let text = m.length(round.from[axis] + round.centre[side]);
+                block.push(format!("{offset}=AC({text})"));
             } else {
-                block.push(m.axis(offsets[axes[side]], centre[side]));
+                block.push(m.axis(offset, round.centre[side]));
             }
         }
     }
     if kind == 4.0 {
-        let across = 3 - axes[0] - axes[1];
-        block.push(m.axis(letters[across], p[across]));
+        block.push(round.rise(m));
     }
     if kind == 5.0 {
         block.push("TURN=1".to_owned());
     }
-    let mut out = vec![begin.join(" "), block.join(" ")];
-    if plane != "G17" {
-        out.push("G17".to_owned());
-    }
-    out
+    round.blocks(begin, &block)
 }
 
 fn change(m: &mut Maker) -> Vec<String> {
@@ -183,25 +162,21 @@ fn change(m: &mut Maker) -> Vec<String> {
     }
 }
 
+const MANNER: Manner = Manner {
+    changes: 0.7,
+    change,
+    flow,
+    full: |m| {
+        let word = m.pick(&["G1", "G0", "G1"]);
+        full(m, word)
+    },
+    part,
+    arc,
+    restate,
+};
+
 fn block(m: &mut Maker, depth: u32) -> Vec<String> {
-    let density = m.density;
-    if m.chance(density) {
-        let kind = m.rng_share();
-        if kind < 0.7 || depth > 1 {
-            return change(m);
-        }
-        return flow(m, kind, depth);
-    }
-    let kind = m.rng_share();
-    match kind {
-        k if k < 0.35 => {
-            let word = m.pick(&["G1", "G0", "G1"]);
-            vec![full(m, word)]
-        }
-        k if k < 0.75 => vec![part(m)],
-        k if k < 0.92 => arc(m),
-        _ => restate(m),
-    }
+    m.block(&MANNER, depth)
 }
 
 fn flow(m: &mut Maker, kind: f64, depth: u32) -> Vec<String> {

@@ -83,7 +83,9 @@ impl Maker<'_> {
             rows.view_mut((3 * k, 3), (3, 3)).copy_from(&-Matrix3::<f64>::identity());
             right.rows_mut(3 * k, 3).copy_from(&-flange.translation.vector);
         }
-        let Ok(found) = rows.svd(true, true).solve(&right, 0.0) else { return };
+        // The least squares by their normal equations: singular vectors are not exact where singular values coincide.
+        let Some(square) = rows.tr_mul(&rows).cholesky() else { return };
+        let found = square.solve(&rows.tr_mul(&right));
         let tip = Translation3::new(found[0], found[1], found[2]);
         self.tools[1].frame = self.rounded(&Pose::from_parts(tip, real.rotation), [6, 9]);
         made.real_tools.push(("tgrind".into(), real));

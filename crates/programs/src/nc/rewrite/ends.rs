@@ -130,8 +130,10 @@ impl Task<'_> {
         let again = written.restates || motion.reason().is_none_or(stays_in_place);
         let own = |axis: &usize| {
             again && written.start[*axis].is_some()
-                || slots.axes[*axis]
-                    .is_some_and(|word| !said(tree, dialect, &word).unwrap_or(!written.absolute))
+                || slots.axes[*axis].is_some_and(|word| {
+                    let increment = said(tree, dialect, &word);
+                    !increment.unwrap_or(!written.absolute || written.counting_open)
+                })
         };
         (0..3).filter(own).fold(0, |all, axis| all | 1 << axis)
     }

@@ -285,6 +285,14 @@ impl Task<'_> {
                     course.place[axis] = Hangs::NOTHING;
                 }
                 (Some(_), _) if machine => course.place[axis] = Hangs::NOTHING,
+                // It may count from the place or from the origin.
+                (Some(word), _) if written.counting_open && said(tree, dialect, &word).is_none() => {
+                    course.hold_place(BY_INCREMENT, axis);
+                    if linear {
+                        course.hold_origin(axis);
+                        course.place[axis] = was.and(course.origin[axis]);
+                    }
+                }
                 (Some(_), Some(true)) => course.hold_place(BY_INCREMENT, axis),
                 (Some(_), _) => {
                     if linear {

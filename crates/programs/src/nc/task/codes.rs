@@ -3,7 +3,7 @@
 use super::super::arc::Plane;
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
-use super::super::machine::{Group, Length, Mode, State, Turn};
+use super::super::machine::{Group, Length, Mode, OF_TOOL, State, Turn};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
 use super::doubt::key;
@@ -57,11 +57,17 @@ impl Lister<'_, '_> {
                 b"TOROTOF" => self.turn(Group::ToolFrame, false),
                 b"PAROT" => self.turn(Group::PartFrame, true),
                 b"PAROTOF" => self.turn(Group::PartFrame, false),
-                b"ORIRPY" => self.state.rpy_stated = true,
-                b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => self.state.rpy_stated = false,
-                b"ORIROTA" => self.state.spin_absolute = true,
+                b"ORIRPY" | b"ORIEULER" | b"ORIVIRT1" | b"ORIVIRT2" | b"ORIRPY2" => {
+                    self.state.rpy_stated = &*name == b"ORIRPY";
+                    self.set(Group::Rpy, 1 + u64::from(self.state.rpy_stated));
+                }
+                b"ORIROTA" => {
+                    self.state.spin_absolute = true;
+                    self.set(Group::Spin, 0);
+                }
                 b"ORIROTR" | b"ORIROTT" | b"ORIROTC" => {
                     self.state.spin_absolute = false;
+                    self.set(Group::Spin, 1);
                     self.state.spin = Err(Reason::OrientationUnknown);
                 }
                 b"ORIPATH" | b"ORIPATHS" | b"ORIRESET" => self.state.lose_orientation(),
@@ -143,26 +149,47 @@ impl Lister<'_, '_> {
     }
 
     /// Something of the tool changes: where it stands has other coordinates now.
-    pub(super) fn tool_is(&mut self, change: impl FnOnce(&mut State)) {
+    fn tool_is(&mut self, change: impl FnOnce(&mut State)) {
         let before = self.state.tool_name(self.dialect);
         change(&mut self.state);
         let after = self.state.tool_name(self.dialect);
-        let doubtful = self.state.doubt(1 << Group::Tool as u32).is_some();
-        self.set(Group::Tool, key(&after));
-        if before != after || doubtful {
+        if before != after || self.state.doubt(OF_TOOL).is_some() {
             self.lose_position();
         }
     }
 
+    /// Another length of the tool counts, whichever tool that is.
+    pub(super) fn length_is(&mut self, change: impl FnOnce(&mut State)) {
+        self.tool_is(change);
+        let State { length, edge, .. } = self.state;
+        let value = match (self.dialect, length) {
+            (Dialect::Siemens | Dialect::Heidenhain, _) => u64::from(edge).wrapping_sub(1),
+            (_, Length::OfTool) => 0,
+            (_, Length::None) => 1,
+            (_, Length::Of(number)) => 2 + u64::from(number),
+        };
+        self.set(Group::Length, value);
+    }
+
     pub(super) fn change_tool(&mut self, name: String) {
+        let value = key(&name);
         self.tool_is(|state| {
             state.tool = name;
             (state.edge, state.own_length) = (1, None);
         });
+        self.set(Group::Tool, value);
+        if matches!(self.dialect, Dialect::Siemens | Dialect::Heidenhain) {
+            // Its first edge; Heidenhain has no other.
+            self.length_is(|_| {});
+        }
     }
 
     /// The tool that is in is changed by the program to what the text does not tell.
     pub(super) fn tool_assigned(&mut self) {
+        if self.state.doubt(OF_TOOL).is_some() {
+            // It may be any.
+            return self.tools_assigned();
+        }
         let name = self.state.tool_name(self.dialect);
         self.state.tools.set(&name, None);
         self.found.assigns.1 = true;
@@ -317,8 +344,10 @@ impl Lister<'_, '_> {
                     self.state.absolute = code == 900;
                     self.set(Group::Distance, u64::from(code));
                 }
-                901 => self.state.centre_absolute = true,
-                911 => self.state.centre_absolute = false,
+                901 | 911 => {
+                    self.state.centre_absolute = code == 901;
+                    self.set(Group::Centre, u64::from(self.state.centre_absolute));
+                }
                 930 | 950 => self.state.feed_per_minute = false,
                 940 => self.state.feed_per_minute = true,
                 _ => {}
@@ -358,13 +387,13 @@ impl Lister<'_, '_> {
     fn length(&mut self, said: &Said<'_>, code: u32) -> bool {
         let number = said.h.map(|index| self.literal(&said.words[index]));
         match code {
-            490 => self.tool_is(|state| state.length = Length::None),
+            490 => self.length_is(|state| state.length = Length::None),
             431 | 432 if self.dialect != Dialect::Fanuc => {
                 self.tool_assigned();
                 return true;
             }
             _ => match number {
-                None => self.tool_is(|state| {
+                None => self.length_is(|state| {
                     if state.length == Length::None {
                         state.length = Length::OfTool;
                     }
@@ -373,14 +402,14 @@ impl Lister<'_, '_> {
                     let number = number.round() as u32;
                     // On LinuxCNC they are the numbers of tools, elsewhere those of a list of their own.
                     let own = self.dialect != Dialect::LinuxCnc;
-                    self.tool_is(|state| {
+                    self.length_is(|state| {
                         state.length = Length::Of(number);
                         if own && state.tool == "T0" && state.own_length.is_none() {
                             state.own_length = Some(number);
                         }
                     });
                 }
-                Some(None) => self.tool_is(|state| state.length = Length::Of(u32::MAX)),
+                Some(None) => self.length_is(|state| state.length = Length::Of(u32::MAX)),
             },
         }
         false
@@ -516,11 +545,11 @@ impl Lister<'_, '_> {
                     return true;
                 }
                 520 if !siemens => {
+                    self.shift_so_far();
                     // A shift of the work frame itself: the tool stands elsewhere in it.
                     for axis in 0..3 {
                         if let Some(index) = said.axes[axis] {
-                            let value = self.worth(&said.words[index]).0;
-                            self.state.shift[axis] = value.map(|value| value * self.state.unit_mm);
+                            self.state.shift[axis] = self.in_mm(self.worth(&said.words[index]).0);
                         }
                     }
                     self.placed(said.axes.map(|axis| axis.is_some()));
@@ -605,6 +634,14 @@ impl Lister<'_, '_> {
         self.dialect == Dialect::LinuxCnc || self.dialect == Dialect::Iso && !said.moves() || none || named
     }
 
+    /// What has been added to programmed values so far: where that is in doubt, of the axes that are not said now it stays
+    /// unknown.
+    fn shift_so_far(&mut self) {
+        if let Some(reason) = self.state.doubt(1 << Group::Shift as u32) {
+            self.state.shift = [Err(reason); 3];
+        }
+    }
+
     /// What is added to programmed values is not known until it ends.
     fn shift_is_lost(&mut self) {
         self.state.shift = [Err(Reason::Displacement); 3];
@@ -631,9 +668,11 @@ impl Lister<'_, '_> {
     /// G92: the place where the tool stands is called this from here on.
     fn set_shift(&mut self, said: &Said<'_>) {
         let mut stated = [None; 3];
+        self.shift_so_far();
+        self.found.presets = true;
         for (axis, stated) in stated.iter_mut().enumerate() {
             let Some(index) = said.axes[axis] else { continue };
-            let value = self.worth(&said.words[index]).0.map(|value| value * self.state.unit_mm);
+            let value = self.in_mm(self.worth(&said.words[index]).0);
             self.state.shift[axis] = match (self.state.position[axis], value) {
                 (Ok(at), Ok(value)) => {
                     *stated = Some(value);

@@ -1,7 +1,7 @@
 //! What is not certain: default-deny for words that are not known, and what still holds where ways meet.
 
 use super::super::dialect::Dialect;
-use super::super::expression::literal;
+use super::super::expression::{Worth, literal};
 use super::super::machine::{GROUPS, Group, Mode};
 use super::super::syntax::Belongs;
 use super::super::token::Token;
@@ -17,6 +17,8 @@ pub(super) struct Found {
     several: u32,
     /// Whether work offsets and tools are set.
     pub(super) assigns: (bool, bool),
+    /// Whether origins are set (G92).
+    pub(super) presets: bool,
     /// How often the way has parted.
     pub(super) forgotten: u32,
 }
@@ -122,6 +124,10 @@ impl Lister<'_, '_> {
             }
         }
         self.state.forget(constant, assigns);
+        // Elsewhere an origin may have been set, or a tool made ready.
+        self.state.preset |= self.whole.as_ref().is_none_or(|whole| whole.presets);
+        self.state.next_tool =
+            (self.changes_tools || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
         self.events.push(Event::Join);
     }
 
@@ -191,6 +197,15 @@ impl Lister<'_, '_> {
         self.state.forget(0, (false, false));
         self.state.next_tool = Some("T?".to_owned());
         self.events.push(Event::Join);
+    }
+
+    /// A length as it is written, in mm; that of what is not 0 is not known where the unit is not.
+    pub(super) fn in_mm(&self, value: Worth) -> Worth {
+        match (value?, self.state.doubt(1 << Group::Unit as u32)) {
+            (0.0, _) => Ok(0.0),
+            (_, Some(reason)) => Err(reason),
+            (value, None) => Ok(value * self.state.unit_mm),
+        }
     }
 
     /// After the machine has gone where the text does not tell.
@@ -268,6 +283,8 @@ impl Lister<'_, '_> {
             Group::Radius,
             Group::Frame,
             Group::Tool,
+            Group::Length,
+            Group::Centre,
             Group::Diameter,
         ] {
             let bit = 1 << group as u32;

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::dialect::Dialect;
-use super::super::machine::{Group, State};
+use super::super::machine::{Group, OF_TOOL, State};
 use super::super::orientation::Angles;
 use super::super::setup::{self, held};
 use super::super::syntax::{Belongs, Word};
@@ -42,11 +42,14 @@ impl Lister<'_, '_> {
             self.state.turn_frame(Group::Programmable, false);
         }
         self.lose_position();
-        let values: Result<Vec<Option<f64>>, Reason> = said
-            .axes
-            .iter()
-            .map(|word| word.map(|index| self.worth(&said.words[index]).0).transpose())
-            .collect();
+        // Angles of ROT, lengths of TRANS, factors of SCALE.
+        let lengths = name.ends_with(b"TRANS");
+        let value = |index: usize| {
+            let value = self.worth(&said.words[index]).0;
+            if lengths { self.in_mm(value) } else { value }
+        };
+        let values: Result<Vec<Option<f64>>, Reason> =
+            said.axes.iter().map(|word| word.map(value).transpose()).collect();
         let rpl = said.words.iter().find(|word| word.is("RPL"));
         let stated = said.moves() || rpl.is_some();
         // Shifts of rotary axes turn what A, B and C mean.
@@ -55,14 +58,15 @@ impl Lister<'_, '_> {
             (_, Err(_)) => None,
             _ if rotary => None,
             (b"TRANS" | b"ATRANS", Ok(shift)) => {
-                let unit = self.state.unit_mm;
-                let shift = Vector3::from_iterator(shift.iter().map(|value| value.unwrap_or(0.0) * unit));
+                let shift = Vector3::from_iterator(shift.iter().map(|value| value.unwrap_or(0.0)));
                 Some(Pose::from_parts(shift.into(), UnitQuaternion::identity()))
             }
             (b"ROT" | b"AROT", Ok(angles)) => {
                 let mut angles: Vec<f64> = angles.iter().map(|value| value.unwrap_or(0.0)).collect();
                 match rpl.map(|word| self.worth(word).0) {
                     None => {}
+                    // About the axis across the plane.
+                    Some(_) if self.state.doubt(1 << Group::Plane as u32).is_some() => angles[0] = f64::NAN,
                     Some(Ok(turn)) => angles[self.state.plane.across] = turn,
                     Some(Err(_)) => angles[0] = f64::NAN,
                 }
@@ -106,8 +110,8 @@ impl Lister<'_, '_> {
         let mut shift = Vector3::zeros();
         for axis in 0..3 {
             let Some(index) = said.axes[axis] else { continue };
-            match self.worth(&said.words[index]).0 {
-                Ok(value) if alone => shift[axis] = value * self.state.unit_mm,
+            match self.in_mm(self.worth(&said.words[index]).0) {
+                Ok(value) if alone => shift[axis] = value,
                 _ => return self.turn(Group::Programmable, true),
             }
         }
@@ -155,15 +159,24 @@ impl Lister<'_, '_> {
             };
             // Under G70 the data of the control stay in its own unit, under G700 they do not.
             let value = self.worth(word).0.ok().filter(|_| self.counts_in_mm());
-            let frame = value.map(|value| {
-                let mut frame = self.tool_value(&tool).unwrap_or(Frame::IDENTITY);
+            // What the control holds of a tool that nobody has stated is not known: each length until it is said.
+            let held = match (self.state.tools.of(&tool), self.tool_value(&tool)) {
+                (_, Ok(frame)) | (Some(Some(frame)), _) => Some(frame),
+                (None, Err(Reason::ToolUnknown)) => {
+                    Some(Frame { position_mm: [f64::NAN; 3], ..Frame::IDENTITY })
+                }
+                _ => None,
+            };
+            // The tool that is in keeps its lengths until it is called again.
+            let open = self.state.doubt(OF_TOOL).is_some() || self.state.tool == tool;
+            let frame = value.zip(held).filter(|_| !open).map(|(value, mut frame)| {
                 frame.position_mm[axis] = value;
                 frame
             });
             self.state.tools.set(&tool, frame);
             self.found.assigns.1 = true;
             self.tool_index.clear();
-            if self.state.tool == tool {
+            if open {
                 self.lose_position();
             }
         } else if matches!(&*name, b"$TC_DP1" | b"$TC_DP2" | b"$TC_DP6" | b"$TC_DP24" | b"$TC_DP25")
@@ -264,7 +277,7 @@ impl Lister<'_, '_> {
         match number(said.l) {
             Some(2.0) => {
                 let name = match p {
-                    Some(0.0) if linux => Some(self.state.frame.clone()),
+                    Some(0.0) if linux => self.frame_that_holds(),
                     Some(p) => named(p),
                     None => None,
                 };
@@ -274,9 +287,9 @@ impl Lister<'_, '_> {
             }
             Some(20.0) => {
                 self.held_here(super::named_axes(said));
-                match p.and_then(named).filter(|_| linux) {
+                let here = p.filter(|p| linux && *p == 0.0).and_then(|_| self.frame_that_holds());
+                match p.and_then(named).filter(|_| linux).or(here) {
                     Some(name) => self.offset_is(&name, None),
-                    None if linux && p == Some(0.0) => self.offset_is(&self.state.frame.clone(), None),
                     None => self.frames_assigned(),
                 }
             }
@@ -291,6 +304,11 @@ impl Lister<'_, '_> {
             // Parameters of the control, or what is not known.
             _ => self.deny(said, "G10", Reason::UnknownWord),
         }
+    }
+
+    /// The work offset that holds, where that is known.
+    fn frame_that_holds(&self) -> Option<String> {
+        self.state.doubt(1 << Group::Frame as u32).is_none().then(|| self.state.frame.clone())
     }
 
     fn state_offset(&mut self, said: &Said<'_>, name: &str) {
@@ -347,6 +365,8 @@ impl Lister<'_, '_> {
     /// The tool of a name, as the program, the setup or a comment states it.
     pub(super) fn tool_value(&self, name: &str) -> Result<Frame, Reason> {
         match self.state.tools.of(name) {
+            // A length of it has not been said yet.
+            Some(Some(frame)) if frame.position_mm.iter().any(|mm| mm.is_nan()) => Err(Reason::ToolUnknown),
             Some(Some(frame)) => Ok(frame),
             Some(None) => Err(Reason::Assigned),
             None => self.tools.get(&setup::plain(name)).copied().ok_or(Reason::ToolUnknown),

@@ -5,7 +5,7 @@ use std::sync::Arc as Shared;
 use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
-use super::super::machine::{ALL_BUT_PLANE, Group, Mode, Turn};
+use super::super::machine::{Group, Mode, OF_ALL, OF_ARCS, OF_TOOL, Turn};
 use super::super::syntax::Belongs;
 use super::{Event, Lister, Needs, Said, Written};
 use crate::motion::{
@@ -39,7 +39,9 @@ impl Lister<'_, '_> {
             insertable: false,
             straightens: false,
             rapid: kind == MotionKind::Joint,
+            configures: false,
             axis: None,
+            by_radius: false,
             modal: Modal { conf_linear: Switch::Off, conf_joint: Switch::Off, ..Modal::START },
             in_loop: false,
             conditional: said.skippable,
@@ -98,6 +100,7 @@ impl Lister<'_, '_> {
             node: said.node,
             absolute: state.absolute,
             unit_mm: state.unit_mm,
+            counting_open: state.doubt(1 << Group::Distance as u32).is_some(),
             start: state.position.map(Result::ok),
             start_angles: angles.map(Result::ok),
             angles: angles.map(Result::ok),
@@ -286,6 +289,7 @@ impl Lister<'_, '_> {
             && !motion.timed
             && before.start.iter().all(Option::is_some);
         motion.axis = arc.map(|(arc, positive, _)| arc.plane.axis(positive));
+        motion.by_radius = arc.is_some() && said.radius.is_some();
         let after = self.written_as(said, None);
         let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
             before.start_angles
@@ -368,7 +372,7 @@ impl Lister<'_, '_> {
     fn restates(&self, said: &Said<'_>, motion: &Motion) -> bool {
         let straight = matches!(motion.kind, MotionKind::Linear | MotionKind::Joint);
         let plain = straight && !said.opaque && said.aside.is_none() && self.contour.is_none();
-        let settled = !(1 << Group::Radius as u32 | 1 << Group::Tool as u32) & ALL_BUT_PLANE;
+        let settled = !(1 << Group::Radius as u32 | OF_TOOL) & OF_ALL;
         // A cycle runs where the words of the block say.
         let call = self.modal_call(said);
         // With words put in, a block would move that does not where its variable has never been set.
@@ -531,9 +535,9 @@ impl Lister<'_, '_> {
             Some(Reason::Cycle)
         } else if let Some(reason) = said.aside.or(self.modal_call(said)) {
             Some(reason)
-        } else if let Some(reason) = state.doubt(ALL_BUT_PLANE) {
+        } else if let Some(reason) = state.doubt(OF_ALL) {
             Some(reason)
-        } else if let (Mode::Circular(_), Some(reason)) = (mode, state.doubt(1 << Group::Plane as u32)) {
+        } else if let (Mode::Circular(_), Some(reason)) = (mode, state.doubt(OF_ARCS)) {
             Some(reason)
         } else if state.turned != 0 {
             Some(Reason::Transformed)

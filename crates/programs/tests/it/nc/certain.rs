@@ -395,3 +395,60 @@ fn a_cycle_whose_line_breaks_off_is_no_panic() {
         assert!(task.listing.motions.iter().all(|motion| motion.reason().is_some()), "{line}");
     }
 }
+
+/// The class: something is set while another thing that it hangs on is in doubt (ways have met, or a label is reached from
+/// elsewhere), and counts as known from then on, with what holds on one of the ways. A length in a unit that is not known, one
+/// axis of a shift, the length of a tool but not which tool, the tool but not which length, the plane but not how centres are
+/// counted.
+#[test]
+fn what_is_set_in_part_leaves_the_rest_in_doubt() {
+    let u = left(UnknownFlow);
+    let skips = |what: &str| format!("IF [#1 GT 0.] GOTO 10\n{what}\nN10 ");
+    check(
+        Fanuc,
+        &[
+            (&format!("{}G52 X10.\nG21\n{F}\nG52 X0. Y0. Z0.\n{F}", skips("G20")), &[u, None]),
+            (&format!("{}G52 X10.\n{F}\nG52 X10. Y0. Z0.\n{F}", skips("G52 Y50.")), &[u, None]),
+            // On the second way an origin is set as well: what G52 makes of it differs from control to control.
+            (&format!("N5 G52 X1. Y2. Z3.\n{F}\nG92 X1.\nGOTO 5"), &[left(Displacement)]),
+            (&format!("{}G43.4 H1\n{F}", skips("T1 M6")), &[u]),
+            // What M6 brings in has been made ready elsewhere.
+            (
+                &format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"),
+                &[left(ToolUnknown)],
+            ),
+        ],
+    );
+    let maybe = |what: &str| format!("o100 if [#1 GT 0]\n{what}\no100 endif\n");
+    let arc = format!("{G}\nG2 X15 Y5 I5 J0");
+    check(
+        LinuxCnc,
+        &[
+            (&format!("T1 M6\nG43\no100 while [#1 LT 3]\nG49\nG43\n{G}\nT2 M6\no100 endwhile"), &[u]),
+            (&format!("{}T1 M6\n{G}\nG43 H1\n{G}", maybe("G49")), &[u, None]),
+            (
+                &format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")),
+                &[left(BeforeLeftArc), u, None, None],
+            ),
+        ],
+    );
+    let maybe = |what: &str| format!("IF R1>0\n{what}\nENDIF\n");
+    let t = left(Transformed);
+    check(
+        Siemens,
+        &[
+            (&format!("{}TRANS X10\nG71\n{S}\nTRANS\n{S}", maybe("G70")), &[t, None]),
+            (&format!("{}G58 X10\nG71\n{S}\nTRANS\n{S}", maybe("G70")), &[t, None]),
+            (&format!("{}D1\n{S}\nT1 D1\n{S}", maybe("T1 D1")), &[u, None]),
+        ],
+    );
+}
+
+/// The class: a word whose counting (G90, G91) is in doubt is taken for a place, and what follows it for independent of what
+/// is before. It may be an increment: a path that stays and begins behind it begins where the motion before has led.
+#[test]
+fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
+    let maybe = "IF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\n";
+    let path = format!("X5 Y0 Z0\n{maybe}CIP X9 Y9 I1=6 J1=7 K1=3\n{S}");
+    check(Siemens, &[(&path, &[left(BeforeLeftPath), left(UnknownFlow), left(NotFollowed), None])]);
+}

@@ -1,0 +1,43 @@
+//! Lines that become longer than the control takes.
+
+use truegrind_programs::motion::Reason;
+use truegrind_programs::nc::dialect::Dialect::{Fanuc, LinuxCnc, Siemens};
+use truegrind_programs::rewrite::Outcome;
+
+use super::certain::{HEAD, begin};
+use super::{change_of, rewrite_as};
+
+/// The class: a correction writes more decimals and words, and the line no longer fits the control, which refuses the file or
+/// cuts the line off. Such a motion stays, and so does one whose end only a line that is full could say again.
+#[test]
+fn a_motion_stays_whose_line_would_become_too_long() {
+    for (dialect, most) in [(Siemens, 512), (LinuxCnc, 253), (Fanuc, 2000)] {
+        let comment = |text: &str, bytes: usize| format!("{text} ({})", "x".repeat(bytes - text.len() - 4));
+        let comment = |text: &str, bytes: usize| match dialect {
+            Siemens => comment(text, bytes).replace('(', ";").replace(')', "x"),
+            _ => comment(text, bytes),
+        };
+        // Eight bytes are left for what grows by seven, or by nine.
+        for (block, fits) in [("X10. Y2. Z3.", true), ("X10. Y20. Z30.5", false)] {
+            let full = comment(block, most - if fits { 40 } else { 4 });
+            let source = format!("{HEAD}{}{full}\nX50. Y60. Z70.\n", begin(dialect));
+            let by = [1.2345, 2.3456, 3.4567];
+            let (text, rewritten) =
+                rewrite_as(&source, dialect, |listing| (1..3).map(|m| change_of(listing, m, by)).collect());
+            let stays = !fits && dialect != Fanuc;
+            let expected = if stays { Outcome::Refused(Reason::LineTooLong) } else { Outcome::InPlace };
+            assert_eq!(rewritten.outcomes[0], expected, "{dialect:?} {text}");
+            assert_eq!(rewritten.outcomes[1], Outcome::InPlace, "{dialect:?}");
+            assert_eq!(text.contains(&full), stays, "{dialect:?} {text}");
+            assert!(text.lines().all(|line| line.len() < most), "{dialect:?} {text}");
+        }
+        // The full line says Y and Z again, which the motion before has moved.
+        let full = comment("X10.", most - 4);
+        let source = format!("{HEAD}{}X5. Y6. Z7.\n{full}\n", begin(dialect));
+        let (text, rewritten) =
+            rewrite_as(&source, dialect, |listing| vec![change_of(listing, 1, [1.2345, 2.3456, 3.4567])]);
+        let expected =
+            if dialect == Fanuc { Outcome::InPlace } else { Outcome::Refused(Reason::LineTooLong) };
+        assert_eq!(rewritten.outcomes[0], expected, "{dialect:?} {text}");
+    }
+}
