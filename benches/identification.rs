@@ -56,6 +56,7 @@ fn task(rows: usize) -> (Calibration, Vec<f64>) {
                 readout_mm: None,
                 condition: still,
                 anchor: 0,
+                motion: None,
                 session: None,
                 other: Vec::new(),
             }

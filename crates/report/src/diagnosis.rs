@@ -32,6 +32,9 @@ pub fn document(found: &Diagnosed, dataset: &Dataset) -> Document {
         if !finding.parameters.is_empty() {
             page.push(parameters(finding));
         }
+        if !finding.sessions.is_empty() {
+            page.push(sessions(finding));
+        }
         if !finding.alternatives.is_empty() {
             page.push(rivals(finding));
         }
@@ -213,6 +216,7 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
             Column::text("effect", "effect"),
             Column::text("where", "where"),
             Column::text("confidence", "confidence"),
+            Column::number("worth_mm", "worth", "mm", 3),
             Column::significant("p_value", "p", "", 2),
             Column::number("cv_rmse_before_mm", "held out without", "mm", 4),
             Column::number("cv_rmse_after_mm", "held out with", "mm", 4),
@@ -223,9 +227,36 @@ pub fn finding_table(diagnosis: &Diagnosis) -> Table {
             Cell::from(finding.effect.as_str()),
             place(finding).into(),
             word(finding.confidence).into(),
+            finding.worth_mm.into(),
             p_value(finding.p_value),
             finding.gain.cv_rmse_before_mm.into(),
             finding.gain.cv_rmse_after_mm.into(),
+        ]);
+    }
+    table.notes.push(
+        "Worth: by how much it moves the readings, RMS over all rows. Identified: beaten rivals, a place beside what nobody has \
+         named, and found again in halves of the rows."
+            .to_owned(),
+    );
+    table
+}
+
+/// What stood where from which row to which, of a set-up that changed with time.
+fn sessions(finding: &Finding) -> Table {
+    let mut table = Table::new(
+        "Sessions",
+        vec![
+            Column::text("rows", "rows"),
+            Column::text("what", "what a shift of these rows alone would be called"),
+            Column::number("worth_mm", "worth", "mm", 3),
+        ],
+    );
+    for session in &finding.sessions {
+        let [from, to] = session.rows;
+        table.push([
+            Cell::from(format!("{from} to {to}")),
+            session.effect.as_str().into(),
+            session.worth_mm.into(),
         ]);
     }
     table
@@ -274,7 +305,11 @@ fn title(finding: &Finding) -> String {
 
 fn others(finding: &Finding) -> String {
     let names: Vec<&str> = finding.alternatives.iter().map(|a| a.effect.as_str()).collect();
-    if names.is_empty() { "its rivals were not beaten".to_owned() } else { names.join(", ") }
+    match finding.doubts.first() {
+        Some(doubt) => doubt.clone(),
+        None if names.is_empty() => "its rivals were not beaten".to_owned(),
+        None => names.join(", "),
+    }
 }
 
 fn reasons(finding: &Finding) -> Vec<String> {
@@ -294,10 +329,12 @@ fn reasons(finding: &Finding) -> Vec<String> {
     out.push(match finding.confidence {
         Confidence::Identified if finding.alternatives.is_empty() => "no other cause comes near".to_owned(),
         Confidence::Identified => "the alternatives below were fitted in its place and beaten".to_owned(),
-        Confidence::Ambiguous => {
+        Confidence::Ambiguous if finding.doubts.is_empty() && !finding.alternatives.is_empty() => {
             "an alternative below explains nearly as much: the name is not sure".to_owned()
         }
+        Confidence::Ambiguous => "the name is not sure".to_owned(),
     });
+    out.extend(finding.doubts.iter().cloned());
     out
 }
 

@@ -138,6 +138,9 @@ pub struct Finding {
     /// By how much it moves the readings (mm RMS over all rows); absent where that is no question.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worth_mm: Option<f64>,
+    /// Why it is not identified, beside the alternatives; and in how many halves of the rows it came back.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// Of a set-up that changed with time: what stood where from which row to which.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,

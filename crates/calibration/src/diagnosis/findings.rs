@@ -180,6 +180,7 @@ impl Context<'_> {
             non_centrality: Some(lambda),
             gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
             worth_mm: None,
+            doubts: Vec::new(),
             sessions: Vec::new(),
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),

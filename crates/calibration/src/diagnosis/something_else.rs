@@ -102,6 +102,7 @@ impl Left<'_> {
                     cv_rmse_after_mm: self.after.random.rmse,
                 },
                 worth_mm: Some(self.discrepancy.worth_mm()),
+                doubts: Vec::new(),
                 sessions: Vec::new(),
                 alternatives: Vec::new(),
                 remedy: words::remedy("unexplained").to_owned(),

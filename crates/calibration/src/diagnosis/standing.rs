@@ -65,6 +65,40 @@ impl Standing {
     }
 }
 
+impl Standing {
+    /// Why it may not be called identified.
+    pub(super) fn doubts(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if !self.plausible {
+            out.push(
+                "nature has no such size, or something else that was found says the same of these rows"
+                    .to_owned(),
+            );
+        }
+        if !self.beside {
+            out.push(
+                "it does not carry itself beside smooth functions of time and pose that nobody has named"
+                    .to_owned(),
+            );
+        } else if self.ahead < AHEAD {
+            out.push(format!(
+                "beside what nobody has named a rival comes near: twice the log Bayes factor {:.1}",
+                self.ahead
+            ));
+        }
+        if self.came_back + MISSED < self.asked {
+            out.push(format!(
+                "searched again, it came back in {} of {} halves of the rows that could tell",
+                self.came_back, self.asked
+            ));
+        }
+        if self.changed > MISSED {
+            out.push(format!("it had another size in {} of {} halves of the rows", self.changed, self.asked));
+        }
+        out
+    }
+}
+
 /// Rows that two shifts share, of all that either has, from which they are the same.
 const OVERLAP: f64 = 0.8;
 

@@ -56,6 +56,7 @@ pub(super) fn told(
         // A story of several causes stands with one of them.
         if !story.causes.iter().any(|&k| standings[k].stands()) {
             story.finding.confidence = Confidence::Ambiguous;
+            story.finding.doubts = story.causes.first().map(|&k| standings[k].doubts()).unwrap_or_default();
         }
         story.finding.worth_mm = Some(worth.of(&story.causes));
     }
@@ -94,6 +95,9 @@ fn overshadow(
         let smooth = story.causes.iter().all(|&k| causes[k].is_smooth());
         if smooth && story.finding.worth_mm.is_some_and(|mm| mm < rough) {
             story.finding.confidence = Confidence::Ambiguous;
+            story.finding.doubts.push(format!(
+                "it is worth less than the {rough:.3} mm of what is only roughly described, and may be a part of that"
+            ));
         }
     }
 }
@@ -182,6 +186,7 @@ fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool, smooth: bool) -
         non_centrality: None,
         gain: gain(members),
         worth_mm: Some(worth_mm),
+        doubts: Vec::new(),
         sessions,
         alternatives: Vec::new(),
         remedy: words::remedy("setup-change").to_owned(),
@@ -209,6 +214,7 @@ fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
         non_centrality: None,
         gain: gain(members),
         worth_mm: Some(worth_mm),
+        doubts: Vec::new(),
         sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy(SMALL_DISTURBANCES).to_owned(),

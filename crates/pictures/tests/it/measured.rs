@@ -44,6 +44,7 @@ fn dataset(count: usize) -> Dataset {
             readout_mm: None,
             condition: Condition::default(),
             anchor: 0,
+            motion: None,
             session: None,
             line: i + 2,
             other: Vec::new(),

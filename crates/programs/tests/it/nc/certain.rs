@@ -413,10 +413,7 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
             (&format!("N5 G52 X1. Y2. Z3.\n{F}\nG92 X1.\nGOTO 5"), &[left(Displacement)]),
             (&format!("{}G43.4 H1\n{F}", skips("T1 M6")), &[u]),
             // What M6 brings in has been made ready elsewhere.
-            (
-                &format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"),
-                &[left(ToolUnknown)],
-            ),
+            (&format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"), &[left(ToolUnknown)]),
         ],
     );
     let maybe = |what: &str| format!("o100 if [#1 GT 0]\n{what}\no100 endif\n");
@@ -426,10 +423,7 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
         &[
             (&format!("T1 M6\nG43\no100 while [#1 LT 3]\nG49\nG43\n{G}\nT2 M6\no100 endwhile"), &[u]),
             (&format!("{}T1 M6\n{G}\nG43 H1\n{G}", maybe("G49")), &[u, None]),
-            (
-                &format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")),
-                &[left(BeforeLeftArc), u, None, None],
-            ),
+            (&format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")), &[left(BeforeLeftArc), u, None, None]),
         ],
     );
     let maybe = |what: &str| format!("IF R1>0\n{what}\nENDIF\n");
