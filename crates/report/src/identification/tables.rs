@@ -241,8 +241,8 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
         });
     }
     table.notes.push(
-        "Beyond six robust standard deviations of a robust fit of geometry. Data rows count from 0 at the first row below \
-         the header; lines as an editor or spreadsheet counts them."
+        "Beyond six robust standard deviations of a robust fit of geometry. Rows count as in the \
+         spreadsheet."
             .to_owned(),
     );
     table
