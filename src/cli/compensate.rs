@@ -451,7 +451,9 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
     }
     say_unused(done.iter().map(|done| &done.used), &shop.cell, shop.surface.as_ref());
     let undeclared: usize = done.iter().map(|done| done.undeclared).sum();
-    if undeclared > 0 && jobs.iter().any(|job| job.under.is_some() && job.paths.len() == 1) {
+    let module = |path: &PathBuf| Language::by_name(&files::name(path)) == Some(Language::Rapid);
+    let alone = |job: &Job| job.under.is_some() && job.paths.len() == 1 && job.paths.iter().any(module);
+    if undeclared > 0 && jobs.iter().any(alone) {
         tell(format_args!(
             "note: {undeclared} motions use tools, work objects or targets that their own file does not declare: where the \
              modules of a folder run together, --together reads them as one task"

@@ -78,7 +78,7 @@ pub struct Provenance {
     pub sha256: String,
     /// Rows used.
     pub rows: usize,
-    /// Rows set aside as outliers, by data row from 0.
+    /// Rows set aside as outliers, as the spreadsheet counts them.
     pub set_aside: Vec<usize>,
     /// Sensor.
     pub sensor: String,

@@ -37,7 +37,7 @@ use truegrind_math::se3::Pose;
 pub use self::scene::{MeasuredScene, Residuals};
 
 /// The time axis: [`Row::number`].
-pub const AXIS: &str = "data row";
+pub const AXIS: &str = "row";
 
 /// Rows that go by in a second when the file is played.
 const ROWS_PER_SECOND: f64 = 4.0;

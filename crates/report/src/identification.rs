@@ -33,7 +33,7 @@ pub fn document(found: &Identification, dataset: &Dataset) -> Document {
     );
     page.figure(
         pictures::by_row(found),
-        "The same errors by data row, in the order of the file. What runs in steps or drifts along the rows is not \
+        "The same errors by row, in the order of the file. What runs in steps or drifts along the rows is not \
          geometry; random splits hide it.",
     );
 
@@ -277,7 +277,7 @@ fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {
     }
     if !from.set_aside.is_empty() {
         let rows: Vec<String> = from.set_aside.iter().map(usize::to_string).collect();
-        remarks.push(remark("Set aside", format!("data rows {}", rows.join(", "))));
+        remarks.push(remark("Set aside", format!("rows {}", rows.join(", "))));
     }
     let condition = &found.estimated.condition;
     for (name, value, unit) in [

@@ -127,7 +127,7 @@ pub struct Identification {
     pub readout_fusion: Result<ReadoutFusion, NotFused>,
     /// Rows set aside.
     pub outliers: Outliers,
-    /// Data rows that were held out, with the error before (registered) and after (geometry) (mm).
+    /// Rows that were held out, as the file counts them, with the error before (registered) and after (geometry) (mm).
     pub held_out: Vec<(usize, f64, f64)>,
     /// Names and values ± σ of everything that was free, of the measurement too.
     pub parameters: Vec<EstimatedParameter>,

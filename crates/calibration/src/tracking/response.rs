@@ -159,7 +159,7 @@ impl Tracker {
     fn in_a_burst(&mut self) -> Option<Alarm> {
         let run = self.set_aside_in_a_row();
         if run > 0 {
-            return (run % SETTLE == 0).then(|| self.mounted_anew()).flatten();
+            return run.is_multiple_of(SETTLE).then(|| self.mounted_anew()).flatten();
         }
         let bound = accident_bound(self.rows_per_pose());
         let fitting = self.state.history.iter().rev().take_while(|seen| seen.nis <= bound).count();

@@ -46,7 +46,9 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
         let held = "; green points: rows that were held out of the fit they are judged by";
         let _ = writeln!(text, "{}.", if scene.held_out.is_empty() { "" } else { held });
     }
-    text.push_str("\nLengths are mm, in the base of the arm with z up. Time counts data rows from 0.\n");
+    text.push_str(
+        "\nLengths are mm, in the base of the arm with z up. Time counts rows as the spreadsheet does.\n",
+    );
     text
 }
 

@@ -31,15 +31,15 @@ pub(super) fn frequency(found: &Identification) -> String {
     .svg()
 }
 
-/// Held-out errors by data row, before and after.
+/// Held-out errors by row, before and after.
 pub(super) fn by_row(found: &Identification) -> String {
     let rows = tables::by_row(found);
     let points = |value: fn(&(usize, f64, f64)) -> f64| -> Vec<[f64; 2]> {
         rows.iter().map(|row| [row.0 as f64, value(row)]).collect()
     };
     Graph {
-        title: "Held-out errors by data row".to_owned(),
-        x: Axis::new("data row", ""),
+        title: "Held-out errors by row".to_owned(),
+        x: Axis::new("row of the file", ""),
         y: error(found),
         series: vec![
             Series::points(BEFORE, points(|row| row.1)).ink(Ink::Vermilion),

@@ -197,7 +197,7 @@ pub fn held_out_table(found: &Identification) -> Table {
     let mut table = Table::new(
         "Held-out rows",
         vec![
-            Column::count("row", "Data row"),
+            Column::count("row", "Row"),
             Column::number("registered_mm", "frames registered", "mm", 3),
             Column::number("geometry_mm", "geometry", "mm", 3),
         ],
@@ -205,7 +205,7 @@ pub fn held_out_table(found: &Identification) -> Table {
     for (row, before, after) in by_row(found) {
         table.push([row.into(), before.into(), after.into()]);
     }
-    table.notes.push("Data rows count from 0 at the first row below the header.".to_owned());
+    table.notes.push("Rows count as in the spreadsheet.".to_owned());
     table
 }
 
@@ -221,8 +221,7 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
     let mut table = Table::new(
         "Rows set aside",
         vec![
-            Column::count("row", "Data row"),
-            Column::count("line", "Line of the file"),
+            Column::count("row", "Row"),
             Column::text("session", "Session"),
             Column::number("robust_sigmas", "Size", "robust σ", 1),
         ],
@@ -231,20 +230,19 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
         let row = dataset.rows.get(*index);
         table.push([
             row_number(dataset, *index).into(),
-            row.map(|row| row.line).into(),
             row.and_then(|row| row.session.clone()).into(),
             (*size).into(),
         ]);
     }
-    if table.rows.iter().all(|row| row[2] == Cell::Missing) {
-        table.columns.remove(2);
+    if table.rows.iter().all(|row| row[1] == Cell::Missing) {
+        table.columns.remove(1);
         table.rows.iter_mut().for_each(|row| {
-            row.remove(2);
+            row.remove(1);
         });
     }
     table.notes.push(
-        "Beyond six robust standard deviations of a robust fit of geometry. Data rows count from 0 at the first row below \
-         the header; lines as an editor or spreadsheet counts them."
+        "Beyond six robust standard deviations of a robust fit of geometry. Rows count as in the \
+         spreadsheet."
             .to_owned(),
     );
     table

@@ -216,27 +216,27 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
 }
 
 #[test]
-fn outliers_are_listed_by_data_row_and_line_of_the_file() {
+fn outliers_are_listed_by_the_rows_of_the_spreadsheet() {
     let (found, dataset) = identification();
     let mut found = found.clone();
     let mut dataset = dataset.clone();
-    // Blank rows in the file: numbers and lines run ahead of the index.
+    // Blank rows in the file: lines run ahead of the index, and rows are called by them.
     for row in &mut dataset.rows {
-        row.number += 10;
         row.line += 10;
+        row.number = row.line;
     }
     found.outliers.rows = vec![(3, 41.26), (0, 7.5)];
     let table = view::outlier_table(&found, &dataset);
     let text = terminal::table(&table, 80);
     let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines[1], "Data row  Line of the file  Size [robust σ]");
-    assert_eq!(lines[3], "      13                15             41.3");
-    assert_eq!(lines[4], "      10                12              7.5");
+    assert_eq!(lines[1], "Row  Size [robust σ]");
+    assert_eq!(lines[3], " 15             41.3");
+    assert_eq!(lines[4], " 12              7.5");
     dataset.rows[3].session = Some("monday".to_owned());
     let text = terminal::table(&view::outlier_table(&found, &dataset), 80);
     assert!(text.contains("monday") && text.contains('–'), "{text}");
     let json = view::json(&found, &dataset);
-    assert_eq!(json["outliers"]["rows"][0]["row"], 13);
+    assert_eq!(json["outliers"]["rows"][0]["row"], 15);
     found.outliers.rows.clear();
     found.outliers.too_many = 30;
     let text = markdown::document(&view::document(&found, &dataset));
