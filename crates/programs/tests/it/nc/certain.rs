@@ -413,10 +413,7 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
             (&format!("N5 G52 X1. Y2. Z3.\n{F}\nG92 X1.\nGOTO 5"), &[left(Displacement)]),
             (&format!("{}G43.4 H1\n{F}", skips("T1 M6")), &[u]),
             // What M6 brings in has been made ready elsewhere.
-            (
-                &format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"),
-                &[left(ToolUnknown)],
-            ),
+            (&format!("N5 M6\nG43.4 H1\n{F}\nT2\nIF [#1 GT 0.] GOTO 5"), &[left(ToolUnknown)]),
         ],
     );
     let maybe = |what: &str| format!("o100 if [#1 GT 0]\n{what}\no100 endif\n");
@@ -426,10 +423,7 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
         &[
             (&format!("T1 M6\nG43\no100 while [#1 LT 3]\nG49\nG43\n{G}\nT2 M6\no100 endwhile"), &[u]),
             (&format!("{}T1 M6\n{G}\nG43 H1\n{G}", maybe("G49")), &[u, None]),
-            (
-                &format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")),
-                &[left(BeforeLeftArc), u, None, None],
-            ),
+            (&format!("{}G17\n{arc}\nG91.1\n{arc}", maybe("G90.1")), &[left(BeforeLeftArc), u, None, None]),
         ],
     );
     let maybe = |what: &str| format!("IF R1>0\n{what}\nENDIF\n");
@@ -448,7 +442,11 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
 /// is before. It may be an increment: a path that stays and begins behind it begins where the motion before has led.
 #[test]
 fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
-    let maybe = "IF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\n";
-    let path = format!("X5 Y0 Z0\n{maybe}CIP X9 Y9 I1=6 J1=7 K1=3\n{S}");
-    check(Siemens, &[(&path, &[left(BeforeLeftPath), left(UnknownFlow), left(NotFollowed), None])]);
+    let source = format!(
+        "{HEAD}{}X5 Y0 Z0\nIF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\nCIP X9 Y9 I1=6 J1=7 K1=3\n{S}\n",
+        begin(Siemens)
+    );
+    let (_, rewritten) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 1, [0.5, 0.4, 0.3])]);
+    let stays = |reason| matches!(reason, BeforeLeftPath | BeforeIncrement);
+    assert!(matches!(rewritten.outcomes[0], Outcome::Refused(reason) if stays(reason)), "{rewritten:?}");
 }

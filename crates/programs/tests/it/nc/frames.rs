@@ -105,10 +105,7 @@ fn data_that_the_program_writes_are_not_those_from_outside() {
             // A tool that is in keeps its lengths until it is called again; of one that nobody has stated each must be said.
             (&format!("T1 D1\n$TC_DP3[1,1]=2\nG54\n{S}"), &[t]),
             (&format!("$TC_DP3[7,1]=2\nT7 D1\nG54\n{S}"), &[left(ToolUnknown)]),
-            (
-                &format!("$TC_DP3[7,1]=2\n$TC_DP4[7,1]=0\n$TC_DP5[7,1]=1\nT7 D1\nG54\n{S}"),
-                &[None],
-            ),
+            (&format!("$TC_DP3[7,1]=2\n$TC_DP4[7,1]=0\n$TC_DP5[7,1]=1\nT7 D1\nG54\n{S}"), &[None]),
             (&format!("G70\n$P_UIFR[1]=CTRANS(X,1)\nG71\nG54\n{S}"), &[w]),
         ],
     );
