@@ -154,6 +154,7 @@ pub fn corrected_task(
         joint_targets: options.joint_targets,
         condition,
         loads: options.payload.is_none().then(|| Loads::of(&program)),
+        open_starts: true,
         points: false,
         cuts: if case.whole_cuts { Cuts::Whole } else { Cuts::Single },
         ..rewrite::Options::default()

@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     arguments.outputs.print(&view::summary(&found))?;
     let mut batch = Batch::sparing(given);
-    let json = serde_json::to_value(&found.diagnosis)?;
+    let json = serde_json::to_value(found.diagnosis.clone().counted_from_0(&dataset))?;
     arguments.outputs.add_made(
         &mut batch,
         || view::document(&found, &dataset),

@@ -37,6 +37,7 @@ mod standing;
 mod stories;
 mod something_else;
 mod written;
+mod contract;
 pub mod newton;
 pub mod extension;
 pub mod design;

@@ -94,6 +94,9 @@ pub struct Options {
     pub loads: Option<Loads>,
     /// What becomes of a cut of which not every motion can be corrected.
     pub cuts: Cuts,
+    /// Whether motions are flagged one by one ([`Why::OpenStart`]) that rest on a configuration which the controller does not
+    /// check, from a start that the text does not tell. Otherwise a note says where such a way begins.
+    pub open_starts: bool,
     /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
     pub points: bool,
 }
@@ -114,6 +117,7 @@ impl Default for Options {
             condition: Condition::default(),
             loads: None,
             cuts: Cuts::Whole,
+            open_starts: false,
             points: true,
         }
     }
@@ -577,7 +581,7 @@ fn work<'a>(
     let passage = Passage::of(motion, path, &good, middle_mm, arms, options);
     (outcome.bend_mm, outcome.inserted) = (passage.bend_mm, passage.before.len());
     // What is said of the motion beside this holds for the configuration that was guessed.
-    let guessed = motion.configures && good.iter().any(|s| s.guess != Guess::No);
+    let guessed = options.open_starts && motion.configures && good.iter().any(|s| s.guess != Guess::No);
     let mut flag = if guessed { Some(Why::OpenStart) } else { passage.flag };
     if let Some(corner) = job.corner(motion, path, &passage, last) {
         outcome.bend_mm = Some(outcome.bend_mm.map_or(corner, |bend| bend.max(corner)));

@@ -147,14 +147,12 @@ impl<'a> Course<'a> {
         let mut passed = false;
         let passing = self.passing(motion, points);
         for (share, q) in way.iter().chain([&(1.0, end)]) {
-            // The circle point, which is passed on the way.
+            self.links.go(q);
+            // The circle point, which is passed on the way; the tool need not be turned there as it is told.
             if count > 1 && !passed && *share >= passing {
                 passed = true;
-                let via = points[0].joints.unwrap_or(*q);
-                self.links.go(&via);
-                (points[0].behind, points[0].flanks) = (self.links.behind(&via), self.links.flanks(&via));
+                (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
             }
-            self.links.go(q);
         }
         let last = &mut points[count - 1];
         (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));

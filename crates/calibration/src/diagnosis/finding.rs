@@ -99,7 +99,7 @@ pub struct Alternative {
 /// Rows in which the set-up stood otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
-    /// Data rows from 0, both ends included.
+    /// Rows as the data set numbers them, both ends included.
     pub rows: [usize; 2],
     /// What a shift of these rows alone would be called.
     pub effect: String,
@@ -118,7 +118,7 @@ pub struct Finding {
     pub cause: String,
     /// How sure.
     pub confidence: Confidence,
-    /// Data rows from 0, both ends included.
+    /// Rows as the data set numbers them, both ends included; the JSON that `diagnose` writes counts data rows from 0.
     pub rows: Option<[usize; 2]>,
     /// Single rows, of outliers and contradicting rows.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -225,7 +225,7 @@ pub struct Diagnosis {
     pub remaining: Option<String>,
     /// Noise that grows with range.
     pub noise_model: Option<RangeNoise>,
-    /// Rows to measure again, by data row from 0.
+    /// Rows to measure again, as the data set numbers them.
     pub measure_again: Vec<usize>,
     /// Different poses that causes need to be told from geometry; absent where there are as many.
     #[serde(default, skip_serializing_if = "Option::is_none")]

