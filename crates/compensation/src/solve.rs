@@ -300,7 +300,10 @@ impl Work<'_> {
     /// Motions of which a target was reached by guess.
     fn guessed(&self) -> Vec<u32> {
         let guessed = |m: &usize| {
-            self.starts[self.first[*m]..self.first[m + 1]].iter().flatten().any(|start| start.guess == Guess::Here)
+            self.starts[self.first[*m]..self.first[m + 1]]
+                .iter()
+                .flatten()
+                .any(|start| start.guess == Guess::Here)
         };
         (0..self.listing.motions.len()).filter(guessed).map(|m| m as u32).collect()
     }

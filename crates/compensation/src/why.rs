@@ -173,7 +173,9 @@ impl Why {
             Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
             Why::SingularWay => "the way to it passes too close to a singularity",
             Why::OpenBranch => "which configuration the controller takes is open",
-            Why::OpenStart => "corrected for the stated configuration, which is not checked, from a start that is not known",
+            Why::OpenStart => {
+                "corrected for the stated configuration, which is not checked, from a start that is not known"
+            }
             Why::PartOfCut { because, .. } => because,
             Why::Step { .. } => "the step to its neighbour is too large",
             Why::NotCovered { .. } => "no measured pose is near",
