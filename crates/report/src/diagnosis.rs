@@ -92,18 +92,13 @@ pub fn summary(found: &Diagnosed) -> Document {
     );
     page.push(super::identification::judged(&found.estimated));
     let fits = &diagnosis.fits;
-    let causes: Vec<String> = diagnosis
-        .findings
-        .iter()
-        .map(|f| match f.confidence {
-            Confidence::Identified => sentence(&f.cause),
-            Confidence::Ambiguous => format!("{} (ambiguous: {})", sentence(&f.cause), others(f)),
-        })
-        .collect();
-    let found_there = match diagnosis.findings.len() {
-        0 => "Nothing but geometry was found".to_owned(),
-        1 => "One cause beyond geometry was found".to_owned(),
-        n => format!("{n} causes beyond geometry were found"),
+    let causes = answer(diagnosis);
+    let sure = diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
+    let found_there = match (sure, diagnosis.findings.len() - sure) {
+        (0, 0) => "Nothing but geometry was found".to_owned(),
+        (0, _) => "No cause beyond geometry is certain".to_owned(),
+        (1, _) => "One cause beyond geometry was identified".to_owned(),
+        (n, _) => format!("{n} causes beyond geometry were identified"),
     };
     // A fit of so few rows follows them whatever is wrong: that it found nothing is no good news.
     let (status, headline) = match diagnosis.poses_needed {
@@ -146,6 +141,32 @@ pub fn summary(found: &Diagnosed) -> Document {
         page.push(transfer_table(diagnosis));
     }
     page
+}
+
+/// What was found, ranked by what it is worth: causes that are identified in a sentence each, what is only possible by name.
+fn answer(diagnosis: &Diagnosis) -> Vec<String> {
+    let worth = |f: &Finding| f.worth_mm.map_or_else(String::new, |mm| format!(" ({mm:.3} mm)"));
+    let is_sure = |f: &&Finding| f.confidence == Confidence::Identified;
+    let named = |f: &&Finding| !["unexplained", "small-disturbances"].contains(&f.effect.as_str());
+    let mut out: Vec<String> = diagnosis
+        .findings
+        .iter()
+        .filter(is_sure)
+        .map(|f| format!("{}{}", sentence(&f.cause), worth(f)))
+        .collect();
+    let possible: Vec<String> = diagnosis
+        .findings
+        .iter()
+        .filter(|f| !is_sure(f))
+        .filter(named)
+        .map(|f| format!("{}, {}{}", f.effect.replace('-', " "), place(f), worth(f)))
+        .collect();
+    if !possible.is_empty() {
+        out.push(format!("Possible, but not certain: {}", possible.join("; ")));
+    }
+    let rest = diagnosis.findings.iter().filter(|f| !named(f));
+    out.extend(rest.map(|f| sentence(&f.cause)));
+    out
 }
 
 /// The models on other series of the same arm.
@@ -301,15 +322,6 @@ fn sentence(text: &str) -> String {
 
 fn title(finding: &Finding) -> String {
     format!("{}, {}", sentence(&finding.effect.replace('-', " ")), place(finding))
-}
-
-fn others(finding: &Finding) -> String {
-    let names: Vec<&str> = finding.alternatives.iter().map(|a| a.effect.as_str()).collect();
-    match finding.doubts.first() {
-        Some(doubt) => doubt.clone(),
-        None if names.is_empty() => "its rivals were not beaten".to_owned(),
-        None => names.join(", "),
-    }
 }
 
 fn reasons(finding: &Finding) -> Vec<String> {
