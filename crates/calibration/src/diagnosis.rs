@@ -18,7 +18,7 @@
 //! 9. [`discrepancy`] with [`marginal`]: what no cause describes, as random functions beside the causes. `standing`: a cause is
 //!    identified only if it wins beside those and comes back in [`halves`] of the rows.
 //! 10. `stories`: one finding for each story, ranked by what it is worth; `something_else`: what is left; `written`: the arm
-//!    for compensation.
+//!     for compensation.
 //! 11. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
 //! Products and factors of large matrices are in `algebra`.

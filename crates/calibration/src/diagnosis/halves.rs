@@ -73,7 +73,7 @@ fn random(poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
 
 /// Alternate blocks of rows; those of the second pair begin in the middle of those of the first.
 fn alternate(poses: &[Vec<usize>], n: usize, pair: usize) -> Vec<bool> {
-    let block = |row: usize| (2 * PIECES * row / n.max(1) + pair) / 2 % 2 == 0;
+    let block = |row: usize| ((2 * PIECES * row / n.max(1) + pair) / 2).is_multiple_of(2);
     poses.iter().map(|pose| block(pose[0])).collect()
 }
 

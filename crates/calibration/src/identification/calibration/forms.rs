@@ -9,6 +9,9 @@ use crate::measurement::sensor::form::{Form, second_degree};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
 
+/// Shifts of the sensor (mm), one for each parameter, by the row and the way from the sensor to the target.
+type Push<'a> = dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>> + 'a;
+
 /// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
@@ -71,7 +74,7 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
         Sensor::Cable => frames.outlets_mm[row.anchor.min(frames.outlets_mm.len().saturating_sub(1))],
         _ => frames.base_from_sensor.translation.vector,
     };
-    let pushed = |push: &dyn Fn(&Row, Vector3<f64>) -> Vec<Vector3<f64>>| {
+    let pushed = |push: &Push<'_>| {
         let count = form.names().len();
         let mut out = vec![Vec::with_capacity(dataset.rows.len()); count];
         for row in dataset.rows.iter() {
