@@ -194,7 +194,7 @@ pub fn outcome(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Outcome {
         hidden.iter().map(|h| findings.iter().filter(sure).any(|f| matches(h, f, setup.rows))).collect();
     let strange: Vec<&Finding> =
         findings.iter().filter(|f| !hidden.iter().any(|h| accounts(h, f, setup.rows, &setup.log))).collect();
-    let wrong_identified = strange.iter().copied().filter(|f| sure(&f)).count();
+    let wrong_identified = strange.iter().copied().filter(|f| sure(f)).count();
     let wrong = strange.into_iter().map(told).collect();
     let mut truth: Vec<Cause> = hidden.iter().filter_map(cause).collect();
     if hidden.iter().any(|h| matches!(h, Hidden::Payload { .. })) {

@@ -78,7 +78,7 @@ mod tests {
         edits.replace(10..11, b"2.5");
         edits.insert(14, b" A1");
         edits.replace(19..20, b"7");
-        assert_eq!(grown(source, &edits, 12), [6..15]);
+        assert_eq!(grown(source, &edits, 12), std::slice::from_ref(&(6..15)));
         assert_eq!(grown(source, &edits, 14), []);
         assert_eq!(grown(source, &edits, 5), [0..6, 6..15]);
     }
