@@ -18,7 +18,7 @@
 //! knocked and a joint that lost its zero can look the same. Lone accidents have no say.
 //!
 //! **Mounted anew, and bursts.** Before that, poses that were set aside one after the other are asked where each of them puts
-//! target and sensor ([`mounting`]): where they agree on a place far from the old one, it was taken off and put on again, which
+//! target and sensor (`mounting`): where they agree on a place far from the old one, it was taken off and put on again, which
 //! is one alarm, and the track goes on from there. Where nothing explains them they are a burst of outliers: one alarm for all
 //! of them, until poses fit again.
 //!

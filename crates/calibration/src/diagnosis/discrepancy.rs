@@ -3,7 +3,7 @@
 //! Two families of functions, each a group with a variance of its own: *courses in time* of everything that a measurement
 //! hangs on (the sensor's frame, the touched point, the zero, the scale, common growth of the links, unlogged load), Brownian
 //! by their spectrum, and *fields over poses*, smooth functions of the joint angles. The variances are those under
-//! which the rows are most probable ([`marginal`](super::marginal)); what is left may be correlated from row to row. A cause that
+//! which the rows are most probable ([`marginal`]); what is left may be correlated from row to row. A cause that
 //! is to be named must win beside all of that, and what it carries is reported as "something else".
 //!
 //! Source: Kennedy and O'Hagan 2001, Brynjarsdóttir and O'Hagan 2014 on the discrepancy of a model; the features of a field
