@@ -15,8 +15,8 @@
 //! 7. [`validation`]: held-out errors by refits of all stages; [`held`]: those of candidates, steps and rivals to first order.
 //! 8. [`remaining`], `record` and `silence`: outliers, a noise that grows with range, structure that nothing in the catalogue
 //!    explains; rounding and contradicting columns; what the rows cannot show.
-//! 9. [`discrepancy`] with [`marginal`]: what no cause describes, as random functions beside the causes. `standing`: a cause is
-//!    identified only if it wins beside those and comes back in [`halves`] of the rows.
+//! 9. [`discrepancy`] with [`marginal`]: what no cause describes, as random functions beside the causes. `confirmation`: a cause
+//!    is identified only if it wins beside those and comes back in [`halves`] of the rows.
 //! 10. `stories`: one finding for each story, ranked by what it is worth; `something_else`: what is left; `written`: the arm
 //!     for compensation.
 //! 11. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
@@ -33,7 +33,7 @@ mod correlated;
 pub mod discrepancy;
 pub mod halves;
 pub mod marginal;
-mod standing;
+mod confirmation;
 mod stories;
 mod something_else;
 mod written;

@@ -76,6 +76,15 @@ pub enum Along {
 }
 
 impl Candidate {
+    /// A cause as a candidate of its own; its size does not matter.
+    pub fn of(cause: &Cause, subject: &Subject<'_>) -> Self {
+        let (dataset, nominal) = (&subject.observed.dataset, subject.nominal);
+        match cause {
+            Cause::Arm(effect) => Self::arm(effect.clone(), dataset, nominal),
+            Cause::Measurement(d) => Self::measurement(d.clone(), dataset, nominal, subject.frames),
+        }
+    }
+
     /// A candidate of the arm, its regressors taken at the nominal arm.
     pub fn arm(effect: Effect, dataset: &Dataset, nominal: &Model) -> Self {
         let statics = nominal.statics();

@@ -52,6 +52,14 @@ impl Cause {
         }
     }
 
+    /// Its parameters, each in its unit.
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            Cause::Arm(effect) => effect.parameters().iter().map(|p| p.value).collect(),
+            Cause::Measurement(disturbance) => disturbance.values.clone(),
+        }
+    }
+
     /// Standard deviation of each parameter before anything was measured, in its unit.
     pub fn sizes(&self) -> Vec<f64> {
         match self {

@@ -1,6 +1,7 @@
 //! The whole diagnosis of one data set.
 
 use super::cause::Cause;
+use super::confirmation::Confirming;
 use super::data_quality::{mismatch_finding, noise_floor, outlier_finding, rounding_finding};
 use super::design::Linear;
 use super::extension::{Extended, Freedom, Subject, fit};
@@ -12,7 +13,6 @@ use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::selection::{self, Accepted, BLOCKS, Selection};
 use super::something_else::Left;
-use super::standing::Charge;
 use super::stories::{self, Story, Worth};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
@@ -200,7 +200,7 @@ pub fn diagnose(
     };
     let (findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
     tell("looking whether the causes come back in halves of the rows");
-    let charge = Charge {
+    let confirming = Confirming {
         subject: &searched,
         found: &found,
         linear: &linear,
@@ -211,11 +211,11 @@ pub fn diagnose(
         sides_from_order: prepared.sides_from_order,
         raw: &whole.design,
     };
-    let trial = charge.tried();
+    let outcome = confirming.outcome();
     let mut stories = stories::told(
         stories::of(findings, &finding_of_cause, pictures),
-        &trial.standings,
-        &trial.discrepancy,
+        &outcome.confirmations,
+        &outcome.discrepancy,
         &Worth::new(&searched, &found, &whole.design),
         &found.causes,
         stages[1].fitted.rmse,
@@ -228,7 +228,7 @@ pub fn diagnose(
     let (floor_mm, floor_source) = noise_floor(&floor, &subject, &extended);
     let rest = Left {
         dataset: &searched.observed.dataset,
-        discrepancy: &trial.discrepancy,
+        discrepancy: &outcome.discrepancy,
         structure: &structure,
         after: &stages[2],
         smoothed,
@@ -266,7 +266,7 @@ pub fn diagnose(
     for (place, story) in stories.iter().enumerate() {
         story.causes.iter().for_each(|&k| finding_of_cause[k] = place);
     }
-    let certain = stories::certain(&stories, &trial.standings);
+    let certain = stories::certain(&stories, &outcome.confirmations);
     let (findings, pictures) = stories.into_iter().map(|s| (s.finding, s.picture)).unzip();
     let mut diagnosis = Diagnosis {
         schema: SCHEMA.to_owned(),
@@ -295,7 +295,7 @@ pub fn diagnose(
         transfers: Vec::new(),
         notes,
     };
-    let of_all = thinned.is_none().then_some(&trial.discrepancy);
+    let of_all = thinned.is_none().then_some(&outcome.discrepancy);
     let written = written(&subject, &extended, &certain, of_all);
     let mut written_stages = stages;
     if let Some(fit) = &written {

@@ -297,11 +297,7 @@ fn own_score(subject: &Subject<'_>, design: &Design, scored: &[Scored], cause: &
     if let Some(found) = scored.iter().find(|s| already(std::slice::from_ref(cause), &s.candidate.cause)) {
         return found.clone();
     }
-    let dataset = &subject.observed.dataset;
-    let candidate = match cause {
-        Cause::Arm(effect) => Candidate::arm(effect.clone(), dataset, subject.nominal),
-        Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, subject.nominal, subject.frames),
-    };
+    let candidate = Candidate::of(cause, subject);
     let tried = scored
         .iter()
         .filter(|s| {

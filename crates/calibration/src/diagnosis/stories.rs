@@ -6,12 +6,12 @@
 
 use super::catalogue::Candidate;
 use super::cause::Cause;
+use super::confirmation::Confirmation;
 use super::design::Design;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{Confidence, Finding, Gain, Session};
 use super::picture::Picture;
-use super::standing::Standing;
 use super::words;
 
 /// A finding with what stands behind it.
@@ -43,27 +43,28 @@ pub(super) fn of(findings: Vec<Finding>, finding_of_cause: &[usize], pictures: V
         .collect()
 }
 
-/// Marks what did not stand the trial, states what each finding is worth, and makes one story of what is one.
+/// Marks what is not confirmed, states what each finding is worth, and makes one story of what is one.
 pub(super) fn told(
     mut stories: Vec<Story>,
-    standings: &[Standing],
+    confirmations: &[Confirmation],
     discrepancy: &Discrepancy,
     worth: &Worth,
     causes: &[Cause],
     geometric_mm: f64,
 ) -> Vec<Story> {
     for story in &mut stories {
-        // A story of several causes stands with one of them.
-        if !story.causes.iter().any(|&k| standings[k].stands()) {
+        // A story of several causes is confirmed with one of them.
+        if !story.causes.iter().any(|&k| confirmations[k].is_confirmed()) {
             story.finding.confidence = Confidence::Ambiguous;
-            story.finding.doubts = story.causes.first().map(|&k| standings[k].doubts()).unwrap_or_default();
+            story.finding.doubts =
+                story.causes.first().map(|&k| confirmations[k].doubts()).unwrap_or_default();
         }
         story.finding.worth_mm = Some(worth.of(&story.causes));
     }
-    overshadow(&mut stories, standings, discrepancy, worth, causes);
+    overshadow(&mut stories, confirmations, discrepancy, worth, causes);
     let smooth = discrepancy.in_time();
     let is_shift = |s: &Story| s.finding.rows.is_some();
-    let drowned = |s: &Story| smooth && s.causes.iter().all(|&k| !standings[k].beside);
+    let drowned = |s: &Story| smooth && s.causes.iter().all(|&k| !confirmations[k].beside);
     let shifts = stories.iter().filter(|s| is_shift(s)).count();
     if shifts >= MANY_SHIFTS || stories.iter().any(|s| is_shift(s) && drowned(s)) {
         merge(&mut stories, is_shift, worth, |members, worth_mm| {
@@ -82,13 +83,13 @@ pub(super) fn told(
 /// roughly described, may be parts of those: they are not certain.
 fn overshadow(
     stories: &mut [Story],
-    standings: &[Standing],
+    confirmations: &[Confirmation],
     discrepancy: &Discrepancy,
     worth: &Worth,
     causes: &[Cause],
 ) {
     let rough = (0..causes.len())
-        .filter(|&k| causes[k].is_roughly_described() && standings[k].stands())
+        .filter(|&k| causes[k].is_roughly_described() && confirmations[k].is_confirmed())
         .map(|k| worth.of(&[k]))
         .fold(discrepancy.field_mm(), f64::max);
     for story in stories {
@@ -103,8 +104,8 @@ fn overshadow(
 }
 
 /// Of each cause whether it is certain enough to move programs.
-pub(super) fn certain(stories: &[Story], standings: &[Standing]) -> Vec<bool> {
-    let mut out: Vec<bool> = standings.iter().map(Standing::stands).collect();
+pub(super) fn certain(stories: &[Story], confirmations: &[Confirmation]) -> Vec<bool> {
+    let mut out: Vec<bool> = confirmations.iter().map(Confirmation::is_confirmed).collect();
     for story in stories.iter().filter(|s| s.finding.effect != SMALL_DISTURBANCES) {
         if story.finding.confidence == Confidence::Ambiguous {
             story.causes.iter().for_each(|&k| out[k] = false);
@@ -231,22 +232,12 @@ pub(super) struct Worth {
 impl Worth {
     /// Of the causes of `fit`; candidates are made of the slopes of `raw`.
     pub(super) fn new(subject: &Subject<'_>, fit: &Extended, raw: &Design) -> Self {
-        let (dataset, nominal) = (&subject.observed.dataset, subject.nominal);
         let pushes = fit
             .causes
             .iter()
             .map(|cause| {
-                let (candidate, values) = match cause {
-                    Cause::Arm(effect) => (
-                        Candidate::arm(effect.clone(), dataset, nominal),
-                        effect.parameters().iter().map(|p| p.value).collect::<Vec<_>>(),
-                    ),
-                    Cause::Measurement(d) => (
-                        Candidate::measurement(d.clone(), dataset, nominal, subject.frames),
-                        d.values.clone(),
-                    ),
-                };
-                let push = candidate.columns(raw) * nalgebra::DVector::from_vec(values);
+                let values = nalgebra::DVector::from_vec(cause.values());
+                let push = Candidate::of(cause, subject).columns(raw) * values;
                 push.iter().zip(&raw.slopes.mm).map(|(v, mm)| v * mm).collect()
             })
             .collect();

@@ -1,4 +1,4 @@
-//! The arm that is handed on to compensation: geometry and the causes of the arm that stood the trial, beside what the
+//! The arm that is handed on to compensation: geometry and the causes of the arm that are identified, beside what the
 //! measurement suffered.
 //!
 //! A cause of the arm that is not certain moves real programs, so it stays out; geometry takes what it can of it. What wandered

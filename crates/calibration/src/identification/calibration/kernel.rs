@@ -64,7 +64,9 @@ impl Pushed {
         for ((disturbance, course), shifts) in disturbances.iter().zip(courses).zip(&columns.shifts) {
             let v = &disturbance.values;
             for (shift, value) in shifts.iter().zip(v) {
-                (0..3).for_each(|k| add(&mut out.frame[k], *value, &shift[k]));
+                for (to, along) in out.frame.iter_mut().zip(shift) {
+                    to.iter_mut().zip(along).zip(course).for_each(|((t, s), c)| *t += value * s * c);
+                }
             }
             match &disturbance.kind {
                 Kind::Zero => add(&mut out.zero, v[0], course),

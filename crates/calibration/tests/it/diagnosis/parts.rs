@@ -177,10 +177,7 @@ fn a_refit_by_one_step_is_a_refit() {
         // What is taken out and added again as a candidate is where it was.
         let design = linear.whole().design;
         for (index, cause) in fitted.causes.iter().enumerate() {
-            let candidate = match cause.clone() {
-                Cause::Arm(effect) => Candidate::arm(effect, dataset, subject.nominal),
-                Cause::Measurement(d) => Candidate::measurement(d, dataset, subject.nominal, subject.frames),
-            };
+            let candidate = Candidate::of(cause, subject);
             let (columns, sizes) = (candidate.columns(&design), cause.sizes());
             let without = held.without(&fitted.places(index));
             let (alone, back) = (without.rmse_mm(None, &[]), without.rmse_mm(Some((&columns, &sizes)), &[]));

@@ -135,6 +135,8 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
     let of_motion = [Form::Latency, Form::LastStep, Form::SlowReading];
     let forms = of_pose.into_iter().chain(of_sensor).chain(of_motion);
     kinds.extend(forms.map(|form| (Kind::Form(form), Course::Always)));
+    // A form that does not go as far in each row.
+    kinds.extend(of_sensor.map(|form| (Kind::Form(form), Course::Clock { time_constant_h: 0.5 })));
     kinds
         .into_iter()
         .map(|(kind, course)| {

@@ -1,4 +1,4 @@
-//! Whether an accepted cause may be called identified: it must win beside what no cause describes, come back in halves of the
+//! Whether an accepted cause is confirmed, without which it is not called identified: it must win beside what no cause describes, come back in halves of the
 //! rows, and be of the same size there.
 //!
 //! 1. *Beside the discrepancy.* The functions of [`discrepancy`](super::discrepancy) get their most probable variances beside the
@@ -32,9 +32,9 @@ use super::score::{Score, log_p_of, score_columns, score_projected};
 use super::selection::{Accepted, Options, already};
 use crate::measurement::sensor::disturbance::{Course, Disturbance};
 
-/// How a cause stood the trial.
+/// How a cause came out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Standing {
+pub(super) struct Confirmation {
     /// Whether it carries itself beside what no cause describes.
     pub beside: bool,
     /// Natural logarithm of its p-value there, corrected for trials.
@@ -57,15 +57,13 @@ const MISSED: usize = 1;
 /// Twice the log Bayes factor by which a cause must be ahead of its rivals beside what no cause describes.
 const AHEAD: f64 = 6.0;
 
-impl Standing {
+impl Confirmation {
     /// Whether it may be called identified, as far as this goes.
-    pub(super) fn stands(&self) -> bool {
+    pub(super) fn is_confirmed(&self) -> bool {
         let enough = self.asked == 0 || self.came_back + MISSED >= self.asked;
         self.beside && self.plausible && self.ahead >= AHEAD && enough && self.changed <= MISSED
     }
-}
 
-impl Standing {
     /// Why it may not be called identified.
     pub(super) fn doubts(&self) -> Vec<String> {
         let mut out = Vec::new();
@@ -111,16 +109,16 @@ const SOME: f64 = 15.0;
 /// Non-centrality in a half from which the half can tell of a cause.
 const TELLING: f64 = 15.0;
 
-/// What the trial of all accepted causes came to.
-pub(super) struct Trial {
+/// What confirming all accepted causes came to.
+pub(super) struct Outcome {
     /// One for each cause.
-    pub standings: Vec<Standing>,
-    /// What no cause describes, beside those that stood.
+    pub confirmations: Vec<Confirmation>,
+    /// What no cause describes, beside those that are confirmed.
     pub discrepancy: Discrepancy,
 }
 
-/// What is tried: the final fit, linearised, with its causes.
-pub(super) struct Charge<'a> {
+/// The final fit, linearised, with its causes and every candidate: what is to be confirmed.
+pub(super) struct Confirming<'a> {
     /// The rows.
     pub subject: &'a Subject<'a>,
     /// The fit.
@@ -141,21 +139,27 @@ pub(super) struct Charge<'a> {
     pub raw: &'a Design,
 }
 
-/// A candidate's columns for all rows, as measured.
-struct Tried {
+/// A candidate with its columns for all rows, whitened as in the fit.
+struct WithColumns {
     candidate: Arc<Candidate>,
     columns: DMatrix<f64>,
 }
 
-impl Charge<'_> {
-    /// Tries all causes.
-    pub(super) fn tried(&self) -> Trial {
+impl Confirming<'_> {
+    /// Confirms each cause or not.
+    pub(super) fn outcome(&self) -> Outcome {
         let numbers: Vec<usize> = self.subject.observed.dataset.rows.iter().map(|r| r.number).collect();
         let functions = Functions::of(self.subject, self.linear);
-        let raw = self.raw;
-        let own: Vec<Tried> =
-            self.found.causes.par_iter().map(|cause| self.tried_cause(cause, raw)).collect();
-        let (mut standings, out, discrepancy) = self.beside(&functions, &own, &numbers);
+        let own: Vec<WithColumns> = self
+            .found
+            .causes
+            .par_iter()
+            .map(|cause| {
+                let candidate = Candidate::of(cause, self.subject);
+                WithColumns { columns: candidate.columns(self.raw), candidate: Arc::new(candidate) }
+            })
+            .collect();
+        let (mut confirmations, out, discrepancy) = self.beside(&functions, &own, &numbers);
         if !own.is_empty() {
             let pool = self.pool(&discrepancy, &numbers);
             let halves = halves(&self.subject.observed.dataset, self.options.seed);
@@ -164,25 +168,28 @@ impl Charge<'_> {
                 .map(|half| Half::of(self, half, &discrepancy, &numbers).told(&own, &pool, &out))
                 .collect();
             for in_half in told {
-                for (standing, told) in standings.iter_mut().zip(in_half) {
+                for (confirmation, told) in confirmations.iter_mut().zip(in_half) {
                     if let Some((came_back, changed)) = told {
-                        standing.asked += 1;
-                        standing.came_back += usize::from(came_back);
-                        standing.changed += usize::from(changed);
+                        confirmation.asked += 1;
+                        confirmation.came_back += usize::from(came_back);
+                        confirmation.changed += usize::from(changed);
                     }
                 }
             }
         }
-        Trial { standings, discrepancy }
+        Outcome { confirmations, discrepancy }
     }
 
     /// Candidates that explain anything of what geometry leaves; the others are selected in no half.
-    fn pool(&self, discrepancy: &Discrepancy, numbers: &[usize]) -> Vec<Tried> {
-        let all: Vec<Tried> = self
+    fn pool(&self, discrepancy: &Discrepancy, numbers: &[usize]) -> Vec<WithColumns> {
+        let all: Vec<WithColumns> = self
             .pool
             .par_iter()
             .filter(|s| s.candidate.cause.rows().is_none())
-            .map(|s| Tried { columns: s.candidate.columns(self.raw), candidate: Arc::clone(&s.candidate) })
+            .map(|s| WithColumns {
+                columns: s.candidate.columns(self.raw),
+                candidate: Arc::clone(&s.candidate),
+            })
             .collect();
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
         let every: Vec<usize> = (0..self.found.causes.len()).collect();
@@ -201,15 +208,6 @@ impl Charge<'_> {
             .collect()
     }
 
-    fn tried_cause(&self, cause: &Cause, raw: &Design) -> Tried {
-        let (dataset, nominal) = (&self.subject.observed.dataset, self.subject.nominal);
-        let candidate = match cause {
-            Cause::Arm(effect) => Candidate::arm(effect.clone(), dataset, nominal),
-            Cause::Measurement(d) => Candidate::measurement(d.clone(), dataset, nominal, self.subject.frames),
-        };
-        Tried { columns: candidate.columns(raw), candidate: Arc::new(candidate) }
-    }
-
     /// Sides that were taken from the order of the rows say nothing that a reading before rest does not say too.
     fn told_otherwise(&self, cause: &Cause) -> bool {
         self.sides_from_order
@@ -225,16 +223,16 @@ impl Charge<'_> {
     fn beside(
         &self,
         functions: &Functions,
-        own: &[Tried],
+        own: &[WithColumns],
         numbers: &[usize],
-    ) -> (Vec<Standing>, Vec<usize>, Discrepancy) {
+    ) -> (Vec<Confirmation>, Vec<usize>, Discrepancy) {
         let mut out: Vec<usize> = Vec::new();
         let mut discrepancy = Discrepancy::of(functions, self.linear, &[], numbers, None);
-        let mut standings = loop {
+        let mut confirmations = loop {
             let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
             let whole = self.linear.beside(&discrepancy.columns).filtered(rho, numbers, noise).whole();
             let whiten = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.linear.per) / noise;
-            let judged: Vec<Standing> = (0..own.len())
+            let judged: Vec<Confirmation> = (0..own.len())
                 .into_par_iter()
                 .map(|k| {
                     let mut dropped = out.clone();
@@ -254,18 +252,18 @@ impl Charge<'_> {
                 Discrepancy::of(functions, self.linear, &self.places(&out), numbers, Some(&discrepancy));
         };
         for k in &out {
-            standings[*k].beside = false;
+            confirmations[*k].beside = false;
         }
-        (standings, out, discrepancy)
+        (confirmations, out, discrepancy)
     }
 
     fn judged(
         &self,
         index: usize,
-        own: &Tried,
+        own: &WithColumns,
         design: &Design,
         whiten: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>,
-    ) -> Standing {
+    ) -> Confirmation {
         let accepted = &self.accepted[index];
         let sizes = own.candidate.cause.sizes();
         let columns = whiten(&own.columns);
@@ -280,7 +278,7 @@ impl Charge<'_> {
                 score_columns(design, &columns, &rival.candidate.cause.sizes(), rival.candidate.tried).merit
             })
             .fold(0.0, f64::max);
-        Standing {
+        Confirmation {
             beside: score.merit > 0.0 && log_p <= self.options.alpha.ln(),
             log_p,
             ahead: score.merit - best,
@@ -294,7 +292,7 @@ impl Charge<'_> {
 
 /// The rows of one half.
 struct Half<'a> {
-    charge: &'a Charge<'a>,
+    confirming: &'a Confirming<'a>,
     rows: &'a [usize],
     numbers: Vec<usize>,
     rho: f64,
@@ -303,13 +301,18 @@ struct Half<'a> {
 }
 
 impl<'a> Half<'a> {
-    fn of(charge: &'a Charge<'a>, rows: &'a [usize], discrepancy: &Discrepancy, numbers: &[usize]) -> Self {
+    fn of(
+        confirming: &'a Confirming<'a>,
+        rows: &'a [usize],
+        discrepancy: &Discrepancy,
+        numbers: &[usize],
+    ) -> Self {
         let numbers: Vec<usize> = rows.iter().map(|&i| numbers[i]).collect();
         let (rho, noise) = (discrepancy.correlation, discrepancy.noise);
-        let part = charge.linear.part(rows);
-        let columns = picked(&discrepancy.columns, rows, charge.linear.per);
+        let part = confirming.linear.part(rows);
+        let columns = picked(&discrepancy.columns, rows, confirming.linear.per);
         let linear = part.beside(&columns).filtered(rho, &numbers, noise);
-        Self { charge, rows, numbers, rho, noise, linear }
+        Self { confirming, rows, numbers, rho, noise, linear }
     }
 
     /// Columns of all rows, in the rows of this half.
@@ -319,17 +322,17 @@ impl<'a> Half<'a> {
     }
 
     /// For each cause whether it came back and whether it had another size; `None` where this half cannot tell.
-    fn told(&self, own: &[Tried], pool: &[Tried], out: &[usize]) -> Vec<Option<(bool, bool)>> {
+    fn told(&self, own: &[WithColumns], pool: &[WithColumns], out: &[usize]) -> Vec<Option<(bool, bool)>> {
         let all: Vec<usize> = (0..own.len()).collect();
-        let selected = self.selected(own, pool, &self.charge.places(&all));
+        let selected = self.selected(own, pool, &self.confirming.places(&all));
         let whole = self.linear.whole();
         own.iter()
             .enumerate()
             .map(|(k, tried)| {
                 let dropped: Vec<usize> = out.iter().copied().filter(|o| *o != k).chain([k]).collect();
-                let design = whole.without(&self.charge.places(&dropped));
+                let design = whole.without(&self.confirming.places(&dropped));
                 let columns = self.columns(&tried.columns);
-                let accepted = &self.charge.accepted[k];
+                let accepted = &self.confirming.accepted[k];
                 let score = score_columns(&design, &columns, &tried.candidate.cause.sizes(), accepted.tried);
                 let before = &accepted.own.estimate;
                 let lambda = |v: &DVector<f64>| (v.transpose() * &score.information * v)[0].max(0.0);
@@ -357,20 +360,18 @@ impl<'a> Half<'a> {
     }
 
     /// Whether a shift is found again where it was.
-    fn found_again(&self, tried: &Tried, design: &Design, score: &Score) -> bool {
+    fn found_again(&self, tried: &WithColumns, design: &Design, score: &Score) -> bool {
         let Some([from, to]) = tried.candidate.cause.rows() else { return false };
         let Cause::Measurement(disturbance) = &tried.candidate.cause else { return false };
         if !(score.evidence > 0.0) {
             return false;
         }
         // The kind in all rows, not only in its own.
-        let always = Disturbance::new(disturbance.kind.clone(), Course::Always);
-        let (dataset, nominal) = (&self.charge.subject.observed.dataset, self.charge.subject.nominal);
-        let everywhere = Candidate::measurement(always, dataset, nominal, self.charge.subject.frames)
-            .columns(self.charge.raw);
+        let always = Cause::Measurement(Disturbance::new(disturbance.kind.clone(), Course::Always));
+        let everywhere = Candidate::of(&always, self.confirming.subject).columns(self.confirming.raw);
         let everywhere = self.columns(&everywhere);
         let Some(strip) = Strip::of(design, &everywhere, &tried.candidate.cause.sizes()) else {
-            return score.evidence > 0.0;
+            return true;
         };
         let best = strip.scan(design, 1);
         let inside = |i: usize| (from..=to).contains(&self.numbers[i]);
@@ -387,16 +388,16 @@ impl<'a> Half<'a> {
     }
 
     /// Causes selected from nothing, best first, each step to first order.
-    fn selected(&self, own: &[Tried], pool: &[Tried], places: &[usize]) -> Vec<Cause> {
+    fn selected(&self, own: &[WithColumns], pool: &[WithColumns], places: &[usize]) -> Vec<Cause> {
         let design = self.linear.design(places);
-        let all: Vec<&Tried> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
+        let all: Vec<&WithColumns> = pool.iter().chain(own.iter().filter(|o| fresh(o, pool))).collect();
         let columns: Vec<DMatrix<f64>> = all.iter().map(|t| self.columns(&t.columns)).collect();
         let mut projected = design.project_all(&columns);
         let ranges = ranges(&columns);
         let beside = side_by_side(&columns, design.rows());
         let mut extra = DMatrix::zeros(0, design.rows());
         let mut chosen: Vec<usize> = Vec::new();
-        let options = self.charge.options;
+        let options = self.confirming.options;
         while chosen.len() < own.len() + 4 {
             let best = (0..all.len())
                 .filter(|j| !chosen.contains(j))
@@ -407,7 +408,7 @@ impl<'a> Half<'a> {
                 })
                 .filter(|(j, score)| {
                     let candidate = &all[*j].candidate;
-                    let trials = (candidate.tried * self.charge.families).ln();
+                    let trials = (candidate.tried * self.confirming.families).ln();
                     score.merit > 0.0
                         && score.plain_log_p(&candidate.cause.sizes()) + trials <= options.alpha.ln()
                 })
@@ -439,7 +440,7 @@ impl<'a> Half<'a> {
 }
 
 /// Whether a cause is not among the pool's.
-fn fresh(own: &Tried, pool: &[Tried]) -> bool {
+fn fresh(own: &WithColumns, pool: &[WithColumns]) -> bool {
     let cause = &own.candidate.cause;
     cause.rows().is_some() || !pool.iter().any(|p| already(std::slice::from_ref(cause), &p.candidate.cause))
 }
