@@ -247,6 +247,7 @@ fn model(file: &Path) -> anyhow::Result<Recording> {
                 before: Some(Deviation::between(&intended, &reached, &Pose::identity(), None)),
                 after: None,
                 sigma_mm: Some(arm.position_sigma_mm(&estimated, &joints, &Pose::identity(), None)),
+                shape_sigma_mm: None,
                 outside: None,
                 status: Status::Left,
                 reason: None,

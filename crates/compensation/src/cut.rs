@@ -35,6 +35,13 @@ pub(super) struct CutsOf {
     runs_into: Vec<(u32, u32)>,
 }
 
+impl CutsOf {
+    /// The cut of a motion, as the index of one of its motions; `None` outside cuts.
+    pub(super) fn root(&self, motion: u32) -> Option<u32> {
+        self.of[motion as usize]
+    }
+}
+
 /// The cuts of a listing.
 pub(super) fn of(listing: &Listing) -> CutsOf {
     let motions = &listing.motions;

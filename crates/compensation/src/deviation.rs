@@ -97,6 +97,8 @@ pub struct PathPoint {
     pub after: Option<Deviation>,
     /// Predicted standard deviation of the position (mm), from the covariance of the estimate.
     pub sigma_mm: Option<f64>,
+    /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    pub shape_sigma_mm: Option<f64>,
     /// How the point leaves the region in which the arm was measured.
     pub outside: Option<Outside>,
     /// What became of it.

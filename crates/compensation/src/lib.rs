@@ -6,6 +6,7 @@
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`compensate`]: the main job, from a program that was read to its new bytes.
 //! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
+//! - [`placement`]: whether the place of a path is corrected or its shape alone; [`risk`]: the chance that a cut gets worse.
 //! - [`undeclared`]: tools and work objects that no file declares, and what to give.
 //! - [`untouched`]: the plan that changes nothing, for the nominal arm.
 //! - [`curve`]: the way from target to target as the controller interpolates it; [`corner`]: how it rounds a point.
@@ -26,6 +27,10 @@ pub mod cut;
 pub mod compensate;
 pub mod untouched;
 pub mod undeclared;
+pub mod placement;
+pub mod risk;
+mod registration;
+mod assessment;
 mod effort;
 mod circumstance;
 mod course;

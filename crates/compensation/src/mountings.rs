@@ -121,6 +121,17 @@ impl Mountings {
         self.places.get(&(tool, object)).copied().unwrap_or(missing)
     }
 
+    /// The work object of each mounting of the list.
+    pub(super) fn objects(&self) -> Vec<u32> {
+        let mut out = vec![0; self.list.len()];
+        for ((_, object), place) in &self.places {
+            if let Ok(place) = place {
+                out[*place] = *object;
+            }
+        }
+        out
+    }
+
     pub(super) fn notes(&self) -> Vec<String> {
         let mut said = HashSet::new();
         let all = self.assumed.iter().chain(self.list.iter().flat_map(|m| &m.notes));

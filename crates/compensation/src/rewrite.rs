@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 
+use super::assessment::{Assessment, Chosen, Knowing, Wanted, assessed};
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
@@ -21,8 +22,10 @@ use super::mountings::Mountings;
 use super::notes::{load_notes, open_notes, play_note};
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
+use super::placement::{Commanded, ObjectPlacement, Placement};
+use super::risk::CutRisk;
 use super::segment::{Ends, Path, middles_off};
-use super::solve::{Guess, Solved, SolvedTargets, as_joints, solve_all, take_room};
+use super::solve::{AsItIs, Guess, Solved, SolvedTargets, as_joints, solve_all, take_room};
 use super::speed::{Pace, fastest};
 use super::staying::{obstacle, staying};
 use super::why::Why;
@@ -94,6 +97,10 @@ pub struct Options {
     pub loads: Option<Loads>,
     /// What becomes of a cut of which not every motion can be corrected.
     pub cuts: Cuts,
+    /// Whether the place of a path is corrected, or its shape alone.
+    pub placement: Placement,
+    /// A cut that the correction makes worse with a larger probability is left.
+    pub max_risk: f64,
     /// Whether motions are flagged one by one ([`Why::OpenStart`]) that rest on a configuration which the controller does not
     /// check, from a start that the text does not tell. Otherwise a note says where such a way begins.
     pub open_starts: bool,
@@ -117,6 +124,8 @@ impl Default for Options {
             condition: Condition::default(),
             loads: None,
             cuts: Cuts::Whole,
+            placement: Placement::Auto,
+            max_risk: 0.1,
             open_starts: false,
             points: true,
         }
@@ -136,8 +145,10 @@ pub struct MotionOutcome {
     pub before_mm: Option<f64>,
     /// See `before_mm`; a predicted remainder.
     pub after_mm: Option<f64>,
-    /// Predicted standard deviation (mm).
+    /// Predicted standard deviation of its place (mm).
     pub sigma_mm: Option<f64>,
+    /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
+    pub shape_sigma_mm: Option<f64>,
     /// Largest bend of the path to this end that is left between targets (mm).
     pub bend_mm: Option<f64>,
     /// Targets put in before it.
@@ -145,7 +156,7 @@ pub struct MotionOutcome {
 }
 
 /// A planned rewrite.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {
     /// What shall change.
     pub changes: Vec<Change>,
@@ -155,6 +166,12 @@ pub struct Plan {
     pub points: Vec<PathPoint>,
     /// What was assumed of tools and work objects.
     pub notes: Vec<String>,
+    /// What was done about the place of each work object.
+    pub placements: Vec<ObjectPlacement>,
+    /// What is known of each cut.
+    pub cuts: Vec<CutRisk>,
+    /// Probability that the cuts that are corrected get worse, taken together; absent where nothing is known of them.
+    pub chance_of_worse: Option<f64>,
 }
 
 /// The two arms and their inverses, shared by all targets.
@@ -208,6 +225,8 @@ pub(super) struct Targets<'a> {
     options: &'a Options,
     arms: Arms<'a>,
     mountings: Mountings,
+    program: AsItIs<'a>,
+    assessment: Assessment,
     solved: SolvedTargets,
     /// The motions that stay as they are in `solved`.
     solved_without: BTreeMap<u32, Why>,
@@ -221,28 +240,38 @@ impl<'a> Targets<'a> {
         options: &'a Options,
     ) -> Self {
         let mut arms = Arms::of(estimated, &options.condition);
-        let mountings = Mountings::of(listing, &arms, cell);
-        let solved_without = BTreeMap::new();
-        let solved = solve_all(listing, &mut arms, &mountings, options, &solved_without);
-        Self { listing, options, arms, mountings, solved, solved_without }
+        let mut mountings = Mountings::of(listing, &arms, cell);
+        let program = AsItIs::of(listing, &arms, &mountings);
+        let assessment = assess(listing, &program, &mut arms, &mut mountings, options);
+        let solved_without = assessment.risky();
+        let solved =
+            solve_all(listing, &program, &mut arms, &mountings, &assessment, options, &solved_without);
+        Self { listing, options, arms, mountings, program, assessment, solved, solved_without }
     }
 
     /// The plan where some motions must stay as they are for reasons of the writer (`refused`, by index), and with them the
     /// cuts that they are part of.
     pub(super) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
         let stays = self.settled(refused);
-        let Self { listing, options, arms, mountings, solved, .. } = self;
-        planned(&Job { listing, solved, stays: &stays, mountings, arms, options })
+        let Self { listing, options, arms, mountings, assessment, solved, .. } = self;
+        let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, arms, options });
+        plan.placements.clone_from(&assessment.placements);
+        plan.cuts.clone_from(&assessment.cuts);
+        plan.chance_of_worse = assessment.chance;
+        plan
     }
 
     /// The motions that stay. Where joints have play, what stays changes the sides from which the joints come to what
     /// follows: then all targets are worked out again.
     fn settled(&mut self, refused: &BTreeMap<u32, Why>) -> BTreeMap<u32, Why> {
-        let Self { listing, options, arms, mountings, solved, solved_without } = self;
+        let Self { listing, options, arms, mountings, program, assessment, solved, solved_without } = self;
         let mut refused = refused.clone();
+        for (motion, why) in assessment.risky() {
+            refused.entry(motion).or_insert(why);
+        }
         for _ in 0..MOST_SETTLING {
             if arms.acting.has_play() && refused != *solved_without {
-                *solved = solve_all(listing, arms, mountings, options, &refused);
+                *solved = solve_all(listing, program, arms, mountings, assessment, options, &refused);
                 solved_without.clone_from(&refused);
             } else {
                 solved.allow_again();
@@ -273,6 +302,34 @@ impl<'a> Targets<'a> {
     }
 }
 
+/// What the model knows of the program. Work objects of which the shape alone is corrected are displaced to where the
+/// path lies.
+fn assess(
+    listing: &Listing,
+    program: &AsItIs<'_>,
+    arms: &mut Arms<'_>,
+    mountings: &mut Mountings,
+    options: &Options,
+) -> Assessment {
+    let Some(knowledge) = arms.knowledge else { return Assessment::default() };
+    let chosen = Chosen::of(listing, |motion| program.knows(motion));
+    let loads = arms.loads(listing, options.loads.as_ref());
+    let at: BTreeMap<u32, Commanded> = chosen
+        .motions()
+        .into_iter()
+        .filter_map(|motion| {
+            let load = loads.get(motion as usize).and_then(Option::as_ref);
+            Some((motion, program.commanded(motion, arms.acting.place([0; 6], load))?))
+        })
+        .collect();
+    let objects = mountings.objects();
+    let with = Knowing { acting: &arms.acting, knowledge };
+    // Experiments take every motion as it is.
+    let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
+    let wanted = Wanted { placement: options.placement, max_risk };
+    assessed(listing, &chosen, &at, &mut mountings.list, &objects, &with, wanted)
+}
+
 /// Rounds in which what stays changes the sides of what follows; more are never made.
 const MOST_SETTLING: usize = 64;
 
@@ -289,7 +346,7 @@ fn planned(job: &Job<'_>) -> Plan {
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(open_notes(listing, solved, &unchecked));
-    let mut plan = Plan { changes: Vec::new(), outcomes: Vec::new(), points: Vec::new(), notes };
+    let mut plan = Plan { notes, ..Plan::default() };
     plan.changes.reserve_exact(portions.iter().map(|p| p.changes.len()).sum());
     plan.outcomes.reserve_exact(listing.motions.len());
     plan.points.reserve_exact(portions.iter().map(|p| p.points.len()).sum());
@@ -547,6 +604,7 @@ fn work<'a>(
         before_mm: None,
         after_mm: None,
         sigma_mm: None,
+        shape_sigma_mm: None,
         bend_mm: None,
         inserted: 0,
     };
@@ -569,6 +627,7 @@ fn work<'a>(
             outcome.before_mm = Some(to.deviation_before.norm_mm());
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
+            outcome.shape_sigma_mm = to.shape_sigma_mm;
             options.points.then(|| path_point(motion, to, &job.mountings.list[to.mounted].real))
         }
         _ => None,
@@ -701,6 +760,7 @@ fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
         before: Some(solved.deviation_before),
         after: Some(solved.deviation_after),
         sigma_mm: Some(solved.sigma_mm),
+        shape_sigma_mm: solved.shape_sigma_mm,
         outside: solved.outside,
         status: Status::Changed,
         reason: None,

@@ -14,17 +14,19 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::assessment::Assessment;
 use super::circumstance::picked;
 use super::course::{Course, Reached, Sides, Stop, courses};
 use super::deviation::Deviation;
 use super::effort;
 use super::mountings::Mountings;
 use super::payload::Load;
+use super::placement::Commanded;
 use super::rewrite::{Arms, Circles, Emit, Options, configured, forbidden, may_change, monitored};
 use super::segment::Way;
 use super::singular::{Replay, at_target};
 use super::why::Why;
-use truegrind_arm::estimated::RidingPoint;
+use truegrind_arm::estimated::{Carried, RidingPoint};
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
@@ -63,7 +65,9 @@ pub(super) struct Solved {
     pub(super) deviation_before: Deviation,
     pub(super) deviation_after: Deviation,
     pub(super) sigma_mm: f64,
-    /// What of it comes from joints whose side is not known (mm).
+    /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
+    pub(super) shape_sigma_mm: Option<f64>,
+    /// What of either comes from joints whose side is not known (mm).
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
     pub(super) singularity: f64,
@@ -142,6 +146,7 @@ impl SolvedTargets {
 /// A target and the motion to which it belongs.
 #[derive(Clone, Copy)]
 struct Asked<'a> {
+    index: u32,
     motion: &'a Motion,
     target: &'a MotionTarget,
 }
@@ -189,35 +194,67 @@ impl Near {
     }
 }
 
+/// The program as it is: the joints that each target leads to.
+pub(super) struct AsItIs<'a> {
+    /// Where the targets of each motion begin, and the end of the last.
+    first: Vec<usize>,
+    asked: Vec<Asked<'a>>,
+    starts: Starts,
+}
+
+impl<'a> AsItIs<'a> {
+    pub(super) fn of(listing: &'a Listing, arms: &Arms<'_>, mountings: &Mountings) -> Self {
+        let mut first = Vec::with_capacity(listing.motions.len() + 1);
+        let mut asked: Vec<Asked<'_>> = Vec::with_capacity(listing.motions.len());
+        for (index, motion) in (0..).zip(&listing.motions) {
+            first.push(asked.len());
+            if motion.left.is_none() {
+                asked.extend(motion.targets.iter().map(|target| Asked { index, motion, target }));
+            }
+        }
+        first.push(asked.len());
+        let starts = starts(listing, &first, &asked, arms, mountings);
+        Self { first, asked, starts }
+    }
+
+    /// Whether the end of a motion is known.
+    pub(super) fn knows(&self, motion: usize) -> bool {
+        self.end(motion).is_some()
+    }
+
+    /// The end of a motion under the condition at `place`.
+    pub(super) fn commanded(&self, motion: u32, place: usize) -> Option<Commanded> {
+        let Start { mounted, meant, joints, .. } = *self.end(motion as usize)?;
+        Some(Commanded { mounted, meant, joints, place })
+    }
+
+    fn end(&self, motion: usize) -> Option<&Start> {
+        self.starts[self.first[motion]..self.first[motion + 1]].last()?.as_ref().ok()
+    }
+}
+
 /// Works out all targets. `stays`: motions that stay as they are though their targets could be corrected.
 pub(super) fn solve_all(
     listing: &Listing,
+    program: &AsItIs<'_>,
     arms: &mut Arms<'_>,
     mountings: &Mountings,
+    assessment: &Assessment,
     options: &Options,
     stays: &BTreeMap<u32, Why>,
 ) -> SolvedTargets {
-    let mut first = Vec::with_capacity(listing.motions.len() + 1);
-    let mut asked: Vec<Asked<'_>> = Vec::with_capacity(listing.motions.len());
-    for motion in &listing.motions {
-        first.push(asked.len());
-        if motion.left.is_none() {
-            asked.extend(motion.targets.iter().map(|target| Asked { motion, target }));
-        }
-    }
-    first.push(asked.len());
-    let starts = starts(listing, &first, &asked, arms, mountings);
-    let work = Work { listing, first, asked, starts, mountings, options, stays };
-    work.solve(arms)
+    let AsItIs { first, asked, starts } = program;
+    Work { listing, first, asked, starts, mountings, assessment, options, stays }.solve(arms)
 }
 
 /// What all targets are worked out from.
 struct Work<'a> {
     listing: &'a Listing,
-    first: Vec<usize>,
-    asked: Vec<Asked<'a>>,
-    starts: Starts,
+    first: &'a [usize],
+    asked: &'a [Asked<'a>],
+    starts: &'a [Result<Start, Why>],
     mountings: &'a Mountings,
+    assessment: &'a Assessment,
     options: &'a Options,
     stays: &'a BTreeMap<u32, Why>,
 }
@@ -245,7 +282,7 @@ impl Work<'_> {
             let guessed = self.guessed();
             return SolvedTargets {
                 forbade: Vec::new(),
-                first: self.first,
+                first: self.first.to_vec(),
                 portions,
                 ways: Vec::new(),
                 guessed,
@@ -294,7 +331,7 @@ impl Work<'_> {
         });
         let ways = ways.collect();
         let guessed = self.guessed();
-        SolvedTargets { forbade: Vec::new(), first: self.first, portions, ways, guessed }
+        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), portions, ways, guessed }
     }
 
     /// Motions of which a target was reached by guess.
@@ -330,7 +367,7 @@ impl Work<'_> {
             let targets = self.targets(portion * PORTION);
             let places = [&before[targets.clone()], &places[targets.clone()]];
             let (asked, starts) = (&self.asked[targets.clone()], &self.starts[targets]);
-            within(allowance, || finish(asked, starts, places, arms, self.mountings, self.options))
+            within(allowance, || finish(asked, starts, places, arms, self))
         })
     }
 
@@ -609,9 +646,9 @@ fn finish(
     starts: &[Result<Start, Why>],
     places: [&[usize]; 2],
     arms: &Arms<'_>,
-    mountings: &Mountings,
-    options: &Options,
+    work: &Work<'_>,
 ) -> Vec<Result<Solved, Why>> {
+    let Work { mountings, assessment, options, .. } = *work;
     let (nominal, acting) = (arms.nominal.arm(), &arms.acting);
     let mut out: Vec<Result<Solved, Why>> = Vec::with_capacity(asked.len());
     // What is still on its way, and where in `out` it belongs.
@@ -681,24 +718,28 @@ fn finish(
     let places: Vec<usize> = way.iter().map(|w| w.place).collect();
     let reached_after = acting.forward(&places, &last);
     let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
-    let sigmas = match arms.knowledge {
-        Some(knowledge) => {
-            let points: Vec<RidingPoint<'_>> = way
-                .iter()
-                .zip(&tools)
-                .map(|(w, tool)| RidingPoint {
-                    joints: w.after,
-                    flange_from_tool: *tool,
-                    carried: mountings.list[w.start.mounted].carried.as_ref(),
-                })
-                .collect();
-            acting.each(&places, |place, items| match items {
-                None => knowledge.position_sigmas_mm(acting.arm(place), &points),
-                Some(items) => knowledge.position_sigmas_mm(acting.arm(place), &picked(&points, items)),
-            })
+    // Against what each is known, for those that are asked.
+    let known = |against: Vec<Option<Option<&Carried>>>| -> Vec<Option<f64>> {
+        let Some(knowledge) = arms.knowledge else { return vec![None; way.len()] };
+        let (mut places_of, mut points) = (Vec::with_capacity(way.len()), Vec::with_capacity(way.len()));
+        let mut at = Vec::with_capacity(way.len());
+        for ((k, w), carried) in way.iter().enumerate().zip(against) {
+            let Some(carried) = carried else { continue };
+            points.push(RidingPoint { joints: w.after, flange_from_tool: tools[k], carried });
+            places_of.push(w.place);
+            at.push(k);
         }
-        None => vec![0.0; way.len()],
+        let found = acting.each(&places_of, |place, items| match items {
+            None => knowledge.position_sigmas_mm(acting.arm(place), &points),
+            Some(items) => knowledge.position_sigmas_mm(acting.arm(place), &picked(&points, items)),
+        });
+        let mut out = vec![None; way.len()];
+        at.into_iter().zip(found).for_each(|(k, sigma)| out[k] = Some(sigma));
+        out
     };
+    let sigmas = known(way.iter().map(|w| Some(mountings.list[w.start.mounted].carried.as_ref())).collect());
+    let cut_of = |w: &OnItsWay| asked[w.index].index;
+    let of_shape = known(way.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect());
     let mut near = Nearest::default();
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
@@ -724,7 +765,10 @@ fn finish(
             margins: [w.start.margins, margins],
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
-            sigma_mm: sigmas[k].hypot(in_play_mm),
+            sigma_mm: sigmas[k].unwrap_or(0.0).hypot(in_play_mm),
+            shape_sigma_mm: of_shape[k]
+                .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
+                .map(|sigma| sigma.hypot(in_play_mm)),
             in_play_mm,
             place: w.place,
             guess: w.start.guess,

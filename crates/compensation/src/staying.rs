@@ -99,7 +99,8 @@ pub(super) fn obstacle(
         return Some((Status::Left, Why::JointTarget));
     }
     let forbidden = targets.iter().find_map(|target| target.as_ref().ok().and_then(|s| s.forbidden));
-    forbidden.or_else(|| stays.get(&index).copied()).map(|why| (Status::Refused, why))
+    let why = forbidden.or_else(|| stays.get(&index).copied())?;
+    Some((if matches!(why, Why::Risk { .. }) { Status::Left } else { Status::Refused }, why))
 }
 
 /// What a motion is that stays as it is: left where the text does not tell enough, refused where what it says cannot be.

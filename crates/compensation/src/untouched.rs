@@ -15,10 +15,11 @@ pub fn untouched(listing: &Listing, options: &Options) -> Plan {
         before_mm: None,
         after_mm: None,
         sigma_mm: None,
+        shape_sigma_mm: None,
         bend_mm: None,
         inserted: 0,
     });
-    Plan { changes: Vec::new(), outcomes: outcomes.collect(), points: Vec::new(), notes: Vec::new() }
+    Plan { outcomes: outcomes.collect(), ..Plan::default() }
 }
 
 fn why(listing: &Listing, motion: &Motion, options: &Options) -> Why {

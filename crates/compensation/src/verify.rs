@@ -121,6 +121,7 @@ pub fn judge(task: &Judged<'_>, acting: &Acting<'_>) -> PathReport {
                     let known = k.position_sigma_mm(arms.acting.arm(place), &joints, tool, carried);
                     known.hypot(arms.acting.in_play_mm(place, &joints, tool))
                 }),
+                shape_sigma_mm: None,
                 outside: acting.knowledge.and_then(|k| k.region.outside(&joints)),
                 status: if second.is_some() { Status::Changed } else { Status::Left },
                 reason: None,

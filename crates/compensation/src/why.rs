@@ -121,6 +121,11 @@ pub enum Why {
         /// The step (mm).
         mm: f64,
     },
+    /// The correction makes the cut worse with a probability that is too large.
+    Risk {
+        /// That probability.
+        chance: f64,
+    },
     /// No measured pose is near.
     NotCovered {
         /// Distance over that of measured poses, above 1.
@@ -178,6 +183,7 @@ impl Why {
             }
             Why::PartOfCut { because, .. } => because,
             Why::Step { .. } => "the step to its neighbour is too large",
+            Why::Risk { .. } => "the correction may well make the cut worse (--max-risk)",
             Why::NotCovered { .. } => "no measured pose is near",
             Why::Uncertain { .. } => "the model is uncertain here",
         }
@@ -266,6 +272,12 @@ impl fmt::Display for Why {
             Why::Step { line, mm } => write!(
                 f,
                 "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
+            ),
+            Why::Risk { chance } => write!(
+                f,
+                "with a probability of {:.0} % the correction makes this cut worse than it is, more than --max-risk takes: the \
+                 measurement does not tell the arm well enough here",
+                100.0 * chance
             ),
             Why::NotCovered { ratio } => {
                 write!(f, "no measured pose is near: {ratio:.1} times the distance of measured poses")

@@ -26,6 +26,7 @@ use truegrind_compensation::cell::Cell;
 use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
+use truegrind_compensation::placement::Placement;
 use truegrind_compensation::rewrite::Options as RewriteBounds;
 use truegrind_compensation::verify::{Acting, Judged, judge};
 use truegrind_estimation::estimate::Termination;
@@ -326,6 +327,7 @@ fn ground(
         max_turn_rad: LARGEST_TURN_RAD,
         cuts: Cuts::Single,
         joint_gain: f64::INFINITY,
+        placement: Placement::Absolute,
         ..RewriteBounds::default()
     };
     let mark = Mark { version: env!("CARGO_PKG_VERSION").to_owned(), model: String::new(), partial: false };

@@ -52,7 +52,12 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            tolerance: Tolerance { length_mm: 3.0, angle_rad: 1.0_f64.to_radians(), ..Tolerance::default() },
+            tolerance: Tolerance {
+                length_mm: 3.0,
+                angle_rad: 1.0_f64.to_radians(),
+                zero_rad: 1.0_f64.to_radians(),
+                ..Tolerance::default()
+            },
             selection: selection::Options::default(),
             blocks: BLOCKS,
             smooth: false,
@@ -298,15 +303,13 @@ pub fn diagnose(
     let of_all = thinned.is_none().then_some(&outcome.discrepancy);
     let written = written(&subject, &extended, &certain, of_all);
     let mut written_stages = stages;
-    if let Some(fit) = &written {
-        written_stages[2] = validation.stage(fit);
-    }
+    written_stages[2] = validation.stage(&written);
     let estimated = estimated(
         dataset,
         robot,
         nominal_arm,
         &subject,
-        written.as_ref().unwrap_or(&extended),
+        &written,
         &written_stages,
         &diagnosis,
         &set_aside,

@@ -9,16 +9,19 @@ use super::cause::Cause;
 use super::design::Linear;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Freedom, Subject, filled, fit};
+use crate::identification::prior_width::learned;
+use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
 
-/// The fit whose arm is written; `None` where it is the extended one. `certain` says it of each cause that was tried, and
+/// The fit whose arm is written, under the tolerances that its own rows tell (the wide ones of the search would leave what the
+/// data do not see farther from the data sheet than arms are). `certain` says it of each cause that was tried, and
 /// `discrepancy` is that of the same rows.
 pub(super) fn written(
     subject: &Subject<'_>,
     extended: &Extended,
     certain: &[bool],
     discrepancy: Option<&Discrepancy>,
-) -> Option<Extended> {
+) -> Extended {
     let kept: Vec<Cause> = extended
         .causes
         .iter()
@@ -31,14 +34,15 @@ pub(super) fn written(
         .map(|(_, cause)| cause.clone())
         .collect();
     let wandered = discrepancy.filter(|d| d.in_time());
-    if kept.len() == extended.causes.len() && wandered.is_none() {
-        return None;
-    }
-    let kept = fit(subject, &kept, Freedom::All, Some(extended));
-    match wandered {
-        Some(wandered) => Some(beside(subject, &kept, wandered).unwrap_or(kept)),
-        None => Some(kept),
-    }
+    let kept =
+        if kept.len() == extended.causes.len() { extended.clone() } else { refit(subject, &kept, extended) };
+    let tolerance = learned(&Tolerance::default(), &kept.parameters, &kept.priors, &kept.estimate);
+    let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
+    wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held)
+}
+
+fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
+    fit(subject, causes, Freedom::All, Some(near))
 }
 
 /// The fit with what wandered free beside it, by one step: it is small against what is linear.

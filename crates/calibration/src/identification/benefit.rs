@@ -125,7 +125,7 @@ pub fn benefit(
 ) -> Option<Benefit> {
     let moved = moved(fitted, estimated)?;
     let mut readings = readings(fitted, dataset);
-    readings.within_the_arm(fitted)?;
+    readings.within_the_arm(fitted, tolerance)?;
     let x = DVector::from_column_slice(&fitted.estimate.x);
     let toward = &moved * &x;
     let square = x.dot(&toward);
@@ -194,13 +194,16 @@ impl Readings {
     /// arm does that is no geometry, and with thousands of rows make a scale of it; and a true scale has next to nothing left
     /// over, since it is an arm that is larger. Which of two explanations of the same readings holds is then for the
     /// tolerances alone to say.
-    fn within_the_arm(&mut self, fitted: &Fitted) -> Option<()> {
+    fn within_the_arm(&mut self, fitted: &Fitted, tolerance: &Tolerance) -> Option<()> {
         let arm = fitted.parameters.len();
         let held = self.matrix.view((0, 0), (arm, arm)).into_owned();
         let mut matrix = held.clone();
         for (k, (parameter, prior)) in fitted.parameters.iter().zip(&fitted.priors).enumerate() {
-            let free = if matches!(parameter, Parameter::Link { .. }) { FREE } else { 1.0 };
-            matrix[(k, k)] += 1.0 / (free * prior.sigma).powi(2);
+            let sigma = match parameter {
+                Parameter::Link { .. } => FREE * tolerance.prior(parameter, &fitted.model).sigma,
+                _ => prior.sigma,
+            };
+            matrix[(k, k)] += 1.0 / (sigma * sigma);
         }
         let (factor, _) = factored(&matrix)?;
         let beside = self.matrix.view((0, arm), (arm, 1)).column(0).into_owned();

@@ -16,6 +16,7 @@
 
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::identifiability::{Identifiability, identifiability};
+use crate::identification::prior_width::learned;
 use crate::identification::rounding::{self, AngleCovariance};
 use crate::identification::solver::Solver;
 use crate::identification::tolerance::Tolerance;
@@ -122,7 +123,7 @@ const SMALLEST_SIGMA_RAD: f64 = 1e-6;
 
 /// Fits `parameters` to `observed`, estimating the sensor's standard deviation along.
 ///
-/// Three rounds of solver and variance.
+/// Three rounds of solver and variance, and of the tolerances of links where they are to be learned.
 pub fn fit(
     observed: &Observed,
     start: Start<'_>,
@@ -131,7 +132,7 @@ pub fn fit(
     solver: &Solver,
     seed: u64,
 ) -> Fitted {
-    let priors = tolerance.priors_within(parameters, start.model, start.frames);
+    let mut priors = tolerance.priors_within(parameters, start.model, start.frames);
     let (mut sigma_mm, mut sigma_rad) = (0.1, 1e-3);
     let mut x = vec![0.0; parameters.len()];
     let mut model = start.model.clone();
@@ -168,7 +169,11 @@ pub fn fit(
         let spent = spent_freedom(&task, &estimate);
         (sigma_mm, sigma_rad) = spreads(&task, &x, &shares, spent);
         rounds.push(estimate.trace.clone());
-        last = Some((task, estimate));
+        if tolerance.learned && round < ROUNDS {
+            let learned = learned(tolerance, parameters, &priors, &estimate);
+            priors = learned.priors_within(parameters, start.model, start.frames);
+        }
+        last = Some((task.held(&priors), estimate));
     }
     let (task, estimate) = last.unwrap_or_else(|| unreachable!("at least one round"));
     Fitted {

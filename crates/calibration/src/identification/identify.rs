@@ -53,7 +53,7 @@ impl Default for Options {
     /// Levenberg–Marquardt with ordinary tolerances; a fifth of the rows is held out.
     fn default() -> Self {
         Self {
-            tolerance: Tolerance::default(),
+            tolerance: Tolerance { learned: true, ..Tolerance::default() },
             solver: &SOLVERS[0],
             held_out: 0.2,
             seed: 0,

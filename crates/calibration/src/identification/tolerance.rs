@@ -7,7 +7,7 @@ use crate::identification::calibration::Frames;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
-use truegrind_arm::parameter::Parameter;
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Prior;
 
 /// Standard deviations of the priors.
@@ -15,8 +15,10 @@ use truegrind_estimation::problem::Prior;
 pub struct Tolerance {
     /// Link lengths and offsets (mm).
     pub length_mm: f64,
-    /// Twists and joint offsets (rad).
+    /// Twists (rad).
     pub angle_rad: f64,
+    /// Joint zeros (rad).
+    pub zero_rad: f64,
     /// The touched point on the flange about its starting value (mm): a hook or reflector stands off.
     pub target_mm: f64,
     /// Orientation of a full-pose target about its starting value (rad).
@@ -25,6 +27,8 @@ pub struct Tolerance {
     pub frame_mm: f64,
     /// Orientation of the sensor frame about its starting value (rad); wide.
     pub frame_rad: f64,
+    /// Whether the rows tell how wide the tolerances of links are, weighed by the ones stated here (`prior_width`).
+    pub learned: bool,
 }
 
 impl Default for Tolerance {
@@ -34,10 +38,12 @@ impl Default for Tolerance {
         Self {
             length_mm: 1.0,
             angle_rad: 0.3_f64.to_radians(),
+            zero_rad: 0.3_f64.to_radians(),
             target_mm: 50.0,
             target_rad: 1.0,
             frame_mm: 2000.0,
             frame_rad: 3.0,
+            learned: false,
         }
     }
 }
@@ -49,6 +55,7 @@ impl Tolerance {
     pub fn prior(&self, parameter: &Parameter, model: &Model) -> Prior {
         let sigma = match *parameter {
             Parameter::Link { coordinate, .. } if coordinate.is_length() => self.length_mm,
+            Parameter::Link { coordinate: LinkCoordinate::Theta, .. } => self.zero_rad,
             Parameter::Link { .. } => self.angle_rad,
             Parameter::Target(k) if k < 3 => self.target_mm,
             Parameter::Target(_) => self.target_rad,

@@ -46,6 +46,8 @@ fn name(why: &Why) -> &'static str {
         Why::JointNotMeasured { .. } => "joint not measured",
         Why::PartOfCut { .. } => "part of cut",
         Why::Step { .. } => "step",
+        // tests/it/placement.rs.
+        Why::Risk { .. } => "risk",
         Why::NotCovered { .. } => "not covered",
         Why::Uncertain { .. } => "uncertain",
     }

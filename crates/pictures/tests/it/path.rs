@@ -97,6 +97,7 @@ fn parts(count: usize) -> Parts {
             before: Some(off(&joints)),
             after: Some(off(&after)),
             sigma_mm: Some(0.05),
+            shape_sigma_mm: None,
             outside: None,
             status: Status::Changed,
             reason: None,

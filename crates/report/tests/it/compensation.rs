@@ -44,6 +44,7 @@ fn outcome(motion: u32, status: Status, reason: Option<Why>) -> MotionOutcome {
         before_mm: Some(1.5),
         after_mm: Some(if status == Status::Changed { 0.0004 } else { 1.5 }),
         sigma_mm: Some(0.12),
+        shape_sigma_mm: None,
         bend_mm: None,
         inserted: 0,
     }
@@ -66,10 +67,9 @@ fn example() -> (Plan, Listing, Vec<ProgramFile>) {
     outcomes[0].sigma_mm = None;
     outcomes[1].inserted = 2;
     let plan = Plan {
-        changes: Vec::new(),
         outcomes,
-        points: Vec::new(),
         notes: vec!["tool disc: origin not stated, taken as metrology".to_owned()],
+        ..Plan::default()
     };
     let files = vec![
         ProgramFile { file: "grind.mod".to_owned(), output: Some("out/grind.mod".to_owned()) },

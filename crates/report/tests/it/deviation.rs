@@ -46,6 +46,7 @@ fn point(
         before: before.map(|v| deviation(v, surface)),
         after: after.map(|v| deviation(v, surface)),
         sigma_mm: Some(0.12),
+        shape_sigma_mm: None,
         outside: None,
         status: Status::Changed,
         reason: None,

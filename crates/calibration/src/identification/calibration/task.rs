@@ -61,6 +61,13 @@ impl Calibration {
         self
     }
 
+    /// This task itself with other priors, one for each parameter.
+    pub fn held(mut self, priors: &[Prior]) -> Self {
+        self.priors.clear();
+        self.priors.extend_from_slice(priors);
+        self
+    }
+
     /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take a
     /// hundred and fifty bytes each.
     pub(crate) fn forget_rows(&mut self) {

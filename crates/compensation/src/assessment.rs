@@ -1,0 +1,215 @@
+//! What the model knows of a program before anything is corrected: where the path over each work object lies, how likely
+//! each cut gets worse, and the best registration of each cut, against which the sigma of its shape is stated.
+//!
+//! All of it follows from some targets of the program as it is, evenly spread, with every joint in the middle of its play.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::circumstance::Circumstances;
+use super::cut::{self, CutsOf};
+use super::mounting::Mounted;
+use super::placement::{self, Commanded, ObjectPlacement, Off, Placement, placed, spread};
+use super::risk::{self, CutRisk, Judgement};
+use super::why::Why;
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_programs::motion::Listing;
+
+/// What is known of a program.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Assessment {
+    /// One for each work object.
+    pub(super) placements: Vec<ObjectPlacement>,
+    /// One for each cut.
+    pub(super) cuts: Vec<CutRisk>,
+    /// Probability that the cuts that are not left get worse, taken together; absent without cuts.
+    pub(super) chance: Option<f64>,
+    /// The cut of each motion, as its place in `cuts`; empty without any.
+    cut_of: Vec<Option<u32>>,
+    /// The best registration of each cut, in the base; absent where the robot holds the part.
+    registered: Vec<Option<Carried>>,
+}
+
+impl Assessment {
+    /// The motions that stay since their cut would too likely get worse.
+    pub(super) fn risky(&self) -> BTreeMap<u32, Why> {
+        let left = self.cuts.iter().filter(|cut| cut.left);
+        left.flat_map(|cut| cut.motions.iter().map(|motion| (*motion, Why::Risk { chance: cut.chance })))
+            .collect()
+    }
+
+    /// Against what the shape of a motion's cut is known: a frame that moves with the arm's parameters as the cut does.
+    pub(super) fn registered(&self, motion: u32) -> Option<&Carried> {
+        self.registered[self.place(motion)?].as_ref()
+    }
+
+    /// The sigma of the shape of a motion's cut (RMS, mm), for parts that the robot holds.
+    pub(super) fn sigma_of_cut_mm(&self, motion: u32) -> Option<f64> {
+        let place = self.place(motion)?;
+        (self.registered[place].is_none()).then_some(self.cuts[place].shape_sigma_mm)
+    }
+
+    fn place(&self, motion: u32) -> Option<usize> {
+        self.cut_of.get(motion as usize).copied().flatten().map(|place| place as usize)
+    }
+}
+
+/// How a program is to be placed, and what chance is taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) placement: Placement,
+    /// Cuts that get worse with a larger probability are left.
+    pub(super) max_risk: f64,
+}
+
+/// What is asked: the estimated arm, under each condition that the targets were given.
+pub(super) struct Knowing<'a, 'm> {
+    pub(super) acting: &'a Circumstances<'m>,
+    pub(super) knowledge: &'a Estimated,
+}
+
+/// The targets that are looked at: of each work object and of each cut.
+pub(super) struct Chosen {
+    objects: Vec<(u32, Vec<u32>)>,
+    cuts: Vec<(Vec<u32>, Vec<u32>)>,
+}
+
+impl Chosen {
+    /// Those of the motions that `reached` says something of.
+    pub(super) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
+        let cuts: CutsOf = cut::of(listing);
+        let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        let mut of_cut: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for (index, motion) in (0_u32..).zip(&listing.motions) {
+            let cut = cuts.root(index);
+            if let Some(root) = cut {
+                of_cut.entry(root).or_default().push(index);
+            }
+            if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
+                of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
+            }
+        }
+        // Where something is cut, the way through the air does not count.
+        let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
+            (object, spread(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
+        });
+        let cuts = of_cut.into_values().filter_map(|all| {
+            let told: Vec<u32> = all.iter().copied().filter(|m| reached(*m as usize)).collect();
+            (!told.is_empty()).then(|| (all, spread(&told, risk::MOST_POINTS)))
+        });
+        Self { objects: objects.collect(), cuts: cuts.collect() }
+    }
+
+    /// Every motion that is looked at, once.
+    pub(super) fn motions(&self) -> Vec<u32> {
+        let objects = self.objects.iter().flat_map(|(_, motions)| motions);
+        let mut all: Vec<u32> = objects.chain(self.cuts.iter().flat_map(|(_, told)| told)).copied().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}
+
+/// Assesses a program. `at` are the targets of [`Chosen::motions`], by motion. Work objects of which the shape alone is
+/// corrected are displaced in `list` to where the path lies.
+pub(super) fn assessed(
+    listing: &Listing,
+    chosen: &Chosen,
+    at: &BTreeMap<u32, Commanded>,
+    list: &mut [Mounted],
+    objects: &[u32],
+    with: &Knowing<'_, '_>,
+    wanted: Wanted,
+) -> Assessment {
+    let Knowing { acting, knowledge } = *with;
+    let mut out = Assessment { cut_of: vec![None; listing.motions.len()], ..Assessment::default() };
+    let mut taken: BTreeMap<u32, Placement> = BTreeMap::new();
+    for (object, motions) in &chosen.objects {
+        let targets: Vec<Commanded> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
+        let name = &listing.work_objects[*object as usize].name;
+        let found = placed(name, &targets, list, acting, knowledge, wanted.placement);
+        let Some((placement, displaced)) = found else { continue };
+        taken.insert(*object, placement.taken);
+        out.placements.push(placement);
+        if let Some(motion) = displaced {
+            for (mounted, _) in list.iter_mut().zip(objects).filter(|(_, of)| **of == *object) {
+                mounted.real.object *= motion;
+            }
+        }
+    }
+    let list: &[Mounted] = list;
+    let judged: Vec<Option<(Judged, Judgement)>> = chosen
+        .cuts
+        .par_iter()
+        .map(|(motions, told)| {
+            let targets: Vec<&Commanded> = told.iter().filter_map(|m| at.get(m)).collect();
+            let mounted = &list[targets.first()?.mounted];
+            let object = listing.motions[motions[0] as usize].work_object?;
+            let placement = *taken.get(&object)?;
+            let off: Vec<Off> = targets.iter().map(|t| Off::of(t, mounted, acting, knowledge)).collect();
+            let judgement = risk::judged(&off, knowledge, placement)?;
+            let weight = motions.len() as f64 / off.len() as f64;
+            let carried = (!mounted.real.holds_part)
+                .then(|| risk::in_base(&judgement.registered, &mounted.real.object));
+            Some((Judged { placement, points: off.len(), weight, carried }, judgement))
+        })
+        .collect();
+    let mut whole = Whole::of(knowledge);
+    for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
+        let Some((judged, judgement)) = judged else { continue };
+        let chance = risk::chance(judgement.square, &judgement.toward, knowledge, judged.points);
+        let left = !(chance <= wanted.max_risk);
+        if !left {
+            whole.add(&judgement, &judged);
+        }
+        let place = out.cuts.len() as u32;
+        motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(place));
+        out.cuts.push(CutRisk {
+            motions: motions.clone(),
+            judged: judged.placement,
+            off_mm: judgement.off_mm,
+            sigma_mm: judgement.sigma_mm,
+            shape_sigma_mm: judgement.shape_sigma_mm,
+            chance,
+            left,
+        });
+        out.registered.push(judged.carried);
+    }
+    out.chance = whole.chance(knowledge);
+    out
+}
+
+/// How a cut was judged.
+struct Judged {
+    placement: Placement,
+    points: usize,
+    /// Motions for each point that was asked.
+    weight: f64,
+    carried: Option<Carried>,
+}
+
+/// All cuts together.
+struct Whole {
+    points: f64,
+    square: f64,
+    toward: DVector<f64>,
+}
+
+impl Whole {
+    fn of(knowledge: &Estimated) -> Self {
+        Self { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) }
+    }
+
+    fn add(&mut self, cut: &Judgement, judged: &Judged) {
+        self.points += judged.weight * judged.points as f64;
+        self.square += judged.weight * cut.square;
+        self.toward += &cut.toward * judged.weight;
+    }
+
+    fn chance(&self, knowledge: &Estimated) -> Option<f64> {
+        (self.points > 0.0)
+            .then(|| risk::chance(self.square, &self.toward, knowledge, self.points.round() as usize))
+    }
+}

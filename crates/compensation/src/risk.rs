@@ -1,0 +1,123 @@
+//! The chance that a correction makes a cut worse than it is.
+//!
+//! A cut whose points are off by d (all its coordinates in one vector) is corrected by the estimate of d. With P its error
+//! covariance, the cut gets worse where the error along d exceeds half of it: with c = |d| and s² = dᵀ P d / c² the
+//! probability is Φ(−c / 2s). For a path whose shape alone is corrected, d is what its best rigid registration leaves.
+//! P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs the one vector Jᵀ d alone.
+
+use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
+
+use super::placement::{Off, Placement};
+use super::registration::Registration;
+use truegrind_arm::estimated::{Carried, Estimated};
+use truegrind_math::se3::Pose;
+use truegrind_math::tail::normal_two_sided;
+
+/// What is known of one cut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutRisk {
+    /// Its motions, by index, in order.
+    pub motions: Vec<u32>,
+    /// Whether its shape is judged, or its place too.
+    pub judged: Placement,
+    /// How far it is off as it is (RMS, mm).
+    pub off_mm: f64,
+    /// Predicted standard deviation of its correction (RMS, mm).
+    pub sigma_mm: f64,
+    /// Predicted standard deviation of its shape, after its best rigid registration (RMS, mm).
+    pub shape_sigma_mm: f64,
+    /// Probability that the correction makes it worse.
+    pub chance: f64,
+    /// Whether it is left as it is for that.
+    pub left: bool,
+}
+
+/// A cut, judged.
+pub(super) struct Judgement {
+    pub(super) off_mm: f64,
+    pub(super) sigma_mm: f64,
+    pub(super) shape_sigma_mm: f64,
+    /// |d|² (mm²), and Jᵀ d: added up they judge the program.
+    pub(super) square: f64,
+    pub(super) toward: DVector<f64>,
+    /// Twists of the best registration per unit of each parameter, in the work object, and the point that they turn about.
+    pub(super) registered: Carried,
+}
+
+/// Points of a cut by which it is judged; more are not asked.
+pub(super) const MOST_POINTS: usize = 32;
+
+/// A cut that is off by less is not made worse by what is written (mm).
+const NOTHING_MM: f64 = 5e-4;
+
+/// Judges the points of a cut.
+pub(super) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -> Option<Judgement> {
+    let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
+    let twists = registration.twists(off.iter().map(|o| &o.jacobian));
+    let twist = registration.twist(off.iter().map(|o| &o.shift));
+    let (mut square, mut variance, mut of_shape) = (0.0, 0.0, 0.0);
+    let mut toward = DVector::zeros(knowledge.order.len());
+    let spread =
+        |jacobian: &Matrix3xX<f64>| (jacobian * &knowledge.covariance).component_mul(jacobian).sum();
+    for (k, point) in off.iter().enumerate() {
+        let mut shape = point.jacobian.clone();
+        for p in 0..shape.ncols() {
+            let moved = registration.shift(&twists.column(p).into_owned(), k);
+            (0..3).for_each(|i| shape[(i, p)] -= moved[i]);
+        }
+        of_shape += spread(&shape);
+        let (shift, jacobian) = match placement {
+            Placement::Shape => (point.shift - registration.shift(&twist, k), &shape),
+            _ => (point.shift, &point.jacobian),
+        };
+        square += shift.norm_squared();
+        toward += jacobian.tr_mul(&shift);
+        variance += spread(jacobian);
+    }
+    let rms = |sum: f64| (sum.max(0.0) / off.len() as f64).sqrt();
+    let registered = Carried {
+        origin_mm: registration.centre.coords,
+        twists: twists.column_iter().map(|twist| twist.into_owned()).collect(),
+    };
+    Some(Judgement {
+        off_mm: rms(square),
+        sigma_mm: rms(variance),
+        shape_sigma_mm: rms(of_shape),
+        square,
+        toward,
+        registered,
+    })
+}
+
+/// Probability that what is off by `square` = |d|² (mm², of `points` points) gets worse, with `toward` = Jᵀ d.
+pub(super) fn chance(square: f64, toward: &DVector<f64>, knowledge: &Estimated, points: usize) -> f64 {
+    if square <= NOTHING_MM * NOTHING_MM * points as f64 {
+        return 0.0;
+    }
+    let variance = toward.dot(&(&knowledge.covariance * toward));
+    if !variance.is_finite() {
+        return 1.0;
+    }
+    if variance <= 0.0 {
+        return 0.0;
+    }
+    // c / 2s = |d|² / (2 √(dᵀ P d)).
+    0.5 * normal_two_sided(0.5 * square / variance.sqrt())
+}
+
+/// The registration of a cut seen from the base, for a work object that stands.
+pub(super) fn in_base(registered: &Carried, base_from_object: &Pose) -> Carried {
+    let turn = base_from_object.rotation;
+    Carried {
+        origin_mm: base_from_object.transform_point(&registered.origin_mm.into()).coords,
+        twists: registered
+            .twists
+            .iter()
+            .map(|t| {
+                let v: Vector3<f64> = turn * t.fixed_rows::<3>(0);
+                let w: Vector3<f64> = turn * t.fixed_rows::<3>(3);
+                Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+            })
+            .collect(),
+    }
+}
