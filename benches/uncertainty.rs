@@ -6,7 +6,7 @@
 //! program → program. The true arm then runs the corrected program. Programs lie inside the measured region.
 //!
 //! `cargo bench --no-default-features --bench uncertainty [-- ARMS [CAUSES]]`: so many arms without causes (identified), and
-//! so many with (diagnosed).
+//! so many with (diagnosed). With `TRUEGRIND_SWEEP=FILE` every arm as a line of CSV in that file.
 
 // A benchmark says what it measured.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
@@ -25,8 +25,8 @@ use truegrind::compensation::placement::Placement;
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::programs::rapid::Task;
 use truegrind::{
-    CompensateOptions, Condition, DiagnoseOptions, Estimated, IdentifyOptions, Joints, Model, Pose, Program, Recipe,
-    Simulation, compensate, diagnose, identify, split,
+    CompensateOptions, Condition, DiagnoseOptions, Estimated, IdentifyOptions, Joints, Model, Pose, Program,
+    Recipe, Simulation, compensate, diagnose, identify, split,
 };
 
 const ROBOTS: [&str; 3] = ["abb-irb-120", "universal-robots-ur10", "fanuc-m-20ia"];
@@ -65,7 +65,9 @@ impl Case {
         let noise = within(0.02, 0.1);
         let target = if self.beside { "38.2, 12.6, 61.3" } else { "0.0, 0.0, 61.3" };
         let sensor = if self.cable {
-            format!("kind = \"cable\"\noutlets_mm = [[900.0, 250.0, 60.0]]\nzeros_mm = [14.0]\nhook_mm = [{target}]")
+            format!(
+                "kind = \"cable\"\noutlets_mm = [[900.0, 250.0, 60.0]]\nzeros_mm = [14.0]\nhook_mm = [{target}]"
+            )
         } else {
             format!(
                 "kind = \"position\"\nframe = {{ position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }}\n\
@@ -207,6 +209,8 @@ struct Cut {
 
 #[derive(Default)]
 struct Outcome {
+    /// Effects of the model that is handed on.
+    effects: String,
     shape: Within,
     placement: Within,
     squares: [f64; 2],
@@ -230,7 +234,9 @@ fn outcome(case: &Case) -> Option<Outcome> {
     let inverse = Inverse::new(nominal, &still, nominal);
     let tool = Pose::translation(TOOL_MM[0], TOOL_MM[1], TOOL_MM[2]);
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed + 31);
-    let mut out = Outcome::default();
+    let effects =
+        estimated.model.effects.iter().map(|e| format!("{e:?}").chars().take(22).collect::<String>());
+    let mut out = Outcome { effects: effects.collect::<Vec<_>>().join(" | "), ..Outcome::default() };
     for _ in 0..PROGRAMS {
         let Some(path) = raster(nominal, &estimated, &mut rng) else {
             out.failed += 1;
@@ -240,7 +246,8 @@ fn outcome(case: &Case) -> Option<Outcome> {
         let (mut error, mut jacobian) = (DVector::zeros(3 * n), DMatrix::zeros(3 * n, estimated.order.len()));
         let mut points = Vec::new();
         for (k, (pose, q)) in path.iter().enumerate() {
-            let off = (known.forward(q) * tool).translation.vector - (real.forward(q) * tool).translation.vector;
+            let off =
+                (known.forward(q) * tool).translation.vector - (real.forward(q) * tool).translation.vector;
             error.rows_mut(3 * k, 3).copy_from(&off);
             jacobian.rows_mut(3 * k, 3).copy_from(&estimated.position_jacobian(&known, q, &tool));
             points.push(pose.translation.vector);
@@ -301,8 +308,12 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, out: &mut Outcome) {
             after: truegrind::After::Achieved,
             loads: [None, None],
         };
-        let acting =
-            Acting { nominal: &estimated.nominal, model: actual, knowledge: None, condition: Condition::default() };
+        let acting = Acting {
+            nominal: &estimated.nominal,
+            model: actual,
+            knowledge: None,
+            condition: Condition::default(),
+        };
         let report = judge(&judged, &acting);
         let lines: Vec<_> = report.points.iter().filter(|p| p.cutting).collect();
         if lines.iter().any(|p| p.after.is_none()) || !done.changed() {
@@ -334,7 +345,12 @@ fn main() {
         let sensor = if case.cable { "cable" } else { "tracker" };
         let target = if case.beside { "beside axis 6" } else { "on axis 6" };
         let causes = if case.causes { "with causes" } else { "without causes" };
-        for key in ["all".to_owned(), causes.to_owned(), format!("{sensor}, {target}, {causes}"), case.robot.to_owned()] {
+        for key in [
+            "all".to_owned(),
+            causes.to_owned(),
+            format!("{sensor}, {target}, {causes}"),
+            case.robot.to_owned(),
+        ] {
             let into = groups.entry(key).or_default();
             let Some(outcome) = outcome else {
                 into.failed += PROGRAMS;
@@ -349,11 +365,23 @@ fn main() {
             into.failed += outcome.failed;
         }
     }
-    println!("{:44} {:>26}   {:>26}  {:>6}", "share within 1, 2, 3 sigma (rms z) [%]", "shape", "placement", "failed");
+    if let Some(path) = std::env::var_os("TRUEGRIND_SWEEP") {
+        std::fs::write(path, csv(&outcomes)).unwrap();
+    }
+    println!(
+        "{:44} {:>26}   {:>26}  {:>6}",
+        "share within 1, 2, 3 sigma (rms z) [%]", "shape", "placement", "failed"
+    );
     for (key, o) in &groups {
         let text = |w: &Within, square: f64| {
             let share = |k: usize| 100.0 * w[k] as f64 / w[3].max(1) as f64;
-            format!("{:5.1} {:5.1} {:5.1} ({:4.2})", share(0), share(1), share(2), (square / w[3].max(1) as f64).sqrt())
+            format!(
+                "{:5.1} {:5.1} {:5.1} ({:4.2})",
+                share(0),
+                share(1),
+                share(2),
+                (square / w[3].max(1) as f64).sqrt()
+            )
         };
         println!(
             "{key:44} {:>26}   {:>26}  {:>6}",
@@ -367,6 +395,19 @@ fn main() {
     }
 }
 
+fn csv(outcomes: &[(Case, Option<Outcome>)]) -> String {
+    let mut out = String::from("robot,cable,beside,causes,seed,shape_rms_z,placement_rms_z,effects\n");
+    for (case, outcome) in outcomes {
+        let Case { robot, cable, beside, causes, seed } = case;
+        let Some(o) = outcome else { continue };
+        let z = |square: f64, w: &Within| (square / w[3].max(1) as f64).sqrt();
+        let (shape, placement) = (z(o.squares[0], &o.shape), z(o.squares[1], &o.placement));
+        let _ =
+            writeln!(out, "{robot},{cable},{beside},{causes},{seed},{shape:.2},{placement:.2},{}", o.effects);
+    }
+    out
+}
+
 /// Whether cuts get worse as often as was said.
 fn risks(key: &str, cuts: &[Cut]) {
     println!("\n{key}: cuts that get worse, said and found");
@@ -378,9 +419,13 @@ fn risks(key: &str, cuts: &[Cut]) {
                 .collect();
             let said: f64 = here.iter().map(|c| c.chance).sum();
             let found = here.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();
-            println!("  {placement:?} {low:4.2}..{high:4.2}: {:5} cuts, said {said:6.1}, found {found}", here.len());
+            println!(
+                "  {placement:?} {low:4.2}..{high:4.2}: {:5} cuts, said {said:6.1}, found {found}",
+                here.len()
+            );
         }
-        let written: Vec<&Cut> = cuts.iter().filter(|c| c.placement == placement && c.chance <= 0.1).collect();
+        let written: Vec<&Cut> =
+            cuts.iter().filter(|c| c.placement == placement && c.chance <= 0.1).collect();
         let worse = written.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();
         let mean = |k: usize| written.iter().map(|c| c.off_mm[k]).sum::<f64>() / written.len().max(1) as f64;
         println!(
@@ -393,5 +438,9 @@ fn risks(key: &str, cuts: &[Cut]) {
     }
     let auto: Vec<&Cut> = cuts.iter().filter(|c| c.auto_takes && c.chance <= 0.1).collect();
     let worse = auto.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();
-    println!("  auto: {} written, {worse} worse ({:.1} %)", auto.len(), 100.0 * worse as f64 / auto.len().max(1) as f64);
+    println!(
+        "  auto: {} written, {worse} worse ({:.1} %)",
+        auto.len(),
+        100.0 * worse as f64 / auto.len().max(1) as f64
+    );
 }

@@ -16,6 +16,7 @@ use truegrind::compensation::cut::Cuts;
 use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::placed::misplaced;
+use truegrind::compensation::placement::Placement;
 use truegrind::compensation::reach::none_in_reach;
 use truegrind::compensation::rewrite::{Circles, Emit, Options, Plan};
 use truegrind::compensation::taught::contradictions;
@@ -60,6 +61,17 @@ pub(super) enum CirclesArgument {
     Keep,
     /// Straight pieces within the tolerance.
     Segments,
+}
+
+/// What is corrected of where a path lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum PlacementArgument {
+    /// Shape and place where the model knows the place better than it is off, else the shape alone.
+    Auto,
+    /// The shape of the path over each work object; the path stays where it is.
+    Shape,
+    /// Shape and place.
+    Absolute,
 }
 
 /// What is known of the cell, for rewriting and judging.
@@ -199,6 +211,13 @@ pub(super) struct Arguments {
     /// it such a cut stays as a whole.
     #[arg(long)]
     partial: bool,
+    /// Whether the place of the path over each work object is corrected or its shape alone. What was taught or adjusted in place
+    /// is in place: correct its shape.
+    #[arg(long, value_enum, default_value_t = PlacementArgument::Auto)]
+    placement: PlacementArgument,
+    /// Leave a cut as it is where the correction makes it worse with a larger probability.
+    #[arg(long, value_name = "P", default_value_t = 0.1, allow_negative_numbers = true)]
+    max_risk: f64,
     /// Rewrite joint targets (MoveAbsJ) too.
     #[arg(long)]
     joint_targets: bool,
@@ -299,6 +318,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             bail!("{name} {value}: expected a length above 0 in mm");
         }
     }
+    if !(0.0..=1.0).contains(&arguments.max_risk) {
+        bail!("--max-risk {}: expected a probability from 0 to 1", arguments.max_risk);
+    }
     let model = inputs::model(&arguments.model)?;
     inputs::refuse_doubtful(&model, arguments.allow_doubtful)?;
     refuse_compensating_controller(arguments.robot.as_deref())?;
@@ -328,6 +350,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
         cuts: if arguments.partial { Cuts::Partial } else { Cuts::Whole },
+        placement: match arguments.placement {
+            PlacementArgument::Auto => Placement::Auto,
+            PlacementArgument::Shape => Placement::Shape,
+            PlacementArgument::Absolute => Placement::Absolute,
+        },
+        max_risk: arguments.max_risk,
         condition,
         points: jobs.len() == 1 && arguments.outputs.of_points(),
         ..Options::default()

@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use truegrind::Confidence;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::calibration::diagnosis;
@@ -14,7 +15,7 @@ use truegrind::calibration::identification::identify::{Identification, Options};
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::measurement::import;
 use truegrind::compensation::compensate::compensate;
-use truegrind::compensation::deviation::{After, PathReport};
+use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport};
 use truegrind::compensation::rewrite::Options as RewriteBounds;
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::planning::taught_cell::taught_cell;
@@ -161,7 +162,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     batch.write()?;
 
     let tables = [deviation_view::block_table(&reports), deviation_view::registered_table(&reports)];
-    let mut text = String::new();
+    let mut text = headline(&reports[0], &causes);
     for table in &tables {
         text += &format::terminal::table(table, width());
         text += "\n";
@@ -183,4 +184,19 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     }
     say(&text)?;
     Ok(Ending::Done)
+}
+
+/// What came of it, in two lines.
+fn headline(report: &PathReport, causes: &diagnosis::diagnose::Diagnosed) -> String {
+    let largest = |which: fn(&PathPoint) -> Option<Deviation>| {
+        report.signed_mm(which).into_iter().map(f64::abs).fold(0.0, f64::max)
+    };
+    let named = causes.diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count();
+    format!(
+        "Largest deviation over the blade: {:.3} mm before, {:.3} mm after (simulated actual arm, along the surface normal).\n\
+         The model behind it: geometry and {named} identified causes, from {} measured poses.\n\n",
+        largest(|p| p.before),
+        largest(|p| p.after),
+        causes.estimated.provenance.rows
+    )
 }

@@ -4,9 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
+use truegrind::ErrorSummary;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::calibration::diagnosis::transfer::transfer;
+use truegrind::calibration::identification::calibration::Frames;
+use truegrind::calibration::identification::fit::summary_on;
+use truegrind::calibration::identification::identify::observe;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::report::diagnosis as view;
@@ -17,6 +21,7 @@ use super::files::Batch;
 use super::identify::{DataArguments, read, write_model};
 use super::outputs::Outputs;
 use super::progress::Work;
+use super::stated::{HeldArguments, StatedArguments};
 use super::terminal::tell;
 
 /// Arguments of `diagnose`.
@@ -48,6 +53,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
     #[command(flatten)]
+    stated: StatedArguments,
+    #[command(flatten)]
+    held: HeldArguments,
+    #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
@@ -78,7 +87,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
     let found = on_threads(arguments.common.threads, || {
-        let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))?;
+        let frames = starting_frames(&dataset, &robot.model, &options.tolerance, true)?;
+        let stated = arguments.stated.frames(&dataset)?;
+        let (tolerance, frames) = arguments.held.held(&options.tolerance, stated.as_ref(), frames)?;
+        let held = Options { tolerance, ..options.clone() };
+        let mut found = diagnose(&dataset, &name, &robot.model, &frames, &held, &|step| work.tell(step))?;
+        if let Some(stated) = &stated {
+            let raw = raw_error(&dataset, &robot.model, stated);
+            found.diagnosis.notes.push(format!(
+                "with the frames as stated the data sheet's arm is {:.3} mm RMS off (raw error, nothing fitted)",
+                raw.rmse
+            ));
+        }
         for other in &others {
             work.tell(&format!("judging on {}", other.file));
             let frames = starting_frames(other, &robot.model, &options.tolerance, true)?;
@@ -115,6 +135,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;
     Ok(if unexplained { Ending::Flagged } else { ending })
+}
+
+/// What the data sheet's arm is off by with frames that were measured by other means.
+fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames) -> ErrorSummary {
+    summary_on(&observe(dataset, nominal, true).0, nominal, stated)
 }
 
 /// The diagnosis, starting frames included.

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
+use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::identify::{Identification, Options, identify};
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::{SOLVERS, by_name};
@@ -27,7 +28,7 @@ use super::files::{self, Batch};
 use super::inputs;
 use super::outputs::Outputs;
 use super::progress::Work;
-use super::stated::StatedArguments;
+use super::stated::{HeldArguments, StatedArguments};
 use super::terminal::{say, tell, tell_lines, width};
 
 /// Whether logged angles are the controller's or already hold the DH offsets.
@@ -97,6 +98,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     stated: StatedArguments,
     #[command(flatten)]
+    held: HeldArguments,
+    #[command(flatten)]
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
@@ -120,8 +123,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments)? };
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
-    let found =
-        on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
+    let found = on_threads(arguments.common.threads, || {
+        let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
+        let stated = options.stated_frames.as_ref();
+        let (tolerance, frames) = arguments.held.held(&options.tolerance, stated, frames)?;
+        let options = Options { tolerance, ..options.clone() };
+        from_frames(&dataset, &name, &robot.model, &frames, &options)
+    })??;
     drop(work);
     for note in &dataset.notes {
         tell(format_args!("note: {note}"));
@@ -248,7 +256,17 @@ pub(super) fn identified(
     options: &Options,
 ) -> anyhow::Result<Identification> {
     let frames = starting_frames(dataset, nominal, &options.tolerance, options.fuse_readout)?;
+    from_frames(dataset, robot, nominal, &frames, options)
+}
+
+fn from_frames(
+    dataset: &Dataset,
+    robot: &str,
+    nominal: &Model,
+    frames: &Frames,
+    options: &Options,
+) -> anyhow::Result<Identification> {
     let share = options.held_out;
     let split = |d: &Dataset| split_of(d, share, options.seed);
-    Ok(identify(dataset, robot, nominal, &frames, &split, options)?)
+    Ok(identify(dataset, robot, nominal, frames, &split, options)?)
 }

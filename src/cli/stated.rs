@@ -4,10 +4,11 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use truegrind::calibration::identification::calibration::Frames;
+use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Sensor};
 use truegrind::math::se3::Pose;
 
-/// Where the sensor stands, if that is known. An identification uses it for the raw error alone: the fit finds frames by
+/// Where the sensor stands, if that is known. Without [`HeldArguments`] it serves the raw error alone, and the fit finds frames by
 /// itself.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct StatedArguments {
@@ -24,6 +25,46 @@ pub(super) struct StatedArguments {
     /// itself.
     #[arg(long, value_name = "X,Y,Z[,Q…]", allow_hyphen_values = true)]
     touched_point: Option<String>,
+}
+
+/// Whether a fit is held by the stated frames.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct HeldArguments {
+    /// How well --sensor-frame, or --outlet and --cable-zero, are known in the robot's base: standard deviation in mm, and in °
+    /// for the turn of a frame (else that of the mm at a metre). The fit is held by them, and the place of a path becomes known.
+    #[arg(long, value_name = "MM[,DEG]", allow_hyphen_values = true)]
+    frame_sigma: Option<String>,
+}
+
+impl HeldArguments {
+    /// The tolerance with which a fit is held by the stated frames, and the frames where it starts: what was stated, with the
+    /// touched point of `found` where none was.
+    pub(super) fn held(
+        &self,
+        tolerance: &Tolerance,
+        stated: Option<&Frames>,
+        found: Frames,
+    ) -> anyhow::Result<(Tolerance, Frames)> {
+        let Some(text) = &self.frame_sigma else { return Ok((*tolerance, found)) };
+        let Some(stated) = stated else {
+            bail!("--frame-sigma says nothing without --sensor-frame, or --outlet and --cable-zero");
+        };
+        let (mm, deg) = match numbers("--frame-sigma", text)?[..] {
+            [mm] => (mm, (mm * 1e-3).to_degrees()),
+            [mm, deg] => (mm, deg),
+            _ => bail!("--frame-sigma {text}: expected MM or MM,DEG"),
+        };
+        if !(mm > 0.0 && deg > 0.0) {
+            bail!("--frame-sigma {text}: expected numbers above 0");
+        }
+        let flange_from_target = if stated.flange_from_target == Pose::identity() {
+            found.flange_from_target
+        } else {
+            stated.flange_from_target
+        };
+        let tolerance = Tolerance { frame_mm: mm, frame_rad: deg.to_radians(), ..*tolerance };
+        Ok((tolerance, Frames { flange_from_target, ..stated.clone() }))
+    }
 }
 
 /// What the frames must fit.

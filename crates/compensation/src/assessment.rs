@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::circumstance::Circumstances;
 use super::cut::{self, CutsOf};
 use super::mounting::Mounted;
-use super::placement::{self, Commanded, ObjectPlacement, Off, Placement, placed, spread};
+use super::placement::{self, Commanded, ObjectPlacement, Off, Placement, Wanted, placed, spread};
+use super::probability::chance;
 use super::risk::{self, CutRisk, Judgement};
 use super::why::Why;
 use truegrind_arm::estimated::{Carried, Estimated};
@@ -54,14 +55,6 @@ impl Assessment {
     fn place(&self, motion: u32) -> Option<usize> {
         self.cut_of.get(motion as usize).copied().flatten().map(|place| place as usize)
     }
-}
-
-/// How a program is to be placed, and what chance is taken.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
-    pub(super) placement: Placement,
-    /// Cuts that get worse with a larger probability are left.
-    pub(super) max_risk: f64,
 }
 
 /// What is asked: the estimated arm, under each condition that the targets were given.
@@ -129,7 +122,7 @@ pub(super) fn assessed(
     for (object, motions) in &chosen.objects {
         let targets: Vec<Commanded> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
         let name = &listing.work_objects[*object as usize].name;
-        let found = placed(name, &targets, list, acting, knowledge, wanted.placement);
+        let found = placed(name, &targets, list, acting, knowledge, wanted);
         let Some((placement, displaced)) = found else { continue };
         taken.insert(*object, placement.taken);
         out.placements.push(placement);
@@ -159,7 +152,7 @@ pub(super) fn assessed(
     let mut whole = Whole::of(knowledge);
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
         let Some((judged, judgement)) = judged else { continue };
-        let chance = risk::chance(judgement.square, &judgement.toward, knowledge, judged.points);
+        let chance = chance(judgement.square, &judgement.toward, knowledge, judged.points);
         let left = !(chance <= wanted.max_risk);
         if !left {
             whole.add(&judgement, &judged);
@@ -210,6 +203,6 @@ impl Whole {
 
     fn chance(&self, knowledge: &Estimated) -> Option<f64> {
         (self.points > 0.0)
-            .then(|| risk::chance(self.square, &self.toward, knowledge, self.points.round() as usize))
+            .then(|| chance(self.square, &self.toward, knowledge, self.points.round() as usize))
     }
 }

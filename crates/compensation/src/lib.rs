@@ -31,6 +31,7 @@ pub mod placement;
 pub mod risk;
 mod registration;
 mod assessment;
+mod probability;
 mod effort;
 mod circumstance;
 mod course;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::circumstance::Circumstances;
 use super::mounting::Mounted;
+use super::probability::chance;
 use super::registration::Registration;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
@@ -21,14 +22,22 @@ use truegrind_math::se3::Pose;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Placement {
-    /// [`Placement::Absolute`] for the work objects whose place the model knows better than it is off, else
-    /// [`Placement::Shape`].
+    /// [`Placement::Absolute`] for the work objects whose place the model knows better than it is off, and gets worse with no
+    /// larger probability than is taken, else [`Placement::Shape`].
     #[default]
     Auto,
     /// The shape of the path over each work object; the path stays where it is.
     Shape,
     /// Shape and place, in the robot's base or in the frame that the arm itself taught.
     Absolute,
+}
+
+/// How a program is to be placed, and what chance is taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) placement: Placement,
+    /// Cuts, and places, that get worse with a larger probability are left.
+    pub(super) max_risk: f64,
 }
 
 /// What was done about the place of one work object.
@@ -115,7 +124,7 @@ pub(super) fn placed(
     list: &[Mounted],
     acting: &Circumstances<'_>,
     knowledge: &Estimated,
-    wanted: Placement,
+    wanted: Wanted,
 ) -> Option<(ObjectPlacement, Option<Pose>)> {
     let taught = targets.iter().any(|target| list[target.mounted].carried.is_some());
     let off: Vec<Off> =
@@ -127,8 +136,10 @@ pub(super) fn placed(
     let twists = registration.twists(off.iter().map(|o| &o.jacobian));
     let covariance: Matrix6<f64> = &twists * &knowledge.covariance * twists.transpose();
     let sigma_mm = registration.mean_square(&covariance).max(0.0).sqrt();
-    let taken = match wanted {
-        Placement::Auto if sigma_mm <= off_mm => Placement::Absolute,
+    let toward = twists.tr_mul(&registration.weighed(&twist));
+    let chance = chance(off_mm * off_mm * off.len() as f64, &toward, knowledge, off.len());
+    let taken = match wanted.placement {
+        Placement::Auto if sigma_mm <= off_mm && chance <= wanted.max_risk => Placement::Absolute,
         Placement::Auto => Placement::Shape,
         other => other,
     };

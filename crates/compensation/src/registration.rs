@@ -78,6 +78,13 @@ impl Registration {
         shifts + (self.inertia * turns).trace() / self.levers.len() as f64
     }
 
+    /// Σ Wᵀ W g over the points, W what a twist displaces a point by (mm², mm³).
+    pub(super) fn weighed(&self, twist: &Vector6<f64>) -> Vector6<f64> {
+        let (v, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
+        let (v, w) = (v * self.levers.len() as f64, self.inertia * w);
+        Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    }
+
     /// The rigid motion that a twist of the centre is.
     pub(super) fn motion(&self, twist: &Vector6<f64>) -> Pose {
         let turn = nalgebra::UnitQuaternion::from_scaled_axis(twist.fixed_rows::<3>(3).into_owned());

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use super::assessment::{Assessment, Chosen, Knowing, Wanted, assessed};
+use super::assessment::{Assessment, Chosen, Knowing, assessed};
 use super::cell::Cell;
 use super::circumstance::Circumstances;
 use super::corner::{CUT_MM, cut_of_lines};
@@ -22,7 +22,7 @@ use super::mountings::Mountings;
 use super::notes::{load_notes, open_notes, play_note};
 use super::passage::{Passage, corner};
 use super::payload::{Load, Loads};
-use super::placement::{Commanded, ObjectPlacement, Placement};
+use super::placement::{Commanded, ObjectPlacement, Placement, Wanted};
 use super::risk::CutRisk;
 use super::segment::{Ends, Path, middles_off};
 use super::solve::{AsItIs, Guess, Solved, SolvedTargets, as_joints, solve_all, take_room};

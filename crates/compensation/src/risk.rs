@@ -11,7 +11,6 @@ use super::placement::{Off, Placement};
 use super::registration::Registration;
 use truegrind_arm::estimated::{Carried, Estimated};
 use truegrind_math::se3::Pose;
-use truegrind_math::tail::normal_two_sided;
 
 /// What is known of one cut.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,9 +46,6 @@ pub(super) struct Judgement {
 /// Points of a cut by which it is judged; more are not asked.
 pub(super) const MOST_POINTS: usize = 32;
 
-/// A cut that is off by less is not made worse by what is written (mm).
-const NOTHING_MM: f64 = 5e-4;
-
 /// Judges the points of a cut.
 pub(super) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -> Option<Judgement> {
     let registration = Registration::of(&off.iter().map(|o| o.meant).collect::<Vec<_>>())?;
@@ -57,8 +53,7 @@ pub(super) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -
     let twist = registration.twist(off.iter().map(|o| &o.shift));
     let (mut square, mut variance, mut of_shape) = (0.0, 0.0, 0.0);
     let mut toward = DVector::zeros(knowledge.order.len());
-    let spread =
-        |jacobian: &Matrix3xX<f64>| (jacobian * &knowledge.covariance).component_mul(jacobian).sum();
+    let spread = |jacobian: &Matrix3xX<f64>| (jacobian * &knowledge.covariance).component_mul(jacobian).sum();
     for (k, point) in off.iter().enumerate() {
         let mut shape = point.jacobian.clone();
         for p in 0..shape.ncols() {
@@ -87,22 +82,6 @@ pub(super) fn judged(off: &[Off], knowledge: &Estimated, placement: Placement) -
         toward,
         registered,
     })
-}
-
-/// Probability that what is off by `square` = |d|² (mm², of `points` points) gets worse, with `toward` = Jᵀ d.
-pub(super) fn chance(square: f64, toward: &DVector<f64>, knowledge: &Estimated, points: usize) -> f64 {
-    if square <= NOTHING_MM * NOTHING_MM * points as f64 {
-        return 0.0;
-    }
-    let variance = toward.dot(&(&knowledge.covariance * toward));
-    if !variance.is_finite() {
-        return 1.0;
-    }
-    if variance <= 0.0 {
-        return 0.0;
-    }
-    // c / 2s = |d|² / (2 √(dᵀ P d)).
-    0.5 * normal_two_sided(0.5 * square / variance.sqrt())
 }
 
 /// The registration of a cut seen from the base, for a work object that stands.

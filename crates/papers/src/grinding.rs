@@ -22,7 +22,7 @@ use truegrind_calibration::identification::solver::{self, SOLVERS, Solver};
 use truegrind_calibration::identification::tolerance::Tolerance;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::split;
-use truegrind_compensation::cell::Cell;
+use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::compensate::compensate;
 use truegrind_compensation::cut::Cuts;
 use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
@@ -189,7 +189,9 @@ pub fn run(
     // Where tool and work offset lie stands in the program's comments.
     let setup = Setup::default();
     let task = Program::read(&[(name.as_str(), program.as_slice())], &setup);
-    let cell = taught_cell(&surface, &path, nominal, ["T1", "G54"]).map_err(|e| fail(e.to_string()))?;
+    let taught = taught_cell(&surface, &path, nominal, ["T1", "G54"]).map_err(|e| fail(e.to_string()))?;
+    // The paper's tool was measured.
+    let cell = Cell { tool: vec![CellFrame::of("T1", FrameOrigin::Metrology)], ..taught };
     let stand_in = match actual {
         Actual::Simulated(_) => None,
         Actual::Estimated => {

@@ -4,13 +4,14 @@ use serde_json::{Value, json};
 
 use super::deviation::{fate, fate_word, sections};
 use super::document::{Block, Document, KeyFigure, Verdict};
+use super::placement;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::{PathReport, Status as Fate};
 use truegrind_compensation::rewrite::{MotionOutcome, Plan};
 use truegrind_compensation::why::Why;
-use truegrind_programs::motion::{Listing, MotionKind, Place};
+use truegrind_programs::motion::{Listing, Place};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +40,8 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
         Column::text("status", "Status"),
         Column::number("before_mm", "before", "mm", 3),
         Column::number("after_mm", "remainder", "mm", 4),
-        Column::number("sigma_mm", "1σ", "mm", 3),
+        Column::number("shape_sigma_mm", "1σ shape", "mm", 3),
+        Column::number("sigma_mm", "1σ place", "mm", 3),
         Column::number("bend_mm", "bend", "mm", 3),
         Column::count("inserted", "Inserted"),
         Column::text("reason", "Reason"),
@@ -56,6 +58,7 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
             fate(outcome.status),
             outcome.before_mm.into(),
             outcome.after_mm.into(),
+            outcome.shape_sigma_mm.into(),
             outcome.sigma_mm.into(),
             outcome.bend_mm.into(),
             if outcome.inserted > 0 { outcome.inserted.into() } else { Cell::Missing },
@@ -69,7 +72,8 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
     table.notes.push(
         "before: how far the tool is off at the end of the motion as programmed. remainder: the predicted remainder, what \
          rounding and inverse kinematics leave under the same model; a motion that is left or refused keeps its deviation. \
-         1σ is predicted from the covariance of the model. bend: how far the path to this end leaves the intended one \
+         1σ is predicted from the covariance of the model: of the shape of the cut, after its best rigid registration, and of \
+         its place. bend: how far the path to this end leaves the intended one \
          between targets; inserted: targets put in before it."
             .to_owned(),
     );
@@ -142,6 +146,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
                         "before_mm": outcome.before_mm,
                         "after_mm": outcome.after_mm,
                         "sigma_mm": outcome.sigma_mm,
+                        "shape_sigma_mm": outcome.shape_sigma_mm,
                     })
                 })
                 .collect();
@@ -153,7 +158,14 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
             })
         })
         .collect();
-    json!({ "schema": "truegrind.compensation/1", "programs": programs })
+    let [placements, cuts] = placement::json(plan, listing);
+    json!({
+        "schema": "truegrind.compensation/1",
+        "programs": programs,
+        "placements": placements,
+        "cuts": cuts,
+        "chance_of_worse": plan.chance_of_worse,
+    })
 }
 
 /// What fits a terminal: verdict with coverage, reasons, what could not be read, notes on tools and work objects.
@@ -167,8 +179,9 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
     if !listing.opaque.is_empty() {
         page.push(opaque_table(listing, files));
     }
-    if !plan.notes.is_empty() {
-        page.push(Block::List(plan.notes.clone()));
+    let notes = [placement::sentences(plan), plan.notes.clone()].concat();
+    if !notes.is_empty() {
+        page.push(Block::List(notes));
     }
     page
 }
@@ -181,6 +194,15 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
         page.push(reasons);
+    }
+    let placed = placement::sentences(plan);
+    if !placed.is_empty() {
+        page.heading(2, "Shape and place");
+        page.push(Block::List(placed));
+    }
+    if let Some(mut cuts) = placement::cut_table(plan, listing) {
+        page.heading(2, std::mem::take(&mut cuts.title));
+        page.push(cuts);
     }
     if !plan.notes.is_empty() {
         page.heading(2, "Tools and work objects");
@@ -277,28 +299,33 @@ fn heading(files: &[ProgramFile]) -> Document {
 pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
     let written = count(plan, Fate::Changed) + flagged;
-    let unsure = unsure(plan, listing);
+    let (left, cuts) = placement::left(plan);
     let same = !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(Why::Same));
     let (status, headline) = match (written, refused + flagged) {
         (0, 0) if same => {
             (Status::NotEvaluated, "Nothing was rewritten: every number is right to its last decimal")
         }
+        (0, 0) if left > 0 => (
+            Status::NotEvaluated,
+            "Nothing was rewritten: the measurement does not tell the arm well enough where the program cuts",
+        ),
         (0, 0) => (Status::NotEvaluated, "Nothing was rewritten"),
         (0, _) => (Status::Bad, "Nothing could be rewritten"),
-        (_, 0) if unsure.is_some() => (
+        (_, 0) if left > 0 => (
             Status::Warning,
-            "Rewritten, but the model does not know enough here to say that the correction helps",
+            "Rewritten, but for cuts where the measurement does not tell the arm well enough: they stay as they are",
         ),
         (_, 0) => (Status::Good, "Everything that can be rewritten is rewritten"),
         _ => (Status::Warning, "Rewritten, but look at what was refused or flagged before the program runs"),
     };
     let mut reasons = vec![coverage(plan)];
-    if let Some((sigma, rms)) = unsure {
+    if left > 0 {
         reasons.push(format!(
-            "the predicted 1σ of {sigma:.3} mm exceeds the deviation that it corrects, {rms:.3} mm RMS: the model does not \
-             know enough here to say that the correction helps"
+            "{left} of {cuts} cuts stay as they are, since the correction makes them worse with a larger probability than \
+             --max-risk takes"
         ));
     }
+    reasons.extend(placement::chance(plan));
     if refused > 0 && written > 0 {
         reasons.push(
             "a refused motion goes where it always went: between it and its rewritten neighbours the path steps by the \
@@ -328,24 +355,6 @@ pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
     Verdict::new(status, headline, reasons)
 }
 
-/// Where the model's uncertainty exceeds what it corrects, both as root mean squares over the lines and arcs that are
-/// rewritten (mm).
-fn unsure(plan: &Plan, listing: &Listing) -> Option<(f64, f64)> {
-    let cuts = |o: &&MotionOutcome| {
-        let kind = listing.motions.get(o.motion as usize).map(|motion| motion.kind);
-        matches!(kind, Some(MotionKind::Linear | MotionKind::Circular))
-            && matches!(o.status, Fate::Changed | Fate::Flagged)
-    };
-    let squares =
-        plan.outcomes.iter().filter(cuts).filter_map(|o| Some((o.sigma_mm?.powi(2), o.before_mm?.powi(2))));
-    let (mut count, mut sigma, mut before) = (0_usize, 0.0, 0.0);
-    for (s, b) in squares {
-        (count, sigma, before) = (count + 1, sigma + s, before + b);
-    }
-    let rms = |sum: f64| (sum / count as f64).sqrt();
-    (count > 0 && rms(sigma) > rms(before)).then(|| (rms(sigma), rms(before)))
-}
-
 fn count_why(plan: &Plan, is: impl Fn(&Why) -> bool) -> usize {
     plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
 }
@@ -369,14 +378,24 @@ fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
     figures.push(
         KeyFigure::new("Largest before", worst(|o| o.before_mm, |_| true), 3, "mm").note("all motions"),
     );
-    figures.push(
-        KeyFigure::new("Predicted remainder", worst(|o| o.after_mm, rewritten), 4, "mm")
-            .note("largest of the rewritten motions"),
-    );
-    figures.push(
-        KeyFigure::new("Predicted 1σ", worst(|o| o.sigma_mm, rewritten), 3, "mm")
-            .note("largest of the rewritten motions"),
-    );
+    let shape = placement::leads_with_shape(plan);
+    let sigma = move |o: &MotionOutcome| if shape { o.shape_sigma_mm } else { o.sigma_mm };
+    let expected = plan
+        .outcomes
+        .iter()
+        .filter(|o| rewritten(o.status))
+        .filter_map(|o| Some(o.after_mm?.hypot(sigma(o)?)))
+        .reduce(f64::max);
+    figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(if shape {
+        "of the shape, 1σ: largest of the rewritten motions"
+    } else {
+        "1σ: largest of the rewritten motions"
+    }));
+    if let Some(chance) = plan.chance_of_worse {
+        figures.push(
+            KeyFigure::new("Chance to be worse", 100.0 * chance, 1, "%").note("the corrected cuts together"),
+        );
+    }
     figures
 }
 
@@ -473,6 +492,9 @@ fn kind(why: &Why) -> (String, Option<(f64, &'static str)>) {
         )),
         Why::Step { mm, .. } => {
             sized("the step to a motion of the same cut that stays exceeds --tolerance".to_owned(), mm, "mm")
+        }
+        Why::Risk { chance } => {
+            sized("the correction may well make the cut worse (--max-risk)".to_owned(), 100.0 * chance, "%")
         }
         Why::NotCovered { ratio } => sized("no measured pose is near".to_owned(), ratio, "×"),
         Why::Uncertain { sigma_mm } => sized("the model is uncertain here".to_owned(), sigma_mm, "mm σ"),

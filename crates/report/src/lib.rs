@@ -21,6 +21,7 @@ pub mod diagnosis;
 pub mod study;
 pub mod tracking;
 pub mod deviation;
+pub mod placement;
 pub mod compensation;
 pub mod batch;
 pub mod robots;

@@ -36,7 +36,9 @@ pub(super) fn written(
     let wandered = discrepancy.filter(|d| d.in_time());
     let kept =
         if kept.len() == extended.causes.len() { extended.clone() } else { refit(subject, &kept, extended) };
-    let tolerance = learned(&Tolerance::default(), &kept.parameters, &kept.priors, &kept.estimate);
+    let wide = subject.tolerance;
+    let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
+    let tolerance = learned(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
     wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held)
 }

@@ -1,5 +1,6 @@
 //! Tests of `identification`.
 
 mod calibration;
+mod prior_width;
 mod promise;
 mod verdict;

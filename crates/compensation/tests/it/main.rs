@@ -6,6 +6,7 @@
 mod cut;
 mod path;
 mod payload;
+mod placement;
 mod play;
 mod reasons;
 mod singular;

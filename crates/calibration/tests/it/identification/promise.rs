@@ -138,7 +138,7 @@ impl Case {
 
 fn identified(dataset: &Dataset, robot: &str, nominal: &Model) -> Option<Identification> {
     let options = Options {
-        tolerance: Tolerance::default(),
+        tolerance: Tolerance { learned: true, ..Tolerance::default() },
         solver: &SOLVERS[0],
         held_out: 0.2,
         seed: 0,

@@ -1,0 +1,231 @@
+//! Shape and place of a path apart, and the chance that a cut gets worse: against arms drawn from the model's covariance.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::{LinkCoordinate, Parameter};
+use truegrind_compensation::cell::Cell;
+use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
+use truegrind_compensation::placement::Placement;
+use truegrind_compensation::rewrite::{Options, Plan};
+use truegrind_compensation::risk::CutRisk;
+use truegrind_compensation::why::Why;
+
+use super::{blade, estimated, nominal, perturbed, rewritten, run_on, worst};
+
+/// A model that is right, of which the data did not see where joint 1 has its zero.
+fn placed_somewhere(seed: u64, joints: &[Joints]) -> Estimated {
+    let mut known = estimated(perturbed(seed, 1.0), joints);
+    let turn = Parameter::Link { joint: 0, coordinate: LinkCoordinate::Theta };
+    let k = known.order.iter().position(|p| *p == turn).unwrap();
+    known.covariance[(k, k)] = 0.02_f64.powi(2);
+    known
+}
+
+fn with(placement: Placement) -> Options {
+    Options { placement, ..Options::default() }
+}
+
+/// The part of displacements that a rigid motion of the points explains.
+fn rigid(points: &[Vector3<f64>]) -> DMatrix<f64> {
+    let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let mut motions = DMatrix::zeros(3 * points.len(), 6);
+    for (k, p) in points.iter().enumerate() {
+        motions.view_mut((3 * k, 0), (3, 3)).copy_from(&Matrix3::identity());
+        motions.view_mut((3 * k, 3), (3, 3)).copy_from(&(-((p - centre) / 100.0).cross_matrix()));
+    }
+    let basis = motions.svd(true, false).u.unwrap();
+    &basis * basis.transpose()
+}
+
+fn cut_points(report: &PathReport) -> Vec<&PathPoint> {
+    report.points.iter().filter(|p| p.cutting).collect()
+}
+
+fn deviations(points: &[&PathPoint], after: bool) -> DVector<f64> {
+    let of = |p: &&PathPoint| if after { p.after.unwrap() } else { p.before.unwrap() };
+    DVector::from_iterator(3 * points.len(), points.iter().flat_map(|p| of(p).vector_mm.as_slice().to_vec()))
+}
+
+#[test]
+fn a_place_that_is_not_known_stays_and_the_shape_is_corrected() {
+    let (source, joints) = blade();
+    for seed in 0..3 {
+        let known = placed_somewhere(seed, &joints);
+        let (plan, program) = rewritten(&source, &known, &Cell::default(), &with(Placement::Auto));
+        let [placement] = plan.placements.as_slice() else { panic!("{:?}", plan.placements) };
+        assert_eq!(placement.taken, Placement::Shape);
+        assert!(placement.sigma_mm > placement.off_mm && !placement.taught);
+        let report = run_on(&known.model, &source, &program, &Cell::default());
+        let points = cut_points(&report);
+        let places: Vec<Vector3<f64>> = points.iter().map(|p| p.intended.translation.vector).collect();
+        let projector = rigid(&places);
+        let (before, after) = (deviations(&points, false), deviations(&points, true));
+        // What is left is where the path as a whole lay, and nothing of its shape.
+        let shape = |d: &DVector<f64>| (d - &projector * d).amax();
+        assert!(shape(&before) > 0.02, "{}", shape(&before));
+        assert!(shape(&after) < 2e-3, "{}", shape(&after));
+        let moved = (&projector * &before - &after).amax();
+        assert!(moved < 5e-3, "the place moved by {moved} mm");
+        assert!(
+            (after.norm() / (points.len() as f64).sqrt() - placement.off_mm).abs() < 0.02 * placement.off_mm
+        );
+    }
+}
+
+#[test]
+fn a_place_that_is_known_is_corrected_and_can_be_asked_for() {
+    let (source, joints) = blade();
+    for (known, placement) in [
+        (estimated(perturbed(1, 1.0), &joints), Placement::Auto),
+        (placed_somewhere(1, &joints), Placement::Absolute),
+    ] {
+        let options = Options { max_risk: 1.0, ..with(placement) };
+        let (plan, program) = rewritten(&source, &known, &Cell::default(), &options);
+        assert_eq!(plan.placements[0].taken, Placement::Absolute);
+        let report = run_on(&known.model, &source, &program, &Cell::default());
+        assert!(worst(&report, true) < 5e-4, "{}", worst(&report, true));
+    }
+}
+
+/// Arms about the estimated one as its covariance has them, of covariance F Fᵀ.
+struct Drawn {
+    known: Estimated,
+    factor: DMatrix<f64>,
+    random: ChaCha8Rng,
+}
+
+impl Drawn {
+    /// Uncertain by some hundredths of a millimetre, more or less in each direction.
+    fn about(seed: u64, joints: &[Joints], scale: f64) -> Self {
+        let mut known = estimated(perturbed(seed, 0.15), joints);
+        let n = known.order.len();
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut factor = DMatrix::from_fn(n, n, |_, _| random.random_range(-1.0..1.0) * scale);
+        for (k, parameter) in known.order.iter().enumerate() {
+            let Parameter::Link { coordinate, .. } = parameter else { continue };
+            factor.row_mut(k).scale_mut(if coordinate.is_length() { 0.02 } else { 5e-5 });
+        }
+        known.covariance = &factor * factor.transpose();
+        Self { known, factor, random }
+    }
+
+    fn arm(&mut self) -> Model {
+        let z = DVector::from_fn(self.factor.ncols(), |_, _| StandardNormal.sample(&mut self.random));
+        let by: DVector<f64> = &self.factor * z;
+        let mut model = self.known.model.clone();
+        for (parameter, by) in self.known.order.iter().zip(by.iter()) {
+            let Parameter::Link { joint, coordinate } = *parameter else { continue };
+            let link = &mut model.links[joint];
+            link.set(coordinate, link.get(coordinate) + by);
+        }
+        model
+    }
+}
+
+/// Where an arm has the tool at the motions of a cut.
+fn reached(model: &Model, plan: &Plan, cut: &CutRisk) -> (Vec<Vector3<f64>>, DVector<f64>) {
+    let arm = model.at_condition(&truegrind_arm::condition::Condition::default());
+    assert_eq!(plan.points.len(), plan.outcomes.len(), "every motion has a pose");
+    let of = |motion: &u32| {
+        let p = &plan.points[*motion as usize];
+        (arm.forward(&p.joints_before.unwrap()) * p.flange_from_tool).translation.vector
+    };
+    let all: Vec<Vector3<f64>> = cut.motions.iter().map(of).collect();
+    let values = all.iter().flat_map(|v| v.as_slice().to_vec()).collect::<Vec<f64>>();
+    (all, DVector::from_vec(values))
+}
+
+#[test]
+fn the_sigma_of_the_shape_is_the_scatter_of_arms_that_are_drawn() {
+    let (source, joints) = blade();
+    let mut drawn = Drawn::about(4, &joints, 1.0);
+    let options = Options { max_risk: 1.0, ..with(Placement::Shape) };
+    let (plan, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
+    assert!(plan.cuts.len() > 5);
+    let arms: Vec<Model> = (0..300).map(|_| drawn.arm()).collect();
+    for cut in plan.cuts.iter().step_by(3) {
+        let (places, middle) = reached(&drawn.known.model, &plan, cut);
+        let projector = rigid(&places);
+        let mut squares = DVector::zeros(middle.len());
+        for arm in &arms {
+            let off = reached(arm, &plan, cut).1 - &middle;
+            let shape = &off - &projector * &off;
+            squares += shape.component_mul(&shape);
+        }
+        let found = (squares.sum() / arms.len() as f64 / places.len() as f64).sqrt();
+        assert!((found / cut.shape_sigma_mm - 1.0).abs() < 0.12, "{found} against {}", cut.shape_sigma_mm);
+        for (k, motion) in cut.motions.iter().enumerate().step_by(7) {
+            let said = plan.outcomes[*motion as usize].shape_sigma_mm.unwrap();
+            let found = (squares.rows(3 * k, 3).sum() / arms.len() as f64).sqrt();
+            assert!((found / said - 1.0).abs() < 0.25, "motion {motion}: {found} against {said}");
+        }
+    }
+}
+
+#[test]
+fn the_chance_that_a_cut_gets_worse_is_the_share_of_drawn_arms_on_which_it_does() {
+    let (source, joints) = blade();
+    for (placement, scale) in [(Placement::Shape, 0.7), (Placement::Absolute, 3.0)] {
+        let mut drawn = Drawn::about(7, &joints, scale);
+        let options = Options { max_risk: 1.0, ..with(placement) };
+        let (plan, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
+        let arms: Vec<Model> = (0..400).map(|_| drawn.arm()).collect();
+        let telling: Vec<&CutRisk> = plan.cuts.iter().filter(|c| (0.02..0.45).contains(&c.chance)).collect();
+        let chances: Vec<f64> = plan.cuts.iter().map(|c| c.chance).collect();
+        assert!(telling.len() > 2, "{placement:?}: {chances:?} show nothing");
+        for cut in telling {
+            let (places, estimate) = reached(&drawn.known.model, &plan, cut);
+            let (_, told) = reached(&nominal(), &plan, cut);
+            let projector = rigid(&places);
+            let counts = |d: DVector<f64>| {
+                if placement == Placement::Shape { &d - &projector * &d } else { d }
+            };
+            let worse = arms.iter().filter(|arm| {
+                let truth = reached(arm, &plan, cut).1;
+                counts(&truth - &estimate).norm() > counts(&truth - &told).norm()
+            });
+            let share = worse.count() as f64 / arms.len() as f64;
+            let sigma = (cut.chance * (1.0 - cut.chance) / arms.len() as f64).sqrt();
+            assert!(
+                (share - cut.chance).abs() < 3.5 * sigma + 0.01,
+                "{placement:?}: {share} against {}",
+                cut.chance
+            );
+        }
+    }
+}
+
+/// The class: a correction that is as likely to follow the noise of the measurement as the arm.
+#[test]
+fn a_cut_that_would_too_likely_get_worse_is_left_whole_with_that_reason() {
+    let (source, joints) = blade();
+    let drawn = Drawn::about(7, &joints, 2.0);
+    let (plan, program) = rewritten(&source, &drawn.known, &Cell::default(), &with(Placement::Shape));
+    let left: Vec<&CutRisk> = plan.cuts.iter().filter(|cut| cut.left).collect();
+    assert!(left.len() > 3, "{:?}", plan.cuts.iter().map(|c| c.chance).collect::<Vec<_>>());
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).lines().map(str::to_owned).collect::<Vec<_>>();
+    let (before, after) = (text(&source), text(&program));
+    let task = truegrind_programs::rapid::Task::read(&[("p.mod", source.as_slice())]);
+    for cut in &left {
+        assert!(cut.chance > 0.1);
+        for motion in &cut.motions {
+            let outcome = &plan.outcomes[*motion as usize];
+            assert_eq!(
+                (outcome.status, outcome.reason),
+                (Status::Left, Some(Why::Risk { chance: cut.chance }))
+            );
+            let line = &before[task.listing.motions[*motion as usize].place.line as usize - 1];
+            assert!(after.contains(line), "{line}");
+        }
+    }
+    // A larger chance may be taken.
+    let largest = left.iter().map(|cut| cut.chance).fold(0.0, f64::max);
+    let options = Options { max_risk: largest + 0.01, ..with(Placement::Shape) };
+    let (taken, _) = rewritten(&source, &drawn.known, &Cell::default(), &options);
+    assert!(taken.outcomes.iter().all(|outcome| !matches!(outcome.reason, Some(Why::Risk { .. }))));
+    assert!(taken.chance_of_worse.unwrap() < 0.5);
+}

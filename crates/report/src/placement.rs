@@ -1,0 +1,138 @@
+//! What is said of the place of a path, and of the chance that cuts get worse.
+
+use serde_json::{Value, json};
+
+use super::table::{Cell, Column, Table};
+use truegrind_compensation::placement::{ObjectPlacement, Placement};
+use truegrind_compensation::rewrite::Plan;
+use truegrind_compensation::risk::CutRisk;
+use truegrind_programs::motion::Listing;
+
+/// Cuts that are named one by one.
+const NAMED: usize = 12;
+
+fn word(placement: Placement) -> &'static str {
+    match placement {
+        Placement::Shape => "shape",
+        _ => "absolute",
+    }
+}
+
+/// One sentence for each work object: what was corrected of it and why, and what would make its place known.
+pub fn sentences(plan: &Plan) -> Vec<String> {
+    plan.placements.iter().map(sentence).collect()
+}
+
+fn sentence(placement: &ObjectPlacement) -> String {
+    let ObjectPlacement { work_object, taken, off_mm, sigma_mm, taught } = placement;
+    let known = format!(
+        "the path as a whole lies {off_mm:.3} mm from where it is meant, which the model knows to ± {sigma_mm:.3} mm (1σ)"
+    );
+    if *taken == Placement::Absolute {
+        return format!("work object {work_object}: shape and place are corrected; {known}");
+    }
+    let remedy = if *taught {
+        "to correct its place too, measure with the target beside the axis of joint 6, at more orientations of the wrist"
+    } else {
+        "to correct its place too, touch three points of the work object with this arm and give their joints (cell file, origin \
+         = \"taught\"), or state where the sensor stands (--sensor-frame with --frame-sigma); --placement absolute corrects it \
+         all the same"
+    };
+    format!(
+        "work object {work_object}: the shape is corrected, the path stays where it is; {known}; {remedy}"
+    )
+}
+
+/// The cuts, those first whose correction is most likely to make them worse; `None` where none is known.
+pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
+    if plan.cuts.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(
+        "Cuts, by the chance that the correction makes them worse",
+        vec![
+            Column::text("lines", "Lines"),
+            Column::count("motions", "Motions"),
+            Column::text("judged", "Judged"),
+            Column::number("off_mm", "before", "mm", 3),
+            Column::number("sigma_mm", "1σ", "mm", 3),
+            Column::number("worse_percent", "worse", "%", 1),
+            Column::text("fate", ""),
+        ],
+    );
+    let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
+    order.sort_by(|a, b| b.chance.total_cmp(&a.chance));
+    for cut in order.iter().take(NAMED) {
+        table.push([
+            lines(cut, listing).into(),
+            cut.motions.len().into(),
+            word(cut.judged).into(),
+            cut.off_mm.into(),
+            cut.sigma_mm.into(),
+            (100.0 * cut.chance).into(),
+            if cut.left { "left as it is".into() } else { Cell::Missing },
+        ]);
+    }
+    let more = order.len().saturating_sub(NAMED);
+    if more > 0 {
+        table.notes.push(format!("{more} more cuts with a smaller chance are not listed."));
+    }
+    table.notes.push(
+        "before: how far the cut is off as it is, RMS (judged by its shape: after its best rigid registration). 1σ: predicted \
+         standard deviation of its correction. worse: probability that the corrected cut is farther off than the cut as it is."
+            .to_owned(),
+    );
+    Some(table)
+}
+
+fn lines(cut: &CutRisk, listing: &Listing) -> String {
+    let line =
+        |motion: Option<&u32>| motion.and_then(|m| listing.motions.get(*m as usize)).map(|m| m.place.line);
+    match (line(cut.motions.first()), line(cut.motions.last())) {
+        (Some(first), Some(last)) if first != last => format!("{first}–{last}"),
+        (Some(first), _) => first.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// How many cuts stay since their correction may well make them worse, of how many.
+pub fn left(plan: &Plan) -> (usize, usize) {
+    (plan.cuts.iter().filter(|cut| cut.left).count(), plan.cuts.len())
+}
+
+/// Predicted 1σ that counts for a motion: of the shape where its cut is judged by that, else of its place.
+pub fn leads_with_shape(plan: &Plan) -> bool {
+    plan.placements.iter().any(|placement| placement.taken == Placement::Shape)
+}
+
+/// The chance that what is written gets worse, in words; `None` where nothing is known of it.
+pub fn chance(plan: &Plan) -> Option<String> {
+    let percent = 100.0 * plan.chance_of_worse?;
+    let largest = plan.cuts.iter().filter(|cut| !cut.left).map(|cut| cut.chance).fold(0.0, f64::max);
+    let of = |percent: f64| match percent {
+        p if p < 0.1 => "under 0.1 %".to_owned(),
+        p => format!("{p:.1} %"),
+    };
+    Some(format!(
+        "the probability that the corrected cuts are farther off than the cuts as they were is {}, of any one of them at most {}",
+        of(percent),
+        of(100.0 * largest)
+    ))
+}
+
+/// What of it the contract holds.
+pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
+    let placements = plan.placements.iter().map(|p| {
+        json!({
+            "work_object": p.work_object, "corrected": word(p.taken), "off_mm": p.off_mm, "sigma_mm": p.sigma_mm,
+            "taught": p.taught,
+        })
+    });
+    let cuts = plan.cuts.iter().map(|cut| {
+        json!({
+            "lines": lines(cut, listing), "motions": cut.motions.len(), "judged": word(cut.judged), "off_mm": cut.off_mm,
+            "sigma_mm": cut.sigma_mm, "shape_sigma_mm": cut.shape_sigma_mm, "chance_of_worse": cut.chance, "left": cut.left,
+        })
+    });
+    [placements.collect(), cuts.collect()]
+}
