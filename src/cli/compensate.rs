@@ -202,6 +202,10 @@ pub(super) struct Arguments {
     /// Rewrite joint targets (MoveAbsJ) too.
     #[arg(long)]
     joint_targets: bool,
+    /// Flag each motion whose configuration is stated but not checked (ConfL \Off, ConfJ \Off) and which starts where the text
+    /// does not tell; without it a note says where such ways begin.
+    #[arg(long)]
+    flag_open_starts: bool,
     #[command(flatten)]
     cell: CellArguments,
     /// Plan and report, write no program.
@@ -327,6 +331,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         tolerance_mm: arguments.tolerance,
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
+        open_starts: arguments.flag_open_starts,
         cuts: if arguments.partial { Cuts::Partial } else { Cuts::Whole },
         condition,
         points: jobs.len() == 1 && arguments.outputs.of_points(),

@@ -28,6 +28,7 @@ pub mod untouched;
 pub mod undeclared;
 mod effort;
 mod circumstance;
+mod wrist;
 mod course;
 mod solve;
 mod mountings;

@@ -213,6 +213,7 @@ fn verbs() -> Vec<Verb> {
                 "--tolerance",
                 "--max-correction",
                 "--joint-targets",
+                "--flag-open-starts",
                 "--partial",
                 "--dry-run",
                 "--check",
