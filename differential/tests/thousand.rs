@@ -15,6 +15,16 @@ fn a_thousand_corrected_executions_of_each_language_agree() {
     assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
+/// The class: a displacement that counts from where the robot stands. What stood there before must go on standing there, on
+/// every way that leads to it.
+#[test]
+fn displacements_from_where_the_robot_stands_agree() {
+    let all = report::many(&[Dialect::Rapid], 9_000_000, 400, Features::MORE);
+    let wrong: Vec<String> =
+        all.iter().flat_map(|one| &one.1.disagreements).map(ToString::to_string).collect();
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
 /// Programs in which original and correction once disagreed: units, shifts, tools and increments in doubt where ways meet; a
 /// shift of G92 under radius compensation; a whole circle with play; a joint that seemed to turn near the end of a line; a
 /// tool taught at poses whose least squares came out wrong; joints with play that turn where the wrist goes by itself, or on

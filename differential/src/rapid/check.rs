@@ -22,11 +22,15 @@ pub struct Features {
     pub taught: bool,
     /// Targets near limits and singularities.
     pub borders: bool,
+    /// Displacements that count from where the robot stands, whichever way it came.
+    pub placed: bool,
 }
 
 impl Features {
+    /// Everything but what came later: a seed stands for the same program as ever.
+    pub const ALL: Features = Features { effects: true, taught: true, borders: true, placed: false };
     /// Everything.
-    pub const ALL: Features = Features { effects: true, taught: true, borders: true };
+    pub const MORE: Features = Features { placed: true, ..Features::ALL };
 }
 
 /// Both programs of a seed, as they are given to the interpreter, with what was seen.
