@@ -1,5 +1,5 @@
 //! `cargo run --release -p truegrind-differential --example differential -- COUNT [--seed S] [--only LANGUAGE] [--one N]
-//! [--without effects,taught,borders] [--show N]`
+//! [--without effects,taught,borders] [--with placed] [--show N]`
 //!
 //! COUNT corrected executions in all, over all languages or one. Ends with 1 where anything disagrees.
 
@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         effects: !left_out.contains("effects"),
         taught: !left_out.contains("taught"),
         borders: !left_out.contains("borders"),
+        placed: value("--with").unwrap_or("").contains("placed"),
     };
     let seed = number("--seed").unwrap_or(0);
     if let Some(one) = number("--one") {

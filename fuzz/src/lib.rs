@@ -5,15 +5,15 @@ mod workbook;
 
 use std::sync::LazyLock;
 
-use truegrind::compensation::cell::{Cell, taught_frame, taught_tcp};
-use truegrind::compensation::compensate::{CompensateError, compensate};
-use truegrind::papers::experiment::Experiment;
-use truegrind::compensation::deviation::Status;
-use truegrind::compensation::rewrite::Options as Bounds;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Joints;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
+use truegrind::compensation::cell::{Cell, taught_frame, taught_tcp};
+use truegrind::compensation::compensate::{CompensateError, compensate};
+use truegrind::compensation::deviation::Status;
+use truegrind::compensation::rewrite::Options as Bounds;
+use truegrind::papers::experiment::Experiment;
 use truegrind::programs::rapid::task_list;
 use truegrind::robots;
 use truegrind::surfaces::mesh::{Mesh, MeshOptions};
@@ -170,7 +170,8 @@ fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
 pub fn xlsx(bytes: &[u8]) {
     let mut book = workbook::of(bytes);
     if bytes.len() % 8 == 7 && !book.is_empty() {
-        let at = bytes.iter().fold(0_usize, |sum, byte| sum.wrapping_mul(31).wrapping_add(usize::from(*byte)));
+        let at =
+            bytes.iter().fold(0_usize, |sum, byte| sum.wrapping_mul(31).wrapping_add(usize::from(*byte)));
         let length = book.len();
         book[at % length] ^= 1 << (at % 8);
     }

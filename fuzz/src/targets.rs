@@ -85,7 +85,9 @@ fn unescaped(line: &str) -> Vec<u8> {
         rest = &rest[at + 1..];
         let plain = [("n", b'\n'), ("r", b'\r'), ("t", b'\t')];
         let hex = rest.strip_prefix("u{").and_then(|hex| hex.split_once('}'));
-        if let Some((code, after)) = hex.and_then(|(h, after)| Some((u32::from_str_radix(h, 16).ok()?, after))) {
+        if let Some((code, after)) =
+            hex.and_then(|(h, after)| Some((u32::from_str_radix(h, 16).ok()?, after)))
+        {
             match u8::try_from(code) {
                 Ok(byte) => out.push(byte),
                 Err(_) => out.extend(char::from_u32(code).map(|c| c.to_string()).unwrap_or_default().bytes()),
@@ -95,7 +97,10 @@ fn unescaped(line: &str) -> Vec<u8> {
             plain.iter().find_map(|(name, byte)| Some((name, *byte, rest.strip_prefix(name)?)))
         {
             // `\Rz` is a word of RAPID, `\n` at the end of a word is the end of a line.
-            if after.is_empty() || after.starts_with(['\\', ' ']) || after.starts_with(|c: char| !c.is_alphanumeric()) {
+            if after.is_empty()
+                || after.starts_with(['\\', ' '])
+                || after.starts_with(|c: char| !c.is_alphanumeric())
+            {
                 out.push(byte);
                 rest = after;
             } else {

@@ -221,6 +221,10 @@ pub(super) struct Arguments {
     /// Rewrite joint targets (MoveAbsJ) too.
     #[arg(long)]
     joint_targets: bool,
+    /// Flag each motion whose configuration is stated but not checked (ConfL \Off, ConfJ \Off) and which starts where the text
+    /// does not tell; without it a note says where such ways begin.
+    #[arg(long)]
+    flag_open_starts: bool,
     #[command(flatten)]
     cell: CellArguments,
     /// Plan and report, write no program.
@@ -349,6 +353,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         tolerance_mm: arguments.tolerance,
         max_correction_mm: arguments.max_correction,
         joint_targets: arguments.joint_targets,
+        open_starts: arguments.flag_open_starts,
         cuts: if arguments.partial { Cuts::Partial } else { Cuts::Whole },
         placement: match arguments.placement {
             PlacementArgument::Auto => Placement::Auto,

@@ -7,3 +7,4 @@ mod command;
 mod programs;
 mod layers;
 mod keys;
+mod keys_of_runs;

@@ -153,7 +153,9 @@ impl Circle {
         };
         let inner = || (1..).zip(&corners[1..count]);
         let extra = (!inner().any(leap)).then(|| inner().map(corner).collect());
-        most.is_finite().then_some((extra, most + CHORD_MM))
+        // More pieces turn where the arc does.
+        let left = if path.ends_as_told(count, &motor, arms) { most + CHORD_MM } else { f64::INFINITY };
+        most.is_finite().then_some((extra, left))
     }
 }
 

@@ -9,13 +9,14 @@
 //! motor alone turns. What stays as it was told leaves a link that turns by less than its play between its flanks.
 //!
 //! Lines and arcs are sampled between their ends, and a parabola through neighbouring samples tells where between them
-//! a joint turned. Where the text leaves open how the joints go (rapid motions of NC; lines of which the wrist goes joint
-//! by joint; lines written as joints or cut by targets that are put in), each way is followed, and a side is known where
-//! they agree.
+//! a joint turned. Where the text leaves open how the joints go (rapid motions of NC; lines and arcs of which the wrist goes
+//! joint by joint; lines written as joints or cut by targets that are put in), each way is followed, and a side is known
+//! where they agree.
 
 use super::curve::Curve;
 use super::effort;
 use super::mounting::Mounting;
+use super::wrist;
 use truegrind_arm::inverse::Inverse;
 use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
@@ -216,6 +217,7 @@ pub(super) fn courses(
 ) -> Vec<Course> {
     let half = play_rad.map(|play| 0.5 * play.abs());
     let (ways, passes) = sampled(stops, before, nominal, &half, mounting);
+    let by_wrist = by_wrist(stops, before, nominal, &half, mounting);
     let mut tracks: Vec<Option<[Track; 6]>> = Vec::with_capacity(stops.len());
     let mut out = Vec::with_capacity(stops.len());
     for (m, stop) in stops.iter().enumerate() {
@@ -235,18 +237,20 @@ pub(super) fn courses(
                     std::array::from_fn(|j| Track::unknown(at[j], half[j]))
                 });
                 here.iter_mut().for_each(|t| t.since = 0.0);
-                let mut way: Vec<(f64, Joints)> = Vec::new();
-                way.extend(start.map(|joints| (0.0, joints)));
-                match &ways[m] {
-                    Some(samples) => way.extend(samples),
-                    // The arm cannot go along the path: how it comes to the end is not known.
-                    None => {
-                        here = std::array::from_fn(|j| Track::unknown(reached.joints[j], half[j]));
-                        way.clear();
-                    }
+                let mut along: Vec<Sampled> = Vec::new();
+                for samples in std::iter::once(&ways[m]).chain(&by_wrist[m]) {
+                    let begin = start.map(|joints| (0.0, joints));
+                    along.extend(
+                        samples.as_ref().map(|inner| begin.into_iter().chain(inner.clone()).collect()),
+                    );
                 }
-                course.via = passing(here, reached, &way, passes[m]);
-                (course.turns, here) = arrive(here, reached, &way);
+                if along.len() < 1 + by_wrist[m].iter().count() {
+                    // The arm cannot go along the path: how it comes to the end is not known.
+                    here = std::array::from_fn(|j| Track::unknown(reached.joints[j], half[j]));
+                    along = vec![Vec::new()];
+                }
+                course.via = agreed(along.iter().map(|way| passing(here, reached, way, passes[m])));
+                (course.turns, here) = arrive(here, reached, &along);
                 course.end = here.map(|t| t.side);
                 for joint in (0..6).filter(|&joint| doubted.get(m).is_some_and(|doubted| doubted[joint])) {
                     course.forget(joint);
@@ -297,6 +301,59 @@ fn sampled(
         rough.retain(|m| !settled(m, &ways[*m]));
     }
     (ways, samples.passes)
+}
+
+/// The samples of motions on which the wrist may be interpolated by itself, nothing for all others; none where the arm cannot
+/// go so.
+fn by_wrist(
+    stops: &[Stop<'_>],
+    before: &[Option<u32>],
+    nominal: &Inverse<'_>,
+    half: &[f64; 6],
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> Vec<Option<Option<Sampled>>> {
+    let of = |(stop, before): (&Stop<'_>, &Option<u32>)| {
+        let (Some(Stop::At(from)), Stop::At(to)) = (before.and_then(|from| stops.get(from as usize)), stop)
+        else {
+            return None;
+        };
+        let wrist = to.motion.modal.wrist_interpolation != Switch::Off;
+        let (curve, within) = Some((from, to)).filter(|_| wrist).and_then(|_| path(from, to, mounting))?;
+        let ends = [&from.joints, &to.joints];
+        let mut count = pieces_of(&curve);
+        loop {
+            let way = wrist::along(nominal.arm(), &within, &curve, ends, count, MOST_STEP_RAD);
+            let settled = |way: &Sampled| agrees(&from.joints, way, &to.joints, half);
+            if count >= MOST_REFINED || way.as_ref().is_some_and(settled) {
+                return Some(way);
+            }
+            count = (4 * count).min(MOST_REFINED);
+        }
+    };
+    stops.iter().zip(before).map(of).collect()
+}
+
+/// The path of a motion that goes along one, in its object, with its tool and object.
+fn path(
+    from: &Reached<'_>,
+    to: &Reached<'_>,
+    mounting: &dyn Fn(usize) -> Mounting,
+) -> Option<(Curve, Mounting)> {
+    if !to.ways().0 {
+        return None;
+    }
+    // The path is one of the tool and in the object of the motion, also where it begins under others.
+    let within = mounting(to.mounted);
+    let mut begin = from.told;
+    if from.mounted != to.mounted {
+        begin = within.target_of(&mounting(from.mounted).flange_for(&from.told));
+    }
+    let curve = match (to.motion.kind, to.via) {
+        (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.told, to.motion),
+        (MotionKind::Circular, None) => None,
+        _ => Some(Curve::line(begin, to.told)),
+    };
+    Some((curve?, within))
 }
 
 /// Whether every other sample of a way tells of the same turns as all of them, for joints with play, and of none near its
@@ -353,9 +410,17 @@ fn turns(way: &[(f64, f64)]) -> Vec<(i8, f64)> {
 /// From each share of the way on, from which side each joint comes.
 type Turns = Vec<(f64, Sides)>;
 
-/// Takes all joints to the end of a motion, by every way that it may go. `way`: its start and the samples between.
-fn arrive(start: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)]) -> (Turns, [Track; 6]) {
+/// The sides on which all ways agree.
+fn agreed(mut sides: impl Iterator<Item = Sides>) -> Sides {
+    let first = sides.next().unwrap_or([0; 6]);
+    sides.fold(first, |all, one| std::array::from_fn(|j| if all[j] == one[j] { all[j] } else { 0 }))
+}
+
+/// Takes all joints to the end of a motion, by every way that it may go. `ways`: its start and the samples between, along
+/// the path and, where it may go so, with a wrist that goes by itself.
+fn arrive(start: [Track; 6], reached: &Reached<'_>, ways: &[Sampled]) -> (Turns, [Track; 6]) {
     let (path, straight) = reached.ways();
+    let way = ways[0].as_slice();
     let path = path && way.len() > 1;
     let mut found: Option<(Turns, [Track; 6])> = None;
     let mut add = |turns: Turns, end: [Track; 6]| match &mut found {
@@ -375,7 +440,7 @@ fn arrive(start: [Track; 6], reached: &Reached<'_>, way: &[(f64, Joints)]) -> (T
         add(turns, tracks);
     };
     if path {
-        once(way);
+        ways.iter().for_each(|way| once(way));
     }
     if straight || !path {
         once(&way[..way.len().min(1)]);
@@ -551,28 +616,14 @@ impl Samples {
     ) {
         let mut passes = 0.5;
         if let (Some(Stop::At(from)), Stop::At(to)) = (from, stop)
-            && to.ways().0
+            && let Some((curve, within)) = path(from, to, mounting)
         {
-            // The path is one of the tool and in the object of the motion, also where it begins under others.
-            let within = mounting(to.mounted);
-            let mut begin = from.told;
-            if from.mounted != to.mounted {
-                begin = within.target_of(&mounting(from.mounted).flange_for(&from.told));
-            }
-            let curve = match (to.motion.kind, to.via) {
-                (MotionKind::Circular, Some(via)) => Curve::round(begin, &via, to.told, to.motion),
-                (MotionKind::Circular, None) => None,
-                _ => Some(Curve::line(begin, to.told)),
-            };
-            if let Some(curve) = curve {
-                passes = to.via.map_or(passes, |via| curve.passes(&via));
-                let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
-                let pieces = (density * pieces(curve.length_mm(), turn)).min(MOST_REFINED);
-                for k in 1..pieces {
-                    let s = k as f64 / pieces as f64;
-                    self.shares.push(s);
-                    self.flanges.push(within.flange_for(&curve.at(s)));
-                }
+            passes = to.via.map_or(passes, |via| curve.passes(&via));
+            let pieces = (density * pieces_of(&curve)).min(MOST_REFINED);
+            for k in 1..pieces {
+                let s = k as f64 / pieces as f64;
+                self.shares.push(s);
+                self.flanges.push(within.flange_for(&curve.at(s)));
             }
         }
         let joints = |stop: Option<&Stop<'_>>| match stop {
@@ -614,6 +665,11 @@ impl Samples {
         );
         portions.into_iter().flatten().collect()
     }
+}
+
+fn pieces_of(curve: &Curve) -> usize {
+    let turn = curve.turn_rad().max(curve.arc().map_or(0.0, |arc| arc.sweep));
+    pieces(curve.length_mm(), turn)
 }
 
 /// Pieces of a path: at least two, so that one sample tells of a joint that turns half way; four and an even number where

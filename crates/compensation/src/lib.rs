@@ -34,6 +34,7 @@ mod assessment;
 mod probability;
 mod effort;
 mod circumstance;
+mod wrist;
 mod course;
 mod solve;
 mod mountings;

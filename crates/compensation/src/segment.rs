@@ -93,7 +93,23 @@ impl Path<'_> {
     /// The links at its start, where a joint turns on it or the load is another than before.
     pub(super) fn slack<'s>(&self, arms: &'s Arms<'_>) -> Option<Slack<'s>> {
         let changes = self.way.first != self.from.place || !self.way.later.is_empty();
-        changes.then(|| Slack::at(&self.from.joints, self.from.place, self.to.place, &arms.acting))
+        changes.then(|| self.links(arms))
+    }
+
+    fn links<'s>(&self, arms: &'s Arms<'_>) -> Slack<'s> {
+        Slack::at(&self.from.joints, self.from.place, self.to.place, &arms.acting)
+    }
+
+    /// Whether links that are told to lie on a side at its end do so where the motors go in so many `pieces` with targets that
+    /// are put in, which need not turn where the whole way does.
+    pub(super) fn ends_as_told(
+        &self,
+        pieces: usize,
+        motor: &dyn Fn(f64) -> Option<Joints>,
+        arms: &Arms<'_>,
+    ) -> bool {
+        let sides = arms.acting.arm(self.to.place).condition.approach;
+        !arms.acting.has_play() || self.links(arms).comes_to(&sides, STEPS * pieces, motor)
     }
 }
 
@@ -252,7 +268,8 @@ const CLEARLY_STRAIGHT_MM: f64 = 0.01;
 /// A told line between two of them bends a joint's course a little. Close to where the joint turns it then turns once more,
 /// and the link waits: where this leaves more than the tolerance, the lines are cut finer.
 ///
-/// `None` where such a target would turn a joint by far more than the correction elsewhere, near a singularity.
+/// `None` where such a target would turn a joint by far more than the correction elsewhere, near a singularity; where the arm
+/// cannot go that way with them either; and where a link with play would not come to lie at the end as is told of it.
 pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) -> Option<(Vec<Extra>, f64)> {
     let mut best = cut(path, arms, options.emit, options.tolerance_mm);
     if let Some(slack) = path.slack(arms) {
@@ -278,7 +295,9 @@ pub(super) fn insertions(path: &Path<'_>, arms: &Arms<'_>, options: &Options) ->
         let meant = between(&path.from.meant, &path.to.meant, stop.share);
         leaps([&meant, &stop.at.told], &stop.at.joints, told, arms, options)
     };
-    (!best.stops.iter().any(leap)).then(|| (best.stops.iter().map(extra).collect(), best.left_mm))
+    let goes = best.left_mm.is_finite()
+        && path.ends_as_told(best.stops.len() + 1, &|u| motor_of(path, &best, u, arms, options.emit), arms);
+    (goes && !best.stops.iter().any(leap)).then(|| (best.stops.iter().map(extra).collect(), best.left_mm))
 }
 
 /// How often the lines between targets that are put in are cut finer.
@@ -325,28 +344,35 @@ fn cut<'a>(path: &Path<'a>, arms: &Arms<'_>, emit: Emit, aim_mm: f64) -> Cut<'a>
 /// Largest distance from the intended line where it is cut, gone by links with play (mm). While a play is taken up on the
 /// spot nothing is judged: the arm may stand off there because it was just loaded.
 fn walked(path: &Path<'_>, cut: &Cut<'_>, slack: &Slack<'_>, arms: &Arms<'_>, emit: Emit) -> f64 {
-    let Path { from, to, .. } = path;
+    let off = |u: f64, flange: &Pose| match piece_of(path, cut, u) {
+        (a, b, _) if a.0 == b.0 => 0.0,
+        (a, b, t) => off_line(&path.from, &path.to, a.0 + t * (b.0 - a.0), flange),
+    };
+    slack.most_off(STEPS * (cut.stops.len() + 1), &|u| motor_of(path, cut, u, arms, emit), &off)
+}
+
+/// The piece of a cut line on which `u` lies, of all pieces taken as equally long: both of its ends with their share of the
+/// way, and the share of the piece.
+fn piece_of<'c, 'a>(
+    path: &'c Path<'a>,
+    cut: &'c Cut<'a>,
+    u: f64,
+) -> ((f64, &'c Ends<'a>), (f64, &'c Ends<'a>), f64) {
     let pieces = cut.stops.len() + 1;
     let node = |k: usize| match k {
-        0 => (0.0, from),
-        k if k == pieces => (1.0, to),
+        0 => (0.0, &path.from),
+        k if k == pieces => (1.0, &path.to),
         k => (cut.stops[k - 1].share, &cut.stops[k - 1].at),
     };
-    // Which piece, and which share of it.
-    let piece = |u: f64| {
-        let u = u * pieces as f64;
-        let k = (u as usize).min(pieces - 1);
-        (node(k), node(k + 1), u - k as f64)
-    };
-    let motor = |u: f64| {
-        let (a, b, t) = piece(u);
-        motor_at(a.1, b.1, t, arms, emit)
-    };
-    let off = |u: f64, flange: &Pose| match piece(u) {
-        (a, b, _) if a.0 == b.0 => 0.0,
-        (a, b, t) => off_line(from, to, a.0 + t * (b.0 - a.0), flange),
-    };
-    slack.most_off(STEPS * pieces, &motor, &off)
+    let u = u * pieces as f64;
+    let k = (u as usize).min(pieces - 1);
+    (node(k), node(k + 1), u - k as f64)
+}
+
+/// Joints to which the controller goes there.
+fn motor_of(path: &Path<'_>, cut: &Cut<'_>, u: f64, arms: &Arms<'_>, emit: Emit) -> Option<Joints> {
+    let (a, b, t) = piece_of(path, cut, u);
+    motor_at(a.1, b.1, t, arms, emit)
 }
 
 /// A point of the intended line as a corrected end, under a condition.

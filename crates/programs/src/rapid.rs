@@ -27,6 +27,7 @@ pub mod value;
 pub mod symbol;
 pub mod evaluate;
 pub mod modal;
+mod standing;
 mod flow;
 pub mod mark;
 mod task;

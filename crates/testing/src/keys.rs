@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 /// Words of which one may stand for another.
-const WORDS: [&[&str]; 13] = [
+const WORDS: [&[&str]; 18] = [
     &["metrology", "taught"],
     &["uframe", "oframe"],
     &["base", "other"],
@@ -17,6 +17,11 @@ const WORDS: [&[&str]; 13] = [
     &["fine", "z0", "z1", "z5"],
     &["unknown", "sequence", "random"],
     &["rapid", "krl", "fanuc"],
+    &["printed", "sound"],
+    &["rad", "deg"],
+    &["as-measured", "position", "distance"],
+    &["irb120-1024", "irb120-1024-position"],
+    &["identified", "ambiguous"],
 ];
 
 /// A way to a value: keys, and places in lists of tables.

@@ -197,10 +197,10 @@ impl Run<'_> {
                 Ok(())
             }
             "pdispon" => {
-                let Some(execution) = given.option("exep") else {
-                    return Err(Stop::Unknown("PDispOn without \\ExeP".into()));
+                let execution = match given.option("exep") {
+                    Some(execution) => self.value(&execution.clone(), frame)?.pose()?,
+                    None => self.stands(given.at(1)?, given.option("wobj"), frame)?,
                 };
-                let execution = self.value(&execution.clone(), frame)?.pose()?;
                 let program = self.value(given.at(0)?, frame)?.pose()?;
                 self.state.displaced = if given.has("rot") {
                     execution * program.inverse()
@@ -349,6 +349,27 @@ impl Run<'_> {
         };
         self.events.push(super::run::Event::Motion(Box::new(motion)));
         Ok(())
+    }
+
+    /// Where the robot stands in an object, as told; the last motion must have had the same tool and object.
+    fn stands(&mut self, tool: &Expr, object: Option<&Expr>, frame: &Frame) -> Result<Pose, Stop> {
+        let tool = self.named(tool, frame)?.0;
+        let object = match object {
+            Some(object) => self.named(&object.clone(), frame)?.0,
+            None => "wobj0".to_owned(),
+        };
+        let last = self.events.iter().rev().find_map(|event| match event {
+            super::run::Event::Motion(motion) => Some(motion),
+            super::run::Event::Said(_) => None,
+        });
+        match last.map(|motion| (motion, motion.goals.last())) {
+            Some((motion, Some(Goal::Pose { in_object, displaced, .. })))
+                if motion.tool.0 == tool && motion.object.0 == object =>
+            {
+                Ok(displaced * in_object)
+            }
+            _ => Err(Stop::Unknown("PDispOn from a motion of another tool or object".into())),
+        }
     }
 
     /// A tool or object: whole data, by the name under which it was declared.

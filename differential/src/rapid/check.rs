@@ -22,11 +22,15 @@ pub struct Features {
     pub taught: bool,
     /// Targets near limits and singularities.
     pub borders: bool,
+    /// Displacements that count from where the robot stands, whichever way it came.
+    pub placed: bool,
 }
 
 impl Features {
+    /// Everything but what came later: a seed stands for the same program as ever.
+    pub const ALL: Features = Features { effects: true, taught: true, borders: true, placed: false };
     /// Everything.
-    pub const ALL: Features = Features { effects: true, taught: true, borders: true };
+    pub const MORE: Features = Features { placed: true, ..Features::ALL };
 }
 
 /// Both programs of a seed, as they are given to the interpreter, with what was seen.
@@ -180,6 +184,7 @@ impl Comparison<'_> {
         let mut new = after.events.iter();
         for old in &before.events {
             let mut found = new.next();
+            let mut nowhere = None;
             // Motions that were put in.
             while let Some(Event::Motion(motion)) = found {
                 let edits = &self.task.files[motion.at.0].edits;
@@ -188,7 +193,7 @@ impl Comparison<'_> {
                 }
                 let reached = courses[1].go(motion);
                 if motion.monitored && reached.iter().any(|point| point.joints.is_none() && !point.adrift) {
-                    self.wrong(0, "inserted", format!("no joints in the written configuration: {motion:?}"));
+                    nowhere = Some(format!("no joints in the written configuration: {motion:?}"));
                 }
                 found = new.next();
             }
@@ -201,7 +206,11 @@ impl Comparison<'_> {
                         self.wrong(line, "order", "another motion runs".to_owned());
                         return self.tally;
                     }
-                    self.motion(a, b, &mut courses);
+                    let goes = self.motion(a, b, &mut courses);
+                    // Where the original stops as well nothing is lost.
+                    if let Some(text) = nowhere.filter(|_| goes) {
+                        self.wrong(self.line(a.at), "inserted", text);
+                    }
                 }
                 (old, found) => {
                     let at = if let Event::Motion(m) = old { self.line(m.at) } else { 0 };
@@ -226,7 +235,8 @@ impl Comparison<'_> {
         self.tally
     }
 
-    fn motion(&mut self, old: &Motion, new: &Motion, courses: &mut [Course<'_>; 2]) {
+    /// Compares a motion; whether the controller can carry out the original.
+    fn motion(&mut self, old: &Motion, new: &Motion, courses: &mut [Course<'_>; 2]) -> bool {
         let line = self.line(old.at);
         self.tally.executed += 1;
         let told = courses[0].go(old);
@@ -237,18 +247,21 @@ impl Comparison<'_> {
         let remounted = std::mem::replace(&mut self.mounted, mounted) != self.mounted;
         let extra = !self.made.options.segments && old.goals.len() != new.goals.len();
         if extra || old.rest != new.rest || old.load != new.load {
-            return self.wrong(line, "state", unlike("what stands behind the target"));
+            self.wrong(line, "state", unlike("what stands behind the target"));
+            return true;
         }
         let tools = difference(&old.tool.2, &new.tool.2).0 + difference(&old.object.2, &new.object.2).0;
         if old.tool.0 != new.tool.0 || (old.object.0 != new.object.0) || tools > 1e-9 {
-            return self.wrong(line, "state", unlike("tool or object"));
+            self.wrong(line, "state", unlike("tool or object"));
+            return true;
         }
         if old.monitored != new.monitored && matches!(new.goals[0], Goal::Pose { .. }) {
-            return self.wrong(line, "state", unlike("whether the configuration counts"));
+            self.wrong(line, "state", unlike("whether the configuration counts"));
+            return true;
         }
         if told.iter().any(|point| point.joints.is_none()) {
             self.tally.unreachable += 1;
-            return;
+            return false;
         }
         let (mut changed, guessed) = (false, self.tally.guessed);
         let offset = told.len() - now.len().min(told.len());
@@ -267,6 +280,7 @@ impl Comparison<'_> {
         } else {
             self.tally.left += 1;
         }
+        true
     }
 
     /// Compares one goal; whether it was changed.

@@ -219,6 +219,7 @@ fn verbs() -> Vec<Verb> {
                 "--tolerance",
                 "--max-correction",
                 "--joint-targets",
+                "--flag-open-starts",
                 "--partial",
                 "--placement",
                 "--max-risk",

@@ -95,7 +95,10 @@ fn everything(at: &Path, threads: &str) {
             true,
         ),
     ] {
-        let outputs = if threaded { pages(stem) } else { Vec::new() };
+        let mut outputs = if threaded { pages(stem) } else { Vec::new() };
+        if cfg!(feature = "visual") && ["id", "why", "one", "dev"].contains(&stem) {
+            outputs.push(format!("--rrd={stem}.rrd"));
+        }
         let mut arguments: Vec<&str> = verb;
         arguments.extend(outputs.iter().map(String::as_str));
         if threaded {

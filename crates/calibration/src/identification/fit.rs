@@ -141,6 +141,7 @@ pub fn fit(
     let (mut last, mut rounds): (Option<(Calibration, Estimate)>, _) = (None, Vec::with_capacity(ROUNDS));
     // Of very many rows some settle the weights, and all of them are fitted once.
     let few = observed.few();
+    let mut steps = Steps::of(few.as_ref().unwrap_or(observed), parameters);
     for round in 1..=ROUNDS {
         let observed = few.as_ref().filter(|_| round < ROUNDS).unwrap_or(observed);
         if few.is_some() && round == ROUNDS {
@@ -156,7 +157,7 @@ pub fn fit(
             }
         };
         drop(weights);
-        let estimate = solver.solve(&task, &x, seed);
+        let estimate = steps.solve(solver, &task, &x, seed);
         evaluations.residuals += estimate.evaluations.residuals;
         evaluations.jacobians += estimate.evaluations.jacobians;
         x.clone_from(&estimate.x);
@@ -192,6 +193,31 @@ pub fn fit(
 
 /// Solver and variance are alternated this often; the variance has settled to per cent after two.
 const ROUNDS: usize = 3;
+
+/// The trial steps that are left to the rounds of a fit: a search that crawls along a valley without a floor must not do so in
+/// every round. Fits that find their optimum take some ten steps a round.
+struct Steps {
+    left: usize,
+}
+
+/// Rows times the square of the parameters, summed over all steps: about a second.
+const WORK: usize = 5_000_000_000;
+
+/// No fit has fewer steps.
+const FEWEST_STEPS: usize = 100;
+
+impl Steps {
+    fn of(observed: &Observed, parameters: &[Parameter]) -> Self {
+        let step = observed.dataset.rows.len() * parameters.len() * parameters.len();
+        Self { left: (WORK / step.max(1)).max(FEWEST_STEPS) }
+    }
+
+    fn solve(&mut self, solver: &Solver, task: &Calibration, start: &[f64], seed: u64) -> Estimate {
+        let estimate = solver.solve_within(task, start, seed, self.left);
+        self.left = self.left.saturating_sub(estimate.trace.len().saturating_sub(1));
+        estimate
+    }
+}
 
 /// Degrees of freedom that the fit used up: Σ (1 − σ²/prior²), each parameter's share that the data determined.
 fn spent_freedom(task: &Calibration, estimate: &Estimate) -> f64 {
@@ -267,6 +293,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
     // 1.4826 turns the median of |normal| into σ; the norm of three coordinates has median 1.538 σ.
     let consistency = if dataset.sensor == Sensor::Cable { 1.4826 } else { 1.0 / 1.538 };
     let mut before: Option<Calibration> = None;
+    let mut steps = Steps::of(observed, &parameters);
     for _ in 0..ROBUST_ROUNDS {
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma, 1e-3);
         let weights: Vec<Weight> = base
@@ -278,7 +305,7 @@ pub fn outliers(observed: &Observed, start: Start<'_>, tolerance: &Tolerance, so
             Some(task) => task.weighted(&weights),
             None => Calibration::new(dataset, start.model, start.frames, &parameters, &priors, &weights),
         };
-        let estimate = solver.solve(&task, &x, 0);
+        let estimate = steps.solve(solver, &task, &x, 0);
         let moved: f64 = estimate
             .x
             .iter()

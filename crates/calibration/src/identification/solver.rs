@@ -101,6 +101,28 @@ impl Solver {
         (self.run)(problem, start, seed)
     }
 
+    /// The same with no more than so many trial steps where the method counts them (`max-iterations`); it never takes more than
+    /// it would by itself.
+    pub fn solve_within(
+        &self,
+        problem: &dyn Problem,
+        start: &[f64],
+        seed: u64,
+        most_iterations: usize,
+    ) -> Estimate {
+        const KEY: &str = "max-iterations";
+        let own = self.configured(&toml::Table::new()).ok();
+        let own = own.and_then(|method| method.settings.get(KEY)?.as_integer());
+        if own.is_none_or(|own| own <= most_iterations as i64) {
+            return self.solve(problem, start, seed);
+        }
+        let fewer = toml::Table::from_iter([(KEY.to_owned(), toml::Value::Integer(most_iterations as i64))]);
+        match self.configured(&fewer) {
+            Ok(method) => (method.run)(problem, start, seed),
+            Err(_) => self.solve(problem, start, seed),
+        }
+    }
+
     /// The method with `changes` to its settings (the fields of its `Options`, in kebab-case).
     ///
     /// # Errors

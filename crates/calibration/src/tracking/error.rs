@@ -72,4 +72,16 @@ pub enum StateError {
     /// Not TOML, or a key that is missing, misspelt or of the wrong type.
     #[error("not a track of truegrind: {0}")]
     Syntax(String),
+    /// A number that no track has.
+    #[error(
+        "{key}: found {found}, expected {expected}: the file was damaged; keep it and begin a new track with another --state"
+    )]
+    Value {
+        /// Its key.
+        key: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: &'static str,
+    },
 }

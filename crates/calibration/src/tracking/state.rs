@@ -162,9 +162,68 @@ impl State {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`StateError::Syntax`] says what cannot be used.
+    /// [`StateError`] says what cannot be used.
     pub fn from_toml(text: &str) -> Result<Self, StateError> {
-        toml::from_str(text).map_err(|e| StateError::Syntax(e.message().replace('\n', " ")))
+        let fault = |e: toml::de::Error| StateError::Syntax(e.message().replace('\n', " "));
+        let state: Self = toml::from_str(text).map_err(fault)?;
+        let whole: toml::Table = toml::from_str(text).map_err(fault)?;
+        if let Some((key, found)) =
+            whole.iter().find_map(|(key, value)| not_finite(value).map(|x| (key.clone(), x)))
+        {
+            return Err(StateError::Value { key, found: found.to_string(), expected: "finite numbers" });
+        }
+        state.check()?;
+        Ok(state)
+    }
+
+    /// Finds numbers that no track has.
+    fn check(&self) -> Result<(), StateError> {
+        let wrong = |key: &str, found: String, expected| {
+            Err(StateError::Value { key: key.to_owned(), found, expected })
+        };
+        for (key, sigma) in [("sigma_mm", self.sigma_mm), ("sigma_rad", self.sigma_rad)] {
+            if !(sigma > 0.0) {
+                return wrong(key, sigma.to_string(), "a standard deviation above 0");
+            }
+        }
+        if self.zeros_mm.len() != self.outlets_mm.len() {
+            let found = format!("{} for {} outlets", self.zeros_mm.len(), self.outlets_mm.len());
+            return wrong("zeros_mm", found, "one for each outlet");
+        }
+        let numbers = match self.sensor.as_str() {
+            "cable" => 1,
+            "position" => 3,
+            _ => 6,
+        };
+        for (k, seen) in self.history.iter().enumerate() {
+            let key = |name: &str| format!("history {}: {name}", k + 1);
+            if seen.reading.len() != numbers {
+                let found = format!("{} numbers for the sensor {}", seen.reading.len(), self.sensor);
+                return wrong(&key("reading"), found, "1 of a cable, 3 of a position, 6 of a pose");
+            }
+            if seen.anchor >= self.outlets_mm.len().max(1) {
+                return wrong(
+                    &key("anchor"),
+                    seen.anchor.to_string(),
+                    "an outlet of the track, counted from 0",
+                );
+            }
+            if !(seen.per_mm >= 0.0 && seen.per_rad >= 0.0) {
+                let found = format!("{} and {}", seen.per_mm, seen.per_rad);
+                return wrong(&key("per_mm, per_rad"), found, "weights of 0 or more");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A number in a value that is none.
+fn not_finite(value: &toml::Value) -> Option<f64> {
+    match value {
+        toml::Value::Float(x) => (!x.is_finite()).then_some(*x),
+        toml::Value::Array(list) => list.iter().find_map(not_finite),
+        toml::Value::Table(table) => table.iter().find_map(|(_, value)| not_finite(value)),
+        _ => None,
     }
 }
 

@@ -12,6 +12,7 @@ use truegrind_calibration::measurement::simulation::recipe::{LinkDeviation, Reci
 use truegrind_calibration::measurement::{import, split};
 use truegrind_calibration::tracking::locate::{Form, locate};
 use truegrind_calibration::tracking::{Course, Options, State, TrackError, Tracker, first_poses};
+use truegrind_testing::keys::unread;
 
 /// A tracker on an arm without effects, so that links are the whole truth.
 const RECIPE: &str = r#"
@@ -395,6 +396,40 @@ fn what_cannot_be_tracked_is_said() {
     let error = Tracker::resume(model(), state, "state.toml").unwrap_err();
     assert!(error.to_string().contains("truegrind.track/9"), "{error}");
     assert!(State::from_toml("x = 1").is_err());
+}
+
+/// The class: a key of the state that nobody looks at, and a number of it that is none and goes on into the next model. Each
+/// key is changed and taken away in turn: the track goes on otherwise, or the file is refused; and no key may hold NaN.
+#[test]
+fn every_key_of_the_state_is_kept_or_refused_and_no_number_is_nan() {
+    let dataset = with_jump(40, zero_of_joint_3());
+    let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
+    // A change that was noticed, and few poses, so that there are not too many keys.
+    let options = Options { window: 3, history: 4, sigma_mm: Some(0.02), ..Options::default() };
+    let mut tracker = Tracker::begin(model(), "hash", &dataset, &options).unwrap();
+    tracker.take(&rows(60)).unwrap();
+    let state = tracker.state().to_toml().unwrap();
+    assert!(state.contains("[[alarms]]") && state.contains("[[history]]"), "{state}");
+    let next = |text: &str| -> Result<String, String> {
+        let state = State::from_toml(text).map_err(|error| error.to_string())?;
+        let mut track = Tracker::resume(model(), state, "state.toml").map_err(|error| error.to_string())?;
+        let alarms = track.take(&rows(61)).map_err(|error| error.to_string())?;
+        let after = track.model().to_toml().map_err(|error| error.to_string())?;
+        Ok(format!("{alarms:?}{after}{}", track.state().to_toml().map_err(|error| error.to_string())?))
+    };
+    assert_eq!(unread(&state, next), Vec::<String>::new());
+    for line in
+        state.lines().filter(|line| line.contains('.') && line.contains(" = ") && !line.contains('\"'))
+    {
+        let (key, value) = line.split_once(" = ").unwrap();
+        let number = value.trim_start_matches('[').split([',', ']']).next().unwrap();
+        if number.parse::<f64>().is_err() {
+            continue;
+        }
+        let broken = state.replacen(line, &format!("{key} = {}", value.replacen(number, "nan", 1)), 1);
+        let error = State::from_toml(&broken).unwrap_err().to_string();
+        assert!(error.contains("finite"), "{line}: {error}");
+    }
 }
 
 /// The recipe with another target and another kind of sensor.

@@ -15,6 +15,7 @@ use truegrind_arm::effect::harmonic::Harmonic;
 use truegrind_arm::effect::ratio::Ratio;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::diagnosis::finding::Confidence;
 
 /// The format that is read.
 pub const SCHEMA: &str = "truegrind.diagnosis/1";
@@ -73,21 +74,23 @@ impl OfFrames {
     }
 }
 
+/// What is read of the file: the rest of it is for people. A diagnosis always writes these keys, so none may be missing.
 #[derive(Deserialize)]
 struct File {
-    schema: String,
-    #[serde(default)]
     findings: Vec<Finding>,
-    #[serde(default)]
     not_testable: Vec<Named>,
+}
+
+#[derive(Deserialize)]
+struct Kind {
+    schema: String,
 }
 
 #[derive(Deserialize)]
 struct Finding {
     effect: String,
-    confidence: String,
+    confidence: Confidence,
     joints: Option<Vec<usize>>,
-    #[serde(default)]
     alternatives: Vec<Named>,
 }
 
@@ -98,9 +101,12 @@ struct Named {
     joints: Option<Vec<usize>>,
 }
 
-fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
-    let joints = joints.into_iter().flatten().filter(|j| (1..=6).contains(*j)).map(|j| j - 1).collect();
-    Suspect { effect: effect.to_owned(), joints }
+fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Result<Suspect, NoDiagnosis> {
+    let joints = joints.into_iter().flatten().map(|&joint| match joint {
+        1..=6 => Ok(joint - 1),
+        _ => Err(NoDiagnosis::Syntax(format!("{effect}: joints: found {joint}, expected 1 to 6"))),
+    });
+    Ok(Suspect { effect: effect.to_owned(), joints: joints.collect::<Result<_, _>>()? })
 }
 
 /// The questions that a diagnosis leaves: ambiguous findings with their alternatives, and what was not testable.
@@ -109,9 +115,9 @@ fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
 /// use truegrind_planning::poses::rival::{NoDiagnosis, questions};
 ///
 /// let diagnosis = r#"{"schema": "truegrind.diagnosis/1", "findings": [
-///     {"effect": "gear-ratio", "joints": [4], "confidence": "identified"},
+///     {"effect": "gear-ratio", "joints": [4], "confidence": "identified", "alternatives": []},
 ///     {"effect": "backlash", "joints": [2], "confidence": "ambiguous", "alternatives": [{"effect": "thermal-drift"}]}
-/// ]}"#;
+/// ], "not_testable": []}"#;
 /// let asked = questions(diagnosis)?;
 /// assert_eq!(asked.len(), 1);
 /// assert_eq!(asked[0].suspects[0].joints, [1]);
@@ -123,18 +129,26 @@ fn suspect(effect: &str, joints: Option<&Vec<usize>>) -> Suspect {
 /// # Errors
 /// [`NoDiagnosis`], where the text is none.
 pub fn questions(text: &str) -> Result<Vec<Question>, NoDiagnosis> {
-    let file: File = serde_json::from_str(text).map_err(|e| NoDiagnosis::Syntax(e.to_string()))?;
-    if file.schema != SCHEMA {
-        return Err(NoDiagnosis::Schema { found: file.schema });
+    let fault = |error: serde_json::Error| NoDiagnosis::Syntax(error.to_string());
+    let Kind { schema } = serde_json::from_str(text).map_err(fault)?;
+    if schema != SCHEMA {
+        return Err(NoDiagnosis::Schema { found: schema });
     }
-    let ambiguous = file.findings.iter().filter(|f| f.confidence == "ambiguous").map(|f| {
-        let first = suspect(&f.effect, f.joints.as_ref());
-        let others = f.alternatives.iter().map(|a| suspect(&a.effect, a.joints.as_ref()));
-        Question { suspects: std::iter::once(first).chain(others).collect() }
-    });
-    let untested =
-        file.not_testable.iter().map(|n| Question { suspects: vec![suspect(&n.effect, n.joints.as_ref())] });
-    Ok(ambiguous.chain(untested).collect())
+    let file: File = serde_json::from_str(text).map_err(fault)?;
+    let of = |named: &Named| suspect(&named.effect, named.joints.as_ref());
+    let mut out = Vec::new();
+    for finding in &file.findings {
+        // Of one that is certain nothing is asked, but it must be one.
+        let first = suspect(&finding.effect, finding.joints.as_ref())?;
+        let others = finding.alternatives.iter().map(of).collect::<Result<Vec<_>, _>>()?;
+        if finding.confidence == Confidence::Ambiguous {
+            out.push(Question { suspects: std::iter::once(first).chain(others).collect() });
+        }
+    }
+    for untested in &file.not_testable {
+        out.push(Question { suspects: vec![of(untested)?] });
+    }
+    Ok(out)
 }
 
 /// What an effect of that name looks like, at size zero; nothing for effects of the measurement.

@@ -15,6 +15,7 @@ use super::evaluate::{Context, Evaluator, Known};
 use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
 use super::predefined;
+use super::standing::Standing;
 use super::symbol::{Unit, What, places, resumes};
 use super::syntax::{Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
@@ -38,6 +39,8 @@ pub(super) struct State {
     pub(super) known: Known,
     pub(super) modal: States,
     pub(super) previous: Option<u32>,
+    /// Where the robot may stand, where anything counts from there.
+    standing: Standing,
     /// Whether any way leads here.
     reached: bool,
 }
@@ -60,6 +63,7 @@ impl State {
             known,
             modal: self.modal.or(other.modal),
             previous: self.previous.filter(|_| self.previous == other.previous),
+            standing: self.standing.or(other.standing),
             reached: true,
         }
     }
@@ -95,8 +99,8 @@ pub(super) trait Visitor {
     fn called_late(&mut self, modal: States);
     /// A call of a routine that is in none of the files, which may call those that are.
     fn called_outside(&mut self, modal: States);
-    /// A displacement is counted from where the robot stands: where this motion has ended.
-    fn placed_from(&mut self, previous: Option<u32>);
+    /// A displacement is counted from where the robot stands.
+    fn placed_from(&mut self, standing: &Standing);
     /// The next cycle begins at main with the switches as they stand here.
     fn cycled(&mut self, modal: States);
 }
@@ -118,7 +122,8 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
     let (exits, any, handled) = (States::NONE, States::NONE, States::NONE);
     let aliases = aliases(evaluator, unit);
     let wanders = symbols.wanders(evaluator.trees, unit);
-    let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, wanders, aliases };
+    let counts = symbols.places();
+    let mut walk = Walk { evaluator, unit, visitor, exits, any, handled, resumes, wanders, counts, aliases };
     walk.handled = walk.handled();
     walk.any = walk.settings(unit.node).or(walk.handled).or(States::ENTRY);
     if let Some(routine) = unit.routine
@@ -127,7 +132,9 @@ pub(super) fn walk(evaluator: &Evaluator<'_, '_>, unit: Unit, visitor: &mut dyn 
         // An error leaves what is called anywhere.
         walk.any = walk.any.or(symbols.routines[routine as usize].reach.sets);
     }
-    let mut state = State { known: Known::new(), modal: States::ENTRY, previous: None, reached: true };
+    let standing = if counts { Standing::at_entry() } else { Standing::default() };
+    let mut state =
+        State { known: Known::new(), modal: States::ENTRY, previous: None, standing, reached: true };
     // Where ExitCycle begins main anew, its variables may be as they were.
     if unit.routine.is_some_and(|routine| !(symbols.cycles && symbols.is_main(evaluator.trees, routine))) {
         for &id in symbols.changed_in(unit) {
@@ -170,6 +177,8 @@ struct Walk<'w, 'a, 's> {
     resumes: bool,
     /// Whether an error handler that goes back to the statements, or a trap routine, moves the robot.
     wanders: bool,
+    /// Whether anything in the program counts from where the robot stands.
+    counts: bool,
     /// The parameters that may be other names of data outside, or of each other.
     aliases: Vec<u32>,
 }
@@ -211,6 +220,8 @@ impl Walk<'_, '_, '_> {
                 let mut entry = state;
                 entry.modal = entry.modal.or(self.settings(node));
                 entry.previous = None;
+                let outside = std::mem::take(&mut entry.standing);
+                entry.standing = outside.in_loop();
                 let displaces = self.displaces(node);
                 let forget = |walk: &mut Self, state: &mut State| {
                     walk.forget_changed(node, state);
@@ -227,6 +238,7 @@ impl Walk<'_, '_, '_> {
                 let mut after = self.block(node, entry.clone(), inside).joined(entry);
                 forget(self, &mut after);
                 after.previous = None;
+                after.standing = after.standing.behind_loop(&outside);
                 after
             }
             Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
@@ -250,7 +262,7 @@ impl Walk<'_, '_, '_> {
             Syntax::Raise if self.resumes => {
                 // The handler of the routine goes on behind it.
                 self.may_set(self.handled, &mut state);
-                State { previous: None, ..state }
+                State { previous: None, standing: self.elsewhere(), ..state }
             }
             // Where a caller catches the error, it counts with all that is set here.
             Syntax::Goto | Syntax::Raise => State { reached: false, ..state },
@@ -260,7 +272,7 @@ impl Walk<'_, '_, '_> {
             }
             Syntax::Opaque | Syntax::Unwritten => {
                 // What could not be read may do anything to what the routine assigns.
-                State { previous: None, known: self.anywhere().known, ..state }
+                State { previous: None, standing: self.elsewhere(), known: self.anywhere().known, ..state }
             }
             // Conditions and bounds: the functions in them.
             _ => {
@@ -303,7 +315,23 @@ impl Walk<'_, '_, '_> {
         if !self.any.keeps(Which::Displacement) {
             known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
         }
-        State { known, modal: self.any, previous: None, reached: true }
+        State { known, modal: self.any, previous: None, standing: self.elsewhere(), reached: true }
+    }
+
+    /// The robot may stand at the end of any motion.
+    fn elsewhere(&self) -> Standing {
+        if self.counts { Standing::anywhere() } else { Standing::default() }
+    }
+
+    /// Where the robot stands after a motion.
+    fn gone(&self, motion: Option<u32>, before: &mut Standing) {
+        if !self.counts {
+            return;
+        }
+        // A handler goes on behind a motion that has failed, or from elsewhere.
+        let also = if self.resumes { std::mem::take(before) } else { Standing::default() };
+        *before = Standing::at(motion).or(also);
+        before.anywhere |= self.wanders;
     }
 
     /// Whether statements under a node may set or end a program displacement.
@@ -415,6 +443,7 @@ impl Walk<'_, '_, '_> {
             if motion.is_some() {
                 // A search stops where its signal comes, and a handler may go on from elsewhere.
                 state.previous = motion.filter(|_| !known.ends_early() && !self.wanders);
+                self.gone(motion, &mut state.standing);
             }
             return state;
         }
@@ -433,21 +462,28 @@ impl Walk<'_, '_, '_> {
         if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
             state.modal = state.modal.then(sets);
             if places(tree, node, name) {
-                self.visitor.placed_from(state.previous);
+                self.visitor.placed_from(&state.standing);
             }
             // One that also moves.
             state.previous = motion.or(state.previous);
+            if motion.is_some() {
+                self.gone(motion, &mut state.standing);
+            }
             if !sets.leaves(Which::Displacement) {
                 let value = self.displaced(node, &state, name);
                 state.known.insert(DISPLACEMENT, value);
             }
             if predefined::displaces(name).is_some() {
                 state.previous = None;
+                self.gone(motion, &mut state.standing);
             }
             return state;
         }
         let called = if late { &[] } else { symbols.called(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
+            if self.counts {
+                self.visitor.placed_from(&state.standing);
+            }
             if self.resumes {
                 // It may be called once more after an error in it.
                 self.may_set(symbols.late_sets_of(self.unit), &mut state);
@@ -459,6 +495,7 @@ impl Walk<'_, '_, '_> {
             self.may_set(symbols.late_sets_of(self.unit), &mut state);
             self.forget_outside(&mut state);
             state.previous = None;
+            state.standing = self.elsewhere();
             return state;
         }
         match called {
@@ -470,6 +507,7 @@ impl Walk<'_, '_, '_> {
                 }
                 if predefined::displaces(name).is_some() {
                     state.previous = None;
+                    self.gone(motion, &mut state.standing);
                 }
                 return state;
             }
@@ -478,8 +516,10 @@ impl Walk<'_, '_, '_> {
                 self.forget_outside(&mut state);
                 if motion.is_some() {
                     state.previous = motion;
+                    self.gone(motion, &mut state.standing);
                     return state;
                 }
+                state.standing = self.elsewhere();
             }
         }
         state.previous = None;
@@ -496,7 +536,10 @@ impl Walk<'_, '_, '_> {
             self.may_set(sets, state);
         }
         if called.iter().any(|routine| symbols.routines[*routine as usize].reach.places) {
-            self.visitor.placed_from(state.previous);
+            self.visitor.placed_from(&state.standing);
+        }
+        if self.counts && called.iter().any(|routine| symbols.routines[*routine as usize].reach.moves) {
+            state.standing.anywhere = true;
         }
         let mut exit = States::NONE;
         for &routine in called {

@@ -234,6 +234,12 @@ impl Symbols {
         std::slice::from_ref(routine)
     }
 
+    /// Whether anything may count from where the robot stands (PDispOn without \ExeP).
+    pub(super) fn places(&self) -> bool {
+        self.units.iter().any(|unit| unit.routine.is_none())
+            || self.routines.iter().any(|routine| routine.reach.places)
+    }
+
     /// Whether a routine is the one with which a program begins.
     pub fn is_main(&self, trees: &[RapidTree<'_>], routine: u32) -> bool {
         let routine = &self.routines[routine as usize];

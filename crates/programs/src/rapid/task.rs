@@ -16,6 +16,7 @@ use super::mark;
 use super::modal::{States, Which};
 use super::parser::parse;
 use super::predefined;
+use super::standing::Standing;
 use super::symbol::{Ends, Symbols, Unit, What};
 use super::syntax::{Argument, RapidTree, Syntax, arguments, expressions, parts, text_of, tokens_of};
 use super::token::{display, folded, same_name};
@@ -123,6 +124,11 @@ struct Lister<'a, 's> {
     depth: u32,
     /// While only the exit of a routine is asked for.
     silent: bool,
+    /// Whether a displacement is counted from where any motion may have ended.
+    placed: bool,
+    /// The units in which one is counted from where the robot stood at their begin. A call says where that is; a new cycle, an
+    /// interrupt and what is not called here do not.
+    placed_at_entry: Vec<u32>,
     names: Vec<Option<Arc<str>>>,
     routines: HashMap<u32, u32>,
     declarations: HashMap<u32, u32>,
@@ -179,6 +185,8 @@ impl<'a, 's> Lister<'a, 's> {
             exits: vec![None; symbols.routines.len()],
             depth: 0,
             silent: false,
+            placed: false,
+            placed_at_entry: Vec::new(),
             names: vec![None; INSTRUCTIONS.len()],
             routines: HashMap::new(),
             declarations: HashMap::new(),
@@ -237,6 +245,18 @@ impl<'a, 's> Lister<'a, 's> {
                     // The next cycle begins with the switches as this one leaves them.
                     self.cycled(exit);
                 }
+            }
+        }
+        let begins_anywhere = |unit: &u32| {
+            let Some(routine) = units[*unit as usize].routine else { return true };
+            let called = |(from, site): &(u32, CallSite)| site.routine == routine && from != unit;
+            self.mains.contains(&routine)
+                || self.symbols.interrupts[routine as usize]
+                || !self.sites.iter().any(called)
+        };
+        if self.placed || self.placed_at_entry.iter().any(begins_anywhere) {
+            for motion in &mut self.listing.motions {
+                motion.left.get_or_insert(Reason::BeforeDisplacement);
             }
         }
     }
@@ -771,9 +791,20 @@ impl Visitor for Lister<'_, '_> {
         }
     }
 
-    fn placed_from(&mut self, previous: Option<u32>) {
-        if let Some(motion) = previous.filter(|_| !self.silent) {
-            self.listing.motions[motion as usize].left.get_or_insert(Reason::BeforeDisplacement);
+    fn placed_from(&mut self, standing: &Standing) {
+        if self.silent {
+            return;
+        }
+        match standing.motions() {
+            Some(motions) => {
+                for motion in motions {
+                    self.listing.motions[*motion as usize].left.get_or_insert(Reason::BeforeDisplacement);
+                }
+            }
+            None => self.placed = true,
+        }
+        if standing.entry {
+            self.placed_at_entry.push(self.unit);
         }
     }
 

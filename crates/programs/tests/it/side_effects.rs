@@ -141,3 +141,45 @@ fn a_displacement_from_where_the_robot_stands_keeps_that_motion() {
     assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn p,tool0;"), Some(Reason::BeforeDisplacement));
     assert_eq!(reason("MoveL p,v100,fine,tool0;\nPDispOn\\ExeP:=p,p,tool0;\nPDispOff;"), None);
 }
+
+/// The class: on any way to such a displacement the robot may stand at the end of another motion, and each of these must go
+/// on ending where it always did: where ways join, around loops, behind calls and handlers, and at the begin of a cycle.
+#[test]
+fn a_displacement_from_where_the_robot_stands_keeps_the_motions_of_every_way() {
+    let left = |main: &str, routines: &str| -> Vec<bool> {
+        let source = format!(
+            "MODULE m\nCONST robtarget p:=[[500,0,400],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nVAR num n;\n\
+             PROC main()\n{main}\nENDPROC\n{routines}\nENDMODULE\n"
+        );
+        let task = Task::read(&[("m.mod", source.as_bytes())]);
+        let before =
+            |motion: &truegrind_programs::motion::Motion| motion.left == Some(Reason::BeforeDisplacement);
+        task.listing.motions.iter().map(before).collect()
+    };
+    const GO: &str = "MoveL p,v100,fine,tool0;\n";
+    const HERE: &str = "PDispOn p,tool0;\nPDispOff;\n";
+    let branches = format!("{GO}IF n>1 THEN\n{GO}ELSE\n{GO}ENDIF\n{HERE}{GO}");
+    assert_eq!(left(&branches, ""), [false, true, true, false]);
+    let one = format!("{GO}{GO}IF n>1 THEN\n{GO}ENDIF\n{HERE}{GO}");
+    assert_eq!(left(&one, ""), [false, true, true, false]);
+    assert_eq!(left(&format!("{GO}{GO}IF n>1 {GO}{HERE}{GO}"), ""), [false, true, true, false]);
+    // Around a loop, and behind it.
+    let around = format!("{GO}FOR i FROM 1 TO 3 DO\n{HERE}{GO}{GO}ENDFOR\n");
+    assert!(left(&around, "")[0] && left(&around, "")[2]);
+    let behind = format!("{GO}{GO}WHILE n>1 DO\n{GO}{GO}ENDWHILE\n{HERE}{GO}");
+    assert_eq!(left(&behind, ""), [false, true, false, true, false]);
+    // Behind a call that moves, also where its name is computed, and in one that is called.
+    let goes = format!("PROC go()\n{GO}ENDPROC");
+    assert!(left(&format!("{GO}go;\n{HERE}"), &goes)[1]);
+    assert!(left(&format!("{GO}%\"go\"%;\n{HERE}"), &goes)[1]);
+    let places = format!("PROC here()\n{HERE}ENDPROC");
+    assert_eq!(left(&format!("{GO}IF n>1 {GO}here;\n{GO}"), &places), [true, true, false]);
+    // One that is called from elsewhere, an interrupt, and the next cycle.
+    assert_eq!(left(GO, &places), [true]);
+    assert_eq!(left(&format!("{HERE}{GO}"), ""), [true]);
+    let interrupt = format!("TRAP t\n{HERE}ENDTRAP");
+    assert_eq!(left(&format!("CONNECT i WITH t;\n{GO}{GO}"), &interrupt), [true, true]);
+    // What does not move changes nothing.
+    let still = "PROC still()\nn:=n+1;\nENDPROC";
+    assert_eq!(left(&format!("{GO}{GO}still;\nn:=2;\n{HERE}{GO}"), still), [false, true, false]);
+}

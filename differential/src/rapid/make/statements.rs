@@ -307,7 +307,40 @@ impl Maker<'_> {
         out.push_str("ENDFOR\n");
     }
 
+    /// A displacement from the programmed point to where the robot stands then, after one motion or another.
+    fn placed(&mut self, out: &mut String) {
+        let named = self.named();
+        let (tool, object) = self.names(named.pair);
+        let name = &named.name;
+        let go = |maker: &mut Self, out: &mut String| {
+            let target = match maker.rng.random_range(0..3) {
+                0 => format!("Offs({name},2,-1,{})", maker.amount()),
+                1 => name.clone(),
+                _ => maker.target(named.pair),
+            };
+            let way = maker.pick(&["MoveL", "MoveL", "MoveJ"]);
+            let _ = writeln!(out, "{way} {target},v100,fine,{tool}\\WObj:={object};");
+        };
+        out.push_str("PDispOff;\n");
+        if self.chance(0.6) {
+            let condition = self.condition();
+            let _ = writeln!(out, "IF {condition} THEN");
+            go(self, out);
+            out.push_str("ELSE\n");
+            go(self, out);
+            out.push_str("ENDIF\n");
+        } else {
+            go(self, out);
+        }
+        let turned = self.pick(&["", "\\Rot"]);
+        let comma = if turned.is_empty() { "" } else { "," };
+        let _ = writeln!(out, "PDispOn{turned}{comma} {name},{tool}\\WObj:={object};");
+    }
+
     fn displacement(&mut self, out: &mut String) {
+        if self.features.placed && self.chance(0.5) {
+            return self.placed(out);
+        }
         let named = self.named();
         let (tool, object) = self.names(named.pair);
         let name = named.name;
