@@ -1,14 +1,14 @@
 //! Forward kinematics of many rows at once, in columns.
 //!
-//! Method: the kernels of [`chain`](super::chain) and of the effects on eight rows in lanes, compiled for the widest
-//! vector instructions that the machine has. No allocation once the buffers have their size.
+//! Method: the kernels of [`chain`](super::chain) and of the effects on as many rows as a register holds, compiled for the
+//! widest vector instructions that the machine has. No allocation once the buffers have their size.
 //! Shapes: one column per joint in, twelve columns out (position and the three axes of the flange).
 //! Checked against: [`PreparedModel::forward`], row by row.
 
 use super::chain::{End, end};
 use super::model::PreparedModel;
 use crate::joints::Joints;
-use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, aligned, sin_cos, vectorised};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// Controller angles of many rows (rad), one column per joint.
@@ -86,24 +86,8 @@ impl PreparedModel<'_> {
             axes: std::array::from_fn(|j| std::array::from_fn(|i| turn[(i, j)])),
             origin: self.model.flange.translation.vector.into(),
         };
-        let plain = self.model.flange == Pose::identity();
-        vectorised(
-            #[inline(always)]
-            || {
-                for from in (0..rows).step_by(WIDTH) {
-                    let mut end = self.end_lanes(joints, from);
-                    if !plain {
-                        end = end.then(&flange);
-                    }
-                    for k in 0..3 {
-                        end.origin[k].store(&mut out.position_mm[k], from);
-                        for j in 0..3 {
-                            end.axes[j][k].store(&mut out.axes[3 * j + k], from);
-                        }
-                    }
-                }
-            },
-        );
+        let flange = (self.model.flange != Pose::identity()).then_some(flange);
+        vectorised(Forward { arm: self, flange, joints, out });
     }
 
     /// Poses of the flange for many joint vectors.
@@ -129,20 +113,61 @@ impl PreparedModel<'_> {
         self.forward_columns(&columns, &mut poses);
         (0..joints.len()).map(|row| poses.pose(row)).collect()
     }
+}
 
-    /// The last frame of eight rows.
+/// [`PreparedModel::forward_columns`], its buffers of the right size; no flange where it is the last frame.
+struct Forward<'a> {
+    arm: &'a PreparedModel<'a>,
+    flange: Option<End<f64>>,
+    joints: &'a JointColumns,
+    out: &'a mut PoseColumns,
+}
+
+impl AnyWidth for Forward<'_> {
+    type Output = ();
+
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn end_lanes(&self, joints: &JointColumns, from: usize) -> End<Lanes> {
-        let zero = Lanes::splat(0.0);
-        let mut angle = [zero; 6];
-        for (lanes, column) in angle.iter_mut().zip(&joints.angle_rad) {
-            *lanes = Lanes::load(column, from);
+    fn run<R: SinCos>(self, like: R) {
+        let Self { arm, flange, joints, out } = self;
+        let rows = joints.len();
+        // The first rows once more with those that follow, so that the rest is written to whole lines of the cache.
+        let second = match aligned(&out.position_mm[0]) % R::ROWS {
+            0 => R::ROWS,
+            head => head,
+        };
+        let (mut from, mut following) = (0, second);
+        let mut next = angles(like, joints, 0);
+        while from < rows {
+            // The next rows are on their way from memory while these are worked on.
+            let angle = next;
+            if following < rows {
+                next = angles(like, joints, following);
+            }
+            let rotation = arm.affected(&arm.mapped(&angle));
+            let (mut sin, mut cos) = (rotation, rotation);
+            for j in 0..6 {
+                (sin[j], cos[j]) = sin_cos(rotation[j]);
+            }
+            let mut end = end(&arm.tables, &sin, &cos);
+            if let Some(flange) = &flange {
+                end = end.then(flange);
+            }
+            for k in 0..3 {
+                end.origin[k].store(&mut out.position_mm[k], from);
+                for j in 0..3 {
+                    end.axes[j][k].store(&mut out.axes[3 * j + k], from);
+                }
+            }
+            (from, following) = (following, following + R::ROWS);
         }
-        let rotation = self.affected(&self.mapped(&angle));
-        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
-        for j in 0..6 {
-            (sin[j], cos[j]) = sin_cos(rotation[j]);
-        }
-        end(&self.tables, &sin, &cos)
     }
+}
+
+#[inline(always)]
+fn angles<R: Real>(like: R, joints: &JointColumns, from: usize) -> [R; 6] {
+    let mut out = [like; 6];
+    for j in 0..6 {
+        out[j] = like.load(&joints.angle_rad[j], from);
+    }
+    out
 }

@@ -1,11 +1,11 @@
-//! The forward kernel: link table in, joint frames out, for one row or for eight in lanes.
+//! The forward kernel: link table in, joint frames out, for one row or for several in lanes.
 //!
 //! Cost: some 45 operations a link, 270 a pose; no branch but the one on Hayati links, no allocation.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::link::{Link, LinkModel};
-use truegrind_math::lanes::Real;
+use truegrind_math::lanes::{Real, splats};
 use truegrind_math::se3::{Pose, rotation_from_matrix};
 
 /// A link with its sines and cosines taken.
@@ -71,6 +71,12 @@ pub fn minus<R: Real>(a: &[R; 3], b: &[R; 3]) -> [R; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// A multiple.
+#[inline(always)]
+pub fn scaled<R: Real>(by: R, v: &[R; 3]) -> [R; 3] {
+    [by * v[0], by * v[1], by * v[2]]
+}
+
 #[inline(always)]
 fn blend<R: Real>(p: R, a: &[R; 3], q: R, b: &[R; 3]) -> [R; 3] {
     [p * a[0] + q * b[0], p * a[1] + q * b[1], p * a[2] + q * b[2]]
@@ -79,37 +85,36 @@ fn blend<R: Real>(p: R, a: &[R; 3], q: R, b: &[R; 3]) -> [R; 3] {
 /// Frames of the chain for joint rotations given by sine and cosine (joint offsets of the links not included).
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> Chain<R> {
-    scaled_chain(links, sin, cos, R::splat(1.0))
+    scaled_chain(links, sin, cos, sin[0].splat(1.0))
 }
 
 /// Like [`chain`], with all lengths times `scale`, which may differ from row to row (links that grow).
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn scaled_chain<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6], scale: R) -> Chain<R> {
-    let (zero, one) = (R::splat(0.0), R::splat(1.0));
-    let mut out = Chain {
-        lateral: [[zero; 3]; 6],
-        y: [[zero; 3]; 6],
-        z: [[zero; 3]; 7],
-        origin: [[zero; 3]; 7],
-        x: [one, zero, zero],
-    };
-    let mut end = End { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] };
-    out.z[0] = end.axes[2];
-    for (i, link) in links.iter().enumerate() {
-        out.lateral[i] = end.advance(link, sin[i], cos[i], scale);
-        out.y[i] = end.axes[1];
-        out.z[i + 1] = end.axes[2];
-        out.origin[i + 1] = end.origin;
+    let mut end = End::base(scale);
+    let base = end;
+    // One after the other and no loop: what nobody asks for is then never written to memory.
+    let (lateral_1, end_1) = (end.advance(&links[0], sin[0], cos[0], scale), end);
+    let (lateral_2, end_2) = (end.advance(&links[1], sin[1], cos[1], scale), end);
+    let (lateral_3, end_3) = (end.advance(&links[2], sin[2], cos[2], scale), end);
+    let (lateral_4, end_4) = (end.advance(&links[3], sin[3], cos[3], scale), end);
+    let (lateral_5, end_5) = (end.advance(&links[4], sin[4], cos[4], scale), end);
+    let lateral_6 = end.advance(&links[5], sin[5], cos[5], scale);
+    let ([x, y, z], origin) = (end.axes, end.origin);
+    Chain {
+        lateral: [lateral_1, lateral_2, lateral_3, lateral_4, lateral_5, lateral_6],
+        y: [end_1.axes[1], end_2.axes[1], end_3.axes[1], end_4.axes[1], end_5.axes[1], y],
+        z: [base.axes[2], end_1.axes[2], end_2.axes[2], end_3.axes[2], end_4.axes[2], end_5.axes[2], z],
+        origin: [base.origin, end_1.origin, end_2.origin, end_3.origin, end_4.origin, end_5.origin, origin],
+        x,
     }
-    out.x = end.axes[0];
-    out
 }
 
 /// The last frame alone, with the bits of [`chain`].
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn end<R: Real>(links: &[LinkTable; 6], sin: &[R; 6], cos: &[R; 6]) -> End<R> {
-    let (zero, one) = (R::splat(0.0), R::splat(1.0));
-    let mut end = End { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] };
+    let one = sin[0].splat(1.0);
+    let mut end = End::base(one);
     for (i, link) in links.iter().enumerate() {
         end.advance(link, sin[i], cos[i], one);
     }
@@ -126,25 +131,32 @@ pub struct End<R> {
 }
 
 impl<R: Real> End<R> {
+    /// The base itself.
+    #[inline(always)]
+    fn base(like: R) -> Self {
+        let (zero, one) = (like.splat(0.0), like.splat(1.0));
+        Self { axes: [[one, zero, zero], [zero, one, zero], [zero, zero, one]], origin: [zero; 3] }
+    }
+
     /// Goes on over one link; hands back the x axis after the joint's rotation.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn advance(&mut self, link: &LinkTable, sin: R, cos: R, scale: R) -> [R; 3] {
         let [x, y, z] = self.axes;
         // sin and cos of joint angle plus offset
-        let (so, co) = (R::splat(link.sin_theta), R::splat(link.cos_theta));
+        let (so, co) = (sin.splat(link.sin_theta), sin.splat(link.cos_theta));
         let s = sin * co + cos * so;
         let c = cos * co - sin * so;
         let lateral = blend(c, &x, s, &y);
         let upright = blend(c, &y, -s, &x);
-        let (a, d) = (scale * R::splat(link.a_mm), scale * R::splat(link.d_mm));
+        let (a, d) = (scale * scale.splat(link.a_mm), scale * scale.splat(link.d_mm));
         for k in 0..3 {
             self.origin[k] += d * z[k] + a * lateral[k];
         }
-        let (sa, ca) = (R::splat(link.sin_alpha), R::splat(link.cos_alpha));
+        let (sa, ca) = (sin.splat(link.sin_alpha), sin.splat(link.cos_alpha));
         self.axes[1] = blend(ca, &upright, sa, &z);
         let z = blend(ca, &z, -sa, &upright);
         if link.twisted {
-            let (sb, cb) = (R::splat(link.sin_beta), R::splat(link.cos_beta));
+            let (sb, cb) = (sin.splat(link.sin_beta), sin.splat(link.cos_beta));
             self.axes[0] = blend(cb, &lateral, -sb, &z);
             self.axes[2] = blend(cb, &z, sb, &lateral);
         } else {
@@ -157,20 +169,23 @@ impl<R: Real> End<R> {
     /// A frame that is fixed to this one, in the base.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn then(&self, fixed: &End<f64>) -> Self {
-        let carried = |v: &[f64; 3]| {
-            let mut out = [R::splat(0.0); 3];
-            for (k, out) in out.iter_mut().enumerate() {
-                *out = R::splat(v[0]) * self.axes[0][k]
-                    + R::splat(v[1]) * self.axes[1][k]
-                    + R::splat(v[2]) * self.axes[2][k];
-            }
-            out
-        };
-        let mut origin = carried(&fixed.origin);
+        let mut origin = self.carried(&fixed.origin);
         for (carried, base) in origin.iter_mut().zip(self.origin) {
             *carried += base;
         }
-        Self { axes: [carried(&fixed.axes[0]), carried(&fixed.axes[1]), carried(&fixed.axes[2])], origin }
+        let [x, y, z] = &fixed.axes;
+        Self { axes: [self.carried(x), self.carried(y), self.carried(z)], origin }
+    }
+
+    /// A direction of this frame, in the base.
+    #[inline(always)]
+    fn carried(&self, v: &[f64; 3]) -> [R; 3] {
+        let mut out = self.origin;
+        let v = splats(out[0], v);
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = v[0] * self.axes[0][k] + v[1] * self.axes[1][k] + v[2] * self.axes[2][k];
+        }
+        out
     }
 }
 

@@ -120,7 +120,7 @@ impl Effect {
         each!(self, e => e.rotation(statics, u, condition))
     }
 
-    /// Adds [`Effect::rotation`] for one row or eight in lanes; `torque` from [`Statics::loads`].
+    /// Adds [`Effect::rotation`] for one row or several in lanes; `torque` from [`Statics::loads`].
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn add_offset<R: SinCos>(
         &self,
@@ -143,7 +143,7 @@ impl Effect {
         }
     }
 
-    /// Adds the slope times a step of u, for one row or eight in lanes, where that is cheap: the slope of compliance,
+    /// Adds the slope times a step of u, for one row or several in lanes, where that is cheap: the slope of compliance,
     /// some 1e-3, is left out. For Newton's method, which forgives it.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {

@@ -10,14 +10,14 @@ mod file;
 use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-use super::chain::{Chain, cross, minus};
+use super::chain::{Chain, cross, minus, scaled};
 use super::condition::Condition;
 use super::jacobian::{Ends, effect_twist, parameter_jacobian};
 use super::model::{Model, PreparedModel};
 use super::parameter::{LinkCoordinate, Parameter};
 use super::region::Region;
 use crate::joints::Joints;
-use truegrind_math::lanes::{Lanes, Real, WIDTH, vectorised};
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::statistics::ErrorSummary;
 
@@ -155,56 +155,111 @@ pub struct RidingPoint<'a> {
     pub carried: Option<&'a Carried>,
 }
 
-/// Velocities of a point that rides on the last frame at `rides`, for the parameters of links (zero for all others);
-/// hands back the point in the base (mm).
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn link_velocities<R: Real>(
-    frames: &Chain<R>,
-    rides: &[R; 3],
+/// Eight points' numbers side by side.
+type Eight = [f64; WIDTH];
+
+/// Velocities of points that ride on the last frame, for the parameters of links (zero for all others); hands back the
+/// points in the base (mm).
+struct LinkVelocities<'a> {
+    arm: &'a PreparedModel<'a>,
+    angles: &'a [Eight; 6],
+    rides: &'a [Eight; 3],
     scale: f64,
-    order: &[Parameter],
-    velocities: &mut [[R; 3]],
-) -> [R; 3] {
-    let mut point = frames.origin[6];
-    for (k, coordinate) in point.iter_mut().enumerate() {
-        *coordinate += rides[0] * frames.x[k] + rides[1] * frames.y[5][k] + rides[2] * frames.z[6][k];
-    }
-    let grown = |axis: &[R; 3]| axis.map(|v| v * R::splat(scale));
-    for (parameter, velocity) in order.iter().zip(velocities) {
-        *velocity = match *parameter {
-            Parameter::Link { joint, coordinate } => match coordinate {
-                LinkCoordinate::D => grown(&frames.z[joint]),
-                LinkCoordinate::A => grown(&frames.lateral[joint]),
-                LinkCoordinate::Theta => cross(&frames.z[joint], &minus(&point, &frames.origin[joint])),
-                LinkCoordinate::Alpha => {
-                    cross(&frames.lateral[joint], &minus(&point, &frames.origin[joint + 1]))
+    order: &'a [Parameter],
+    velocities: &'a mut [[Eight; 3]],
+}
+
+impl AnyWidth for LinkVelocities<'_> {
+    type Output = [Eight; 3];
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) -> [Eight; 3] {
+        let mut points = [[0.0; WIDTH]; 3];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let frames = self.arm.frames_of(&loaded(like, self.angles, from));
+            let rides = loaded(like, self.rides, from);
+            let mut point = frames.origin[6];
+            for (k, coordinate) in point.iter_mut().enumerate() {
+                *coordinate += rides[0] * frames.x[k] + rides[1] * frames.y[5][k] + rides[2] * frames.z[6][k];
+                coordinate.store(&mut points[k], from);
+            }
+            let none = like.splat(0.0);
+            for (parameter, velocity) in self.order.iter().zip(&mut *self.velocities) {
+                let here = match *parameter {
+                    Parameter::Link { joint, coordinate } => {
+                        link_velocity(&frames, &point, joint, coordinate, like.splat(self.scale))
+                    }
+                    _ => [none; 3],
+                };
+                for k in 0..3 {
+                    here[k].store(&mut velocity[k], from);
                 }
-                LinkCoordinate::Beta => cross(&frames.y[joint], &minus(&point, &frames.origin[joint + 1])),
-            },
-            _ => [R::splat(0.0); 3],
-        };
+            }
+        }
+        points
     }
-    point
+}
+
+#[inline(always)]
+fn loaded<R: Real, const N: usize>(like: R, columns: &[Eight; N], from: usize) -> [R; N] {
+    let mut out = [like; N];
+    for k in 0..N {
+        out[k] = like.load(&columns[k], from);
+    }
+    out
+}
+
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn link_velocity<R: Real>(
+    frames: &Chain<R>,
+    point: &[R; 3],
+    joint: usize,
+    coordinate: LinkCoordinate,
+    scale: R,
+) -> [R; 3] {
+    match coordinate {
+        LinkCoordinate::D => scaled(scale, &frames.z[joint]),
+        LinkCoordinate::A => scaled(scale, &frames.lateral[joint]),
+        LinkCoordinate::Theta => cross(&frames.z[joint], &minus(point, &frames.origin[joint])),
+        LinkCoordinate::Alpha => cross(&frames.lateral[joint], &minus(point, &frames.origin[joint + 1])),
+        LinkCoordinate::Beta => cross(&frames.y[joint], &minus(point, &frames.origin[joint + 1])),
+    }
 }
 
 /// Σᵢⱼ Cᵢⱼ vᵢ·vⱼ for a symmetric C, given column by column.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn quadratic<R: Real>(matrix: &[f64], velocities: &[[R; 3]]) -> R {
-    let n = velocities.len();
-    let mut out = R::splat(0.0);
-    for (i, v) in velocities.iter().enumerate() {
-        let column = &matrix[i * n..i * n + i + 1];
-        let mut sum = [R::splat(0.0); 3];
-        for (c, w) in column.iter().zip(&velocities[..i]) {
-            for k in 0..3 {
-                sum[k] += R::splat(2.0 * c) * w[k];
+struct Quadratic<'a> {
+    matrix: &'a [f64],
+    velocities: &'a [[Eight; 3]],
+}
+
+impl AnyWidth for Quadratic<'_> {
+    type Output = Eight;
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) -> Eight {
+        let n = self.velocities.len();
+        let mut out = [0.0; WIDTH];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let mut total = like.splat(0.0);
+            for (i, v) in self.velocities.iter().enumerate() {
+                let column = &self.matrix[i * n..i * n + i + 1];
+                let mut sum = [like.splat(0.0); 3];
+                for (c, w) in column.iter().zip(&self.velocities[..i]) {
+                    let w = loaded(like, w, from);
+                    let twice = like.splat(2.0 * c);
+                    for k in 0..3 {
+                        sum[k] += twice * w[k];
+                    }
+                }
+                let v = loaded(like, v, from);
+                for k in 0..3 {
+                    total += v[k] * (sum[k] + like.splat(column[i]) * v[k]);
+                }
             }
+            total.store(&mut out, from);
         }
-        for k in 0..3 {
-            out += v[k] * (sum[k] + R::splat(column[i]) * v[k]);
-        }
+        out
     }
-    out
 }
 
 /// √v of a variance that rounding may have taken below 0; not a number of what is none.
@@ -243,29 +298,23 @@ impl Estimated {
     /// [`Estimated::position_sigma_mm`] of many points, eight in lanes.
     pub fn position_sigmas_mm(&self, arm: &PreparedModel<'_>, points: &[RidingPoint<'_>]) -> Vec<f64> {
         let growth: f64 = arm.model.effects.iter().map(|e| e.growth(&arm.condition)).sum();
-        let zero = Lanes([0.0; WIDTH]);
-        let mut velocities = vec![[zero; 3]; self.order.len()];
+        let mut velocities = vec![[[0.0; WIDTH]; 3]; self.order.len()];
         let mut out = Vec::with_capacity(points.len());
         for block in points.chunks(WIDTH) {
             let row = |k: usize| &block[k.min(block.len() - 1)];
-            let angles: [Lanes; 6] =
-                std::array::from_fn(|i| Lanes(std::array::from_fn(|k| row(k).joints[i])));
+            let angles: [Eight; 6] = std::array::from_fn(|i| std::array::from_fn(|k| row(k).joints[i]));
             let rides: [Vector3<f64>; WIDTH] =
                 std::array::from_fn(|k| (arm.model.flange * row(k).flange_from_tool).translation.vector);
-            let rides: [Lanes; 3] = std::array::from_fn(|i| Lanes(std::array::from_fn(|k| rides[k][i])));
-            let at = vectorised(
-                #[inline(always)]
-                || {
-                    link_velocities(
-                        &arm.frames_of(&angles),
-                        &rides,
-                        1.0 + growth,
-                        &self.order,
-                        &mut velocities,
-                    )
-                },
-            );
-            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i].0[k]) };
+            let rides: [Eight; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rides[k][i]));
+            let at = vectorised(LinkVelocities {
+                arm,
+                angles: &angles,
+                rides: &rides,
+                scale: 1.0 + growth,
+                order: &self.order,
+                velocities: &mut velocities,
+            });
+            let point = |k: usize| -> [f64; 3] { std::array::from_fn(|i| at[i][k]) };
             if !arm.model.effects.is_empty() {
                 for k in 0..block.len() {
                     let frames = arm.frames(&row(k).joints);
@@ -273,7 +322,7 @@ impl Estimated {
                         if let Parameter::Effect { index, parameter } = *parameter {
                             let twist =
                                 effect_twist(arm, &row(k).joints, &frames, index, parameter, &point(k));
-                            (0..3).for_each(|i| velocity[i].0[k] = twist[i]);
+                            (0..3).for_each(|i| velocity[i][k] = twist[i]);
                         }
                     }
                 }
@@ -283,14 +332,12 @@ impl Estimated {
                 let lever = Vector3::from(point(k)) - carried.origin_mm;
                 for (velocity, twist) in velocities.iter_mut().zip(&carried.twists) {
                     let moved = twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&lever);
-                    (0..3).for_each(|i| velocity[i].0[k] -= moved[i]);
+                    (0..3).for_each(|i| velocity[i][k] -= moved[i]);
                 }
             }
-            let variance = vectorised(
-                #[inline(always)]
-                || quadratic(self.covariance.as_slice(), &velocities),
-            );
-            out.extend(variance.0[..block.len()].iter().map(|v| root(*v)));
+            let variance =
+                vectorised(Quadratic { matrix: self.covariance.as_slice(), velocities: &velocities });
+            out.extend(variance[..block.len()].iter().map(|v| root(*v)));
         }
         out
     }

@@ -33,7 +33,7 @@ use super::chain::End;
 use super::condition::Condition;
 use super::link::Link;
 use super::model::{Model, PreparedModel};
-use crate::joints::{Joints, Limits};
+use crate::joints::{self, Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
@@ -253,22 +253,44 @@ impl<'a> Inverse<'a> {
         self.structure.margins_of(&self.arm.frames(joints))
     }
 
-    /// The solution of the kernel, if it counts: arrived, not far from the seed, on its branch.
+    /// The solution of the kernel, if it counts.
     fn accepted(&self, solved: &Solved<f64>, seed: &Joints) -> Option<Solution> {
-        let joints = self.map_inverse? * Joints::from(solved.mapped);
+        let joints = self.unmapped(&solved.mapped);
+        self.counts(solved, &joints, seed).then_some(solved.solution(&joints))
+    }
+
+    /// Controller angles for mapped ones.
+    #[inline(always)]
+    fn unmapped(&self, mapped: &[f64; 6]) -> Joints {
+        match &self.map_inverse {
+            Some(inverse) if !self.arm.map_is_identity() => inverse * Joints::from(*mapped),
+            _ => Joints::from(*mapped),
+        }
+    }
+
+    /// Whether a solution of the kernel counts: arrived, not far from the seed, on its branch.
+    #[inline(always)]
+    fn counts(&self, solved: &Solved<f64>, joints: &Joints, seed: &Joints) -> bool {
         let farthest =
             if self.structure.has_branches() { FARTHEST_RAD } else { FARTHEST_WITHOUT_BRANCHES_RAD };
-        (solved.converged == 1.0
+        self.map_inverse.is_some()
+            && solved.converged == 1.0
             && solved.singularity > 1e-9
-            && (joints - seed).amax() < farthest
-            && same_branch(&solved.margins[0], &solved.margins[1]))
-        .then_some(Solution {
-            joints,
-            residual_mm: solved.residual_mm,
-            residual_rad: solved.residual_rad,
-            iterations: solved.steps as usize,
-            singularity: solved.singularity,
-        })
+            && joints::farthest_apart(joints, seed) < farthest
+            && same_branch(&solved.margins[0], &solved.margins[1])
+    }
+
+    #[inline(always)]
+    fn within_limits(&self, joints: &Joints) -> bool {
+        let Limits { min_rad, max_rad, .. } = &self.arm.model.limits;
+        let mut inside = true;
+        for joint in 0..6 {
+            let angle_rad = joints[joint];
+            let outside =
+                angle_rad < min_rad[joint] - LIMIT_SLACK_RAD || angle_rad > max_rad[joint] + LIMIT_SLACK_RAD;
+            inside &= !outside;
+        }
+        inside
     }
 
     fn check_limits(&self, joints: &Joints) -> Result<(), InverseError> {
@@ -306,6 +328,7 @@ fn apart_mm(estimated: &Model, condition: &Condition, nominal: &Model, extent_mm
 }
 
 /// Whether margins belong to one branch; a border near which either stands does not count.
+#[inline(always)]
 fn same_branch(a: &[f64; 3], b: &[f64; 3]) -> bool {
     (0..3).all(|k| {
         (a[k] < 0.0) == (b[k] < 0.0) || a[k].abs() < BRANCH_TOLERANCE || b[k].abs() < BRANCH_TOLERANCE

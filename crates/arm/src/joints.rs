@@ -33,3 +33,14 @@ impl Limits {
         (0..6).find(|&i| !(self.min_rad[i]..=self.max_rad[i]).contains(&q[i]))
     }
 }
+
+/// The largest difference between joints of the same number (rad); one that is not a number counts as the largest of all.
+#[inline(always)]
+pub(crate) fn farthest_apart(a: &Joints, b: &Joints) -> f64 {
+    let mut out = 0.0;
+    for joint in 0..6 {
+        let apart = (a[joint] - b[joint]).abs();
+        out = if apart <= out { out } else { apart };
+    }
+    out
+}

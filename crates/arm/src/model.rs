@@ -75,6 +75,7 @@ impl Model {
             tables: chain::tables(&self.links_under(condition)),
             statics: (!self.effects.is_empty()).then(|| self.statics()),
             loaded: self.effects.iter().any(Effect::needs_torque),
+            straight: self.joint_map == Matrix6::identity(),
         }
     }
 
@@ -109,6 +110,8 @@ pub struct PreparedModel<'a> {
     pub tables: [LinkTable; 6],
     statics: Option<Statics>,
     loaded: bool,
+    /// Whether the joint map is the identity.
+    straight: bool,
 }
 
 impl PreparedModel<'_> {
@@ -122,11 +125,11 @@ impl PreparedModel<'_> {
         self.frames_of(&(*q).into())
     }
 
-    /// All joint frames in the base, for one row or eight in lanes.
+    /// All joint frames in the base, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn frames_of<R: SinCos>(&self, q: &[R; 6]) -> Chain<R> {
         let rotation = self.affected(&self.mapped(q));
-        let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
+        let (mut sin, mut cos) = (rotation, rotation);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotation[i]);
         }
@@ -138,29 +141,43 @@ impl PreparedModel<'_> {
         self.affected(&self.mapped(&(*q).into())).into()
     }
 
-    /// Joint angles after the joint map, for one row or eight in lanes.
+    /// Whether mapped angles are the controller's.
+    pub(crate) fn map_is_identity(&self) -> bool {
+        self.straight
+    }
+
+    /// Joint angles after the joint map, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn mapped<R: Real>(&self, q: &[R; 6]) -> [R; 6] {
         let map = &self.model.joint_map;
-        let mut out = [R::splat(0.0); 6];
+        let zero = q[0].splat(0.0);
+        if self.straight {
+            // The sum below, bit by bit: −0 becomes 0.
+            let mut out = *q;
+            for angle in &mut out {
+                *angle = zero + *angle;
+            }
+            return out;
+        }
+        let mut out = [zero; 6];
         for i in 0..6 {
             for j in 0..6 {
                 if map[(i, j)] != 0.0 {
-                    out[i] += R::splat(map[(i, j)]) * q[j];
+                    out[i] += q[j].splat(map[(i, j)]) * q[j];
                 }
             }
         }
         out
     }
 
-    /// DH joint rotations for mapped joint angles: the effects alone, for one row or eight in lanes.
+    /// DH joint rotations for mapped joint angles: the effects alone, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn affected<R: SinCos>(&self, mapped: &[R; 6]) -> [R; 6] {
         let mut out = *mapped;
         if let Some(statics) = &self.statics {
             let torque = match self.loaded {
                 true => statics.loads(mapped, &self.condition),
-                false => [R::splat(0.0); 6],
+                false => [mapped[0].splat(0.0); 6],
             };
             for effect in &self.model.effects {
                 effect.add_offset(statics, mapped, &torque, &self.condition, &mut out);

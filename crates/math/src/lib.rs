@@ -1,6 +1,7 @@
 //! Rigid motions, numerical differences and statistics: what every other module stands on.
 
 pub mod lanes;
+pub mod gram;
 pub mod se3;
 pub mod difference;
 pub mod statistics;

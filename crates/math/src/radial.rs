@@ -6,7 +6,7 @@
 
 use super::lanes::Real;
 
-/// Value of the bump at `u` around `centre`, for one point or eight in lanes.
+/// Value of the bump at `u` around `centre`, for one point or several in lanes.
 ///
 /// ```
 /// use truegrind_math::radial::bump;
@@ -20,30 +20,30 @@ use super::lanes::Real;
 pub fn bump<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> R {
     let (t, r) = inside(u, centre, reach);
     let square = t * t;
-    square * square * (R::splat(4.0) * r + R::splat(1.0))
+    square * square * (r.splat(4.0) * r + r.splat(1.0))
 }
 
 /// Derivative of [`bump`] along `step`.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn slope_along<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64, step: &[R; D]) -> R {
     let (t, _) = inside(u, centre, reach);
-    let mut along = R::splat(0.0);
+    let mut along = t.splat(0.0);
     for k in 0..D {
-        along += (u[k] - R::splat(centre[k])) * step[k];
+        along += (u[k] - u[k].splat(centre[k])) * step[k];
     }
-    R::splat(-20.0 / (reach * reach)) * t * t * t * along
+    t.splat(-20.0 / (reach * reach)) * t * t * t * along
 }
 
 /// 1 − r, not below 0, and r.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn inside<R: Real, const D: usize>(u: &[R; D], centre: &[f64; D], reach: f64) -> (R, R) {
-    let mut square = R::splat(0.0);
+    let mut square = u[0].splat(0.0);
     for k in 0..D {
-        let d = u[k] - R::splat(centre[k]);
+        let d = u[k] - u[k].splat(centre[k]);
         square += d * d;
     }
-    let r = square.sqrt() * R::splat(1.0 / reach);
-    let t = R::splat(1.0) - r;
+    let r = square.sqrt() * square.splat(1.0 / reach);
+    let t = r.splat(1.0) - r;
     (t * t.positive(), r)
 }
 

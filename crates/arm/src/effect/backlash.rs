@@ -61,7 +61,7 @@ impl Backlash {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_offset<R: Real>(&self, condition: &Condition, out: &mut [R; 6]) {
         let side = f64::from(condition.approach[self.joint]);
-        out[self.joint] += R::splat(self.play_rad * 0.5 * side);
+        out[self.joint] += out[self.joint].splat(self.play_rad * 0.5 * side);
     }
 
     pub(super) fn slope(&self, _: &Statics, _: &Joints, _: &Condition) -> Matrix6<f64> {

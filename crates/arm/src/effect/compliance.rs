@@ -63,7 +63,7 @@ impl Compliance {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_offset<R: Real>(&self, torque: &[R; 6], out: &mut [R; 6]) {
-        out[self.joint] += R::splat(self.compliance_rad_per_nm) * torque[self.joint];
+        out[self.joint] += torque[self.joint].splat(self.compliance_rad_per_nm) * torque[self.joint];
     }
 
     pub(super) fn slope(&self, statics: &Statics, u: &Joints, condition: &Condition) -> Matrix6<f64> {

@@ -46,7 +46,7 @@ impl Coupling {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
-        out[self.joint] += R::splat(self.factor) * u[self.driver];
+        out[self.joint] += u[self.driver].splat(self.factor) * u[self.driver];
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]

@@ -89,14 +89,15 @@ impl Harmonic {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_offset<R: SinCos>(&self, u: &[R; 6], out: &mut [R; 6]) {
-        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
-        out[self.joint] += R::splat(self.sine_rad) * sin + R::splat(self.cosine_rad) * cos;
+        let (sin, cos) = sin_cos(u[self.joint].splat(self.order) * u[self.joint]);
+        out[self.joint] += sin.splat(self.sine_rad) * sin + cos.splat(self.cosine_rad) * cos;
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_jacobian_product<R: SinCos>(&self, u: &[R; 6], step: &[R; 6], out: &mut [R; 6]) {
-        let (sin, cos) = sin_cos(R::splat(self.order) * u[self.joint]);
-        let slope = R::splat(self.order * self.sine_rad) * cos - R::splat(self.order * self.cosine_rad) * sin;
+        let (sin, cos) = sin_cos(u[self.joint].splat(self.order) * u[self.joint]);
+        let slope =
+            cos.splat(self.order * self.sine_rad) * cos - sin.splat(self.order * self.cosine_rad) * sin;
         out[self.joint] += slope * step[self.joint];
     }
 

@@ -10,12 +10,12 @@
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{Chain, cross, dot, minus};
+use crate::chain::{Chain, cross, dot, minus, scaled};
 use crate::condition::Condition;
 use crate::effect::parameter::EffectParameter;
 use crate::effect::statics::{GRAVITY, Statics};
 use crate::joints::Joints;
-use truegrind_math::lanes::{Real, SinCos};
+use truegrind_math::lanes::{Real, SinCos, splats};
 
 /// One lump.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -96,7 +96,7 @@ impl GravityLoad {
     /// Torque of 1 kg at a lump's place.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn torque<R: Real>(&self, statics: &Statics, frames: &Chain<R>, lump: &Lump) -> R {
-        let g = pull(statics, lump).map(R::splat);
+        let g = splats(frames.x[0], &pull(statics, lump));
         let lever = lever(frames, lump, self.joint);
         dot(&frames.z[self.joint], &cross(&lever, &g))
     }
@@ -123,7 +123,7 @@ impl GravityLoad {
     pub(super) fn add_offset<R: SinCos>(&self, statics: &Statics, u: &[R; 6], out: &mut [R; 6]) {
         let frames = statics.frames(u);
         for lump in &self.lump {
-            out[self.joint] += R::splat(lump.factor) * self.torque(statics, &frames, lump);
+            out[self.joint] += u[0].splat(lump.factor) * self.torque(statics, &frames, lump);
         }
     }
 
@@ -153,7 +153,7 @@ fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
         Some(1) => frames.y[lump.frame - 1],
         Some(_) => frames.z[lump.frame],
     };
-    axis.map(|a| R::splat(1e3) * a)
+    scaled(axis[0].splat(1e3), &axis)
 }
 
 /// Weight of 1 kg (N), with metres for the millimetres of the levers.
@@ -161,6 +161,10 @@ fn lever<R: Real>(frames: &Chain<R>, lump: &Lump, joint: usize) -> [R; 3] {
 fn pull(statics: &Statics, lump: &Lump) -> [f64; 3] {
     match lump.axis {
         None => statics.gravity_newton(),
-        Some(axis) => std::array::from_fn(|k| if k == axis { GRAVITY * 1e-3 } else { 0.0 }),
+        Some(axis) => {
+            let mut along = [0.0; 3];
+            along[axis] = GRAVITY * 1e-3;
+            along
+        }
     }
 }

@@ -58,7 +58,7 @@ impl Ratio {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add_offset<R: Real>(&self, u: &[R; 6], out: &mut [R; 6]) {
-        out[self.joint] += R::splat(self.error) * u[self.joint];
+        out[self.joint] += u[self.joint].splat(self.error) * u[self.joint];
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]

@@ -107,7 +107,7 @@ impl Smooth {
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
             let bump = radial::bump(&v, centre, self.reach_rad);
             for joint in 0..JOINTS {
-                out[joint] += R::splat(weights[joint]) * bump;
+                out[joint] += bump.splat(weights[joint]) * bump;
             }
         }
     }
@@ -118,7 +118,7 @@ impl Smooth {
         for (centre, weights) in self.centres_rad.iter().zip(&self.weights_rad) {
             let slope = radial::slope_along(&v, centre, self.reach_rad, &along);
             for joint in 0..JOINTS {
-                out[joint] += R::splat(weights[joint]) * slope;
+                out[joint] += slope.splat(weights[joint]) * slope;
             }
         }
     }

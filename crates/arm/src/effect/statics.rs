@@ -7,7 +7,7 @@ use crate::chain::{self, Chain, LinkTable, cross, dot};
 use crate::condition::Condition;
 use crate::joints::Joints;
 use crate::link::Link;
-use truegrind_math::lanes::{SinCos, sin_cos};
+use truegrind_math::lanes::{SinCos, sin_cos, splats};
 
 /// The static torques of an arm, for effects that need them.
 #[derive(Debug, Clone)]
@@ -39,12 +39,12 @@ impl Statics {
         (torque, slope)
     }
 
-    /// The torques alone, for one row or eight in lanes.
+    /// The torques alone, for one row or several in lanes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn loads<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> [R; 6] {
         let (frames, levers) = self.levers(u, condition);
-        let g = self.gravity_newton().map(R::splat);
-        let mut out = [R::splat(0.0); 6];
+        let g = splats(u[0], &self.gravity_newton());
+        let mut out = *u;
         for j in 0..6 {
             out[j] = dot(&frames.z[j], &cross(&levers[j], &g));
         }
@@ -54,14 +54,14 @@ impl Statics {
     /// Weight of a kilogram, with metres for the millimetres of the levers.
     #[inline(always)]
     pub(super) fn gravity_newton(&self) -> [f64; 3] {
-        [self.gravity.x, self.gravity.y, self.gravity.z].map(|v| v * GRAVITY * 1e-3)
+        let g = &self.gravity;
+        [g.x * GRAVITY * 1e-3, g.y * GRAVITY * 1e-3, g.z * GRAVITY * 1e-3]
     }
 
     /// The frames at mapped angles `u`.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn frames<R: SinCos>(&self, u: &[R; 6]) -> Chain<R> {
-        let zero = R::splat(0.0);
-        let (mut sin, mut cos) = ([zero; 6], [zero; 6]);
+        let (mut sin, mut cos) = (*u, *u);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(u[i]);
         }
@@ -71,7 +71,7 @@ impl Statics {
     /// The frames, and for each joint Σ m (c − o) [kg mm] over everything beyond it.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn levers<R: SinCos>(&self, u: &[R; 6], condition: &Condition) -> (Chain<R>, [[R; 3]; 6]) {
-        let zero = R::splat(0.0);
+        let zero = u[0].splat(0.0);
         let frames = self.frames(u);
         let mut levers = [[zero; 3]; 6];
         let (mut sum, mut mass) = ([zero; 3], 0.0);
@@ -81,17 +81,16 @@ impl Statics {
             let body = &self.bodies[k];
             let payload = if k == 5 { condition.payload_kg.unwrap_or(0.0) } else { 0.0 };
             // Σ m c of the body, and of the payload, which has its centre in the same frame.
-            let c = std::array::from_fn::<f64, 3, _>(|i| {
-                body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i]
-            });
+            let mut c = [0.0; 3];
+            for i in 0..3 {
+                c[i] = body.mass_kg * body.centre_mm[i] + payload * condition.payload_centre_mm[i];
+            }
             let here = body.mass_kg + payload;
             mass += here;
+            let (c, here, total) = (splats(zero, &c), zero.splat(here), zero.splat(mass));
             for i in 0..3 {
-                sum[i] += R::splat(here) * o[i]
-                    + R::splat(c[0]) * x[i]
-                    + R::splat(c[1]) * y[i]
-                    + R::splat(c[2]) * z[i];
-                levers[k][i] = sum[i] - R::splat(mass) * frames.origin[k][i];
+                sum[i] += here * o[i] + c[0] * x[i] + c[1] * y[i] + c[2] * z[i];
+                levers[k][i] = sum[i] - total * frames.origin[k][i];
             }
         }
         (frames, levers)

@@ -1,11 +1,11 @@
-//! Newton's method for one target or for eight in lanes: the fast road, with no branch and no allocation.
+//! Newton's method for one target or for several in lanes: the fast road, with no branch and no allocation.
 //!
 //! Method: the twist that is missing is taken at the wrist point, which joints 4 to 6 hardly move. The Jacobian is
 //! then [A B; C D] with A (3 × 3, translation by joints 1 to 3) far from singular wherever shoulder and elbow are, and
 //! A⁻¹ and the inverse of the Schur complement S = D − C A⁻¹ B follow from cross products: no pivoting. The slope σ of
 //! the effects enters as Δu = (I − σ) Δθ, exact to σ²; that of compliance (some 1e-3) is left out and costs at most
 //! one step more.
-//! Shapes: `R` is one row or eight; unknowns are the mapped joint angles u (rad).
+//! Shapes: `R` is one row or several; unknowns are the mapped joint angles u (rad).
 //! Stops: a row stands still once it is within [`TOLERANCE_MM`] and
 //! [`TOLERANCE_RAD`], so it gets the same bits whatever its neighbours do; a row whose step is longer than
 //! [`LONGEST_STEP_RAD`] or which needs more than [`STEPS`] is given up and left to [`super::newton`]. Where only the
@@ -14,10 +14,12 @@
 //! Checked against: [`super::newton`], the forward map.
 
 use super::newton::{TOLERANCE_MM, TOLERANCE_RAD};
+use super::solution::Solution;
 use super::structure::Structure;
 use crate::chain::{Chain, End, chain, cross, dot, minus};
+use crate::joints::Joints;
 use crate::model::PreparedModel;
-use truegrind_math::lanes::{SinCos, sin_cos};
+use truegrind_math::lanes::{SinCos, sin_cos, splats};
 
 /// Most steps of a row.
 const STEPS: usize = 8;
@@ -49,7 +51,7 @@ pub(super) struct Kernel {
 }
 
 /// Where a row ended.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Solved<R> {
     /// Mapped joint angles (rad).
     pub(super) mapped: [R; 6],
@@ -62,13 +64,25 @@ pub(super) struct Solved<R> {
     pub(super) margins: [[R; 3]; 2],
 }
 
+impl Solved<f64> {
+    #[inline(always)]
+    pub(super) fn solution(&self, joints: &Joints) -> Solution {
+        Solution {
+            joints: *joints,
+            residual_mm: self.residual_mm,
+            residual_rad: self.residual_rad,
+            iterations: self.steps as usize,
+            singularity: self.singularity,
+        }
+    }
+}
+
 #[inline(always)]
 fn at<R: SinCos>(origin: &[R; 3], axes: &[[R; 3]; 3], point: &[f64; 3]) -> [R; 3] {
     let mut out = *origin;
+    let point = splats(origin[0], point);
     for k in 0..3 {
-        out[k] += R::splat(point[0]) * axes[0][k]
-            + R::splat(point[1]) * axes[1][k]
-            + R::splat(point[2]) * axes[2][k];
+        out[k] += point[0] * axes[0][k] + point[1] * axes[1][k] + point[2] * axes[2][k];
     }
     out
 }
@@ -78,7 +92,7 @@ fn at<R: SinCos>(origin: &[R; 3], axes: &[[R; 3]; 3], point: &[f64; 3]) -> [R; 3
 fn inverse_rows<R: SinCos>(columns: &[[R; 3]; 3]) -> [[R; 3]; 3] {
     let [a, b, c] = columns;
     let mut rows = [cross(b, c), cross(c, a), cross(a, b)];
-    let scale = R::splat(1.0) / dot(a, &rows[0]);
+    let scale = a[0].splat(1.0) / dot(a, &rows[0]);
     for row in &mut rows {
         for entry in row {
             *entry = *entry * scale;
@@ -94,7 +108,7 @@ fn times<R: SinCos>(rows: &[[R; 3]; 3], v: &[R; 3]) -> [R; 3] {
 
 #[inline(always)]
 fn combine<R: SinCos>(columns: &[[R; 3]; 3], v: &[R; 3]) -> [R; 3] {
-    let mut out = [R::splat(0.0); 3];
+    let mut out = *v;
     for k in 0..3 {
         out[k] = columns[0][k] * v[0] + columns[1][k] * v[1] + columns[2][k] * v[2];
     }
@@ -116,7 +130,7 @@ struct Factored<R> {
 impl<R: SinCos> Factored<R> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn of(frames: &Chain<R>, wrist: &[R; 3]) -> Self {
-        let zero = R::splat(0.0);
+        let zero = wrist[0].splat(0.0);
         let mut shifts = [[zero; 3]; 6];
         for (j, shift) in shifts.iter_mut().enumerate() {
             *shift = cross(&frames.z[j], &minus(wrist, &frames.origin[j]));
@@ -143,18 +157,18 @@ impl<R: SinCos> Factored<R> {
     /// Above 0 where both factors have an inverse.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn regular(&self, length: f64) -> R {
-        let mut square = R::splat(0.0);
+        let mut square = self.first[0][0].splat(0.0);
         for k in 0..3 {
-            let first = dot(&self.first[k], &self.first[k]) * R::splat(length * length);
+            let first = dot(&self.first[k], &self.first[k]) * square.splat(length * length);
             square += first + dot(&self.last[k], &self.last[k]);
         }
-        R::splat(1.0) / square.sqrt()
+        square.splat(1.0) / square.sqrt()
     }
 
     /// 1/‖J⁻¹‖ (Frobenius) at a point from which `lever` leads to the wrist point, translations divided by `length`.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn distance(&self, lever: &[R; 3], length: f64) -> R {
-        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        let (zero, one) = (lever[0].splat(0.0), lever[0].splat(1.0));
         let mut square = zero;
         for k in 0..3 {
             let mut unit = [zero; 3];
@@ -163,7 +177,7 @@ impl<R: SinCos> Factored<R> {
             let shift = self.solve(&unit, &[zero; 3]);
             let turn = self.solve(&cross(&unit, lever), &unit);
             for j in 0..6 {
-                let scaled = shift[j] * R::splat(length);
+                let scaled = shift[j] * zero.splat(length);
                 square += scaled * scaled + turn[j] * turn[j];
             }
         }
@@ -182,7 +196,7 @@ impl Kernel {
         start: &[R; 6],
         asked: Asked,
     ) -> Solved<R> {
-        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        let (zero, one) = (start[0].splat(0.0), start[0].splat(1.0));
         let goal_wrist = at(&goal.origin, &goal.axes, &self.wrist_mm);
         let goal_flange = at(&goal.origin, &goal.axes, &self.flange_mm);
         let mut mapped = *start;
@@ -203,7 +217,7 @@ impl Kernel {
             for (here, there) in axes.iter().zip(&goal.axes) {
                 let c = cross(here, there);
                 for (t, c) in turn.iter_mut().zip(c) {
-                    *t += R::splat(0.5) * c;
+                    *t += zero.splat(0.5) * c;
                 }
                 trace += dot(here, there);
             }
@@ -217,7 +231,7 @@ impl Kernel {
             }
             alive = alive * sensible * (one - converged);
             let factored = Factored::of(&frames, &wrist);
-            let mut ends = step == STEPS || alive.max_abs() == 0.0;
+            let mut ends = step == STEPS || !alive.any_above(0.0);
             if !ends {
                 let mut delta = factored.solve(&minus(&goal_wrist, &wrist), &turn);
                 let mut carried = [zero; 6];
@@ -240,8 +254,8 @@ impl Kernel {
                         last = last * turn.within(SETTLED_RAD);
                     }
                     alive += -last;
-                    ends = alive.max_abs() == 0.0;
-                    if last.max_abs() > 0.0 {
+                    ends = !alive.any_above(0.0);
+                    if last.any_above(0.0) {
                         let margins = structure.margins(&frames, &wrist);
                         for k in 0..3 {
                             settled_margins[k] += last * margins[k];
@@ -276,7 +290,7 @@ impl Kernel {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn frames<R: SinCos>(&self, arm: &PreparedModel<'_>, mapped: &[R; 6]) -> Chain<R> {
         let rotations = arm.affected(mapped);
-        let (mut sin, mut cos) = ([R::splat(0.0); 6], [R::splat(0.0); 6]);
+        let (mut sin, mut cos) = (rotations, rotations);
         for i in 0..6 {
             (sin[i], cos[i]) = sin_cos(rotations[i]);
         }

@@ -7,8 +7,8 @@ use super::effort::{Allowance, within};
 use super::kernel::{Asked, Solved};
 use super::{Branch, Inverse, InverseError, Solution, same_branch};
 use crate::chain::End;
-use crate::joints::Joints;
-use truegrind_math::lanes::{Lanes, SinCos, WIDTH, vectorised};
+use crate::joints::{self, Joints};
+use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 use truegrind_math::se3::Pose;
 
 /// Neighbours on a path that stand farther apart are solved one after the other, not in lanes (rad).
@@ -59,17 +59,15 @@ impl Inverse<'_> {
     /// The joints of [`Inverse::solve_path`], without residuals and distances to singularity: half the work. They may
     /// differ by 1e-12 rad.
     pub fn reach_path(&self, targets: &[Pose], start: &Joints) -> Vec<Result<Reached, InverseError>> {
-        self.along(targets, start, Asked::Joints, false, |Solution { joints, .. }, margins| Reached {
-            joints,
-            configuration: self.configuration_of(&joints, &margins),
-            margins,
+        self.along(targets, start, Asked::Joints, false, |solution, margins| {
+            self.reached(&solution.joints, &margins)
         })
     }
 
     /// The first of [`Inverse::reach_path`], up to a target for which all branches would have to be searched.
     pub fn reach_path_easily(&self, targets: &[Pose], start: &Joints) -> Vec<Reached> {
-        let reached = self.along(targets, start, Asked::Joints, true, |Solution { joints, .. }, margins| {
-            Reached { joints, configuration: self.configuration_of(&joints, &margins), margins }
+        let reached = self.along(targets, start, Asked::Joints, true, |solution, margins| {
+            self.reached(&solution.joints, &margins)
         });
         reached.into_iter().map_while(Result::ok).collect()
     }
@@ -86,38 +84,41 @@ impl Inverse<'_> {
         let mut out = Vec::with_capacity(targets.len());
         let (mut last, mut stride) = (*start, Joints::zeros());
         let mut margins = self.margins(start);
+        let (mut seeds, mut solved) = ([last; WIDTH], Solved::default());
+        let mut lanes = Asking::default();
         for block in targets.chunks(WIDTH) {
-            let seeds: [Joints; WIDTH] = std::array::from_fn(|k| last + stride * (k + 1) as f64);
-            let solved = self.solve_lanes(block, &seeds, asked);
+            for (k, seed) in seeds.iter_mut().enumerate() {
+                let ahead = (k + 1) as f64;
+                for joint in 0..6 {
+                    seed[joint] = last[joint] + stride[joint] * ahead;
+                }
+            }
+            self.solve_lanes(block, &seeds, asked, &mut lanes, &mut solved);
             for (k, target) in block.iter().enumerate() {
                 let row = lane(&solved, k);
+                let joints = self.unmapped(&row.mapped);
                 // The road in lanes is open while strides are short and the branch is kept.
-                let quick = self
-                    .accepted(&row, &seeds[k])
-                    .filter(|s| {
-                        (s.joints - last).amax() < LONGEST_STRIDE_RAD
-                            && same_branch(&margins, &row.margins[1])
-                    })
-                    .filter(|s| self.check_limits(&s.joints).is_ok());
-                let result = match quick {
-                    Some(solution) => {
-                        margins = row.margins[1];
-                        Ok(solution)
-                    }
-                    None if easily => match self.solve_easily(target, &last) {
-                        Some(Ok(solution)) => {
-                            margins = self.margins(&solution.joints);
-                            Ok(solution)
-                        }
+                if self.counts(&row, &joints, &seeds[k])
+                    && joints::farthest_apart(&joints, &last) < LONGEST_STRIDE_RAD
+                    && same_branch(&margins, &row.margins[1])
+                    && self.within_limits(&joints)
+                {
+                    margins = row.margins[1];
+                    stride = stride_between(&last, &joints);
+                    last = joints;
+                    out.push(Ok(keep(row.solution(&joints), margins)));
+                    continue;
+                }
+                let result = match easily {
+                    true => match self.solve_easily(target, &last) {
+                        Some(Ok(solution)) => Ok(solution),
                         Some(Err(_)) | None => return out,
                     },
-                    None => self.solve_near(target, &last).inspect(|s| margins = self.margins(&s.joints)),
+                    false => self.solve_near(target, &last),
                 };
                 if let Ok(solution) = &result {
-                    stride = solution.joints - last;
-                    if stride.amax() >= STEADY_STRIDE_RAD {
-                        stride = Joints::zeros();
-                    }
+                    margins = self.margins(&solution.joints);
+                    stride = stride_between(&last, &solution.joints);
                     last = solution.joints;
                 }
                 out.push(result.map(|solution| keep(solution, margins)));
@@ -151,7 +152,8 @@ impl Inverse<'_> {
                 within(&mut allowance, || {
                     let blocks = targets.chunks(WIDTH).zip(seeds.chunks(WIDTH));
                     let solved = blocks.flat_map(|(targets, seeds)| {
-                        let solved = self.solve_lanes(targets, &padded(seeds), Asked::Everything);
+                        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
+                        self.solve_lanes(targets, &padded(seeds), Asked::Everything, &mut lanes, &mut solved);
                         (0..targets.len())
                             .map(move |k| self.judged(&lane(&solved, k), &targets[k], &seeds[k]))
                     });
@@ -165,21 +167,19 @@ impl Inverse<'_> {
     /// differ by 1e-12 rad. One thread.
     pub fn reach_seeded(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Reached, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
+        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
         for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
-            let solved = self.solve_lanes(targets, &padded(seeds), Asked::Joints);
+            self.solve_lanes(targets, &padded(seeds), Asked::Joints, &mut lanes, &mut solved);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let row = lane(&solved, k);
-                let found = match self.accepted(&row, seed) {
-                    Some(solution) => {
-                        self.check_limits(&solution.joints).map(|()| (solution.joints, row.margins[1]))
+                let joints = self.unmapped(&row.mapped);
+                out.push(match self.counts(&row, &joints, seed) {
+                    true => self.check_limits(&joints).map(|()| self.reached(&joints, &row.margins[1])),
+                    false => {
+                        let found = self.solve_near(target, seed);
+                        found.map(|s| self.reached(&s.joints, &self.margins(&s.joints)))
                     }
-                    None => self.solve_near(target, seed).map(|s| (s.joints, self.margins(&s.joints))),
-                };
-                out.push(found.map(|(joints, margins)| Reached {
-                    joints,
-                    configuration: self.configuration_of(&joints, &margins),
-                    margins,
-                }));
+                });
             }
         }
         out
@@ -191,9 +191,10 @@ impl Inverse<'_> {
     pub fn solve_beside(&self, targets: &[Pose], seeds: &[Joints]) -> Vec<Result<Solution, InverseError>> {
         let mut out = Vec::with_capacity(targets.len());
         let mut beside = Joints::zeros();
+        let (mut lanes, mut solved) = (Asking::default(), Solved::default());
         for (targets, seeds) in targets.chunks(WIDTH).zip(seeds.chunks(WIDTH)) {
-            let solved =
-                self.solve_lanes(targets, &padded(seeds).map(|seed| seed + beside), Asked::Everything);
+            let begun = padded(seeds).map(|seed| seed + beside);
+            self.solve_lanes(targets, &begun, Asked::Everything, &mut lanes, &mut solved);
             for (k, (target, seed)) in targets.iter().zip(seeds).enumerate() {
                 let result = self.judged(&lane(&solved, k), target, seed);
                 if let Ok(solution) = &result {
@@ -210,14 +211,16 @@ impl Inverse<'_> {
 
     /// The kernel's solution where it counts, the careful one elsewhere.
     fn judged(&self, row: &Solved<f64>, target: &Pose, seed: &Joints) -> Result<Solution, InverseError> {
-        match self.accepted(row, seed) {
-            Some(solution) => self.check_limits(&solution.joints).map(|()| solution),
-            None => self.solve_near(target, seed),
+        let joints = self.unmapped(&row.mapped);
+        match self.counts(row, &joints, seed) {
+            true => self.check_limits(&joints).map(|()| row.solution(&joints)),
+            false => self.solve_near(target, seed),
         }
     }
 
-    fn configuration_of(&self, joints: &Joints, margins: &[f64; 3]) -> Configuration {
-        configuration::of(self.structure.has_branches().then(|| Branch::of(margins)), joints)
+    fn reached(&self, joints: &Joints, margins: &[f64; 3]) -> Reached {
+        let branch = self.structure.has_branches().then(|| Branch::of(margins));
+        Reached { joints: *joints, configuration: configuration::of(branch, joints), margins: *margins }
     }
 
     /// The kernel on one target.
@@ -229,29 +232,28 @@ impl Inverse<'_> {
         self.kernel.solve(&self.arm, &self.structure, &goal, &start, Asked::Everything)
     }
 
-    /// The kernel on up to eight targets; the last one fills the lanes.
-    fn solve_lanes(&self, targets: &[Pose], seeds: &[Joints; WIDTH], asked: Asked) -> Solved<Lanes> {
-        let zero = Lanes([0.0; WIDTH]);
-        let (mut quaternion, mut translation, mut start) = ([zero; 4], [zero; 3], [zero; 6]);
+    /// The kernel on up to eight targets; the last one fills the lanes. `lanes` is room for them.
+    fn solve_lanes(
+        &self,
+        targets: &[Pose],
+        seeds: &[Joints; WIDTH],
+        asked: Asked,
+        lanes: &mut Asking,
+        solved: &mut Solved<Eight>,
+    ) {
         for k in 0..WIDTH {
             let target = &targets[k.min(targets.len() - 1)];
-            for (i, lanes) in quaternion.iter_mut().enumerate() {
-                lanes.0[k] = target.rotation.coords[i];
+            for i in 0..4 {
+                lanes.quaternion[i][k] = target.rotation.coords[i];
             }
-            for (i, lanes) in translation.iter_mut().enumerate() {
-                lanes.0[k] = target.translation.vector[i];
+            for i in 0..3 {
+                lanes.translation[i][k] = target.translation.vector[i];
             }
-            for (i, lanes) in start.iter_mut().enumerate() {
-                lanes.0[k] = seeds[k][i];
+            for i in 0..6 {
+                lanes.start[i][k] = seeds[k][i];
             }
         }
-        vectorised(
-            #[inline(always)]
-            || {
-                let goal = self.place(&quaternion, &translation);
-                self.kernel.solve(&self.arm, &self.structure, &goal, &self.arm.mapped(&start), asked)
-            },
-        )
+        vectorised(Block { inverse: self, targets: lanes, asked, solved });
     }
 
     /// Place of the last frame for a pose of the flange, given by quaternion (x, y, z, w) and translation.
@@ -261,8 +263,8 @@ impl Inverse<'_> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn place<R: SinCos>(&self, quaternion: &[R; 4], translation: &[R; 3]) -> End<R> {
         let [x, y, z, w] = *quaternion;
-        let one = R::splat(1.0);
-        let two = R::splat(2.0) / (x * x + y * y + z * z + w * w);
+        let one = x.splat(1.0);
+        let two = x.splat(2.0) / (x * x + y * y + z * z + w * w);
         let columns = [
             [one - two * (y * y + z * z), two * (x * y + w * z), two * (x * z - w * y)],
             [two * (x * y - w * z), one - two * (x * x + z * z), two * (y * z + w * x)],
@@ -272,19 +274,90 @@ impl Inverse<'_> {
     }
 }
 
+/// The stride to be continued: none after a long one.
+#[inline(always)]
+fn stride_between(from: &Joints, to: &Joints) -> Joints {
+    if joints::farthest_apart(from, to) >= STEADY_STRIDE_RAD { Joints::zeros() } else { to - from }
+}
+
 /// Eight seeds; the last one fills the lanes.
 fn padded(seeds: &[Joints]) -> [Joints; WIDTH] {
     std::array::from_fn(|k| seeds[k.min(seeds.len() - 1)])
 }
 
-fn lane(solved: &Solved<Lanes>, k: usize) -> Solved<f64> {
-    Solved {
-        mapped: solved.mapped.map(|v| v.0[k]),
-        residual_mm: solved.residual_mm.0[k],
-        residual_rad: solved.residual_rad.0[k],
-        steps: solved.steps.0[k],
-        converged: solved.converged.0[k],
-        singularity: solved.singularity.0[k],
-        margins: solved.margins.map(|m| m.map(|v| v.0[k])),
+/// Eight targets' numbers side by side.
+type Eight = [f64; WIDTH];
+
+/// Eight targets with their seeds.
+#[derive(Default)]
+struct Asking {
+    quaternion: [Eight; 4],
+    translation: [Eight; 3],
+    start: [Eight; 6],
+}
+
+/// The kernel on eight targets.
+struct Block<'a> {
+    inverse: &'a Inverse<'a>,
+    targets: &'a Asking,
+    asked: Asked,
+    solved: &'a mut Solved<Eight>,
+}
+
+impl AnyWidth for Block<'_> {
+    type Output = ();
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) {
+        let Inverse { arm, structure, kernel, .. } = self.inverse;
+        let (targets, out) = (self.targets, self.solved);
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let (mut quaternion, mut translation, mut start) = ([like; 4], [like; 3], [like; 6]);
+            for k in 0..4 {
+                quaternion[k] = like.load(&targets.quaternion[k], from);
+            }
+            for k in 0..3 {
+                translation[k] = like.load(&targets.translation[k], from);
+            }
+            for k in 0..6 {
+                start[k] = like.load(&targets.start[k], from);
+            }
+            let goal = self.inverse.place(&quaternion, &translation);
+            let solved = kernel.solve(arm, structure, &goal, &arm.mapped(&start), self.asked);
+            for k in 0..6 {
+                solved.mapped[k].store(&mut out.mapped[k], from);
+            }
+            solved.residual_mm.store(&mut out.residual_mm, from);
+            solved.residual_rad.store(&mut out.residual_rad, from);
+            solved.steps.store(&mut out.steps, from);
+            solved.converged.store(&mut out.converged, from);
+            solved.singularity.store(&mut out.singularity, from);
+            for side in 0..2 {
+                for k in 0..3 {
+                    solved.margins[side][k].store(&mut out.margins[side][k], from);
+                }
+            }
+        }
     }
+}
+
+#[inline(always)]
+fn lane(solved: &Solved<Eight>, k: usize) -> Solved<f64> {
+    let mut out = Solved {
+        residual_mm: solved.residual_mm[k],
+        residual_rad: solved.residual_rad[k],
+        steps: solved.steps[k],
+        converged: solved.converged[k],
+        singularity: solved.singularity[k],
+        ..Solved::default()
+    };
+    for (place, lanes) in out.mapped.iter_mut().zip(&solved.mapped) {
+        *place = lanes[k];
+    }
+    for side in 0..2 {
+        for (place, lanes) in out.margins[side].iter_mut().zip(&solved.margins[side]) {
+            *place = lanes[k];
+        }
+    }
+    out
 }

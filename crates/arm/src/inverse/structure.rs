@@ -7,7 +7,7 @@ use super::seed::Seed;
 use super::{spherical, ur};
 use crate::chain::{Chain, cross, dot, minus};
 use crate::model::Model;
-use truegrind_math::lanes::Real;
+use truegrind_math::lanes::{Real, splats};
 use truegrind_math::se3::Pose;
 
 /// The family of an arm.
@@ -116,12 +116,13 @@ impl Structure {
         let (end, reference) = match self.family {
             Family::Spherical(_) => (*wrist, z[3]),
             Family::Parallel(_) => (o[3], z[1]),
-            Family::Other => return [R::splat(1.0); 3],
+            Family::Other => return [wrist[0].splat(1.0); 3],
         };
-        let shoulder = dot(&cross(&z[1], &z[0]), &minus(wrist, &o[0])) * R::splat(self.scales[0]);
+        let scales = splats(wrist[0], &self.scales);
+        let shoulder = dot(&cross(&z[1], &z[0]), &minus(wrist, &o[0])) * scales[0];
         let bend = cross(&minus(&o[2], &o[1]), &minus(&end, &o[2]));
-        let elbow = dot(&z[1], &bend) * R::splat(self.scales[1]);
-        let wrist = dot(&z[4], &cross(&reference, &z[5])) * R::splat(self.scales[2]);
+        let elbow = dot(&z[1], &bend) * scales[1];
+        let wrist = dot(&z[4], &cross(&reference, &z[5])) * scales[2];
         [shoulder, elbow, wrist]
     }
 

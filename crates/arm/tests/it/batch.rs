@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use truegrind_arm::batch::{JointColumns, PoseColumns};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
+use truegrind_math::lanes::{Instructions, with_instructions};
 use truegrind_math::se3::{Pose, difference};
 
 use super::arms::{SHEETS, generator, joints_within, perturbed, with_effects};
@@ -45,4 +46,30 @@ fn a_lost_row_is_lost_alone() {
     posed.forward_columns(&joints.iter().copied().collect(), &mut out);
     let x = &out.position_mm[0];
     assert!(x[3].is_nan() && (0..8).all(|k| k == 3 || x[k] == x[0]));
+}
+
+/// Whatever travels together, and with whatever instructions: columns of every length hold the bits of each row alone.
+#[test]
+fn columns_have_the_same_bits_on_every_set_of_instructions() {
+    let condition = Condition { payload_kg: Some(3.0), time_h: Some(0.5), ..Condition::default() };
+    let mut random = generator(62);
+    for sheet in SHEETS {
+        let model = with_effects(&perturbed(&sheet.model(), &mut random, 1.0, 0.5), &mut random);
+        let posed = model.at_condition(&condition);
+        let rows: Vec<Joints> = (0..21).map(|_| joints_within(&model, &mut random)).collect();
+        let found = |set, rows: &[Joints]| {
+            let mut out = PoseColumns::default();
+            let columns: JointColumns = rows.iter().copied().collect();
+            with_instructions(set, || posed.forward_columns(&columns, &mut out));
+            out
+        };
+        let together = found(Instructions::Scalar, &rows);
+        for set in Instructions::available() {
+            assert_eq!(found(set, &rows), together, "{}: {set:?}", sheet.name);
+            let last = found(set, &rows[20..]);
+            for (alone, column) in last.position_mm.iter().zip(&together.position_mm) {
+                assert_eq!(alone[0].to_bits(), column[20].to_bits(), "{}: {set:?}", sheet.name);
+            }
+        }
+    }
 }

@@ -6,9 +6,9 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::backlash::Backlash;
 use truegrind_arm::effect::thermal::Thermal;
-use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::difference::jacobian;
-use truegrind_math::lanes::{Lanes, WIDTH};
+use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, vectorised, with_instructions};
 
 use super::arms::{SHEETS, Sheet, generator, joints_within, perturbed, with_effects};
 
@@ -142,16 +142,41 @@ fn an_effect_is_the_sum_of_its_regressors() {
     }
 }
 
+/// The joint rotations of eight rows.
+struct Affected<'a> {
+    arm: &'a PreparedModel<'a>,
+    rows: &'a [Joints; WIDTH],
+}
+
+impl AnyWidth for Affected<'_> {
+    type Output = [[f64; WIDTH]; 6];
+
+    fn run<R: SinCos>(self, like: R) -> Self::Output {
+        let mut out = [[0.0; WIDTH]; 6];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let mapped = std::array::from_fn(|j| like.load(&self.rows.map(|row| row[j]), from));
+            for (number, lanes) in self.arm.affected(&mapped).iter().zip(&mut out) {
+                number.store(lanes, from);
+            }
+        }
+        out
+    }
+}
+
 #[test]
 fn effects_in_lanes_get_the_bits_of_one_row_alone() {
-    let model = heavy(&SHEETS[0], 49);
-    let posed = model.at_condition(&condition());
     let mut random = generator(50);
-    let rows: [Joints; WIDTH] = std::array::from_fn(|_| joints_within(&model, &mut random));
-    let eight = posed.affected(&std::array::from_fn(|j| Lanes(std::array::from_fn(|k| rows[k][j]))));
-    for (k, row) in rows.iter().enumerate() {
-        let one = posed.affected::<f64>(&(*row).into());
-        assert_eq!(eight.map(|v| v.0[k].to_bits()), one.map(f64::to_bits));
+    for sheet in SHEETS {
+        let model = heavy(sheet, 49);
+        let arm = &model.at_condition(&condition());
+        let rows: &[Joints; WIDTH] = &std::array::from_fn(|_| joints_within(&model, &mut random));
+        for set in Instructions::available() {
+            let eight = with_instructions(set, || vectorised(Affected { arm, rows }));
+            for (k, row) in rows.iter().enumerate() {
+                let one = arm.affected::<f64>(&(*row).into());
+                assert_eq!(eight.map(|v| v[k].to_bits()), one.map(f64::to_bits), "{set:?}");
+            }
+        }
     }
 }
 

@@ -1,11 +1,11 @@
 //! Tests of links, chain and the forward map.
 
 use nalgebra::{Isometry3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
-use truegrind_arm::chain::{chain, tables};
+use truegrind_arm::chain::{LinkTable, chain, tables};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::link::{Link, LinkModel};
 use truegrind_arm::model::{Joints, Model};
-use truegrind_math::lanes::{Lanes, WIDTH, sin_cos, vectorised};
+use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, sin_cos, vectorised, with_instructions};
 use truegrind_math::se3::{Pose, difference};
 
 use super::arms::{SHEETS, Sheet, generator, joints_within, perturbed, with_effects};
@@ -98,34 +98,45 @@ fn frames_hold_the_axes_of_the_links_on_the_way() {
     assert!((pose.rotation * Vector3::x() - Vector3::from(frames.x)).norm() < 1e-13);
 }
 
+/// All numbers of the chain of eight rows, row by row.
+struct Chains<'a> {
+    tables: &'a [LinkTable; 6],
+    rows: &'a [Joints; WIDTH],
+}
+
+impl AnyWidth for Chains<'_> {
+    type Output = [Vec<u64>; WIDTH];
+
+    fn run<R: SinCos>(self, like: R) -> Self::Output {
+        let mut out = [const { Vec::new() }; WIDTH];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let (mut sin, mut cos) = ([like; 6], [like; 6]);
+            for j in 0..6 {
+                let column = self.rows.map(|row| row[j]);
+                (sin[j], cos[j]) = sin_cos(like.load(&column, from));
+            }
+            let frames = chain(self.tables, &sin, &cos);
+            let vectors = frames.z.iter().chain(&frames.origin).chain(&frames.y).chain(&frames.lateral);
+            for number in vectors.chain([&frames.x]).flatten() {
+                let mut lanes = [0.0; WIDTH];
+                number.store(&mut lanes, 0);
+                (0..R::ROWS).for_each(|k| out[from + k].push(lanes[k].to_bits()));
+            }
+        }
+        out
+    }
+}
+
 #[test]
-fn eight_rows_in_lanes_get_the_bits_of_one_row_alone() {
+fn rows_in_lanes_get_the_bits_of_one_row_alone() {
     let mut random = generator(6);
     for sheet in SHEETS {
         let model = perturbed(&sheet.model(), &mut random, 2.0, 1.0);
-        let tables = tables(&model.links);
-        let rows: [Joints; WIDTH] = std::array::from_fn(|_| joints_within(&model, &mut random));
-        let eight = vectorised(|| {
-            let (mut sin, mut cos) = ([Lanes([0.0; WIDTH]); 6], [Lanes([0.0; WIDTH]); 6]);
-            for j in 0..6 {
-                (sin[j], cos[j]) = sin_cos(Lanes(std::array::from_fn(|k| rows[k][j])));
-            }
-            chain(&tables, &sin, &cos)
-        });
-        for (k, q) in rows.iter().enumerate() {
-            let (mut sin, mut cos) = ([0.0; 6], [0.0; 6]);
-            for j in 0..6 {
-                (sin[j], cos[j]) = sin_cos(q[j]);
-            }
-            let one = chain(&tables, &sin, &cos);
-            for i in 0..7 {
-                assert_eq!(eight.z[i].map(|v| v.0[k].to_bits()), one.z[i].map(f64::to_bits));
-                assert_eq!(eight.origin[i].map(|v| v.0[k].to_bits()), one.origin[i].map(f64::to_bits));
-            }
-            for i in 0..6 {
-                assert_eq!(eight.y[i].map(|v| v.0[k].to_bits()), one.y[i].map(f64::to_bits));
-                assert_eq!(eight.lateral[i].map(|v| v.0[k].to_bits()), one.lateral[i].map(f64::to_bits));
-            }
+        let tables = &tables(&model.links);
+        let rows: &[Joints; WIDTH] = &std::array::from_fn(|_| joints_within(&model, &mut random));
+        let alone = Chains { tables, rows }.run(0.0);
+        for set in Instructions::available() {
+            assert_eq!(with_instructions(set, || vectorised(Chains { tables, rows })), alone, "{set:?}");
         }
     }
 }

@@ -3,6 +3,7 @@
 use truegrind_arm::condition::Condition;
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
+use truegrind_math::lanes::{Instructions, with_instructions};
 use truegrind_math::se3::{Pose, difference};
 
 use super::arms::{SHEETS, Sheet, even, generator, joints_within, perturbed, with_effects};
@@ -153,5 +154,33 @@ fn an_interpolated_orientation_costs_no_more_steps_than_any_other() {
         let middle = pair[0].translation.vector.lerp(&pair[1].translation.vector, 0.5);
         let solution = inverse.solve_near(&Pose::from_parts(middle.into(), rotation), q).unwrap();
         assert!(solution.iterations <= 3, "{} steps", solution.iterations);
+    }
+}
+
+/// The joints of a path, of seeded targets and their residuals are the same to the bit on every set of instructions.
+#[test]
+fn every_set_of_instructions_solves_to_the_same_bits() {
+    let mut random = generator(79);
+    for sheet in SHEETS {
+        let nominal = sheet.model();
+        let arm = with_effects(&perturbed(&nominal, &mut random, 0.5, 0.1), &mut random);
+        let inverse = Inverse::new(&arm, &condition(), &nominal);
+        let joints = around(&comfortable(sheet, &mut random), 43);
+        let seeds: Vec<Joints> = joints.iter().map(|q| q.map(|q| q + 0.01)).collect();
+        let targets: Vec<Pose> = joints.iter().map(|q| inverse.arm().forward(q)).collect();
+        let found = |set| {
+            with_instructions(set, || {
+                (
+                    inverse.solve_path(&targets, &seeds[0]),
+                    inverse.reach_path(&targets, &seeds[0]),
+                    inverse.reach_seeded(&targets, &seeds),
+                    inverse.solve_beside(&targets, &seeds),
+                )
+            })
+        };
+        let alone = found(Instructions::Scalar);
+        for set in Instructions::available() {
+            assert_eq!(found(set), alone, "{}: {set:?}", sheet.name);
+        }
     }
 }

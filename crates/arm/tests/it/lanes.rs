@@ -1,7 +1,9 @@
 //! Tests of `math::lanes`.
 
 use rand::RngExt;
-use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
+use truegrind_math::lanes::{
+    AnyWidth, Instructions, Real, SinCos, WIDTH, sin_cos, vectorised, with_instructions,
+};
 
 use super::arms::generator;
 
@@ -44,45 +46,146 @@ fn what_has_no_short_reduction_goes_through_the_standard_library() {
     }
 }
 
-#[test]
-fn eight_sines_at_once_are_the_bits_of_eight_sines() {
+/// What a kernel makes of one column, on one set of instructions.
+struct OfColumns<'a, F>(&'a [f64], F);
+
+/// A function of numbers that works at any width: two numbers of one.
+trait OfOne {
+    fn of<R: SinCos>(x: R) -> [R; 2];
+}
+
+impl<F: OfOne> AnyWidth for OfColumns<'_, F> {
+    type Output = [Vec<f64>; 2];
+
+    fn run<R: SinCos>(self, like: R) -> Self::Output {
+        let mut out = [vec![0.0; self.0.len()], vec![0.0; self.0.len()]];
+        for from in (0..self.0.len()).step_by(R::ROWS) {
+            let found = F::of(like.load(self.0, from));
+            found[0].store(&mut out[0], from);
+            found[1].store(&mut out[1], from);
+        }
+        out
+    }
+}
+
+fn bits(columns: &[Vec<f64>; 2]) -> Vec<u64> {
+    columns.iter().flatten().map(|v| v.to_bits()).collect()
+}
+
+/// Every set of instructions that the machine has gives the bits of one row at a time, NaN and infinities included.
+fn assert_same_bits<F: OfOne + Copy>(values: &[f64], f: F) {
+    let alone = OfColumns(values, f).run(0.0);
+    for set in Instructions::available() {
+        let together = with_instructions(set, || vectorised(OfColumns(values, f)));
+        assert_eq!(bits(&together), bits(&alone), "{set:?}");
+    }
+}
+
+/// Odd values among even ones, wherever they stand in a register.
+fn with_odd_values() -> Vec<f64> {
     let mut values = arguments();
-    // Odd values spoil only their own lane, wherever they stand.
     for (k, odd) in [f64::NAN, f64::INFINITY, 1e6, 1e300, f64::NEG_INFINITY].into_iter().enumerate() {
         values.insert(100 + 9 * k, odd);
     }
-    for from in (0..values.len()).step_by(WIDTH) {
-        let (s, c) = vectorised(|| sin_cos(Lanes::load(&values, from)));
-        for (k, &x) in values[from..].iter().take(WIDTH).enumerate() {
-            let one = sin_cos(x);
-            assert_eq!((s.0[k].to_bits(), c.0[k].to_bits()), (one.0.to_bits(), one.1.to_bits()), "{x}");
-        }
+    values
+}
+
+#[derive(Clone, Copy)]
+struct Sines;
+impl OfOne for Sines {
+    fn of<R: SinCos>(x: R) -> [R; 2] {
+        let (sine, cosine) = sin_cos(x);
+        [sine, cosine]
     }
 }
 
 #[test]
-fn a_short_column_repeats_its_last_value() {
-    let column = [1.0, 2.0, 3.0];
-    assert_eq!(Lanes::load(&column, 1).0, [2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0]);
-    assert_eq!(Lanes::load(&column, 5).0, [3.0; WIDTH]);
-    assert_eq!(Lanes::load(&[], 0).0, [0.0; WIDTH]);
+fn sines_side_by_side_are_the_bits_of_sines_one_by_one() {
+    assert_same_bits(&with_odd_values(), Sines);
 }
 
+/// The arithmetic of a kernel in which every product would be fused if any were.
+#[derive(Clone, Copy)]
+struct Arithmetic;
+impl OfOne for Arithmetic {
+    fn of<R: SinCos>(x: R) -> [R; 2] {
+        let y = x * x.splat(0.3) + x.splat(1.7);
+        let mut sum = (x * y - y / x).sqrt() + -x;
+        sum += y * y;
+        sum -= x * y;
+        [sum, x.within(2.0) + y.positive() * x.splat(0.5) + x.each(|x| x.tanh())]
+    }
+}
+
+/// Products and sums are fused on no set of instructions: lanes give the bits of one row, and those of plain arithmetic.
 #[test]
 fn arithmetic_in_lanes_is_arithmetic_of_each_lane() {
-    let a = Lanes(std::array::from_fn(|k| 0.3 + k as f64));
-    let b = Lanes(std::array::from_fn(|k| -1.7 + 0.9 * k as f64));
-    for k in 0..WIDTH {
-        let (x, y) = (a.0[k], b.0[k]);
-        assert_eq!((a + b).0[k], x + y);
-        assert_eq!((a - b).0[k], x - y);
-        assert_eq!((a * b).0[k], x * y);
-        assert_eq!((a / b).0[k], x / y);
-        assert_eq!((-a).0[k], -x);
-        assert_eq!(a.sqrt().0[k], x.sqrt());
-        assert_eq!(b.within(2.0).0[k], y.within(2.0));
-        assert_eq!(b.positive().0[k], y.positive());
+    let values: Vec<f64> = with_odd_values().into_iter().filter(|v| *v != 0.0).collect();
+    assert_same_bits(&values, Arithmetic);
+    for x in [0.7, -3.1, 12.0_f64] {
+        let y = x * 0.3 + 1.7;
+        let mut sum = (x * y - y / x).sqrt() + -x;
+        sum += y * y;
+        sum -= x * y;
+        assert_eq!(Arithmetic::of(x)[0].to_bits(), sum.to_bits());
     }
-    assert_eq!(b.max_abs(), b.0[WIDTH - 1]);
     assert_eq!((f64::NAN.within(1.0), f64::NAN.positive(), 0.0.positive()), (0.0, 0.0, 0.0));
+}
+
+/// Reads and writes at the border of a column, and says what lies above.
+struct Borders;
+impl AnyWidth for Borders {
+    type Output = (Vec<f64>, Vec<f64>, [bool; 4]);
+
+    fn run<R: SinCos>(self, like: R) -> Self::Output {
+        let short = [1.0, 2.0, 3.0];
+        let mut read = [0.0; WIDTH];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            like.load(&short, 1 + from).store(&mut read, from);
+        }
+        let mut written = [9.0; 3];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            like.splat(from as f64).each(|v| v + 1.0).store(&mut written, from);
+        }
+        let nothing = like.load(&[], 0).any_above(0.0);
+        let any = like.splat(-2.0).any_above(1.0);
+        let none = like.splat(f64::NAN).any_above(1.0);
+        let equal = like.splat(1.0).any_above(1.0);
+        (read.to_vec(), written.to_vec(), [nothing, any, none, equal])
+    }
+}
+
+#[test]
+fn a_short_column_repeats_its_last_value_and_is_written_as_far_as_it_goes() {
+    for set in Instructions::available() {
+        let (read, written, above) = with_instructions(set, || vectorised(Borders));
+        assert_eq!(read, [2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0], "{set:?}");
+        assert_eq!(written.iter().filter(|v| **v == 9.0).count(), 0, "{set:?}");
+        assert_eq!(above, [false, true, false, false], "{set:?}");
+    }
+}
+
+/// What is demanded holds for as long as the work lasts, also where that ends in a panic.
+#[test]
+fn demanded_instructions_hold_for_the_work_alone() {
+    struct Rows;
+    impl AnyWidth for Rows {
+        type Output = usize;
+        fn run<R: SinCos>(self, _: R) -> usize {
+            R::ROWS
+        }
+    }
+    let before = vectorised(Rows);
+    let panicked =
+        std::panic::catch_unwind(|| with_instructions(Instructions::Scalar, || panic!("on purpose")));
+    assert!(panicked.is_err());
+    assert_eq!(vectorised(Rows), before);
+    assert_eq!(with_instructions(Instructions::Scalar, || vectorised(Rows)), 1);
+    let sets = Instructions::available();
+    assert!(sets.contains(&Instructions::Scalar) && sets.contains(&Instructions::Widest));
+    for (set, rows) in [(Instructions::Avx2, 4), (Instructions::Avx512, 8)] {
+        if sets.contains(&set) {
+            assert_eq!(with_instructions(set, || vectorised(Rows)), rows);
+        }
+    }
 }

@@ -10,6 +10,7 @@ mod batch;
 mod effect;
 mod effort;
 mod forward;
+mod gram;
 mod inverse;
 mod inverse_path;
 mod jacobian;

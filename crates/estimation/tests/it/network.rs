@@ -3,7 +3,7 @@
 use truegrind_estimation::network::rbf::{self, Options, Task};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference::jacobian;
-use truegrind_math::lanes::{Lanes, WIDTH};
+use truegrind_math::lanes::{AnyWidth, Instructions, SinCos, WIDTH, vectorised, with_instructions};
 use truegrind_math::radial;
 
 /// A smooth field of two outputs over the unit square.
@@ -77,6 +77,25 @@ fn is_linear_and_its_jacobian_has_a_twin() {
     assert!(j.iter().zip(twin.iter()).all(|(a, b)| (a - b).abs() < 1e-10));
 }
 
+/// The bump at eight points.
+struct Bumps<'a> {
+    columns: &'a [[f64; WIDTH]; 3],
+    centre: &'a [f64; 3],
+}
+
+impl AnyWidth for Bumps<'_> {
+    type Output = [f64; WIDTH];
+
+    fn run<R: SinCos>(self, like: R) -> [f64; WIDTH] {
+        let mut out = [0.0; WIDTH];
+        for from in (0..WIDTH).step_by(R::ROWS) {
+            let points: [R; 3] = std::array::from_fn(|k| like.load(&self.columns[k], from));
+            radial::bump(&points, self.centre, 0.5).store(&mut out, from);
+        }
+        out
+    }
+}
+
 #[test]
 fn the_bump_ends_at_its_reach_and_is_the_same_in_lanes() {
     let centre = [0.1, -0.2, 0.3];
@@ -84,11 +103,14 @@ fn the_bump_ends_at_its_reach_and_is_the_same_in_lanes() {
     assert_eq!(radial::bump(&[0.1, -0.2, 0.8], &centre, 0.5), 0.0);
     assert_eq!(radial::bump(&[7.0, 8.0, 9.0], &centre, 0.5), 0.0);
     let row = |i: usize| [0.05 * i as f64, -0.1, 0.2 + 0.03 * i as f64];
-    let lanes: [Lanes; 3] = std::array::from_fn(|k| Lanes(std::array::from_fn(|i| row(i)[k])));
-    let together: Lanes = radial::bump(&lanes, &centre, 0.5);
+    let columns: [[f64; WIDTH]; 3] = std::array::from_fn(|k| std::array::from_fn(|i| row(i)[k]));
     for i in 0..WIDTH {
         let alone: f64 = radial::bump(&row(i), &centre, 0.5);
-        assert_eq!(alone.to_bits(), together.0[i].to_bits());
+        for set in Instructions::available() {
+            let together =
+                with_instructions(set, || vectorised(Bumps { columns: &columns, centre: &centre }));
+            assert_eq!(alone.to_bits(), together[i].to_bits());
+        }
         let step = [0.3, -0.2, 0.1];
         let slope: f64 = radial::slope_along(&row(i), &centre, 0.5, &step);
         let moved = |t: f64| {

@@ -1,4 +1,4 @@
-//! The inner loop of a calibration: residual and Jacobian of eight rows at a time.
+//! The inner loop of a calibration: residual and Jacobian of as many rows at a time as a register holds.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,12 +6,12 @@ use super::columns::Columns;
 use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
-use truegrind_arm::chain::{self, Chain, LinkTable, cross, dot, minus, scaled_chain};
+use truegrind_arm::chain::{self, Chain, LinkTable, cross, dot, minus, scaled, scaled_chain};
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
-use truegrind_math::lanes::{Lanes, Real, WIDTH, sin_cos, vectorised};
+use truegrind_math::lanes::{AnyWidth, Real, SinCos, WIDTH, sin_cos, splats, vectorised};
 use truegrind_math::se3::{Pose, left_jacobian};
 
-type V = [Lanes; 3];
+type V<R> = [R; 3];
 
 /// Everything of x that is the same for all rows.
 pub(super) struct State {
@@ -89,8 +89,18 @@ impl Pushed {
 }
 
 #[inline(always)]
-fn load(columns: &[Vec<f64>; 3], at: usize) -> V {
-    std::array::from_fn(|k| Lanes::load(&columns[k], at))
+fn load<R: Real>(like: R, columns: &[Vec<f64>; 3], at: usize) -> V<R> {
+    [like.load(&columns[0], at), like.load(&columns[1], at), like.load(&columns[2], at)]
+}
+
+/// Three columns of many.
+#[inline(always)]
+fn three<R: Real>(like: R, columns: &[Vec<f64>], first: usize, at: usize) -> V<R> {
+    let mut out = [like; 3];
+    for (k, lanes) in out.iter_mut().enumerate() {
+        *lanes = like.load(&columns[first + k], at);
+    }
+    out
 }
 
 impl State {
@@ -133,50 +143,64 @@ pub(super) fn fill(
     jacobian: bool,
     out: &mut [f64],
 ) {
-    vectorised(
-        #[inline(always)]
-        || {
-            for group in 0..lanes {
-                let at = (from + group) * WIDTH;
-                let place = group * WIDTH;
-                match task.sensor {
-                    Sensor::Cable => cable(task, state, at, jacobian, lanes * WIDTH, place, out),
-                    Sensor::Position => space(task, state, at, jacobian, lanes * WIDTH, place, false, out),
-                    Sensor::Pose => space(task, state, at, jacobian, lanes * WIDTH, place, true, out),
+    vectorised(Fill { task, state, from, lanes, jacobian, out });
+}
+
+/// See [`Calibration::fill`].
+struct Fill<'a> {
+    task: &'a Calibration,
+    state: &'a State,
+    from: usize,
+    lanes: usize,
+    jacobian: bool,
+    out: &'a mut [f64],
+}
+
+impl AnyWidth for Fill<'_> {
+    type Output = ();
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) {
+        let Self { task, state, from, lanes, jacobian, out } = self;
+        let rows = lanes * WIDTH;
+        match task.sensor {
+            Sensor::Cable => {
+                for place in (0..rows).step_by(R::ROWS) {
+                    cable(like, task, state, from * WIDTH + place, jacobian, rows, place, out);
                 }
             }
-        },
-    );
+            Sensor::Position | Sensor::Pose => {
+                let oriented = task.sensor == Sensor::Pose;
+                for place in (0..rows).step_by(R::ROWS) {
+                    space(like, task, state, from * WIDTH + place, jacobian, rows, place, oriented, out);
+                }
+            }
+        }
+    }
 }
 
 #[inline(always)]
-fn splat(v: &Vector3<f64>) -> V {
-    [Lanes::splat(v.x), Lanes::splat(v.y), Lanes::splat(v.z)]
+fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
+    splats(like, &[v.x, v.y, v.z])
 }
 
-#[inline(always)]
-fn store(out: &mut [f64], at: usize, value: Lanes) {
-    out[at..at + WIDTH].copy_from_slice(&value.0);
-}
-
-/// Frames of eight rows, and the factor by which their lengths have grown.
+/// Frames of the rows, and the factor by which their lengths have grown.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn frames(task: &Calibration, state: &State, at: usize) -> (Chain<Lanes>, Lanes) {
+fn frames<R: SinCos>(like: R, task: &Calibration, state: &State, at: usize) -> (Chain<R>, R) {
     let columns = &task.columns;
-    let mut sin: [Lanes; 6] = std::array::from_fn(|j| Lanes::load(&columns.sin[j], at));
-    let mut cos: [Lanes; 6] = std::array::from_fn(|j| Lanes::load(&columns.cos[j], at));
-    let mut scale = Lanes::splat(1.0);
+    let (mut sin, mut cos) = (six(like, &columns.sin, at), six(like, &columns.cos, at));
+    let mut scale = like.splat(1.0);
     if let Some(extra) = &columns.extra {
-        let mut turn: [Lanes; 6] = std::array::from_fn(|j| Lanes::load(&extra[j], at));
-        scale += Lanes::load(&columns.growth, at);
+        let mut turn = six(like, extra, at);
+        scale += like.load(&columns.growth, at);
         for (effect, value) in columns.effects.iter().zip(&state.effects) {
             for (j, rotation) in effect.rotation.iter().enumerate() {
                 if let Some(rotation) = rotation {
-                    turn[j] += Lanes::splat(*value) * Lanes::load(rotation, at);
+                    turn[j] += like.splat(*value) * like.load(rotation, at);
                 }
             }
             if let Some(growth) = &effect.growth {
-                scale += Lanes::splat(*value) * Lanes::load(growth, at);
+                scale += like.splat(*value) * like.load(growth, at);
             }
         }
         for j in 0..6 {
@@ -187,20 +211,37 @@ fn frames(task: &Calibration, state: &State, at: usize) -> (Chain<Lanes>, Lanes)
     (scaled_chain(&state.tables, &sin, &cos, scale), scale)
 }
 
+#[inline(always)]
+fn six<R: Real>(like: R, columns: &[Vec<f64>; 6], at: usize) -> [R; 6] {
+    let mut out = [like; 6];
+    for (lanes, column) in out.iter_mut().zip(columns) {
+        *lanes = like.load(column, at);
+    }
+    out
+}
+
 /// A vector of the last DH frame, in the base.
 #[inline(always)]
-fn in_base(frames: &Chain<Lanes>, v: &Vector3<f64>) -> V {
+fn in_base<R: Real>(frames: &Chain<R>, v: &Vector3<f64>) -> V<R> {
     let (x, y, z) = (&frames.x, &frames.y[5], &frames.z[6]);
-    let w = splat(v);
-    std::array::from_fn(|k| w[0] * x[k] + w[1] * y[k] + w[2] * z[k])
+    let w = splat(x[0], v);
+    let mut out = w;
+    for k in 0..3 {
+        out[k] = w[0] * x[k] + w[1] * y[k] + w[2] * z[k];
+    }
+    out
+}
+
+#[inline(always)]
+fn plus<R: Real>(a: &V<R>, b: &V<R>) -> V<R> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn point(frames: &Chain<Lanes>, state: &State, at: usize) -> V {
-    let shift = in_base(frames, &state.target.translation.vector);
-    let mut out: V = std::array::from_fn(|k| frames.origin[6][k] + shift[k]);
+fn point<R: Real>(frames: &Chain<R>, state: &State, at: usize) -> V<R> {
+    let mut out = plus(&frames.origin[6], &in_base(frames, &state.target.translation.vector));
     if let Some(pushed) = &state.pushed {
-        let tool = load(&pushed.tool, at);
+        let tool = load(out[0], &pushed.tool, at);
         for (axis, along) in tool.iter().enumerate() {
             let direction = in_base(frames, &state.flange.column(axis).into());
             for k in 0..3 {
@@ -213,24 +254,30 @@ fn point(frames: &Chain<Lanes>, state: &State, at: usize) -> V {
 
 /// How far disturbance `index` goes in the rows.
 #[inline(always)]
-fn course(task: &Calibration, index: usize, at: usize) -> Lanes {
-    Lanes::load(&task.columns.courses[index], at)
+fn course<R: Real>(like: R, task: &Calibration, index: usize, at: usize) -> R {
+    like.load(&task.columns.courses[index], at)
 }
 
 /// What a unit of a cable's sag adds to its length (mm m²): see the page of disturbances.
 #[inline(always)]
-fn sagging(away: &V, length: Lanes) -> Lanes {
-    Lanes::splat(1e-6 / 24.0) * (away[0] * away[0] + away[1] * away[1]) * length
+fn sagging<R: Real>(away: &V<R>, length: R) -> R {
+    length.splat(1e-6 / 24.0) * (away[0] * away[0] + away[1] * away[1]) * length
 }
 
 /// One value of the row's cable, for each lane.
 #[inline(always)]
-fn of_anchor(task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> Lanes {
-    Lanes(std::array::from_fn(|k| value(task.columns.anchor[at + k])))
+fn of_anchor<R: Real>(like: R, task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> R {
+    let mut lanes = [0.0; WIDTH];
+    for (lane, anchor) in lanes.iter_mut().zip(&task.columns.anchor[at..at + R::ROWS]) {
+        *lane = value(*anchor);
+    }
+    like.load(&lanes, 0)
 }
 
+#[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn cable(
+fn cable<R: SinCos>(
+    like: R,
     task: &Calibration,
     state: &State,
     at: usize,
@@ -239,69 +286,73 @@ fn cable(
     place: usize,
     out: &mut [f64],
 ) {
-    let weight = Lanes::load(&task.columns.per_mm, at);
-    let (frames, scale) = frames(task, state, at);
+    let weight = like.load(&task.columns.per_mm, at);
+    let (frames, scale) = frames(like, task, state, at);
     let p = point(&frames, state, at);
     let single = state.outlets.len() == 1;
-    let (outlet, zero): (V, Lanes) = if single {
-        (splat(&state.outlets[0]), Lanes::splat(state.zeros[0]))
+    let (outlet, zero): (V<R>, R) = if single {
+        (splat(like, &state.outlets[0]), like.splat(state.zeros[0]))
     } else {
-        let outlet = std::array::from_fn(|k| of_anchor(task, at, |a| state.outlets[a][k]));
-        (outlet, of_anchor(task, at, |a| state.zeros[a]))
+        let mut outlet = [like; 3];
+        for (k, coordinate) in outlet.iter_mut().enumerate() {
+            *coordinate = of_anchor(like, task, at, |a| state.outlets[a][k]);
+        }
+        (outlet, of_anchor(like, task, at, |a| state.zeros[a]))
     };
     let mut v = minus(&p, &outlet);
     if let Some(pushed) = &state.pushed {
-        v = minus(&v, &load(&pushed.frame, at));
+        v = minus(&v, &load(like, &pushed.frame, at));
     }
     let length = dot(&v, &v).sqrt();
     let mut free = length + zero;
     let mut predicted = free;
     if let Some(pushed) = &state.pushed {
-        free += Lanes::load(&pushed.zero, at);
-        predicted =
-            free * Lanes::load(&pushed.scale, at) + Lanes::load(&pushed.sag, at) * sagging(&v, length);
+        free += like.load(&pushed.zero, at);
+        predicted = free * like.load(&pushed.scale, at) + like.load(&pushed.sag, at) * sagging(&v, length);
     }
-    let residual = weight * (predicted - Lanes::load(&task.columns.reading[0], at));
+    let residual = weight * (predicted - like.load(&task.columns.reading[0], at));
     let columns = task.parameters.len();
     if !jacobian {
-        store(out, place, residual);
+        residual.store(out, place);
         return;
     }
-    store(out, columns * rows + place, residual);
+    residual.store(out, columns * rows + place);
     // u carries the weight, so that every column comes out whitened.
-    let scaled = state.pushed.as_ref().map_or(Lanes::splat(1.0), |pushed| Lanes::load(&pushed.scale, at));
-    let pull = weight * scaled / length;
-    let u: V = std::array::from_fn(|k| v[k] * pull);
-    let moment: [V; 7] = std::array::from_fn(|i| cross(&minus(&p, &frames.origin[i]), &u));
-    let link = |joint, coordinate| link_pull(&frames, &u, &moment, joint, coordinate);
-    let none = Lanes::splat(0.0);
+    let through = state.pushed.as_ref().map_or(like.splat(1.0), |pushed| like.load(&pushed.scale, at));
+    let pull = weight * through / length;
+    let u = scaled(pull, &v);
+    let mut moment = [u; 7];
+    for (moment, origin) in moment.iter_mut().zip(&frames.origin) {
+        *moment = cross(&minus(&p, origin), &u);
+    }
+    let none = like.splat(0.0);
     for (k, parameter) in task.parameters.iter().enumerate() {
         let value = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
-                scale * link(joint, coordinate)
+                scale * link_pull(&frames, &u, &moment, joint, coordinate)
             }
-            Parameter::Link { joint, coordinate } => link(joint, coordinate),
+            Parameter::Link { joint, coordinate } => link_pull(&frames, &u, &moment, joint, coordinate),
             Parameter::Target(axis) if axis < 3 => {
                 dot(&in_base(&frames, &state.flange.column(axis).into()), &u)
             }
             Parameter::Outlet { axis, .. } if single => -u[axis],
-            Parameter::Zero { .. } if single => weight * scaled,
+            Parameter::Zero { .. } if single => weight * through,
             Parameter::Outlet { anchor, axis } => {
-                -u[axis] * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
+                -u[axis] * of_anchor(like, task, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Zero { anchor } => {
-                weight * scaled * of_anchor(task, at, |a| f64::from(u8::from(a == anchor)))
+                weight * through * of_anchor(like, task, at, |a| f64::from(u8::from(a == anchor)))
             }
             Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
-                let how_far = course(task, index, at);
+                let how_far = course(like, task, index, at);
                 how_far
                     * match task.frames.disturbances[index].kind {
-                        Kind::Zero => weight * scaled,
+                        Kind::Zero => weight * through,
                         Kind::Frame { .. } => -u[parameter.min(2)],
                         Kind::Tool => dot(&in_base(&frames, &state.flange.column(parameter).into()), &u),
                         Kind::Scale => weight * free,
                         Kind::Sag => weight * sagging(&v, length),
-                        Kind::Form(_) => -dot(&load(&task.columns.shifts[index][parameter], at), &u),
+                        Kind::Form(_) => -dot(&load(like, &task.columns.shifts[index][parameter], at), &u),
                         Kind::Load { .. } => none,
                     }
             }
@@ -310,23 +361,26 @@ fn cable(
                 if let Some(effect) = task.columns.effect_of(k) {
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
-                            sum += Lanes::load(rotation, at) * link(joint, LinkCoordinate::Theta);
+                            sum += like.load(rotation, at)
+                                * link_pull(&frames, &u, &moment, joint, LinkCoordinate::Theta);
                         }
                     }
                     if let Some(growth) = &effect.growth {
                         let mut grown = none;
                         for (joint, (a, d)) in state.links_mm.iter().enumerate() {
-                            grown += Lanes::splat(*a) * link(joint, LinkCoordinate::A);
-                            grown += Lanes::splat(*d) * link(joint, LinkCoordinate::D);
+                            grown +=
+                                like.splat(*a) * link_pull(&frames, &u, &moment, joint, LinkCoordinate::A);
+                            grown +=
+                                like.splat(*d) * link_pull(&frames, &u, &moment, joint, LinkCoordinate::D);
                         }
-                        sum += Lanes::load(growth, at) * grown;
+                        sum += like.load(growth, at) * grown;
                     }
                 }
                 sum
             }
             Parameter::SensorFrame(_) | Parameter::Target(_) => none,
         };
-        store(out, k * rows + place, value);
+        value.store(out, k * rows + place);
     }
 }
 
@@ -338,21 +392,21 @@ fn turns_joints(task: &Calibration, index: usize) -> bool {
 
 /// v turned by a small rotation vector, to second order: some 1e-7 of v is left out at 0.5°.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn turned_by(turn: &V, v: &V) -> V {
+fn turned_by<R: Real>(turn: &V<R>, v: &V<R>) -> V<R> {
     let first = cross(turn, v);
     let second = cross(turn, &first);
-    std::array::from_fn(|k| v[k] + first[k] + Lanes::splat(0.5) * second[k])
+    plus(&plus(v, &first), &scaled(v[0].splat(0.5), &second))
 }
 
 /// u · ∂p for a coordinate of a link; `moment[i]` is (p − oᵢ) × u, since u·(z × r) = z·(r × u).
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn link_pull(
-    frames: &Chain<Lanes>,
-    u: &V,
-    moment: &[V; 7],
+fn link_pull<R: Real>(
+    frames: &Chain<R>,
+    u: &V<R>,
+    moment: &[V<R>; 7],
     joint: usize,
     coordinate: LinkCoordinate,
-) -> Lanes {
+) -> R {
     match coordinate {
         LinkCoordinate::Theta => dot(&frames.z[joint], &moment[joint]),
         LinkCoordinate::D => dot(&frames.z[joint], u),
@@ -363,23 +417,27 @@ fn link_pull(
 }
 
 /// Velocity of the point and angular velocity, in the base.
-type Twist = (V, V);
+type Twist<R> = (V<R>, V<R>);
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn link_twist(frames: &Chain<Lanes>, p: &V, joint: usize, coordinate: LinkCoordinate) -> Twist {
-    let none = [Lanes::splat(0.0); 3];
-    let turning = |axis: &V, through: &V| (cross(axis, &minus(p, through)), *axis);
+fn link_twist<R: Real>(frames: &Chain<R>, p: &V<R>, joint: usize, coordinate: LinkCoordinate) -> Twist<R> {
+    let none = [p[0].splat(0.0); 3];
     match coordinate {
-        LinkCoordinate::Theta => turning(&frames.z[joint], &frames.origin[joint]),
+        LinkCoordinate::Theta => turning(&frames.z[joint], p, &frames.origin[joint]),
         LinkCoordinate::D => (frames.z[joint], none),
         LinkCoordinate::A => (frames.lateral[joint], none),
-        LinkCoordinate::Alpha => turning(&frames.lateral[joint], &frames.origin[joint + 1]),
-        LinkCoordinate::Beta => turning(&frames.y[joint], &frames.origin[joint + 1]),
+        LinkCoordinate::Alpha => turning(&frames.lateral[joint], p, &frames.origin[joint + 1]),
+        LinkCoordinate::Beta => turning(&frames.y[joint], p, &frames.origin[joint + 1]),
     }
 }
 
 #[inline(always)]
-fn add(to: &mut Twist, scale: Lanes, twist: &Twist) {
+fn turning<R: Real>(axis: &V<R>, p: &V<R>, through: &V<R>) -> Twist<R> {
+    (cross(axis, &minus(p, through)), *axis)
+}
+
+#[inline(always)]
+fn add<R: Real>(to: &mut Twist<R>, scale: R, twist: &Twist<R>) {
     for k in 0..3 {
         to.0[k] += scale * twist.0[k];
         to.1[k] += scale * twist.1[k];
@@ -388,13 +446,18 @@ fn add(to: &mut Twist, scale: Lanes, twist: &Twist) {
 
 /// Matrix of columns times vector.
 #[inline(always)]
-fn times(columns: &[V; 3], v: &V) -> V {
-    std::array::from_fn(|i| columns[0][i] * v[0] + columns[1][i] * v[1] + columns[2][i] * v[2])
+fn times<R: Real>(columns: &[V<R>; 3], v: &V<R>) -> V<R> {
+    let mut out = *v;
+    for i in 0..3 {
+        out[i] = columns[0][i] * v[0] + columns[1][i] * v[1] + columns[2][i] * v[2];
+    }
+    out
 }
 
 #[allow(clippy::too_many_arguments)]
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn space(
+fn space<R: SinCos>(
+    like: R,
     task: &Calibration,
     state: &State,
     at: usize,
@@ -405,46 +468,46 @@ fn space(
     out: &mut [f64],
 ) {
     let columns = &task.columns;
-    let (weight, turn_weight) = (Lanes::load(&columns.per_mm, at), Lanes::load(&columns.per_rad, at));
-    let none = [Lanes::splat(0.0); 3];
-    let (frames, scale) = frames(task, state, at);
+    let (weight, turn_weight) = (like.load(&columns.per_mm, at), like.load(&columns.per_rad, at));
+    let none = [like.splat(0.0); 3];
+    let (frames, scale) = frames(like, task, state, at);
     let p = point(&frames, state, at);
     let components = if oriented { 6 } else { 3 };
     let rotation = state.base_from_sensor.rotation.to_rotation_matrix();
-    let sensor: [V; 3] = std::array::from_fn(|k| splat(&rotation.matrix().column(k).into()));
-    let reading: V = std::array::from_fn(|k| Lanes::load(&columns.reading[k], at));
+    let mut sensor = [none; 3];
+    for (k, axis) in sensor.iter_mut().enumerate() {
+        *axis = splat(like, &rotation.matrix().column(k).into());
+    }
+    let reading = three(like, &columns.reading, 0, at);
     let mut turned = times(&sensor, &reading);
-    let mut origin = splat(&state.base_from_sensor.translation.vector);
+    let mut origin = splat(like, &state.base_from_sensor.translation.vector);
     // The scale multiplies what the model sees, not the reading: its noise must not look like evidence of a scale.
-    let mut scaled = Lanes::splat(1.0);
+    let mut through = like.splat(1.0);
     if let Some(pushed) = &state.pushed {
-        scaled = Lanes::load(&pushed.scale, at);
-        turned = turned_by(&load(&pushed.turn, at), &turned);
-        let shift = load(&pushed.frame, at);
-        (0..3).for_each(|k| origin[k] += shift[k]);
+        through = like.load(&pushed.scale, at);
+        turned = turned_by(&load(like, &pushed.turn, at), &turned);
+        origin = plus(&origin, &load(like, &pushed.frame, at));
     }
     let seen = minus(&p, &origin);
     let last = if jacobian { task.parameters.len() } else { 0 };
     for k in 0..3 {
-        let residual = weight * (turned[k] - scaled * seen[k]);
-        store(out, (last * components + k) * rows + place, residual);
+        let residual = weight * (turned[k] - through * seen[k]);
+        residual.store(out, (last * components + k) * rows + place);
     }
     // E = R_C R_m (R R_t)ᵀ as columns, its trace, and ½ vee(E − Eᵀ).
     let mut error = [none; 3];
-    let mut trace = Lanes::splat(0.0);
+    let mut trace = like.splat(0.0);
     if oriented {
-        let measured: [V; 3] = std::array::from_fn(|column| {
-            let axis = times(
-                &sensor,
-                &std::array::from_fn(|k| Lanes::load(&columns.reading[3 + 3 * column + k], at)),
-            );
-            match &state.pushed {
-                Some(pushed) => turned_by(&load(&pushed.turn, at), &axis),
-                None => axis,
-            }
-        });
+        let (mut measured, mut modelled) = (error, error);
         let target = state.target.rotation.to_rotation_matrix();
-        let modelled: [V; 3] = std::array::from_fn(|k| in_base(&frames, &target.matrix().column(k).into()));
+        for column in 0..3 {
+            let axis = times(&sensor, &three(like, &columns.reading, 3 + 3 * column, at));
+            measured[column] = match &state.pushed {
+                Some(pushed) => turned_by(&load(like, &pushed.turn, at), &axis),
+                None => axis,
+            };
+            modelled[column] = in_base(&frames, &target.matrix().column(column).into());
+        }
         for j in 0..3 {
             for i in 0..3 {
                 error[j][i] = measured[0][i] * modelled[0][j]
@@ -453,14 +516,14 @@ fn space(
             }
         }
         trace = error[0][0] + error[1][1] + error[2][2];
-        let half = Lanes::splat(0.5) * turn_weight;
+        let half = like.splat(0.5) * turn_weight;
         let vee = [
             half * (error[1][2] - error[2][1]),
             half * (error[2][0] - error[0][2]),
             half * (error[0][1] - error[1][0]),
         ];
         for (k, value) in vee.into_iter().enumerate() {
-            store(out, (last * components + 3 + k) * rows + place, value);
+            value.store(out, (last * components + 3 + k) * rows + place);
         }
     }
     if !jacobian {
@@ -469,10 +532,10 @@ fn space(
     for (k, parameter) in task.parameters.iter().enumerate() {
         // The reading's side moves with a sensor frame, the arm's side with everything else.
         let mut of_sensor = false;
-        let twist: Twist = match *parameter {
+        let twist: Twist<R> = match *parameter {
             Parameter::Link { joint, coordinate } if coordinate.is_length() => {
                 let (v, w) = link_twist(&frames, &p, joint, coordinate);
-                (v.map(|v| scale * v), w)
+                (scaled(scale, &v), w)
             }
             Parameter::Link { joint, coordinate } => link_twist(&frames, &p, joint, coordinate),
             Parameter::Target(axis) if axis < 3 => {
@@ -481,29 +544,29 @@ fn space(
             Parameter::Target(axis) => (none, in_base(&frames, &state.target_axes.column(axis - 3).into())),
             Parameter::SensorFrame(axis) if axis < 3 => {
                 of_sensor = true;
-                (splat(&Vector3::ith(axis, 1.0)), none)
+                (splat(like, &Vector3::ith(axis, 1.0)), none)
             }
             Parameter::SensorFrame(axis) => {
                 of_sensor = true;
-                let w = splat(&state.sensor_axes.column(axis - 3).into());
+                let w = splat(like, &state.sensor_axes.column(axis - 3).into());
                 (cross(&w, &turned), w)
             }
             Parameter::Disturbance { index, parameter } if !turns_joints(task, index) => {
-                let how_far = course(task, index, at);
+                let how_far = course(like, task, index, at);
                 let kind = &task.frames.disturbances[index].kind;
                 of_sensor = !matches!(kind, Kind::Tool);
                 let (v, w) = match kind {
-                    Kind::Frame { .. } if parameter < 3 => (splat(&Vector3::ith(parameter, 1.0)), none),
+                    Kind::Frame { .. } if parameter < 3 => (splat(like, &Vector3::ith(parameter, 1.0)), none),
                     Kind::Frame { .. } => {
-                        let w = splat(&Vector3::ith(parameter - 3, 1.0));
+                        let w = splat(like, &Vector3::ith(parameter - 3, 1.0));
                         (cross(&w, &turned), w)
                     }
                     Kind::Tool => (in_base(&frames, &state.flange.column(parameter).into()), none),
-                    Kind::Scale => (seen.map(|v| -v / scaled), none),
-                    Kind::Form(_) => (load(&columns.shifts[index][parameter], at), none),
+                    Kind::Scale => ([-seen[0] / through, -seen[1] / through, -seen[2] / through], none),
+                    Kind::Form(_) => (load(like, &columns.shifts[index][parameter], at), none),
                     Kind::Zero | Kind::Sag | Kind::Load { .. } => (none, none),
                 };
-                (v.map(|v| how_far * v), w.map(|w| how_far * w))
+                (scaled(how_far, &v), scaled(how_far, &w))
             }
             Parameter::Effect { .. } | Parameter::Disturbance { .. } => {
                 let mut sum = (none, none);
@@ -511,16 +574,16 @@ fn space(
                     for (joint, rotation) in effect.rotation.iter().enumerate() {
                         if let Some(rotation) = rotation {
                             let twist = link_twist(&frames, &p, joint, LinkCoordinate::Theta);
-                            add(&mut sum, Lanes::load(rotation, at), &twist);
+                            add(&mut sum, like.load(rotation, at), &twist);
                         }
                     }
                     if let Some(growth) = &effect.growth {
-                        let grown = Lanes::load(growth, at);
+                        let grown = like.load(growth, at);
                         for (joint, (a, d)) in state.links_mm.iter().enumerate() {
                             let along = link_twist(&frames, &p, joint, LinkCoordinate::A);
-                            add(&mut sum, grown * Lanes::splat(*a), &along);
+                            add(&mut sum, grown * like.splat(*a), &along);
                             let up = link_twist(&frames, &p, joint, LinkCoordinate::D);
-                            add(&mut sum, grown * Lanes::splat(*d), &up);
+                            add(&mut sum, grown * like.splat(*d), &up);
                         }
                     }
                 }
@@ -533,16 +596,16 @@ fn space(
             *parameter,
             Parameter::SensorFrame(3..) | Parameter::Disturbance { parameter: 3.., .. }
         ) || !of_sensor;
-        let size = if through_scale { weight * scaled } else { weight };
+        let size = if through_scale { weight * through } else { weight };
         let sign = if of_sensor { size } else { -size };
         for (i, v) in twist.0.into_iter().enumerate() {
-            store(out, (k * components + i) * rows + place, sign * v);
+            (sign * v).store(out, (k * components + i) * rows + place);
         }
         if oriented {
             // δ ½vee = ½ (tr E − E) w for the sensor's side, −½ (tr E − Eᵀ) w for the arm's.
             let w = twist.1;
-            let half = Lanes::splat(0.5) * turn_weight;
-            let product: V = if of_sensor {
+            let half = like.splat(0.5) * turn_weight;
+            let product: V<R> = if of_sensor {
                 times(&error, &w)
             } else {
                 [dot(&error[0], &w), dot(&error[1], &w), dot(&error[2], &w)]
@@ -550,7 +613,7 @@ fn space(
             for i in 0..3 {
                 let value = half * (trace * w[i] - product[i]);
                 let value = if of_sensor { value } else { -value };
-                store(out, (k * components + 3 + i) * rows + place, value);
+                value.store(out, (k * components + 3 + i) * rows + place);
             }
         }
     }

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
@@ -11,7 +9,8 @@ use super::kernel::{self, State};
 use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
-use truegrind_math::lanes::WIDTH;
+use truegrind_math::gram::add_products;
+use truegrind_math::lanes::{Buffer, WIDTH};
 
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
@@ -160,14 +159,15 @@ impl Problem for Calibration {
         let parts: Vec<DMatrix<f64>> = blocks
             .par_chunks(together)
             .map_init(
-                || vec![0.0; (p + 1) * c * most * WIDTH],
+                || Buffer::zeros((p + 1) * c * most * WIDTH),
                 |buffer, blocks| {
                     let mut square = DMatrix::zeros(p + 1, p + 1);
                     for &(from, lanes) in blocks {
                         let rows = c * lanes * WIDTH;
-                        let columns = &mut buffer[..(p + 1) * rows];
+                        let columns = buffer.first_mut((p + 1) * rows);
                         self.fill(&state, from, lanes, true, columns);
-                        add_gram(columns, rows, &mut square);
+                        // [J r]ᵀ[J r], the residual in the last column.
+                        add_products(columns, rows, square.as_mut_slice());
                     }
                     square
                 },
@@ -183,15 +183,6 @@ impl Problem for Calibration {
         out.mirror();
         out
     }
-}
-
-/// Adds [J r]ᵀ[J r] of columns of `rows` entries, the residual in the last, to the lower triangle of `square`.
-fn add_gram(columns: &[f64], rows: usize, square: &mut DMatrix<f64>) {
-    let size = square.nrows();
-    let a = MatRef::from_column_major_slice(columns, rows, size);
-    let out = MatMut::from_column_major_slice_mut(square.as_mut_slice(), size, size);
-    let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-    triangular::matmul(out, lower, Accum::Add, a.transpose(), full, a, full, 1.0, Par::Seq);
 }
 
 impl Calibration {

@@ -17,6 +17,7 @@ use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbanc
 use truegrind_calibration::measurement::sensor::form::Form;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::difference;
+use truegrind_math::lanes::{Instructions, with_instructions};
 use truegrind_math::se3::{Pose, pose_from_vector};
 
 fn arm() -> Model {
@@ -261,6 +262,24 @@ fn normal_equations_equal_the_stacked_jacobian_and_padding_is_silent() {
             let mut part = vec![0.0; half.len()];
             task.residuals(&x, half.clone(), &mut part);
             assert_eq!(part, r.as_slice()[half]);
+        }
+    }
+}
+
+/// Residuals, Jacobian and whatever comes with a disturbance are the same to the bit on every set of instructions.
+#[test]
+fn every_set_of_instructions_gives_the_same_rows() {
+    for sensor in [Sensor::Cable, Sensor::Position, Sensor::Pose] {
+        let task = task(sensor, 21);
+        let x = vec![1e-5; task.parameters()];
+        let found = |set| {
+            let (mut r, mut j) = (vec![0.0; task.rows()], vec![0.0; task.rows() * x.len()]);
+            with_instructions(set, || task.jacobian(&x, 0..task.rows(), &mut r, &mut j));
+            r.into_iter().chain(j).map(f64::to_bits).collect::<Vec<_>>()
+        };
+        let alone = found(Instructions::Scalar);
+        for set in Instructions::available() {
+            assert!(found(set) == alone, "{sensor:?}: {set:?}");
         }
     }
 }

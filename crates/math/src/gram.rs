@@ -1,0 +1,121 @@
+//! Products of the columns of a tall matrix with each other: what a pass over a million rows spends half of its time on.
+//!
+//! Method: 4 × 4 pairs of columns at a time, whose sums stay in registers while the rows go by. Each sum is eight sums, of
+//! every eighth row, so that it does not depend on how many rows a register holds; they are added in one order at the end.
+//! Here, and only here, product and sum are one instruction: everywhere, with one rounding, so that every set of
+//! instructions gives the same bits, and so does a processor that has no such instruction, if slowly.
+//! Cost: for n rows and p columns n p (p + 1) operations at 8 to 16 to an instruction, and half as many bytes from the
+//! second-level cache as there are operations.
+//! Checked against: nalgebra's products.
+
+use super::lanes::{AnyWidth, Real, SinCos, WIDTH, widest};
+
+/// Columns on either side of a tile: sixteen sums, and room for what goes into them.
+const TILE: usize = 4;
+
+/// Adds the products of columns with each other to the lower triangle of `square`, which is column-major: entry (i, j) of it
+/// gains Σₖ aₖᵢ aₖⱼ for i ≥ j.
+///
+/// ```
+/// use truegrind_math::gram::add_products;
+///
+/// // Two columns of eight rows.
+/// let columns: Vec<f64> = (0..8).map(f64::from).chain([1.0; 8]).collect();
+/// let mut square = [0.0; 4];
+/// add_products(&columns, 8, &mut square);
+/// assert_eq!(square, [140.0, 28.0, 0.0, 8.0]);
+/// ```
+///
+/// # Panics
+/// Where the rows of a column are no multiple of [`WIDTH`], or `square` is not one of as many columns as there are.
+pub fn add_products(columns: &[f64], rows: usize, square: &mut [f64]) {
+    let size = if rows == 0 { 0 } else { columns.len() / rows };
+    assert!(rows.is_multiple_of(WIDTH), "{rows} rows are not whole groups");
+    assert!(columns.len() == size * rows && (rows == 0 || square.len() == size * size), "not a matrix");
+    widest(Products { columns, rows, size, square });
+}
+
+struct Products<'a> {
+    columns: &'a [f64],
+    rows: usize,
+    size: usize,
+    square: &'a mut [f64],
+}
+
+impl AnyWidth for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: SinCos>(mut self, like: R) {
+        let size = self.size;
+        for i in (0..size).step_by(TILE) {
+            for j in (0..i).step_by(TILE) {
+                match size - i {
+                    1 => self.tile::<R, 1, TILE>(like, i, j),
+                    2 => self.tile::<R, 2, TILE>(like, i, j),
+                    3 => self.tile::<R, 3, TILE>(like, i, j),
+                    _ => self.tile::<R, TILE, TILE>(like, i, j),
+                }
+            }
+            match size - i {
+                1 => self.tile::<R, 1, 1>(like, i, i),
+                2 => self.tile::<R, 2, 2>(like, i, i),
+                3 => self.tile::<R, 3, 3>(like, i, i),
+                _ => self.tile::<R, TILE, TILE>(like, i, i),
+            }
+        }
+    }
+}
+
+impl Products<'_> {
+    /// The pairs of I columns from `i` with J columns from `j`.
+    #[inline(always)]
+    fn tile<R: Real, const I: usize, const J: usize>(&mut self, like: R, i: usize, j: usize) {
+        let left = self.columns_from::<I>(i);
+        let right = self.columns_from::<J>(j);
+        let zero = like.splat(0.0);
+        let mut eight = [[[0.0; WIDTH]; J]; I];
+        for part in (0..WIDTH).step_by(R::ROWS) {
+            let mut sums = [[zero; J]; I];
+            let mut row = part;
+            while row < self.rows {
+                let (mut a, mut b) = ([zero; I], [zero; J]);
+                for k in 0..I {
+                    a[k] = like.whole(&left[k][row..]);
+                }
+                for k in 0..J {
+                    b[k] = like.whole(&right[k][row..]);
+                }
+                for k in 0..I {
+                    for l in 0..J {
+                        sums[k][l] = a[k].times_plus(b[l], sums[k][l]);
+                    }
+                }
+                row += WIDTH;
+            }
+            for k in 0..I {
+                for l in 0..J {
+                    sums[k][l].store(&mut eight[k][l], part);
+                }
+            }
+        }
+        for k in 0..I {
+            for l in 0..J {
+                if i + k >= j + l {
+                    let s = &eight[k][l];
+                    let sum = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+                    self.square[(j + l) * self.size + i + k] += sum;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn columns_from<const N: usize>(&self, first: usize) -> [&'_ [f64]; N] {
+        let mut out = [&self.columns[..0]; N];
+        for (k, column) in out.iter_mut().enumerate() {
+            *column = &self.columns[(first + k) * self.rows..][..self.rows];
+        }
+        out
+    }
+}
