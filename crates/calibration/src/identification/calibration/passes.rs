@@ -12,6 +12,7 @@ use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
 use truegrind_math::lanes::WIDTH;
+use truegrind_math::work::checkpoint;
 
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
@@ -40,6 +41,7 @@ impl Calibration {
         let mut out = vec![0.0; self.rows()];
         let chunk = COST_LANES * WIDTH;
         out.par_chunks_mut(chunk * per).enumerate().for_each(|(k, out)| {
+            checkpoint();
             let first = k * chunk;
             self.scatter(&state, first..first + out.len() / per, Some(out), None);
             for (i, r) in out.iter_mut().enumerate() {
@@ -67,6 +69,7 @@ impl Calibration {
             .zip(transposed.as_mut_slice().par_chunks_mut(chunk * per * p))
             .enumerate()
             .for_each(|(k, (residuals, transposed))| {
+                checkpoint();
                 let (first, rows) = (k * chunk, residuals.len());
                 let mut jacobian = vec![0.0; rows * p];
                 self.scatter(&state, first..first + rows / per, Some(residuals), Some(&mut jacobian));
@@ -142,6 +145,7 @@ impl Problem for Calibration {
             .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
             .into_par_iter()
             .map(|(from, lanes)| {
+                checkpoint();
                 let mut out = vec![0.0; c * lanes * WIDTH];
                 self.fill(&state, from, lanes, false, &mut out);
                 0.5 * out.iter().map(|r| r * r).sum::<f64>()
@@ -162,6 +166,7 @@ impl Problem for Calibration {
             .map_init(
                 || vec![0.0; (p + 1) * c * most * WIDTH],
                 |buffer, blocks| {
+                    checkpoint();
                     let mut square = DMatrix::zeros(p + 1, p + 1);
                     for &(from, lanes) in blocks {
                         let rows = c * lanes * WIDTH;
