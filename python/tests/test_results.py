@@ -71,7 +71,7 @@ def test_programs_are_never_overwritten(tmp_path, model):
 
 
 def test_what_must_not_be_corrected_is_refused(tmp_path, model):
-    with pytest.raises(tg.ProgramError, match="nothing"):
+    with pytest.raises(tg.ArgumentError, match="nothing"):
         tg.compensate({}, model, allow_doubtful=True)
     with pytest.raises(FileNotFoundError):
         tg.compensate(tmp_path / "nowhere.mod", model, allow_doubtful=True)
@@ -88,7 +88,7 @@ def test_the_correction_helps_the_actual_arm():
     source = PROGRAMS / "told.mod"
     done = tg.compensate(source, found.model, allow_doubtful=True)
     off = tg.deviation(done.programs, found.model, intended=source, actual=made.actual).points
-    pairs = [(b, a) for b, a in zip(off["before_mm"], off["after_mm"]) if a is not None]
+    pairs = [(b, a) for b, a in zip(off["before_norm_mm"], off["after_norm_mm"]) if a is not None]
     before, after = np.array(pairs).T
     assert np.mean(after) < 0.5 * np.mean(before)
 

@@ -183,6 +183,23 @@ const PARALLEL_POSES: [Pose; 3] = [
     ),
 ];
 
+/// What tools leave behind in a URDF: marks of their own without a declaration, macros that are only defined, comments.
+#[test]
+fn what_tools_leave_behind_is_passed_over() {
+    let left = TURNED.replacen(
+        "<link",
+        "<drake:collision_filter_group name=\"a\"/><!-- <xacro:arm/> ${a} --><xacro:property name=\"a\" value=\"${b}\"/><link",
+        1,
+    );
+    meets(&read(&left, "left.urdf", &Choice::default()).robot.model, Vector3::zeros(), &WORKSHOP);
+    // An axis that stands off the upright by less than the cosine of it tells.
+    let leaning = TURNED.replacen("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"3e-9 0 1\"/>", 1);
+    let found = read(&leaning, "leaning.urdf", &Choice::default()).robot.model;
+    let flange = found.forward(&Joints::zeros(), &Condition::default()).translation.vector;
+    // Seen from a base that leans so, the flange 640 mm higher stands 640 mm · 3e-9 further back.
+    assert!((flange.x - (394.0 - 640.0 * 3e-9 + 290.0 * 3e-9)).abs() < 1e-9, "{:e}", flange.x - 394.0);
+}
+
 #[test]
 fn what_is_no_urdf_of_an_arm_is_refused_in_words() {
     let none = Choice::default();

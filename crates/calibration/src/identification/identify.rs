@@ -27,7 +27,7 @@ use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
-use truegrind_math::work::tell;
+use truegrind_math::work::{checkpoint, tell};
 
 /// How to identify.
 #[derive(Debug, Clone)]
@@ -482,6 +482,7 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
         .samples_deg
         .par_iter()
         .map(|q| {
+            checkpoint();
             let q = Joints::from_fn(|i, _| q[i].to_radians());
             let variance = estimated.position_covariance(&posed, &q, &target).trace();
             if variance <= 0.0 { 0.0 } else { variance.sqrt() }

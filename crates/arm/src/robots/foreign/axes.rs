@@ -103,8 +103,11 @@ fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
     if upright {
         return (Pose::from_parts(foot.coords.into(), UnitQuaternion::identity()), turn);
     }
-    let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &z)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    // By sine and cosine: from the cosine alone a turn of less than 1e-8 is none.
+    let across = Vector3::z().cross(&z);
+    let (sine, cosine) = (across.norm(), z.z);
+    let axis = if sine > 0.0 { across / sine } else { Vector3::x() };
+    let rotation = UnitQuaternion::from_scaled_axis(axis * sine.atan2(cosine));
     (Pose::from_parts(foot.coords.into(), rotation), turn)
 }
 

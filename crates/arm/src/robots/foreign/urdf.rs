@@ -4,6 +4,7 @@
 //! the flange in `tool0` or `flange` where there is one; whatever else asks for base and tip. Lengths are metres and angles
 //! radians; what stands beyond a fixed joint belongs to the link before, masses too.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -61,17 +62,11 @@ struct Tree<'a> {
 
 /// The arm of a description.
 pub(super) fn read(text: &str, file: &str, choice: &Choice) -> Result<Described, RobotError> {
-    if file.to_ascii_lowercase().ends_with(".xacro") || text.contains("<xacro:") || text.contains("${") {
-        return Err(refused(
-            file,
-            "robot",
-            "xacro macros",
-            "URDF, in which they are expanded",
-            "expand it first: `xacro arm.urdf.xacro > arm.urdf` (ROS, or `pip install xacro`)",
-        ));
+    if file.to_ascii_lowercase().ends_with(".xacro") {
+        return Err(macros(file));
     }
-    let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options).map_err(|error| {
+    let text = with_prefixes(text);
+    let document = Document::parse_with_options(&text, options()).map_err(|error| {
         let key = format!("line {}", error.pos().row);
         refused(file, key, error.to_string(), "XML", "export the description again")
     })?;
@@ -86,10 +81,50 @@ pub(super) fn read(text: &str, file: &str, choice: &Choice) -> Result<Described,
             "give a URDF: SDF and MJCF are other formats",
         ));
     }
+    // What is only defined and never used says nothing of the robot.
+    let defines = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "property" | "arg" | "macro");
+    let is_macro =
+        |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|name| name.contains("xacro"));
+    if root.children().any(|node| is_macro(&node) && !defines(&node)) {
+        return Err(macros(file));
+    }
     let tree = Tree::of(&root, file)?;
     let base = tree.base(choice)?;
     let path = tree.chain(base, choice)?;
     tree.described(&root, base, &path)
+}
+
+fn options<'a>() -> ParsingOptions<'a> {
+    ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() }
+}
+
+fn macros(file: &str) -> RobotError {
+    refused(
+        file,
+        "robot",
+        "xacro macros",
+        "URDF, in which they are expanded",
+        "expand it first: `xacro arm.urdf.xacro > arm.urdf` (ROS, or `pip install xacro`)",
+    )
+}
+
+/// More than these no file forgets to declare.
+const MOST_PREFIXES: usize = 16;
+
+/// The text with its prefixes declared: many tools leave that out, and nothing of what they mark is read.
+fn with_prefixes(text: &str) -> Cow<'_, str> {
+    let mut text = Cow::Borrowed(text);
+    for _ in 0..MOST_PREFIXES {
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) =
+            Document::parse_with_options(&text, options())
+        else {
+            break;
+        };
+        let Some(at) = text.find("<robot") else { break };
+        let declared = format!("<robot xmlns:{prefix}=\"{prefix}\"");
+        text.to_mut().replace_range(at..at + "<robot".len(), &declared);
+    }
+    text
 }
 
 /// Numbers of an attribute.
@@ -102,6 +137,9 @@ fn numbers<const N: usize>(
     let Some((node, text)) = node.and_then(|node| Some((node, node.attribute(attribute)?))) else {
         return Ok(otherwise);
     };
+    if text.contains("${") {
+        return Err(macros(file));
+    }
     let values: Option<Vec<f64>> =
         text.split_whitespace().map(|cell| cell.parse().ok().filter(|v: &f64| v.is_finite())).collect();
     values.and_then(|values| <[f64; N]>::try_from(values).ok()).ok_or_else(|| {
