@@ -176,7 +176,7 @@ fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robo
     let plain = map == Matrix6::identity();
     let place = laid.base.translation.vector;
     let sheet = DataSheet {
-        name: file.rsplit(['/', '\\']).next().unwrap_or(file).to_owned(),
+        name: name_of(file),
         maker: described.maker.clone(),
         model: described.designation.clone(),
         payload_kg: None,
@@ -223,6 +223,11 @@ fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robo
     let robot = Robot::new(sheet, file)?;
     compared(&robot, &described, &laid.base, &map, file)?;
     Ok((robot, notes))
+}
+
+/// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.
+fn name_of(file: &str) -> String {
+    file.rsplit(['/', '\\']).next().unwrap_or(file).replace('.', "-")
 }
 
 /// What stands where a zero was meant.

@@ -76,7 +76,7 @@ fn a_turned_tool_and_whatever_is_fixed_belong_to_the_links() {
     // What was read goes to a robot file and back.
     let found = read(TURNED, "arms/turned.urdf", &Choice::default()).robot;
     let again = parse(&text(&found).unwrap(), "turned.toml").unwrap();
-    assert_eq!((again.model, again.sheet.name.as_str()), (found.model, "turned.urdf"));
+    assert_eq!((again.model, again.sheet.name.as_str()), (found.model, "turned-urdf"));
 }
 
 /// Masses stand where the links are, what is fixed to a link with it.
