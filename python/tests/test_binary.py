@@ -10,6 +10,10 @@ import truegrind as tg
 from conftest import DATA, PROGRAMS
 
 
+def test_the_version_is_that_of_the_binary(run):
+    assert run("--version").decode().split() == ["truegrind", tg.__version__]
+
+
 @pytest.mark.parametrize("file", ["irb120-cable.csv", "irb120-tracker.csv", "irb120-rounded.csv"])
 def test_identify_gives_the_bytes_of_the_binary(run, tmp_path, file):
     model = tmp_path / "arm.toml"

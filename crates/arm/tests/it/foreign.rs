@@ -509,3 +509,52 @@ fn what_is_exported_comes_back() {
         }
     }
 }
+
+/// Whatever a file holds, it is read or refused: bytes changed, taken out and doubled at random.
+#[test]
+fn no_damage_brings_the_readers_down() {
+    use rand::{RngExt, SeedableRng};
+    let conf = "robot = universal-robots-ur10\ndelta_theta = [0, 0, 0, 0, 0, 0]\ndelta_d = [0, 0, 0, 0, 0, 0]\n\
+        delta_a = [0, 0, 0, 0, 0, 0]\ndelta_alpha = [0, 0, 0, 0, 0, 0]\n";
+    let yaml = truegrind_arm::robots::export::write(
+        &load("universal-robots-ur10").unwrap().model,
+        "ur",
+        truegrind_arm::robots::export::Format::UrYaml,
+        &[],
+    );
+    let none = Choice::default();
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+    let mut read_whole = 0;
+    for (text, file) in [
+        (TURNED, "a.urdf"),
+        (TWO, "a.urdf"),
+        (PARALLEL, "a.urdf"),
+        (STANDARD, "a.csv"),
+        (conf, "a.conf"),
+        (&yaml, "a.yaml"),
+    ] {
+        for _ in 0..300 {
+            let mut bytes = text.as_bytes().to_vec();
+            for _ in 0..random.random_range(1..4) {
+                let at = random.random_range(0..bytes.len());
+                let to = (at + random.random_range(1..60)).min(bytes.len());
+                match random.random_range(0..4) {
+                    0 => drop(bytes.drain(at..to)),
+                    1 => bytes[at] = b"0123456789-.eE<>\"/;,\n"[random.random_range(0..21)],
+                    2 => {
+                        let part = bytes[at..to].to_vec();
+                        bytes.splice(at..at, part);
+                    }
+                    _ => bytes[at] = b'9',
+                }
+            }
+            let damaged = String::from_utf8_lossy(&bytes);
+            if let Ok(found) = read_any(&damaged, file, &none) {
+                read_whole += 1;
+                let flange = found.robot.model.forward(&Joints::repeat(0.3), &Condition::default());
+                assert!(flange.translation.vector.iter().all(|v| v.is_finite()));
+            }
+        }
+    }
+    assert!(read_whole > 100, "{read_whole}");
+}
