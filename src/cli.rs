@@ -30,6 +30,7 @@ mod cell;
 mod manual;
 mod compensate;
 mod deviation;
+mod export;
 mod demo;
 #[cfg(feature = "visual")]
 mod view;
@@ -74,6 +75,8 @@ enum Verb {
     Compensate(compensate::Arguments),
     /// How far programs are off under a model; nothing is rewritten.
     Deviation(deviation::Arguments),
+    /// The links of an estimated arm in the formats of others: URDF, tables of link parameters, the kinematics of UR drivers.
+    Export(export::Arguments),
     /// Show in Rerun what any of the above wrote.
     #[cfg(feature = "visual")]
     View(view::Arguments),
@@ -124,6 +127,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Cell(arguments) => cell::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),
+        Verb::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "visual")]
         Verb::View(arguments) => view::run(&arguments),
         Verb::Completions(arguments) => manual::completions(&arguments, Cli::command()),

@@ -661,7 +661,7 @@ fn rewritten(
     }
     worked();
     if let Some(surface) = &shop.surface {
-        add_normals(&mut planned, surface);
+        planned.add_normals(surface);
     }
     let files: Vec<ProgramFile> = names
         .iter()
@@ -830,19 +830,4 @@ fn already(
         ));
     }
     Ok(marked)
-}
-
-/// Deviations along the normal of the surface that is ground.
-pub(super) fn add_normals(plan: &mut Plan, surface: &SurfaceFile) {
-    for point in &mut plan.points {
-        let in_object = point.base_from_object.inverse() * point.intended;
-        let foot = surface.surface.foot(&nalgebra::Point3::from(in_object.translation.vector));
-        let Some(foot) = foot else { continue };
-        let normal = foot.contact.normal.into_inner();
-        point.cutting &= foot.normal_mm.abs() < 0.5;
-        point.normal = Some(normal);
-        for deviation in [&mut point.before, &mut point.after].into_iter().flatten() {
-            deviation.normal_mm = Some(normal.dot(&deviation.vector_mm));
-        }
-    }
 }

@@ -16,7 +16,7 @@ use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import;
-use truegrind::calibration::measurement::plausibility::{Evidence, plausibility};
+use truegrind::calibration::measurement::matching::{Mismatch, matched};
 use truegrind::calibration::measurement::split::{self, Split};
 use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
@@ -40,6 +40,15 @@ pub(super) enum Angles {
     Dh,
 }
 
+impl From<Angles> for AngleConvention {
+    fn from(angles: Angles) -> Self {
+        match angles {
+            Angles::Logged => AngleConvention::Logged,
+            Angles::Dh => AngleConvention::Dh,
+        }
+    }
+}
+
 /// How a measurement file is read.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DataArguments {
@@ -57,6 +66,13 @@ pub(super) struct DataArguments {
     /// Take the units as they are, however odd they look.
     #[arg(long)]
     pub(super) allow_odd_units: bool,
+}
+
+impl DataArguments {
+    /// A file as it is, of a robot.
+    pub(super) fn of(data: PathBuf, robot: String) -> Self {
+        Self { data, robot, sheet: None, angles: None, allow_odd_units: false }
+    }
 }
 
 /// Arguments of `identify`.
@@ -223,23 +239,14 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
     let bytes = files::read(&arguments.data)?;
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
-    let mut dataset = import::read(&files::name(&arguments.data), &bytes, &options)?;
-    let dh = match arguments.angles {
-        Some(angles) => angles == Angles::Dh,
-        None => robot.sheet.joints.angles == truegrind::robots::sheet::Angles::Dh,
-    };
-    let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
-    if !arguments.allow_odd_units {
-        for suspicion in plausibility(&dataset, &robot.model, convention) {
-            match suspicion.evidence {
-                Evidence::Sensor => bail!("{suspicion} (--allow-odd-units takes the file at its word)"),
-                Evidence::Readout => dataset.notes.push(suspicion.to_string()),
-            }
-        }
-    }
-    let dataset = convention.apply(&dataset, &robot.model).ok_or_else(|| {
-        anyhow!("{}: its joint map cannot be inverted, so DH angles cannot be read", robot.sheet.name)
-    })?;
+    let dataset = import::read(&files::name(&arguments.data), &bytes, &options)?;
+    let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
+    let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
+    let dataset =
+        matched(dataset, name, &robot.model, convention, odd).map_err(|mismatch| match mismatch {
+            Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units takes the file at its word)"),
+            _ => anyhow!("{mismatch}"),
+        })?;
     Ok((robot, dataset))
 }
 

@@ -6,17 +6,16 @@ use anyhow::{Context, anyhow, bail};
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
-use truegrind::robots::{self, Robot};
+use truegrind::robots::{self, Choice, Kind, Robot, read_any};
 
 use super::files;
 use super::terminal::tell;
 
-/// A robot by catalogue name or from a TOML file.
+/// A robot by catalogue name or from a file of any kind that is known.
 pub(super) fn robot(name: &str) -> anyhow::Result<Robot> {
     let path = Path::new(name);
-    let is_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || name.contains('/');
-    if is_file || path.is_file() {
-        Ok(robots::parse(&files::read_text(path)?, name)?)
+    if Kind::of(name).is_some() || name.contains('/') || path.is_file() {
+        Ok(read_any(&files::read_text(path)?, name, &Choice::default())?.robot)
     } else {
         Ok(robots::load(name)?)
     }

@@ -17,8 +17,8 @@ use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
 use super::naming;
-use super::programs::angles;
 use super::terminal::tell;
+use truegrind::compensation::setup::angles;
 
 /// Arguments of `path`.
 #[derive(Debug, Args)]

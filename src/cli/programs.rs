@@ -5,13 +5,11 @@ use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use truegrind::compensation::cell::{Cell, CellFrame};
-use truegrind::programs::motion::Frame;
-use truegrind::programs::nc::orientation::Angles;
+use truegrind::compensation;
+use truegrind::compensation::cell::Cell;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::rapid::task_list;
 use truegrind::programs::reading::{Language, Program};
-use truegrind::robots::sheet::Orientation;
 
 use super::terminal::tell;
 use super::{files, inputs};
@@ -288,24 +286,5 @@ impl Programs {
 pub(super) fn setup(cell: &Cell, robot: Option<&str>) -> Setup {
     let orientation =
         robot.and_then(|name| inputs::robot(name).ok()).and_then(|robot| robot.sheet.orientation());
-    let frames = |list: &[CellFrame]| -> Vec<(String, Frame)> {
-        list.iter().filter_map(|frame| Some((frame.name.clone(), Frame::from_pose(&frame.pose()?)))).collect()
-    };
-    Setup {
-        dialect: None,
-        angles: cell.angles().or_else(|| orientation.and_then(angles)),
-        tools: frames(&cell.tool),
-        frames: frames(&cell.wobj),
-    }
-}
-
-/// The convention of A, B and C that a robot file names; quaternions are no three angles.
-pub(super) fn angles(orientation: Orientation) -> Option<Angles> {
-    match orientation {
-        Orientation::Quaternion => None,
-        Orientation::Abc => Some(Angles::Abc),
-        Orientation::Wpr => Some(Angles::Wpr),
-        Orientation::RotationVector => Some(Angles::RotationVector),
-        Orientation::Rxyz => Some(Angles::Rxyz),
-    }
+    compensation::setup::setup(cell, orientation)
 }

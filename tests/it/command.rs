@@ -12,6 +12,7 @@ mod belonging;
 mod files;
 mod manual;
 mod nc;
+mod robots;
 mod same;
 mod text;
 

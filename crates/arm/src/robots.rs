@@ -12,6 +12,8 @@
 //! ```
 
 mod error;
+pub mod export;
+mod foreign;
 pub mod sheet;
 pub mod validation;
 
@@ -19,6 +21,7 @@ use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
 
 pub use error::{NominalMismatch, RobotError};
+pub use foreign::{Choice, Kind, Understood, read_any};
 
 /// The files of the catalogue: name for messages, text.
 const FILES: [(&str, &str); 7] = [
@@ -153,6 +156,14 @@ pub fn parse(text: &str, file: &str) -> Result<Robot, RobotError> {
         (Some(sheet), 0) => Robot::new(sheet, file),
         (_, rest) => Err(RobotError::Several { file: file.to_owned(), found: rest + usize::from(rest > 0) }),
     }
+}
+
+/// The text of a file that [`parse`] reads.
+///
+/// # Errors
+/// What the writer says of a number that TOML does not hold.
+pub fn text(robot: &Robot) -> Result<String, String> {
+    toml::to_string(&RobotFile { robot: vec![robot.sheet.clone()] }).map_err(|error| error.to_string())
 }
 
 /// The sheets of a file, as written: keys and types are right, values are not yet checked.

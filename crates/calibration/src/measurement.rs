@@ -12,6 +12,7 @@ pub mod dataset;
 pub mod import;
 pub mod convention;
 pub mod plausibility;
+pub mod matching;
 pub mod sensor;
 pub mod registration;
 pub mod split;

@@ -63,7 +63,7 @@ pub(super) struct Knowing<'a, 'm> {
     pub(super) knowledge: &'a Estimated,
 }
 
-/// The targets that are looked at: of each work object and of each cut.
+/// The targets that are looked at: of each work object and of each cut, the point included at which it begins.
 pub(super) struct Chosen {
     objects: Vec<(u32, Vec<u32>)>,
     cuts: Vec<(Vec<u32>, Vec<u32>)>,
@@ -74,11 +74,19 @@ impl Chosen {
     pub(super) fn of(listing: &Listing, reached: impl Fn(usize) -> bool) -> Self {
         let cuts: CutsOf = cut::of(listing);
         let mut of_object: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
-        let mut of_cut: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        // Its motions, and the ends of others at which it begins.
+        let mut of_cut: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         for (index, motion) in (0_u32..).zip(&listing.motions) {
             let cut = cuts.root(index);
             if let Some(root) = cut {
-                of_cut.entry(root).or_default().push(index);
+                let begins = motion.previous.filter(|before| {
+                    let before_that = &listing.motions[*before as usize];
+                    cuts.root(*before) != cut
+                        && (before_that.tool, before_that.work_object) == (motion.tool, motion.work_object)
+                });
+                let [all, begin] = of_cut.entry(root).or_default();
+                all.push(index);
+                begin.extend(begins);
             }
             if let Some(object) = motion.work_object.filter(|_| reached(index as usize)) {
                 of_object.entry(object).or_default()[usize::from(cut.is_none())].push(index);
@@ -88,8 +96,8 @@ impl Chosen {
         let objects = of_object.into_iter().map(|(object, [cuts, rest])| {
             (object, spread(if cuts.is_empty() { &rest } else { &cuts }, placement::MOST_POINTS))
         });
-        let cuts = of_cut.into_values().filter_map(|all| {
-            let told: Vec<u32> = all.iter().copied().filter(|m| reached(*m as usize)).collect();
+        let cuts = of_cut.into_values().filter_map(|[all, begin]| {
+            let told: Vec<u32> = begin.iter().chain(&all).copied().filter(|m| reached(*m as usize)).collect();
             (!told.is_empty()).then(|| (all, spread(&told, risk::MOST_POINTS)))
         });
         Self { objects: objects.collect(), cuts: cuts.collect() }

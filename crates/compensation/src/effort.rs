@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use truegrind_arm::inverse::effort::Allowance;
+use truegrind_math::work::checkpoint;
 
 /// Works through pieces in parallel, each with its part of the whole; those that fell short are done again, one after the
 /// other, with what the others left.
@@ -18,6 +19,7 @@ pub(super) fn shared_out<T: Send>(
     work: impl Fn(usize, &mut Allowance) -> T + Sync,
 ) -> Vec<T> {
     let one = |piece: usize| {
+        checkpoint();
         let mut allowance = whole.part(piece, pieces);
         (work(piece, &mut allowance), allowance)
     };

@@ -3,6 +3,7 @@
 //! - [`cell`]: where tools and work objects come from; [`taught`]: those that were taught, under a better arm;
 //!   [`mounting`]: the two of a motion, as told and as they are; [`placed`]: where a surface file puts them; [`reach`]: whether the
 //!   arm is the program's at all; [`skeleton`]: the cell file that programs ask for.
+//! - [`setup`]: what cell and robot say that NC programs do not; [`belonging`]: whether all of them are of one robot.
 //! - [`payload`]: what the arm carries at each motion, as the program says.
 //! - [`compensate`]: the main job, from a program that was read to its new bytes.
 //! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
@@ -26,6 +27,9 @@ pub mod rewrite;
 pub mod cut;
 pub mod compensate;
 pub mod untouched;
+pub mod setup;
+pub mod belonging;
+mod normals;
 pub mod undeclared;
 pub mod placement;
 pub mod risk;

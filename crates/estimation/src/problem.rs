@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use truegrind_math::work::checkpoint;
 
 /// Prior knowledge of one parameter: a normal distribution. `sigma` infinite means none.
 ///
@@ -182,6 +183,10 @@ where
     T: Send,
 {
     let chunks = chunks(problem);
+    let work = |rows: Range<usize>| {
+        checkpoint();
+        work(rows)
+    };
     // Handing one small chunk to the pool costs more than a swarm's whole evaluation of it.
     if chunks.len() <= 1 {
         chunks.into_iter().map(work).collect()

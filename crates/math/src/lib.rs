@@ -9,3 +9,4 @@ pub mod distribution;
 pub mod tail;
 pub mod radial;
 pub mod spectral;
+pub mod work;

@@ -2,14 +2,17 @@
 
 use serde_json::{Value, json};
 
-use super::document::{Block, Document, KeyFigure, Verdict};
+use super::document::{Block, Document, Figure, KeyFigure, Verdict};
 use super::number::MISSING;
+use super::plot::{Axis, PlanPath, PlanView};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
+use truegrind_arm::condition::Condition;
 use truegrind_arm::link::LinkModel;
-use truegrind_arm::robots::Robot;
+use truegrind_arm::model::Joints;
 use truegrind_arm::robots::sheet::{Angles, Dialect, Orientation, Point};
 use truegrind_arm::robots::validation;
+use truegrind_arm::robots::{Robot, Understood};
 
 /// Name, maker, designation, rated load, reach, repeatability and program language of each arm.
 pub fn catalogue_table(robots: &[Robot]) -> Table {
@@ -271,6 +274,53 @@ pub fn document(robot: &Robot) -> Document {
     page.heading(2, "Sources");
     page.push(untitled(source_table(robot)));
     page
+}
+
+/// What was understood of a robot file, in a few lines: to be compared with the manual before anything is measured.
+pub fn understood(found: &Understood) -> Document {
+    let mut page = Document::new(found.robot.sheet.name.clone());
+    page.subtitle = format!("{}, as it is understood", found.kind.text());
+    page.push(Block::List(found.sentences.clone()));
+    page.paragraph("Compare zero pose and axes with the manual: a wrong zero is the usual mistake.");
+    page
+}
+
+/// The same with a picture of the zero pose, and the page of the arm.
+pub fn checked(found: &Understood) -> Document {
+    let mut page = understood(found);
+    page.push(Block::Figure(zero_pose(&found.robot)));
+    let whole = document(&found.robot);
+    page.blocks.extend(whole.blocks);
+    page
+}
+
+/// The lines between the joints with all of them at 0°, from the side and from the front.
+fn zero_pose(robot: &Robot) -> Figure {
+    let ready = robot.model.at_condition(&Condition::default());
+    let frames = ready.frames(&Joints::zeros());
+    let flange = ready.forward(&Joints::zeros());
+    let tip = flange.translation.vector;
+    // A short piece along the flange's z shows where it looks.
+    let ahead = tip + flange.rotation * nalgebra::Vector3::z() * 60.0;
+    let mut stops: Vec<[f64; 3]> = frames.origin.to_vec();
+    stops.extend([tip, ahead].map(<[f64; 3]>::from));
+    let seen = |name: &str, across: usize| PlanPath {
+        name: name.to_owned(),
+        points: stops.iter().map(|at| [at[across], at[2]]).collect(),
+        values: (0..stops.len()).map(|k| k.min(6) as f64).collect(),
+    };
+    let view = PlanView {
+        title: "All joints at 0°".to_owned(),
+        x: Axis::new("x, y", "mm"),
+        y: Axis::new("z", "mm"),
+        value: Axis::new("link", ""),
+        paths: vec![seen("from the side: x and z", 0), seen("from the front: y and z", 1)],
+        ..PlanView::default()
+    };
+    Figure::new(
+        view.svg(),
+        "The lines between the joints' frames with all joints at 0°, and 60 mm along the flange's z: the picture of the manual?",
+    )
 }
 
 /// The data sheet with what its published poses say of it; schema `truegrind.robot/1`.

@@ -7,7 +7,9 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum RobotError {
     /// The name is not in the catalogue.
-    #[error("unknown robot \"{name}\", expected one of {known}; or give the path of a TOML file of your own")]
+    #[error(
+        "unknown robot \"{name}\", expected one of {known}; or give the path of a robot file of your own"
+    )]
     Unknown {
         /// What was asked for.
         name: String,
@@ -37,6 +39,20 @@ pub enum RobotError {
         file: String,
         /// How many.
         found: usize,
+    },
+    /// Something in another's description of an arm that cannot be used.
+    #[error("{file}: {key}: found {found}, expected {expected}; {remedy}")]
+    Foreign {
+        /// File.
+        file: Box<str>,
+        /// Where in it.
+        key: Box<str>,
+        /// What is there.
+        found: Box<str>,
+        /// What should be.
+        expected: &'static str,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A value that cannot be right.
     #[error("{file}: robot \"{robot}\": {key}: found {found}, expected {expected}; {remedy}")]

@@ -6,6 +6,7 @@ use faer::linalg::cholesky::llt;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use truegrind_math::work::checkpoint;
 
 /// Columns of a result that one thread makes.
 const PART: usize = 64;
@@ -52,6 +53,7 @@ fn in_parts(
         return;
     }
     let part = |(k, place): (usize, &mut [f64])| {
+        checkpoint();
         let columns = place.len() / rows;
         fill(k * width, MatMut::from_column_major_slice_mut(place, rows, columns));
     };

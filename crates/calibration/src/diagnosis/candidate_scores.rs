@@ -18,6 +18,7 @@ use super::lines;
 use super::score::score_projected;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use truegrind_arm::effect::Effect;
+use truegrind_math::work::checkpoint;
 
 /// A listed candidate and its projection on the whole design.
 struct Entry {
@@ -71,7 +72,14 @@ impl<'a> CandidateScores<'a> {
         let linear = Linear::of(subject, &fit);
         let whole = linear.whole();
         let design = &whole.design;
-        let columns: Vec<_> = catalogue.listed.par_iter().map(|c| c.columns(design)).collect();
+        let columns: Vec<_> = catalogue
+            .listed
+            .par_iter()
+            .map(|c| {
+                checkpoint();
+                c.columns(design)
+            })
+            .collect();
         let listed = catalogue
             .listed
             .iter()

@@ -27,6 +27,7 @@ use truegrind_arm::effect::map::JointMap;
 use truegrind_arm::effect::ratio::Ratio;
 use truegrind_arm::effect::thermal::Thermal;
 use truegrind_arm::model::Model;
+use truegrind_math::work::checkpoint;
 
 /// A cause with its regressors.
 #[derive(Debug, Clone)]
@@ -333,7 +334,10 @@ pub fn arm_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
     }
     effects
         .into_par_iter()
-        .map(|(effect, tried)| Candidate { tried, ..Candidate::arm(effect, dataset, nominal) })
+        .map(|(effect, tried)| {
+            checkpoint();
+            Candidate { tried, ..Candidate::arm(effect, dataset, nominal) }
+        })
         .collect()
 }
 

@@ -31,6 +31,7 @@ use super::intervals::Strip;
 use super::score::{Score, log_p_of, score_columns, score_projected};
 use super::selection::{Accepted, Options, already};
 use crate::measurement::sensor::disturbance::{Course, Disturbance};
+use truegrind_math::work::checkpoint;
 
 /// How a cause came out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -235,6 +236,7 @@ impl Confirming<'_> {
             let judged: Vec<Confirmation> = (0..own.len())
                 .into_par_iter()
                 .map(|k| {
+                    checkpoint();
                     let mut dropped = out.clone();
                     if !out.contains(&k) {
                         dropped.push(k);

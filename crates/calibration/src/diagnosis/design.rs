@@ -21,6 +21,7 @@ use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
+use truegrind_math::work::checkpoint;
 
 /// Slopes of the whitened residual by what candidates are made of, n each.
 #[derive(Debug, Clone)]
@@ -369,7 +370,13 @@ impl Design {
 
     /// The same for the columns of many candidates, with one pass over the basis for those that are dense.
     pub fn project_all(&self, all: &[DMatrix<f64>]) -> Vec<Projected> {
-        let sparse: Vec<_> = all.par_iter().map(|columns| self.sparse_product(columns)).collect();
+        let sparse: Vec<_> = all
+            .par_iter()
+            .map(|columns| {
+                checkpoint();
+                self.sparse_product(columns)
+            })
+            .collect();
         let dense = || all.iter().zip(&sparse).filter(|(_, s)| s.is_none()).map(|(columns, _)| columns);
         let mut side_by_side = DMatrix::zeros(self.rows(), dense().map(DMatrix::ncols).sum());
         let mut first = 0;
@@ -390,6 +397,7 @@ impl Design {
             .collect();
         work.into_par_iter()
             .map(|(columns, sparse, own)| {
+                checkpoint();
                 let (shared, square) = sparse
                     .unwrap_or_else(|| (shared.columns(own, columns.ncols()).into_owned(), gram(columns)));
                 self.projected(columns, shared, square)

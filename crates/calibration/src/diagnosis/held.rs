@@ -14,6 +14,7 @@ use super::algebra::{factored, gram, outer, product, solved};
 use super::design::Linear;
 use crate::measurement::split::Split;
 use truegrind_math::statistics::ErrorSummary;
+use truegrind_math::work::checkpoint;
 
 /// One fold.
 #[derive(Debug, Clone)]
@@ -57,6 +58,7 @@ impl<'a> FoldErrors<'a> {
         let folds = splits
             .par_iter()
             .map(|split| {
+                checkpoint();
                 let further = neither(split, linear.observations);
                 let observations = split.test.iter().chain(&further);
                 let out: Vec<usize> = observations.flat_map(|&i| i * per..(i + 1) * per).collect();
@@ -86,6 +88,7 @@ impl<'a> FoldErrors<'a> {
             .folds
             .par_iter()
             .map(|fold| {
+                checkpoint();
                 let p = kept.len();
                 let mut normal = DMatrix::zeros(p, p);
                 for (b, &to) in kept.iter().enumerate() {
@@ -158,6 +161,7 @@ impl Reduced<'_> {
             .par_iter()
             .zip(&self.solved)
             .map(|(fold, solved)| {
+                checkpoint();
                 let residual = picked(&self.residual, &fold.out);
                 let unknown = || DVector::from_element(fold.out.len(), f64::INFINITY);
                 let Some((lower, half)) = solved else { return unknown() };

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::algebra::gram;
 use super::design::Design;
+use truegrind_math::work::checkpoint;
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,6 +161,7 @@ impl Strip {
         let mut coarse: Vec<Interval> = (0..grid)
             .into_par_iter()
             .map(|first| {
+                checkpoint();
                 let from = self.cuts[first];
                 let mut found = Vec::new();
                 for last in first + 1..=grid {

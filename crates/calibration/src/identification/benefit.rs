@@ -37,6 +37,7 @@ use truegrind_arm::parameter::Parameter;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::se3::{Pose, vector_from_pose};
 use truegrind_math::tail::normal_two_sided;
+use truegrind_math::work::checkpoint;
 
 /// What a model promises inside its measured region, apart from where base and flange are placed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -172,13 +173,19 @@ fn weighed(beliefs: &[Belief], readings: &Readings, written: &Written<'_>) -> Op
     let arm = written.x.len();
     let seen = RIVALS.map(|rival| rival.seen(readings, arm));
     let seen_by = |belief: &Belief| &seen[belief.rival];
-    let heard: Vec<Option<f64>> =
-        beliefs.par_iter().map(|belief| belief.log_weight(seen_by(belief), readings)).collect();
+    let heard: Vec<Option<f64>> = beliefs
+        .par_iter()
+        .map(|belief| {
+            checkpoint();
+            belief.log_weight(seen_by(belief), readings)
+        })
+        .collect();
     let best = heard.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
     let views = beliefs
         .par_iter()
         .zip(&heard)
         .filter_map(|(belief, heard)| {
+            checkpoint();
             let log = (*heard)? - best;
             (log > NEGLIGIBLE).then(|| Some((log.exp(), belief.view(seen_by(belief), written)?)))?
         })
@@ -435,6 +442,7 @@ fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
     let mut out =
         Readings { matrix: DMatrix::zeros(all, all), right: DVector::zeros(all), square: 0.0, count: 0 };
     for from in (0..dataset.rows.len()).step_by(ROWS) {
+        checkpoint();
         let to = (from + ROWS).min(dataset.rows.len());
         let n = (to - from) * per;
         let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);

@@ -26,6 +26,7 @@ use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Iteration, Termination};
 use truegrind_estimation::problem::{Prior, Problem};
 use truegrind_math::statistics::{ErrorSummary, median};
+use truegrind_math::work::checkpoint;
 
 /// Parameters of the measurement: frame, outlet, zero, touched point.
 pub fn frame_parameters(dataset: &Dataset) -> Vec<Parameter> {
@@ -143,6 +144,7 @@ pub fn fit(
     let few = observed.few();
     let mut steps = Steps::of(few.as_ref().unwrap_or(observed), parameters);
     for round in 1..=ROUNDS {
+        checkpoint();
         let observed = few.as_ref().filter(|_| round < ROUNDS).unwrap_or(observed);
         if few.is_some() && round == ROUNDS {
             last = None;
@@ -250,6 +252,7 @@ fn spreads(task: &Calibration, x: &[f64], shares: &[(f64, f64)], spent: f64) -> 
             return smallest;
         }
         for _ in 0..60 {
+            checkpoint();
             let middle = 0.5 * (low + high);
             if excess(middle.exp()) > 0.0 { low = middle } else { high = middle }
         }

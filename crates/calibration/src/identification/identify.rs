@@ -27,6 +27,7 @@ use truegrind_arm::region::Region;
 use truegrind_estimation::estimate::Termination;
 use truegrind_estimation::problem::Problem;
 use truegrind_math::statistics::{ErrorSummary, largest, median};
+use truegrind_math::work::{checkpoint, tell};
 
 /// How to identify.
 #[derive(Debug, Clone)]
@@ -149,6 +150,7 @@ pub fn identify(
     split: &dyn Fn(&Dataset) -> Split,
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
+    tell("looking for outliers");
     let start = Start { model: nominal, frames };
     let (observed, readout_fusion) = observe(dataset, nominal, options.fuse_readout);
     enough(&observed.dataset, nominal, options.held_out)?;
@@ -168,6 +170,7 @@ pub fn identify(
     let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
+    tell("fitting without the rows that are held out");
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let seed = options.seed;
@@ -206,6 +209,7 @@ pub fn identify(
         .map(|((&i, before), after)| (observed.dataset.rows[i].number, before, after))
         .collect();
     // The model itself: all rows.
+    tell("fitting all rows");
     let mut registered =
         fit(&observed, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
     registered.task.forget_rows();
@@ -249,6 +253,7 @@ pub fn identify(
         },
         condition: mean_condition(dataset),
     };
+    tell("judging what the model promises programs");
     let mut estimated = with_region(estimated, &observed.dataset, &geometry);
     let benefit = if options.solver.literal {
         None
@@ -477,6 +482,7 @@ pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &
         .samples_deg
         .par_iter()
         .map(|q| {
+            checkpoint();
             let q = Joints::from_fn(|i, _| q[i].to_radians());
             let variance = estimated.position_covariance(&posed, &q, &target).trace();
             if variance <= 0.0 { 0.0 } else { variance.sqrt() }

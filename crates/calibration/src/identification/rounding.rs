@@ -14,6 +14,7 @@ use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::jacobian::joint_jacobian;
 use truegrind_arm::model::Model;
+use truegrind_math::work::checkpoint;
 
 /// Covariance of the joint angles of each row (rad²): one for all rows until some have their own.
 #[derive(Debug, Clone)]
@@ -213,6 +214,7 @@ pub fn angle_shares(
         .iter()
         .enumerate()
         .map(|(i, row)| {
+            checkpoint();
             let covariance = angles.of(i);
             if covariance.trace() == 0.0 {
                 return (0.0, 0.0);

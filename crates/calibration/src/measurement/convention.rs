@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
 use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::robots::sheet::Angles;
 
 /// The meaning of `q1` to `q6` in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -17,6 +18,15 @@ pub enum AngleConvention {
     Logged,
     /// The angles θ of the DH table: joint map and theta offsets are in them already.
     Dh,
+}
+
+impl From<Angles> for AngleConvention {
+    fn from(angles: Angles) -> Self {
+        match angles {
+            Angles::Logged => AngleConvention::Logged,
+            Angles::Dh => AngleConvention::Dh,
+        }
+    }
 }
 
 impl AngleConvention {

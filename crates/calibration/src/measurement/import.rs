@@ -21,7 +21,7 @@ pub use options::Options;
 
 use sha2::{Digest, Sha256};
 
-use self::cell::Table;
+use self::cell::{Cell, Line, Table};
 use self::columns::Columns;
 use super::dataset::Dataset;
 
@@ -53,6 +53,53 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
         from_text(file, &csv::Text::of(file, bytes)?, options)?
     };
     dataset.sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
+    Ok(dataset)
+}
+
+/// Rows that stand in no file, as arrays and data frames of a program do, under the same names and checks as the columns of a
+/// file. `file` is what messages and reports call them; rows are counted from 0.
+///
+/// ```
+/// use truegrind_calibration::measurement::import::cell::Cell;
+/// use truegrind_calibration::measurement::import::{Options, rows};
+///
+/// let names = ["q1", "q2", "q3", "q4", "q5", "q6", "L"].map(String::from);
+/// let number = |value: f64| Cell::Number { value, as_text: false };
+/// let pose = |length: f64| vec![10.0, 20.0, 30.0, 40.0, 50.0, 60.0, length].into_iter().map(number).collect::<Vec<_>>();
+/// let found = rows("array", &names, [pose(500.25), pose(500.5)].into_iter(), &Options::default())?;
+/// assert_eq!((found.rows.len(), found.rows[1].number), (2, 1));
+///
+/// let error = rows("array", &names, [pose(500.25), pose(f64::NAN)].into_iter(), &Options::default());
+/// let said = error.map(|_| ()).map_err(|error| error.to_string());
+/// assert!(said.is_err_and(|said| said.starts_with("array, row 1, column L: found `NaN`; expected a finite number")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`ImportError`], as for a file.
+pub fn rows(
+    file: &str,
+    names: &[String],
+    rows: impl Iterator<Item = Vec<Cell>>,
+    options: &Options,
+) -> Result<Dataset, ImportError> {
+    let header = Line { number: 0, cells: names.iter().map(|name| Cell::Text(name.clone())).collect() };
+    let table = Table { rows: vec![header], ..Table::default() };
+    let columns = Columns::find(file, &table).map_err(ImportError::without_row)?;
+    let mut digest = Sha256::new();
+    digest.update(names.join(","));
+    let lines = rows.enumerate().map(|(number, cells)| {
+        for cell in &cells {
+            match cell {
+                Cell::Empty => digest.update([0]),
+                Cell::Number { value, .. } => digest.update(value.to_le_bytes()),
+                Cell::Text(text) => digest.update(text),
+            }
+        }
+        Ok(Line { number, cells })
+    });
+    let mut dataset = rows::dataset(file, &table, &columns, options, lines)?;
+    dataset.sha256 = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
     Ok(dataset)
 }
 

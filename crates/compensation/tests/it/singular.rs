@@ -9,6 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix6, Vector6};
 use truegrind_arm::inverse::Inverse;
+use truegrind_compensation::placement::Placement;
 use truegrind_compensation::rewrite::MotionOutcome;
 use truegrind_programs::motion::{MotionKind, TargetValue};
 
@@ -360,7 +361,12 @@ fn lines_past_a_singularity_keep_their_joints_or_stay() {
                 format!("MoveL {},v100,fine,tool0;\n", target(&to, confdata(&arm, &on[STEPS]))),
             ]);
             let known = known(robot, round as u64);
-            let options = Options { tolerance_mm: 5.0, ..Options::default() };
+            let options = Options {
+                tolerance_mm: 5.0,
+                placement: Placement::Absolute,
+                max_risk: 1.0,
+                ..Options::default()
+            };
             let (plan, program) = rewritten(source.as_bytes(), &known, &Cell::default(), &options);
             count += 1;
             on_the_way += usize::from(matches!(

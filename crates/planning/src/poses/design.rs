@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::rows::Told;
 use truegrind_math::spectral;
+use truegrind_math::work::checkpoint;
 
 pub use super::options::Index;
 
@@ -74,6 +75,7 @@ impl Part {
             .into_par_iter()
             .step_by(PORTION)
             .map(|first| {
+                checkpoint();
                 let some = PORTION.min(count - first);
                 let x = self.readings.columns(first * per, some * per);
                 let vx = &inverse * x;

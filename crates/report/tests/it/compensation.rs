@@ -87,7 +87,7 @@ fn the_json_is_the_contract_field_by_field() {
     let (plan, listing, files) = example();
     assert_eq!(listing.motions.len(), 7);
     let json = view::json(&plan, &listing, &files);
-    assert_eq!(keys(&json), BTreeSet::from(["schema", "programs"]));
+    assert_eq!(keys(&json), BTreeSet::from(["schema", "programs", "placements", "cuts", "chance_of_worse"]));
     assert_eq!(json["schema"], "truegrind.compensation/1");
     let programs = json["programs"].as_array().unwrap();
     assert_eq!(programs.len(), 2);
@@ -106,7 +106,8 @@ fn the_json_is_the_contract_field_by_field() {
                     "reason",
                     "before_mm",
                     "after_mm",
-                    "sigma_mm"
+                    "sigma_mm",
+                    "shape_sigma_mm"
                 ])
             );
             assert!(["changed", "left", "refused", "flagged"].contains(&motion["status"].as_str().unwrap()));
@@ -160,11 +161,11 @@ fn the_table_has_a_row_for_each_motion_and_dashes_for_what_is_not_known() {
     let text = terminal::table(&table, 220);
     let words = |instruction: &str| -> Vec<String> {
         let line = text.lines().find(|line| line.contains(instruction)).unwrap();
-        line.split_whitespace().map(str::to_owned).take(9).collect()
+        line.split_whitespace().map(str::to_owned).take(10).collect()
     };
-    let unknown = ["grind.mod", "5", "MoveAbsJ", "○", "left", "–", "–", "–", "–"];
+    let unknown = ["grind.mod", "5", "MoveAbsJ", "○", "left", "–", "–", "–", "–", "–"];
     assert_eq!(words("MoveAbsJ"), unknown, "{text}");
-    let changed = ["grind.mod", "6", "MoveJ", "✓", "changed", "1.500", "0.0004", "0.120", "–"];
+    let changed = ["grind.mod", "6", "MoveJ", "✓", "changed", "1.500", "0.0004", "–", "0.120", "–"];
     assert_eq!(words("MoveJ "), changed, "{text}");
     // One file needs no column for it.
     assert_eq!(view::table(&plan, &listing, &files[..1]).columns[0].key, "line");

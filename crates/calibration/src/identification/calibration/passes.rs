@@ -11,6 +11,7 @@ use crate::measurement::dataset::Sensor;
 use truegrind_estimation::problem::{NormalEquations, Prior, Problem};
 use truegrind_math::gram::add_products;
 use truegrind_math::lanes::{Buffer, WIDTH};
+use truegrind_math::work::checkpoint;
 
 /// Groups of eight rows that share one buffer: 512 rows, which with 29 columns stay in the second-level cache.
 const BLOCK_LANES: usize = 64;
@@ -39,6 +40,7 @@ impl Calibration {
         let mut out = vec![0.0; self.rows()];
         let chunk = COST_LANES * WIDTH;
         out.par_chunks_mut(chunk * per).enumerate().for_each(|(k, out)| {
+            checkpoint();
             let first = k * chunk;
             self.scatter(&state, first..first + out.len() / per, Some(out), None);
             for (i, r) in out.iter_mut().enumerate() {
@@ -66,6 +68,7 @@ impl Calibration {
             .zip(transposed.as_mut_slice().par_chunks_mut(chunk * per * p))
             .enumerate()
             .for_each(|(k, (residuals, transposed))| {
+                checkpoint();
                 let (first, rows) = (k * chunk, residuals.len());
                 let mut jacobian = vec![0.0; rows * p];
                 self.scatter(&state, first..first + rows / per, Some(residuals), Some(&mut jacobian));
@@ -141,6 +144,7 @@ impl Problem for Calibration {
             .blocks_of(if self.parameters.len() > FEW { COST_LANES } else { BLOCK_LANES })
             .into_par_iter()
             .map(|(from, lanes)| {
+                checkpoint();
                 let mut out = vec![0.0; c * lanes * WIDTH];
                 self.fill(&state, from, lanes, false, &mut out);
                 0.5 * out.iter().map(|r| r * r).sum::<f64>()
@@ -161,6 +165,7 @@ impl Problem for Calibration {
             .map_init(
                 || Buffer::zeros((p + 1) * c * most * WIDTH),
                 |buffer, blocks| {
+                    checkpoint();
                     let mut square = DMatrix::zeros(p + 1, p + 1);
                     for &(from, lanes) in blocks {
                         let rows = c * lanes * WIDTH;

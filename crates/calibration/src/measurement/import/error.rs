@@ -186,6 +186,40 @@ pub enum ImportError {
     },
 }
 
+impl ImportError {
+    /// Where in the file, as far as it is known.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::NotATable { place }
+            | Self::Format { place, .. }
+            | Self::TooLarge { place, .. }
+            | Self::Empty { place }
+            | Self::MissingColumns { place, .. }
+            | Self::NoSensor { place, .. }
+            | Self::TwoSensors { place, .. }
+            | Self::DuplicateColumn { place }
+            | Self::TooManyJoints { place, .. }
+            | Self::Cell { place, .. }
+            | Self::LongRow { place, .. }
+            | Self::Units { place, .. } => Some(place),
+            Self::UnknownSheet { .. } | Self::NoSheets { .. } => None,
+        }
+    }
+
+    /// The same of a table whose header stands in no row.
+    pub(super) fn without_row(mut self) -> Self {
+        if let Self::MissingColumns { place, .. }
+        | Self::NoSensor { place, .. }
+        | Self::TwoSensors { place, .. }
+        | Self::DuplicateColumn { place }
+        | Self::TooManyJoints { place, .. } = &mut self
+        {
+            place.row = None;
+        }
+        self
+    }
+}
+
 fn list(names: &[String]) -> String {
     if names.is_empty() {
         return "none".into();

@@ -3,6 +3,7 @@
 //! Stops after 100 steps, when a step gains less than 1e-14 of the cost, or when no damping helps any more.
 
 use nalgebra::{DMatrix, DVector};
+use truegrind_math::work::checkpoint;
 
 /// Normal equations, one row at a time.
 #[derive(Debug, Clone)]
@@ -42,6 +43,7 @@ pub(super) fn fit<S: Clone>(
     moved: impl Fn(&S, &DVector<f64>) -> S,
 ) -> (f64, S) {
     let at = |state: &S| {
+        checkpoint();
         let mut normal = Normal::new(size);
         rows(state, &mut normal);
         normal

@@ -1,0 +1,265 @@
+//! An arm in the formats of others. They hold links and ranges of joints; what an estimated arm has beyond that stays behind, and
+//! whoever writes one has to say so ([`left_out`]).
+
+use std::fmt::Write;
+
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+
+use crate::condition::Condition;
+use crate::joints::Joints;
+use crate::model::Model;
+use truegrind_math::se3::Pose;
+
+/// A format that is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Unified Robot Description Format: links without shapes.
+    Urdf,
+    /// Standard table of Denavit–Hartenberg parameters.
+    Standard,
+    /// The same after Craig.
+    Modified,
+    /// The kinematics file of ROS drivers for Universal Robots.
+    UrYaml,
+}
+
+/// The joints of such a file.
+const UR: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+
+/// What of an arm the format does not hold, one sentence each.
+pub fn left_out(model: &Model, format: Format) -> Vec<String> {
+    let mut out = Vec::new();
+    if !model.effects.is_empty() {
+        let names: Vec<&str> = model.effects.iter().map(|effect| effect.name()).collect();
+        out.push(format!("effects beyond rigid links are left out: {}", names.join(", ")));
+    }
+    if format != Format::Urdf && model.bodies.is_some() {
+        out.push("masses are left out".to_owned());
+    }
+    let behind = behind(model, format);
+    if behind != Pose::identity() {
+        let (place, turn) = (behind.translation.vector, behind.rotation);
+        out.push(format!(
+            "the file ends at the last link frame; the flange lies in it at ({}, {}, {}) mm, turned by the quaternion \
+             ({}, {}, {}, {}), w first",
+            place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k
+        ));
+    }
+    if format != Format::Standard && format != Format::Modified && coupled(model) {
+        out.push("joints that turn several links are not held: angles are those of the links".to_owned());
+    }
+    if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
+        out.push("ranges and speeds of joints are left out".to_owned());
+    }
+    out
+}
+
+/// The flange in the last frame that a format holds: a table ends before it; Craig's, and the file of UR drivers, before length and
+/// twist of the last link.
+pub fn behind(model: &Model, format: Format) -> Pose {
+    let last = &model.links[5];
+    match format {
+        Format::Urdf => Pose::identity(),
+        Format::Standard => model.flange,
+        Format::Modified | Format::UrYaml => {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), last.alpha_rad);
+            Pose::from_parts(Vector3::new(last.a_mm, 0.0, 0.0).into(), turn) * model.flange
+        }
+    }
+}
+
+/// Whether a controller's joint turns another link than its own, or turns it by more or less than one for one.
+fn coupled(model: &Model) -> bool {
+    let map = &model.joint_map;
+    (0..6).any(|i| (0..6).any(|j| if i == j { map[(i, j)].abs() != 1.0 } else { map[(i, j)] != 0.0 }))
+}
+
+/// The links of an arm in a format; `name` is the robot's, `notes` stand in it as comments.
+pub fn write(model: &Model, name: &str, format: Format, notes: &[String]) -> String {
+    match format {
+        Format::Urdf => urdf(model, name, notes),
+        Format::Standard => table(model, false, notes),
+        Format::Modified => table(model, true, notes),
+        Format::UrYaml => ur_yaml(model, notes),
+    }
+}
+
+/// The frame of each joint in the one before, turning about its z; the flange in the last, all joints at zero.
+fn places(model: &Model) -> [Pose; 7] {
+    let mut out = [Pose::identity(); 7];
+    let mut rest = Pose::identity();
+    for (place, link) in out.iter_mut().zip(&model.links) {
+        // The offset theta turns the frame before the joint; what comes after it belongs to the next.
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), link.theta_rad);
+        let turned = Pose::from_parts(Default::default(), turn);
+        *place = rest * turned;
+        rest = turned.inverse() * link.pose(0.0);
+    }
+    out[6] = rest * model.flange;
+    out
+}
+
+/// Lines of comments, safe for XML, YAML and tables alike.
+fn comments(notes: &[String]) -> impl Iterator<Item = String> {
+    notes.iter().map(|note| note.replace(['\n', '\r'], " ").replace("--", "– "))
+}
+
+fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
+    let plain: String = name
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' })
+        .collect();
+    let mut out = String::from("<?xml version=\"1.0\"?>\n");
+    for note in comments(notes) {
+        let _ = writeln!(out, "<!-- {note} -->");
+    }
+    let _ = writeln!(out, "<robot name=\"{plain}\">\n  <link name=\"base_link\"/>");
+    let frames = model.at_condition(&Condition::default()).frames(&Joints::zeros());
+    let places = places(model);
+    let mut at = Pose::identity();
+    for i in 0..6 {
+        at *= places[i];
+        let sign = if model.joint_map[(i, i)] < 0.0 { -1 } else { 1 };
+        let parent = if i == 0 { "base_link".to_owned() } else { format!("link_{i}") };
+        let _ = write!(out, "  <link name=\"link_{}\"", i + 1);
+        match &model.bodies {
+            Some(bodies) => {
+                let end = frame(&frames, i);
+                let centre = at.inverse() * end * nalgebra::Point3::from(bodies[i].centre_mm);
+                let _ = writeln!(
+                    out,
+                    ">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
+                     <inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>\n    </inertial>\n  </link>",
+                    metres(&centre.coords),
+                    bodies[i].mass_kg
+                );
+            }
+            None => out.push_str("/>\n"),
+        }
+        let (low, high) = (model.limits.min_rad[i], model.limits.max_rad[i]);
+        let speed = model.limits.speed_rad_s.map_or(0.0, |speed| speed[i]);
+        let _ = writeln!(
+            out,
+            "  <joint name=\"joint_{n}\" type=\"revolute\">\n    <parent link=\"{parent}\"/>\n    <child link=\"link_{n}\"/>\n    \
+             <origin {}/>\n    <axis xyz=\"0 0 {sign}\"/>\n    <limit lower=\"{low}\" upper=\"{high}\" velocity=\"{speed}\" \
+             effort=\"0\"/>\n  </joint>",
+            origin(&places[i]),
+            n = i + 1
+        );
+    }
+    let _ = writeln!(
+        out,
+        "  <link name=\"tool0\"/>\n  <joint name=\"flange\" type=\"fixed\">\n    <parent link=\"link_6\"/>\n    <child \
+         link=\"tool0\"/>\n    <origin {}/>\n  </joint>\n</robot>",
+        origin(&places[6])
+    );
+    out
+}
+
+/// The frame at the end of a link, all joints at zero.
+fn frame(frames: &crate::chain::Chain<f64>, link: usize) -> Pose {
+    let [y, z] = [Vector3::from(frames.y[link]), Vector3::from(frames.z[link + 1])];
+    let matrix = nalgebra::Matrix3::from_columns(&[y.cross(&z), y, z]);
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    Pose::from_parts(Vector3::from(frames.origin[link + 1]).into(), turn)
+}
+
+fn metres(v: &Vector3<f64>) -> String {
+    format!("{} {} {}", v.x / 1000.0, v.y / 1000.0, v.z / 1000.0)
+}
+
+fn origin(pose: &Pose) -> String {
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    format!("xyz=\"{}\" rpy=\"{roll} {pitch} {yaw}\"", metres(&pose.translation.vector))
+}
+
+fn ur_yaml(model: &Model, notes: &[String]) -> String {
+    let mut out = String::new();
+    for note in comments(notes) {
+        let _ = writeln!(out, "# {note}");
+    }
+    out.push_str("kinematics:\n");
+    let mut places = places(model);
+    // The last frame turns about its own z, along which it may stand anywhere.
+    places[5] *= Pose::translation(0.0, 0.0, model.links[5].d_mm);
+    for (name, pose) in UR.iter().zip(&places) {
+        let place = pose.translation.vector / 1000.0;
+        let (roll, pitch, yaw) = pose.rotation.euler_angles();
+        let _ = writeln!(
+            out,
+            "  {name}:\n    x: {}\n    y: {}\n    z: {}\n    roll: {roll}\n    pitch: {pitch}\n    yaw: {yaw}",
+            place.x, place.y, place.z
+        );
+    }
+    out
+}
+
+/// Two twists as one about x, with what turns the joints before and after: a common normal that may lie far away.
+fn table(model: &Model, modified: bool, notes: &[String]) -> String {
+    let rows = plain(model);
+    let mut out = String::new();
+    for note in comments(notes) {
+        let _ = writeln!(out, "# {note}");
+    }
+    out.push_str("convention,theta_deg,d_mm,a_mm,alpha_deg,min_deg,max_deg,q1,q2,q3,q4,q5,q6\n");
+    for (i, row) in rows.iter().enumerate() {
+        let [theta, d, ..] = *row;
+        let [a, alpha] = match (modified, i) {
+            (false, _) => [row[2], row[3]],
+            (true, 0) => [0.0, 0.0],
+            (true, _) => [rows[i - 1][2], rows[i - 1][3]],
+        };
+        let word = if modified { "modified" } else { "standard" };
+        let _ = write!(
+            out,
+            "{word},{},{d},{a},{},{},{}",
+            theta.to_degrees(),
+            alpha.to_degrees(),
+            model.limits.min_rad[i].to_degrees(),
+            model.limits.max_rad[i].to_degrees()
+        );
+        for j in 0..6 {
+            let _ = write!(out, ",{}", model.joint_map[(i, j)]);
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Rows theta (rad), d (mm), a (mm), alpha (rad) of plain Denavit–Hartenberg links for the same axes: the common normals between
+/// them, which for nearly parallel ones lie far away. The last frame stays where it is but for a turn and a shift that the last
+/// row takes up; where the last link has a twist, the flange keeps it.
+fn plain(model: &Model) -> [[f64; 4]; 6] {
+    let mut out = [[0.0; 4]; 6];
+    // What the frame of the links is off the frame of the rows: a turn about z and a shift along z, since both have one axis.
+    let (mut turn, mut shift) = (0.0, 0.0);
+    for (row, link) in out.iter_mut().zip(&model.links) {
+        let (sin, cos) = link.beta_rad.sin_cos();
+        if sin == 0.0 {
+            *row = [link.theta_rad + turn, link.d_mm + shift, link.a_mm, link.alpha_rad];
+            (turn, shift) = (0.0, 0.0);
+            continue;
+        }
+        // The next axis in the frame after theta: it passes (a, 0, d) along v.
+        let (sin_alpha, cos_alpha) = link.alpha_rad.sin_cos();
+        let v = Vector3::new(sin, -sin_alpha * cos, cos_alpha * cos);
+        let across = v.x.hypot(v.y);
+        let normal = Vector3::new(-v.y, v.x, 0.0) / across;
+        let place = Vector3::new(link.a_mm, 0.0, link.d_mm);
+        // Where the common normal meets the next axis, counted from the place along it.
+        let along = -(place.x * v.x + place.y * v.y) / (across * across);
+        let foot = place + v * along;
+        let theta = normal.y.atan2(normal.x);
+        let alpha = (-(v.y * normal.x - v.x * normal.y)).atan2(v.z);
+        *row = [link.theta_rad + turn + theta, foot.z + shift, foot.dot(&normal), alpha];
+        // The link's own frame after it: from the rows' frame a shift along z and a turn about it.
+        shift = -along;
+        let rows_x = normal;
+        let links_x = {
+            let (sin_b, cos_b) = link.beta_rad.sin_cos();
+            Vector3::new(cos_b, sin_alpha * sin_b, -cos_alpha * sin_b)
+        };
+        turn = rows_x.cross(&links_x).dot(&v).atan2(rows_x.dot(&links_x));
+    }
+    out
+}

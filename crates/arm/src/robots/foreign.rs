@@ -1,0 +1,360 @@
+//! Arms that somebody else described: URDF files, tables of Denavit–Hartenberg parameters, the calibration files of Universal
+//! Robots.
+//!
+//! Whatever the form, six axes are read as lines in space at zero ([`axes`]), and our links are laid through them. So a table
+//! whose parallel axes put a link hundreds of metres away gives links of the arm's own size, and nothing depends on where somebody
+//! else put his frames. The outcome is compared with the file's own product of transforms before it is handed out.
+
+mod axes;
+mod chain;
+mod table;
+mod ur;
+mod urdf;
+
+use nalgebra::{Matrix6, Vector3};
+
+use super::error::RobotError;
+use super::sheet::{
+    Angles, Convention, DataSheet, Dialect, FlangeSheet, JointSheet, Masses, Mounting, Sources,
+};
+use super::{Robot, load, parse};
+use crate::condition::Condition;
+use crate::joints::Joints;
+use chain::Described;
+use truegrind_math::se3::{Pose, difference};
+
+/// What a file leaves open.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Choice {
+    /// The link that stands: the root of the tree where left out.
+    pub base: Option<String>,
+    /// The link that is the flange: `tool0` or `flange` where left out and there is one.
+    pub tip: Option<String>,
+    /// The log's third angle is that of the forearm against the ground, whatever joint 2 does, as FANUC controllers count it.
+    pub ground_joint_3: bool,
+}
+
+/// An arm, and what was understood of its file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Understood {
+    /// The arm.
+    pub robot: Robot,
+    /// Which kind of file it is.
+    pub kind: Kind,
+    /// What a reader should compare with the manual, one sentence each: joints, zero pose, axes, flange, and what was taken from
+    /// the file beside.
+    pub sentences: Vec<String>,
+}
+
+/// A kind of file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Our own.
+    Toml,
+    /// Unified Robot Description Format.
+    Urdf,
+    /// A table of link parameters.
+    Table,
+    /// `calibration.conf` of a Universal Robots controller.
+    UrConf,
+    /// The kinematics file that ROS drivers take from such a controller.
+    UrYaml,
+}
+
+impl Kind {
+    /// What a file is, by its ending.
+    pub fn of(name: &str) -> Option<Self> {
+        let ending = name.rsplit_once('.')?.1.to_ascii_lowercase();
+        match ending.as_str() {
+            "toml" => Some(Kind::Toml),
+            "urdf" | "xml" | "xacro" => Some(Kind::Urdf),
+            "csv" | "tsv" | "txt" => Some(Kind::Table),
+            "conf" => Some(Kind::UrConf),
+            "yaml" | "yml" => Some(Kind::UrYaml),
+            _ => None,
+        }
+    }
+
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Kind::Toml => "robot file of truegrind",
+            Kind::Urdf => "URDF",
+            Kind::Table => "table of link parameters",
+            Kind::UrConf => "calibration.conf of Universal Robots",
+            Kind::UrYaml => "kinematics file of Universal Robots",
+        }
+    }
+}
+
+/// An arm from a file of any kind that is known; `file` is its name, by whose ending the kind is told, and which messages name.
+///
+/// ```
+/// use truegrind_arm::robots::{Choice, read_any};
+///
+/// // Craig's ("modified") table of an arm: twist and length belong to the joint before.
+/// let table = "convention,alpha_deg,a_mm,theta_deg,d_mm\n\
+///              modified,0,0,0,400\nmodified,-90,0,-90,0\nmodified,0,500,0,0\n\
+///              modified,-90,60,0,480\nmodified,90,0,0,0\nmodified,-90,0,0,90\n";
+/// let found = read_any(table, "workshop.csv", &Choice::default())?;
+/// let flange = found.robot.model.forward(&nalgebra::Vector6::zeros(), &Default::default());
+/// assert!((flange.translation.vector - nalgebra::Vector3::new(570.0, 0.0, 960.0)).norm() < 1e-9);
+/// # Ok::<(), truegrind_arm::robots::RobotError>(())
+/// ```
+///
+/// # Errors
+/// [`RobotError`], with line, found and expected as far as they are known.
+pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, RobotError> {
+    let kind = Kind::of(file).ok_or_else(|| {
+        refused(
+            file,
+            "the ending",
+            file.to_owned(),
+            "a robot file: .toml, .urdf, .csv (table of link parameters), .yaml or .conf (Universal Robots)",
+            "name the file after what is in it",
+        )
+    })?;
+    if kind != Kind::Urdf && (choice.base.is_some() || choice.tip.is_some()) {
+        let found = format!("a base or a tip for a {}", kind.text());
+        return Err(refused(file, "base and tip", found, "links of a URDF", "leave them out"));
+    }
+    let described = match kind {
+        Kind::Toml => {
+            let robot = parse(text, file)?;
+            let sentences = told(&robot, &[]);
+            return Ok(Understood { robot, kind, sentences });
+        }
+        Kind::Urdf => urdf::read(text, file, choice)?,
+        Kind::Table => table::read(text, file)?,
+        Kind::UrYaml => ur::read_yaml(text, file)?,
+        Kind::UrConf => ur::read_conf(text, file, |name| load(name))?,
+    };
+    let (robot, notes) = robot(described, file, choice.ground_joint_3)?;
+    let sentences = told(&robot, &notes);
+    Ok(Understood { robot, kind, sentences })
+}
+
+/// Something that cannot be used, in a file of somebody else.
+fn refused(
+    file: &str,
+    key: impl Into<String>,
+    found: impl Into<String>,
+    expected: &'static str,
+    remedy: &'static str,
+) -> RobotError {
+    RobotError::Foreign {
+        file: file.into(),
+        key: key.into().into(),
+        found: found.into().into(),
+        expected,
+        remedy,
+    }
+}
+
+/// Our arm through the axes of a described one, compared with it.
+fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robot, Vec<String>), RobotError> {
+    let laid = axes::laid(&described, file)?;
+    let mut notes = described.notes.clone();
+    if let Some(note) = laid.note() {
+        notes.push(note);
+    }
+    let mut map = Matrix6::identity();
+    map[(0, 0)] = laid.first_turn;
+    if let Some(couplings) = &described.joint_map {
+        map *= couplings;
+    }
+    if ground_joint_3 {
+        // The link's own angle is that against the ground less what joint 2 turns it by.
+        map[(2, 1)] -= laid.parallel_2_3(file)?;
+        notes.push(
+            "joint 3 is counted against the ground: link 3 turns by J3 and by what J2 takes back".to_owned(),
+        );
+    }
+    let inside = laid.base.inverse();
+    let gravity = inside.rotation * Vector3::new(0.0, 0.0, -1.0);
+    let plain = map == Matrix6::identity();
+    let place = laid.base.translation.vector;
+    let sheet = DataSheet {
+        name: name_of(file),
+        maker: described.maker.clone(),
+        model: described.designation.clone(),
+        payload_kg: None,
+        reach_mm: None,
+        repeatability_mm: None,
+        dialect: described.dialect,
+        convention: Convention::StandardDh,
+        orientation: None,
+        compensates: false,
+        link: laid.links.to_vec(),
+        joints: JointSheet {
+            angles: Angles::Logged,
+            map: (!plain).then(|| std::array::from_fn(|i| std::array::from_fn(|j| map[(i, j)]))),
+            min_deg: described.limits_deg.map(|limits| limits.map(|[low, _]| low)),
+            max_deg: described.limits_deg.map(|limits| limits.map(|[_, high]| high)),
+            speed_deg_s: described.speed_deg_s,
+        },
+        flange: (laid.flange != Pose::identity()).then(|| FlangeSheet {
+            position_mm: laid.flange.translation.vector.into(),
+            quaternion_wxyz: {
+                let q = laid.flange.rotation;
+                [q.w, q.i, q.j, q.k]
+            },
+        }),
+        mounting: Mounting {
+            gravity: gravity.map(tidy).into(),
+            plate_mm: (inside.rotation * -place).map(tidy).into(),
+        },
+        masses: described.masses.as_ref().map(|masses| Masses {
+            mass_kg: std::array::from_fn(|i| masses[i].mass_kg),
+            centre_mm: std::array::from_fn(|i| {
+                let centre = laid.frames[i + 1].inverse() * nalgebra::Point3::from(masses[i].centre_mm);
+                centre.coords.map(tidy).into()
+            }),
+        }),
+        sources: Sources {
+            links: described.source.clone(),
+            limits: described.limits_deg.map(|_| described.source.clone()).unwrap_or_default(),
+            masses: described.masses.as_ref().map(|_| described.source.clone()).unwrap_or_default(),
+            payload: String::new(),
+        },
+        published: Vec::new(),
+    };
+    let robot = Robot::new(sheet, file)?;
+    compared(&robot, &described, &laid.base, &map, file)?;
+    Ok((robot, notes))
+}
+
+/// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.
+fn name_of(file: &str) -> String {
+    file.rsplit(['/', '\\']).next().unwrap_or(file).replace('.', "-")
+}
+
+/// What stands where a zero was meant.
+fn tidy(value: f64) -> f64 {
+    if value.abs() < 1e-12 { 0.0 } else { value }
+}
+
+/// Our arm may differ from the file's own product of transforms by this (mm, and rad on a metre).
+const SAME_MM: f64 = 1e-6;
+
+/// Refuses what came out otherwise than the file has it. The joints of the file are those of the links, before any coupling.
+fn compared(
+    robot: &Robot,
+    described: &Described,
+    base: &Pose,
+    map: &Matrix6<f64>,
+    file: &str,
+) -> Result<(), RobotError> {
+    let mut plain = Matrix6::identity();
+    plain[(0, 0)] = robot.model.joint_map[(0, 0)].signum();
+    let from_links = map.try_inverse().unwrap_or(plain) * plain;
+    for joints in [
+        Joints::zeros(),
+        Joints::new(0.3, -0.4, 0.5, -0.6, 0.7, -0.8),
+        Joints::new(-2.1, 0.9, -1.2, 1.7, -1.1, 2.9),
+    ] {
+        let ours = base * robot.model.forward(&(from_links * joints), &Condition::default());
+        let theirs = described.forward(&joints);
+        let (translation, turn) = apart(&ours, &theirs);
+        if !(translation.max(1000.0 * turn) <= SAME_MM) {
+            return Err(refused(
+                file,
+                "links",
+                format!(
+                    "links that miss the file's own transforms by {translation:.2e} mm and {turn:.2e} rad"
+                ),
+                "the same arm",
+                "please report it with the file: this is a defect of truegrind",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    let off = difference(a, b);
+    (off.fixed_rows::<3>(0).norm(), off.fixed_rows::<3>(3).norm())
+}
+
+/// What was understood: to be compared with the manual.
+fn told(robot: &Robot, notes: &[String]) -> Vec<String> {
+    let still = Condition::default();
+    let ready = robot.model.at_condition(&still);
+    let frames = ready.frames(&Joints::zeros());
+    let flange = ready.forward(&Joints::zeros());
+    let place = flange.translation.vector;
+    let reach: f64 = robot.model.links[1..].iter().map(|link| link.a_mm.hypot(link.d_mm)).sum();
+    let axes: Vec<String> = (0..6)
+        .map(|i| {
+            let turn = robot.model.joint_map[(i, i)];
+            let axis = Vector3::from(frames.z[i]) * if turn < 0.0 { -1.0 } else { 1.0 };
+            format!("J{} {}", i + 1, direction(&axis))
+        })
+        .collect();
+    let map = robot.model.joint_map;
+    let coupled: Vec<String> = (0..6)
+        .flat_map(|i| (0..6).map(move |j| (i, j)))
+        .filter(|&(i, j)| i != j && map[(i, j)] != 0.0)
+        .map(|(i, j)| format!("link {} turns with J{} too, by {}", i + 1, j + 1, map[(i, j)]))
+        .collect();
+    let family = if crate::inverse::Inverse::new(&robot.model, &still, &robot.model).has_branches() {
+        "a closed form is known for its inverse"
+    } else {
+        "no closed form is known for its inverse: it is sought step by step"
+    };
+    let mut out = vec![
+        format!(
+            "zero pose: all joints at 0° put the flange at ({:.3}, {:.3}, {:.3}) mm",
+            place.x, place.y, place.z
+        ),
+        format!(
+            "flange at zero: its z points along {}, its x along {}",
+            direction(&(flange.rotation * Vector3::z())),
+            direction(&(flange.rotation * Vector3::x()))
+        ),
+        format!("axes at zero, about which joints turn counter-clockwise: {}", axes.join(", ")),
+        format!("links behind axis 1 are {reach:.0} mm long together; {family}"),
+    ];
+    if !coupled.is_empty() {
+        out.push(coupled.join("; "));
+    }
+    out.extend(notes.iter().cloned());
+    out
+}
+
+/// A direction as people say it.
+fn direction(v: &Vector3<f64>) -> String {
+    for (axis, name) in [(Vector3::x(), "x"), (Vector3::y(), "y"), (Vector3::z(), "z")] {
+        let along = v.dot(&axis);
+        if along.abs() > 1.0 - 1e-6 {
+            return format!("{}{name}", if along < 0.0 { "−" } else { "+" });
+        }
+    }
+    format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z)
+}
+
+/// The language of a maker's programs, where a name tells the maker.
+fn maker_of(text: &str) -> (Option<Dialect>, &'static str) {
+    let text = text.to_lowercase();
+    for (word, maker, dialect) in [
+        ("abb", "ABB", Dialect::Rapid),
+        ("irb", "ABB", Dialect::Rapid),
+        ("kuka", "KUKA", Dialect::Krl),
+        ("fanuc", "FANUC", Dialect::Fanuc),
+        ("ur3", "Universal Robots", Dialect::Urscript),
+        ("ur5", "Universal Robots", Dialect::Urscript),
+        ("ur10", "Universal Robots", Dialect::Urscript),
+        ("ur16", "Universal Robots", Dialect::Urscript),
+        ("ur20", "Universal Robots", Dialect::Urscript),
+        ("ur30", "Universal Robots", Dialect::Urscript),
+        ("staubli", "Stäubli", Dialect::Val3),
+        ("motoman", "Yaskawa", Dialect::Inform),
+        ("yaskawa", "Yaskawa", Dialect::Inform),
+    ] {
+        if text.contains(word) {
+            return (Some(dialect), maker);
+        }
+    }
+    (None, "")
+}

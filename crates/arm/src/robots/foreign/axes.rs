@@ -1,0 +1,239 @@
+//! Our links through six axes in space.
+//!
+//! Method: the common normals of Denavit and Hartenberg (1955) between axes that are not parallel. Between parallel ones, where
+//! common normals are everywhere or far away, Hayati and Mirmirani's form (1985): the next frame lies where the next axis meets
+//! the plane through this frame across this axis, and two twists turn this axis into the next. That holds exactly for axes that are
+//! nearly parallel too, so nothing is rounded to a parallel.
+//! Departures: of the two directions of a normal the one is taken that turns the joint by less.
+//! Checked against: the file's own product of transforms.
+
+use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
+
+use super::chain::Described;
+use super::{refused, tidy};
+use crate::link::{Link, LinkModel};
+use crate::robots::error::RobotError;
+use crate::robots::sheet::LinkSheet;
+use truegrind_math::se3::Pose;
+
+/// Below this sine of the angle between them two axes are taken by Hayati's form: 0.5°, as the check of data sheets has it.
+const PARALLEL: f64 = 0.0087;
+
+/// Axes that are closer than this meet (mm).
+const MEET_MM: f64 = 1e-9;
+
+/// Links, and where they were laid.
+#[derive(Debug, Clone)]
+pub(super) struct Laid {
+    /// The links.
+    pub(super) links: [LinkSheet; 6],
+    /// The flange in the last link frame.
+    pub(super) flange: Pose,
+    /// Our base in the file's: its z is axis 1. The same wherever that allows it.
+    pub(super) base: Pose,
+    /// −1 where joint 1 of the file turns against our z.
+    pub(super) first_turn: f64,
+    /// Frames of the links in the file's base with all joints at zero; the base first.
+    pub(super) frames: [Pose; 7],
+    /// Directions of the axes in the file's base.
+    directions: [UnitVector3<f64>; 6],
+}
+
+/// Lays our links through the axes of a described arm.
+pub(super) fn laid(described: &Described, file: &str) -> Result<Laid, RobotError> {
+    let frames = described.frames();
+    let lines: [(Point3<f64>, UnitVector3<f64>); 6] = std::array::from_fn(|i| {
+        let frame = &frames[i];
+        let direction = UnitVector3::new_normalize((frame.rotation * described.steps[i].axis).into_inner());
+        (Point3::from(frame.translation.vector), direction)
+    });
+    let (base, first_turn) = base(&lines[0]);
+    let mut at = base;
+    let mut out = [base; 7];
+    let mut links = [LinkSheet {
+        model: LinkModel::Dh,
+        a_mm: 0.0,
+        d_mm: 0.0,
+        alpha_deg: 0.0,
+        theta_deg: 0.0,
+        beta_deg: 0.0,
+    }; 6];
+    for i in 0..5 {
+        let (point, direction) = (at.inverse() * lines[i + 1].0, at.inverse() * lines[i + 1].1);
+        let link = between(&point, &direction, i, file)?;
+        at *= turned(&link);
+        links[i] = link;
+        out[i + 1] = at;
+    }
+    let (last, flange) = last(&(at.inverse() * frames[6]));
+    links[5] = last;
+    out[6] = at * turned(&last);
+    Ok(Laid {
+        links,
+        flange,
+        base,
+        first_turn,
+        frames: out,
+        directions: lines.map(|(_, direction)| direction),
+    })
+}
+
+/// The pose of a link with its joint at zero, from the degrees that the sheet holds.
+fn turned(link: &LinkSheet) -> Pose {
+    Link {
+        model: link.model,
+        a_mm: link.a_mm,
+        d_mm: link.d_mm,
+        alpha_rad: link.alpha_deg.to_radians(),
+        theta_rad: link.theta_deg.to_radians(),
+        beta_rad: link.beta_deg.to_radians(),
+    }
+    .pose(0.0)
+}
+
+/// Our base for a first axis, and whether it turns against the axis: the file's own base where that lies on the axis, else the
+/// place on the axis nearest to it.
+fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
+    // Upright whichever way round the file counts joint 1.
+    let turn = if direction.z < -1.0 + 1e-9 { -1.0 } else { 1.0 };
+    let z = direction.into_inner() * turn;
+    let upright = (z - Vector3::z()).norm() < 1e-12;
+    let foot = point - z * z.dot(&point.coords);
+    let foot = if foot.coords.norm() < MEET_MM { Point3::origin() } else { foot };
+    if upright {
+        return (Pose::from_parts(foot.coords.into(), UnitQuaternion::identity()), turn);
+    }
+    // By sine and cosine: from the cosine alone a turn of less than 1e-8 is none.
+    let across = Vector3::z().cross(&z);
+    let (sine, cosine) = (across.norm(), z.z);
+    let axis = if sine > 0.0 { across / sine } else { Vector3::x() };
+    let rotation = UnitQuaternion::from_scaled_axis(axis * sine.atan2(cosine));
+    (Pose::from_parts(foot.coords.into(), rotation), turn)
+}
+
+/// A direction of a normal by its angle, turned the other way round where that turns the joint by less.
+fn shorter(angle: f64) -> (f64, f64) {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    if angle > FRAC_PI_2 + 1e-9 {
+        (angle - PI, -1.0)
+    } else if angle <= -FRAC_PI_2 - 1e-9 {
+        (angle + PI, -1.0)
+    } else {
+        (angle, 1.0)
+    }
+}
+
+/// The link from a joint to the next axis, which is given in the joint's frame.
+fn between(
+    point: &Point3<f64>,
+    direction: &UnitVector3<f64>,
+    joint: usize,
+    file: &str,
+) -> Result<LinkSheet, RobotError> {
+    let sine = direction.x.hypot(direction.y);
+    let about_z = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+    if sine < PARALLEL {
+        // Where the next axis meets the plane through this frame.
+        let meets = point - direction.into_inner() * (point.z / direction.z);
+        let length = meets.x.hypot(meets.y);
+        if length < 1e-6 {
+            return Err(refused(
+                file,
+                format!("joints {} and {}", joint + 1, joint + 2),
+                "two joints that turn about one line",
+                "six joints that each turn about a line of their own",
+                "give the link that does not turn, or the right table",
+            ));
+        }
+        let (theta, sign) = shorter(meets.y.atan2(meets.x));
+        let next = about_z(-theta) * direction;
+        return Ok(LinkSheet {
+            model: LinkModel::Hayati,
+            a_mm: sign * length,
+            d_mm: 0.0,
+            alpha_deg: tidy((-next.y).atan2(next.z).to_degrees()),
+            theta_deg: tidy(theta.to_degrees()),
+            beta_deg: tidy(next.x.asin().to_degrees()),
+        });
+    }
+    // The common normal: across both axes.
+    let normal = Vector3::new(-direction.y, direction.x, 0.0) / sine;
+    let along = (point.x * direction.x + point.y * direction.y) / sine;
+    let foot = point - direction.into_inner() * (along / sine);
+    let length = foot.coords.dot(&normal);
+    let (theta, sign) = shorter(normal.y.atan2(normal.x));
+    let next = about_z(-theta) * direction;
+    Ok(LinkSheet {
+        model: LinkModel::Dh,
+        a_mm: if length.abs() < MEET_MM { 0.0 } else { sign * length },
+        d_mm: if foot.z.abs() < MEET_MM { 0.0 } else { foot.z },
+        alpha_deg: tidy((-next.y).atan2(next.z).to_degrees()),
+        theta_deg: tidy(theta.to_degrees()),
+        beta_deg: 0.0,
+    })
+}
+
+/// The last link and the flange behind it: what the link can hold of the flange is in the link.
+fn last(flange: &Pose) -> (LinkSheet, Pose) {
+    let place = flange.translation.vector;
+    let z = flange.rotation * Vector3::z();
+    let x = flange.rotation * Vector3::x();
+    let upright = z.x.hypot(z.y) < 1e-12;
+    let (theta, alpha) = match (upright, z.z < 0.0) {
+        (true, false) => (x.y.atan2(x.x), 0.0),
+        (true, true) => (x.y.atan2(x.x), std::f64::consts::PI),
+        (false, _) => (0.0, 0.0),
+    };
+    let link = LinkSheet {
+        model: LinkModel::Dh,
+        a_mm: 0.0,
+        d_mm: tidy(place.z),
+        alpha_deg: alpha.to_degrees(),
+        theta_deg: tidy(theta.to_degrees()),
+        beta_deg: 0.0,
+    };
+    let rest = turned(&link).inverse() * flange;
+    let none = rest.translation.vector.norm() < MEET_MM && rest.rotation.angle() < 1e-12;
+    (link, if none { Pose::identity() } else { rest })
+}
+
+impl Laid {
+    /// Where our base lies, where that is not the file's.
+    pub(super) fn note(&self) -> Option<String> {
+        let mut parts = Vec::new();
+        if self.first_turn < 0.0 {
+            parts.push("joint 1 turns clockwise seen from above".to_owned());
+        }
+        if self.base != Pose::identity() {
+            let place = self.base.translation.vector;
+            let [roll, pitch, yaw] = {
+                let (r, p, y) = self.base.rotation.euler_angles();
+                [r, p, y].map(f64::to_degrees)
+            };
+            parts.push(format!(
+                "axis 1 is not the z axis of the file's base: positions are those of a base on axis 1, which lies at \
+                 ({:.3}, {:.3}, {:.3}) mm in the file's, turned by roll {roll:.4}°, pitch {pitch:.4}°, yaw {yaw:.4}°",
+                place.x, place.y, place.z
+            ));
+        }
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+
+    /// +1 or −1 where axes 2 and 3 are parallel or against each other.
+    ///
+    /// # Errors
+    /// Where they are neither, since then nothing is counted against the ground.
+    pub(super) fn parallel_2_3(&self, file: &str) -> Result<f64, RobotError> {
+        let along = self.directions[1].dot(&self.directions[2]);
+        if along.abs() < 1.0 - 1e-4 {
+            return Err(refused(
+                file,
+                "joint 3 against the ground",
+                format!("axes 2 and 3 at {:.2}° to each other", along.clamp(-1.0, 1.0).acos().to_degrees()),
+                "parallel axes 2 and 3",
+                "leave it out: such an arm counts no joint against the ground",
+            ));
+        }
+        Ok(along.signum())
+    }
+}

@@ -1,0 +1,76 @@
+//! Six joints and the fixed transforms between them, as a file has them.
+
+use nalgebra::{Matrix6, UnitQuaternion, UnitVector3, Vector3};
+
+use crate::body::Body;
+use crate::joints::Joints;
+use crate::robots::sheet::Dialect;
+use truegrind_math::se3::Pose;
+
+/// One joint: where its frame lies in the frame before, and about which axis of its own it turns.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    /// Fixed transform that comes before the turn.
+    pub(super) before: Pose,
+    /// Axis of the turn, in the joint's own frame.
+    pub(super) axis: UnitVector3<f64>,
+}
+
+/// An arm as a file describes it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Described {
+    /// The joints from base to flange.
+    pub(super) steps: [Step; 6],
+    /// From the sixth joint's frame to the flange.
+    pub(super) after: Pose,
+    /// Lowest and highest angle of each joint (°), where all are stated.
+    pub(super) limits_deg: Option<[[f64; 2]; 6]>,
+    /// Highest speeds (°/s), where all are stated.
+    pub(super) speed_deg_s: Option<[f64; 6]>,
+    /// Turns of the links for turns of the controller's joints, where that is more than one for one.
+    pub(super) joint_map: Option<Matrix6<f64>>,
+    /// Mass of each link, its centre in the base with all joints at zero (mm).
+    pub(super) masses: Option<[Body; 6]>,
+    /// Maker, designation, language of programs, where told.
+    pub(super) maker: String,
+    pub(super) designation: String,
+    pub(super) dialect: Option<Dialect>,
+    /// Where the numbers come from.
+    pub(super) source: String,
+    /// What a reader should know.
+    pub(super) notes: Vec<String>,
+}
+
+impl Described {
+    /// The frame of each joint in the base, all joints at zero; the flange last.
+    pub(super) fn frames(&self) -> [Pose; 7] {
+        let mut pose = Pose::identity();
+        let mut out = [Pose::identity(); 7];
+        for (place, step) in out.iter_mut().zip(&self.steps) {
+            pose *= step.before;
+            *place = pose;
+        }
+        out[6] = pose * self.after;
+        out
+    }
+
+    /// The flange in the base for turns of the links (rad): the product as the file has it.
+    pub(super) fn forward(&self, joints: &Joints) -> Pose {
+        let turned = |step: &Step, angle: f64| {
+            step.before
+                * Pose::from_parts(Default::default(), UnitQuaternion::from_axis_angle(&step.axis, angle))
+        };
+        let steps = self.steps.iter().zip(joints.iter());
+        steps.fold(Pose::identity(), |pose, (step, angle)| pose * turned(step, *angle)) * self.after
+    }
+}
+
+/// A joint about its own z.
+pub(super) fn about_z(before: Pose) -> Step {
+    Step { before, axis: Vector3::z_axis() }
+}
+
+/// Roll, pitch and yaw about the fixed x, y and z (rad), as URDF has them.
+pub(super) fn from_rpy(position_mm: Vector3<f64>, [roll, pitch, yaw]: [f64; 3]) -> Pose {
+    Pose::from_parts(position_mm.into(), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}

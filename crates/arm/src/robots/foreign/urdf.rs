@@ -1,0 +1,591 @@
+//! URDF: the joints between two links of a tree.
+//!
+//! Which part of the tree is the arm is not guessed: a tree with one chain of exactly six joints that move is read by itself, with
+//! the flange in `tool0` or `flange` where there is one; whatever else asks for base and tip. Lengths are metres and angles
+//! radians; what stands beyond a fixed joint belongs to the link before, masses too.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::chain::{Described, Step, from_rpy};
+use super::{Choice, maker_of, refused};
+use crate::body::Body;
+use crate::robots::error::RobotError;
+use truegrind_math::se3::Pose;
+
+/// Far more than any description of robots has.
+const MOST_NODES: u32 = 1_000_000;
+
+/// Names by which the flange goes; the first that is there is taken.
+const FLANGES: [&str; 4] = ["tool0", "flange", "ee_link", "tool_link"];
+
+#[derive(Debug, Clone, PartialEq)]
+enum Moves {
+    Not,
+    Turns,
+    Slides,
+    Follows(String),
+    Otherwise(String),
+}
+
+#[derive(Debug, Clone)]
+struct Joint<'a> {
+    name: &'a str,
+    parent: &'a str,
+    child: &'a str,
+    before: Pose,
+    axis: Vector3<f64>,
+    moves: Moves,
+    limits_rad: Option<[f64; 2]>,
+    speed_rad_s: Option<f64>,
+    line: u32,
+}
+
+impl Joint<'_> {
+    fn is_moving(&self) -> bool {
+        self.moves != Moves::Not
+    }
+}
+
+struct Tree<'a> {
+    file: &'a str,
+    joints: Vec<Joint<'a>>,
+    /// The joint that leads to each link.
+    to: BTreeMap<&'a str, usize>,
+    masses: BTreeMap<&'a str, Body>,
+    links: Vec<&'a str>,
+    meshes: usize,
+}
+
+/// The arm of a description.
+pub(super) fn read(text: &str, file: &str, choice: &Choice) -> Result<Described, RobotError> {
+    if file.to_ascii_lowercase().ends_with(".xacro") {
+        return Err(macros(file));
+    }
+    let text = with_prefixes(text);
+    let document = Document::parse_with_options(&text, options()).map_err(|error| {
+        let key = format!("line {}", error.pos().row);
+        refused(file, key, error.to_string(), "XML", "export the description again")
+    })?;
+    let root = document.root_element();
+    if !root.has_tag_name("robot") {
+        let found = format!("<{}>", root.tag_name().name());
+        return Err(refused(
+            file,
+            "root element",
+            found,
+            "<robot>",
+            "give a URDF: SDF and MJCF are other formats",
+        ));
+    }
+    // What is only defined and never used says nothing of the robot.
+    let defines = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "property" | "arg" | "macro");
+    let is_macro =
+        |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|name| name.contains("xacro"));
+    if root.children().any(|node| is_macro(&node) && !defines(&node)) {
+        return Err(macros(file));
+    }
+    let tree = Tree::of(&root, file)?;
+    let base = tree.base(choice)?;
+    let path = tree.chain(base, choice)?;
+    tree.described(&root, base, &path)
+}
+
+fn options<'a>() -> ParsingOptions<'a> {
+    ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() }
+}
+
+fn macros(file: &str) -> RobotError {
+    refused(
+        file,
+        "robot",
+        "xacro macros",
+        "URDF, in which they are expanded",
+        "expand it first: `xacro arm.urdf.xacro > arm.urdf` (ROS, or `pip install xacro`)",
+    )
+}
+
+/// More than these no file forgets to declare.
+const MOST_PREFIXES: usize = 16;
+
+/// The text with its prefixes declared: many tools leave that out, and nothing of what they mark is read.
+fn with_prefixes(text: &str) -> Cow<'_, str> {
+    let mut text = Cow::Borrowed(text);
+    for _ in 0..MOST_PREFIXES {
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) =
+            Document::parse_with_options(&text, options())
+        else {
+            break;
+        };
+        let Some(at) = text.find("<robot") else { break };
+        let declared = format!("<robot xmlns:{prefix}=\"{prefix}\"");
+        text.to_mut().replace_range(at..at + "<robot".len(), &declared);
+    }
+    text
+}
+
+/// Numbers of an attribute.
+fn numbers<const N: usize>(
+    node: Option<Node<'_, '_>>,
+    attribute: &str,
+    otherwise: [f64; N],
+    file: &str,
+) -> Result<[f64; N], RobotError> {
+    let Some((node, text)) = node.and_then(|node| Some((node, node.attribute(attribute)?))) else {
+        return Ok(otherwise);
+    };
+    if text.contains("${") {
+        return Err(macros(file));
+    }
+    let values: Option<Vec<f64>> =
+        text.split_whitespace().map(|cell| cell.parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    values.and_then(|values| <[f64; N]>::try_from(values).ok()).ok_or_else(|| {
+        let line = node.document().text_pos_at(node.range().start).row;
+        refused(
+            file,
+            format!("line {line}, <{} {attribute}>", node.tag_name().name()),
+            format!("`{text}`"),
+            if N == 1 { "a finite number" } else { "three finite numbers" },
+            "correct it",
+        )
+    })
+}
+
+fn child<'a, 'i>(node: &Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+/// The transform of an `<origin>`; none is no transform.
+fn origin(node: &Node<'_, '_>, file: &str) -> Result<Pose, RobotError> {
+    let place = child(node, "origin");
+    let xyz = numbers(place, "xyz", [0.0; 3], file)?;
+    let rpy = numbers(place, "rpy", [0.0; 3], file)?;
+    Ok(from_rpy(Vector3::from(xyz) * 1000.0, rpy))
+}
+
+fn joint<'a>(node: &Node<'a, '_>, file: &str) -> Result<Joint<'a>, RobotError> {
+    let line = node.document().text_pos_at(node.range().start).row;
+    let name = node.attribute("name").unwrap_or("without a name");
+    let link = |end: &str| {
+        child(node, end).and_then(|end| end.attribute("link")).ok_or_else(|| {
+            let key = format!("line {line}, joint {name}, <{end}>");
+            refused(file, key, "nothing", "the name of a link", "a joint leads from a parent to a child")
+        })
+    };
+    let axis = Vector3::from(numbers(child(node, "axis"), "xyz", [1.0, 0.0, 0.0], file)?);
+    let kind = node.attribute("type").unwrap_or_default();
+    let mimic =
+        child(node, "mimic").map(|mimic| mimic.attribute("joint").unwrap_or("another joint").to_owned());
+    let moves = match (kind, mimic) {
+        ("fixed", _) => Moves::Not,
+        (_, Some(other)) => Moves::Follows(other),
+        ("revolute" | "continuous", None) => Moves::Turns,
+        ("prismatic", None) => Moves::Slides,
+        (other, None) => Moves::Otherwise(other.to_owned()),
+    };
+    if moves == Moves::Turns && !(axis.norm() > 1e-6) {
+        let key = format!("line {line}, joint {name}, <axis>");
+        return Err(refused(
+            file,
+            key,
+            format!("({}, {}, {})", axis.x, axis.y, axis.z),
+            "a direction",
+            "correct it",
+        ));
+    }
+    let limit = child(node, "limit");
+    let bounded = kind == "revolute"
+        && limit.is_some_and(|limit| limit.has_attribute("lower") || limit.has_attribute("upper"));
+    let limits_rad = if bounded {
+        let [low] = numbers(limit, "lower", [0.0], file)?;
+        let [high] = numbers(limit, "upper", [0.0], file)?;
+        Some([low, high])
+    } else {
+        None
+    };
+    let [speed] = numbers(limit, "velocity", [0.0], file)?;
+    Ok(Joint {
+        name,
+        parent: link("parent")?,
+        child: link("child")?,
+        before: origin(node, file)?,
+        axis,
+        moves,
+        limits_rad,
+        speed_rad_s: (speed > 0.0).then_some(speed),
+        line,
+    })
+}
+
+/// Mass and centre of a link, in the link's own frame.
+fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
+    let Some(inertial) = child(node, "inertial") else { return Ok(None) };
+    let [mass_kg] = numbers(child(&inertial, "mass"), "value", [0.0], file)?;
+    let centre = origin(&inertial, file)?.translation.vector;
+    Ok((mass_kg > 0.0).then(|| Body { mass_kg, centre_mm: centre.into() }))
+}
+
+impl<'a> Tree<'a> {
+    fn of(root: &Node<'a, '_>, file: &'a str) -> Result<Self, RobotError> {
+        let mut tree = Self {
+            file,
+            joints: Vec::new(),
+            to: BTreeMap::new(),
+            masses: BTreeMap::new(),
+            links: Vec::new(),
+            meshes: 0,
+        };
+        for node in root.children().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "link" => {
+                    let name = node.attribute("name").unwrap_or_default();
+                    tree.links.push(name);
+                    if let Some(body) = body(&node, file)? {
+                        tree.masses.insert(name, body);
+                    }
+                    tree.meshes += node.descendants().filter(|inner| inner.has_tag_name("mesh")).count();
+                }
+                // A transmission has joints of its own, which are none.
+                "joint" => {
+                    let joint = joint(&node, file)?;
+                    if let Some(first) = tree.to.insert(joint.child, tree.joints.len()) {
+                        let first: &Joint<'_> = &tree.joints[first];
+                        return Err(refused(
+                            file,
+                            format!("line {}, joint {}", joint.line, joint.name),
+                            format!(
+                                "link {} as its child, which is that of joint {} already",
+                                joint.child, first.name
+                            ),
+                            "a tree: one joint that leads to each link",
+                            "take one of the two out",
+                        ));
+                    }
+                    tree.joints.push(joint);
+                }
+                _ => {}
+            }
+        }
+        Ok(tree)
+    }
+
+    /// The link where the arm begins.
+    fn base(&self, choice: &Choice) -> Result<&'a str, RobotError> {
+        if let Some(base) = &choice.base {
+            return self.named(base, "base");
+        }
+        let mut roots: Vec<&str> =
+            self.joints.iter().map(|joint| joint.parent).filter(|link| !self.to.contains_key(link)).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        match roots.as_slice() {
+            [root] => Ok(root),
+            [] => Err(refused(
+                self.file,
+                "joints",
+                "no link that stands",
+                "one root",
+                "a tree begins at a link that is no child",
+            )),
+            several => Err(refused(
+                self.file,
+                "links",
+                format!("{} links that stand: {}", several.len(), several.join(", ")),
+                "one root",
+                "say which one is the base (--base)",
+            )),
+        }
+    }
+
+    fn named(&self, name: &str, which: &str) -> Result<&'a str, RobotError> {
+        let found = self.links.iter().copied().chain(self.to.keys().copied()).find(|link| *link == name);
+        found.ok_or_else(|| {
+            let mut known: Vec<&str> = self.links.clone();
+            known.truncate(40);
+            refused(
+                self.file,
+                which,
+                format!("`{name}`; the links are {}", known.join(", ")),
+                "the name of a link",
+                "give a name as the file has it",
+            )
+        })
+    }
+
+    /// The joints from a base to a tip; `None` where the one does not stand above the other.
+    fn path(&self, base: &str, tip: &str) -> Option<Vec<usize>> {
+        let mut out = Vec::new();
+        let mut at = tip;
+        while at != base {
+            let joint = *self.to.get(at)?;
+            out.push(joint);
+            at = self.joints[joint].parent;
+            // A circle leads nowhere.
+            if out.len() > self.joints.len() {
+                return None;
+            }
+        }
+        out.reverse();
+        Some(out)
+    }
+
+    fn moving(&self, path: &[usize]) -> Vec<usize> {
+        path.iter().copied().filter(|joint| self.joints[*joint].is_moving()).collect()
+    }
+
+    fn names(&self, joints: &[usize]) -> String {
+        joints.iter().map(|joint| self.joints[*joint].name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The joints of the arm, from base to flange.
+    fn chain(&self, base: &'a str, choice: &Choice) -> Result<Vec<usize>, RobotError> {
+        if let Some(tip) = &choice.tip {
+            let tip = self.named(tip, "tip")?;
+            let path = self.path(base, tip).ok_or_else(|| {
+                let found = format!("link {tip}, to which no joints lead from {base}");
+                refused(self.file, "tip", found, "a link behind the base", "give base and tip of one arm")
+            })?;
+            self.six(&path)?;
+            return Ok(path);
+        }
+        if let Some(path) = self.to_flange(base)? {
+            return Ok(path);
+        }
+        let (ends, longest) = self.ends(base);
+        match ends.as_slice() {
+            [end] => self.tip_behind(base, *end),
+            [] => Err(self.not_six(&longest)),
+            several => Err(self.several(several)),
+        }
+    }
+
+    /// The joints to the flange, where a link bears the name of one; what moves behind it is a gripper.
+    fn to_flange(&self, base: &'a str) -> Result<Option<Vec<usize>>, RobotError> {
+        let named = |link: &str, name: &str| {
+            link.strip_suffix(name).is_some_and(|rest| rest.is_empty() || rest.ends_with(['_', '-', '/']))
+        };
+        for name in FLANGES {
+            let paths: Vec<Vec<usize>> = self
+                .to
+                .keys()
+                .filter(|link| named(link, name))
+                .filter_map(|link| self.path(base, link))
+                .collect();
+            let arms: Vec<&Vec<usize>> = paths.iter().filter(|path| self.moving(path).len() == 6).collect();
+            match arms.as_slice() {
+                [path] => return self.six(path).map(|_| Some((*path).clone())),
+                [] => {
+                    // The flange of another kind of arm.
+                    if let Some(path) = paths.iter().max_by_key(|path| self.moving(path).len())
+                        && !self.moving(path).is_empty()
+                    {
+                        return Err(self.not_six(&self.moving(path)));
+                    }
+                }
+                several => {
+                    let ends: Vec<usize> =
+                        several.iter().filter_map(|path| self.moving(path).pop()).collect();
+                    return Err(self.several(&ends));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The last joint of every chain that has six and is not on the way to a seventh, and the longest chain there is.
+    fn ends(&self, base: &str) -> (Vec<usize>, Vec<usize>) {
+        let parents: Vec<&str> = self.joints.iter().map(|joint| joint.parent).collect();
+        let leaves = self.to.keys().filter(|link| !parents.contains(link));
+        let chains: Vec<Vec<usize>> =
+            leaves.filter_map(|leaf| self.path(base, leaf)).map(|path| self.moving(&path)).collect();
+        let mut ends: Vec<usize> = chains
+            .iter()
+            .filter(|chain| chain.len() == 6)
+            .filter_map(|chain| chain.last().copied())
+            .collect();
+        ends.sort_unstable();
+        ends.dedup();
+        ends.retain(|end| !chains.iter().any(|chain| chain.len() > 6 && chain.contains(end)));
+        (ends, chains.into_iter().max_by_key(Vec::len).unwrap_or_default())
+    }
+
+    fn several(&self, ends: &[usize]) -> RobotError {
+        refused(
+            self.file,
+            "joints",
+            format!("{} arms of six joints, which end with {}", ends.len(), self.names(ends)),
+            "one arm",
+            "say which one by its first and last link: `truegrind robots --check FILE --base LINK --tip LINK -o arm.toml` \
+             writes the robot file of one",
+        )
+    }
+
+    fn not_six(&self, moving: &[usize]) -> RobotError {
+        let found = format!("{} joints that move in a row: {}", moving.len(), self.names(moving));
+        refused(
+            self.file,
+            "joints",
+            found,
+            "six joints that turn",
+            "truegrind knows arms with six rotary axes; where a gripper or a track is among them, --base and --tip say where \
+             the arm begins and ends",
+        )
+    }
+
+    /// Refuses a path that is not six joints that turn.
+    fn six(&self, path: &[usize]) -> Result<Vec<usize>, RobotError> {
+        let moving = self.moving(path);
+        for joint in moving.iter().map(|joint| &self.joints[*joint]) {
+            let found = match &joint.moves {
+                Moves::Not | Moves::Turns => continue,
+                Moves::Slides => "a joint that slides (prismatic)".to_owned(),
+                Moves::Follows(other) => format!("a joint that follows {other} (mimic)"),
+                Moves::Otherwise(kind) => format!("a joint of type `{kind}`"),
+            };
+            return Err(refused(
+                self.file,
+                format!("line {}, joint {}", joint.line, joint.name),
+                found,
+                "six joints that turn on their own, and fixed ones",
+                "say by --base and --tip which six; an arm whose links couple joints is given as a table with columns q1 to q6",
+            ));
+        }
+        if moving.len() == 6 { Ok(moving) } else { Err(self.not_six(&moving)) }
+    }
+
+    /// The path to the flange behind the sixth joint.
+    fn tip_behind(&self, base: &'a str, end: usize) -> Result<Vec<usize>, RobotError> {
+        let behind: Vec<&str> = self
+            .links_behind(end)
+            .into_iter()
+            .filter(|link| self.path(base, link).is_some_and(|path| self.moving(&path).last() == Some(&end)))
+            .collect();
+        let tip = match behind.as_slice() {
+            [only] => only,
+            several => {
+                return Err(refused(
+                    self.file,
+                    "flange",
+                    format!(
+                        "{} links behind joint {}: {}",
+                        several.len(),
+                        self.joints[end].name,
+                        several.join(", ")
+                    ),
+                    "one that is tool0 or flange",
+                    "say which one by --tip",
+                ));
+            }
+        };
+        let path = self.path(base, tip).unwrap_or_default();
+        self.six(&path)?;
+        Ok(path)
+    }
+
+    /// The child of a joint and all that hangs on it.
+    fn links_behind(&self, joint: usize) -> Vec<&'a str> {
+        let mut out = vec![self.joints[joint].child];
+        let mut at = 0;
+        while let Some(link) = out.get(at).copied() {
+            out.extend(self.joints.iter().filter(|joint| joint.parent == link).map(|joint| joint.child));
+            at += 1;
+            if out.len() > self.joints.len() + 1 {
+                break;
+            }
+        }
+        out
+    }
+
+    fn described(&self, root: &Node<'_, '_>, base: &str, path: &[usize]) -> Result<Described, RobotError> {
+        let moving = self.six(path)?;
+        let mut before = Pose::identity();
+        let mut steps: Vec<Step> = Vec::new();
+        for joint in path.iter().map(|joint| &self.joints[*joint]) {
+            before *= joint.before;
+            if joint.is_moving() {
+                steps.push(Step { before, axis: UnitVector3::new_normalize(joint.axis) });
+                before = Pose::identity();
+            }
+        }
+        let steps: [Step; 6] = steps.try_into().map_err(|_| self.not_six(&moving))?;
+        let six: [&Joint<'_>; 6] = std::array::from_fn(|i| &self.joints[moving[i]]);
+        let tip = path.last().map_or(base, |joint| self.joints[*joint].child);
+        let robot = root.attribute("name").unwrap_or_default();
+        let (dialect, maker) = maker_of(&format!("{robot} {}", self.file));
+        let mut notes =
+            vec![format!("joints 1 to 6 are {}; from link {base} to link {tip}", self.names(&moving))];
+        let limits = six.map(|joint| joint.limits_rad);
+        let unlimited: Vec<&str> =
+            six.iter().filter(|joint| joint.limits_rad.is_none()).map(|joint| joint.name).collect();
+        let limits_deg = limits
+            .iter()
+            .any(Option::is_some)
+            .then(|| limits.map(|range| range.map_or([-360.0, 360.0], |range| range.map(f64::to_degrees))));
+        if limits_deg.is_some() && !unlimited.is_empty() {
+            notes.push(format!(
+                "no range is stated of {}: one turn either way is taken",
+                unlimited.join(", ")
+            ));
+        }
+        let speeds = six.map(|joint| joint.speed_rad_s);
+        let masses = self.masses(base, &moving);
+        notes.push(match &masses {
+            Some(masses) => {
+                format!(
+                    "masses are taken: {:.1} kg behind the base",
+                    masses.iter().map(|body| body.mass_kg).sum::<f64>()
+                )
+            }
+            None => "masses are not stated of every link, and not taken".to_owned(),
+        });
+        if self.meshes > 0 {
+            notes.push(format!("{} meshes are named; they are not used", self.meshes));
+        }
+        if maker == "FANUC" {
+            notes.push(
+                "FANUC controllers count joint 3 against the ground, URDF files count it against link 2: where the log is the \
+                 controller's, say --ground-joint-3"
+                    .to_owned(),
+            );
+        }
+        Ok(Described {
+            steps,
+            after: before,
+            limits_deg,
+            speed_deg_s: speeds
+                .iter()
+                .all(Option::is_some)
+                .then(|| speeds.map(|speed| speed.unwrap_or_default().to_degrees())),
+            joint_map: None,
+            masses,
+            maker: maker.to_owned(),
+            designation: robot.to_owned(),
+            dialect,
+            source: format!("{}, URDF, links {base} to {tip}", self.file),
+            notes,
+        })
+    }
+
+    /// What turns with each joint and no further: its link and whatever is fixed to it. `None` where one has no mass.
+    fn masses(&self, base: &str, moving: &[usize]) -> Option<[Body; 6]> {
+        let mut out = [Body { mass_kg: 0.0, centre_mm: [0.0; 3] }; 6];
+        for (link, body) in &self.masses {
+            let Some(path) = self.path(base, link) else { continue };
+            let own = self.moving(&path);
+            // What hangs on a finger does not belong to the arm.
+            let Some(place) = moving.iter().position(|joint| own.last() == Some(joint)) else { continue };
+            let frame = path.iter().fold(Pose::identity(), |pose, joint| pose * self.joints[*joint].before);
+            let centre = frame * Point3::from(body.centre_mm);
+            let whole = &mut out[place];
+            let mass = whole.mass_kg + body.mass_kg;
+            for k in 0..3 {
+                whole.centre_mm[k] = (whole.mass_kg * whole.centre_mm[k] + body.mass_kg * centre[k]) / mass;
+            }
+            whole.mass_kg = mass;
+        }
+        out.iter().all(|body| body.mass_kg > 0.0).then_some(out)
+    }
+}

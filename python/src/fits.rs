@@ -1,0 +1,333 @@
+//! What measurements tell of an arm: identify and diagnose.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truegrind::calibration::diagnosis::transfer::transfer;
+use truegrind::math::work::tell;
+use truegrind::report::{diagnosis, format, identification};
+use truegrind::{
+    Dataset, DiagnoseOptions, Diagnosed, Identification, IdentifyOptions, Robot, Tolerance, diagnose,
+    identify, solver_by_name, split, starting_frames,
+};
+
+use crate::dataset::PyDataset;
+use crate::errors::Refusal;
+use crate::model::{PyModel, parameter};
+use crate::robot::robot;
+use crate::running::run;
+
+/// What an identification found.
+#[pyclass(name = "Identification", module = "truegrind", frozen)]
+pub(crate) struct PyIdentification {
+    found: Arc<Identification>,
+    rows: Arc<Dataset>,
+}
+
+#[pymethods]
+impl PyIdentification {
+    /// The estimated arm.
+    #[getter]
+    fn model(&self) -> PyResult<PyModel> {
+        Ok(PyModel::found(&self.found.estimated)?)
+    }
+
+    /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        crate::model::word(self.found.estimated.verdict.status)
+    }
+
+    /// Why, one sentence each.
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.found.estimated.verdict.reasons.clone()
+    }
+
+    /// RMS error on rows that the fit did not see (mm).
+    #[getter]
+    fn held_out_rmse_mm(&self) -> f64 {
+        self.found.estimated.geometry.held_out.rmse
+    }
+
+    /// Largest error on rows that the fit did not see (mm).
+    #[getter]
+    fn held_out_max_mm(&self) -> f64 {
+        self.found.estimated.geometry.held_out.max
+    }
+
+    /// RMS error on these rows with the data sheet's arm and a fitted sensor frame (mm).
+    #[getter]
+    fn held_out_rmse_before_mm(&self) -> f64 {
+        self.found.estimated.registered.held_out.rmse
+    }
+
+    /// What the sensor and the rounding leave (mm); ``None`` where it cannot be told.
+    #[getter]
+    fn noise_floor_mm(&self) -> Option<f64> {
+        self.found.estimated.noise_floor_mm
+    }
+
+    /// Everything that was free, of the measurement too: dictionaries with name, unit, nominal, value, sigma, determined.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.found.parameters.iter().map(|found| parameter(py, found)).collect()
+    }
+
+    /// Errors of the rows that were held out (mm): row numbers, before and after, each of shape (n,).
+    #[getter]
+    fn held_out<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rows = &self.found.held_out;
+        let out = PyDict::new(py);
+        out.set_item("row", PyArray1::from_iter(py, rows.iter().map(|(row, _, _)| *row as i64)))?;
+        out.set_item("before_mm", PyArray1::from_iter(py, rows.iter().map(|(_, before, _)| *before)))?;
+        out.set_item("after_mm", PyArray1::from_iter(py, rows.iter().map(|(_, _, after)| *after)))?;
+        Ok(out)
+    }
+
+    /// Everything as JSON text, schema ``truegrind.identification/1``: the bytes that ``truegrind identify --json`` writes.
+    fn to_json(&self) -> PyResult<String> {
+        crate::json(&identification::json(&self.found, &self.rows))
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        format::html::document(&identification::document(&self.found, &self.rows))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Identification of {} from {} rows: held-out RMSE {:.4} mm, before {:.4} mm, verdict {}>",
+            self.found.estimated.robot,
+            self.rows.rows.len(),
+            self.held_out_rmse_mm(),
+            self.held_out_rmse_before_mm(),
+            self.verdict()
+        )
+    }
+}
+
+/// Fits an arm to measured poses. ``robot`` is a Robot, a name of ``truegrind.robots()`` or a robot file. ``held_out`` is the
+/// share of rows that the error is stated on; tolerances (mm, °) are the priors of links; ``angles`` is ``"logged"`` or ``"dh"``
+/// where the robot file does not say it. ``progress`` is called with each step. The result is the same for any number of threads.
+#[pyfunction]
+#[pyo3(
+    name = "identify",
+    signature = (
+        dataset, robot, *, method = "lm", held_out = 0.2, seed = 0, fuse_readout = true, limit_rmse_mm = None,
+        limit_max_mm = None, tolerance_length_mm = None, tolerance_angle_deg = None, angles = None, threads = None,
+        progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn identify_(
+    py: Python<'_>,
+    dataset: &PyDataset,
+    #[pyo3(from_py_with = robot)] robot: Robot,
+    method: &str,
+    held_out: f64,
+    seed: u64,
+    fuse_readout: bool,
+    limit_rmse_mm: Option<f64>,
+    limit_max_mm: Option<f64>,
+    tolerance_length_mm: Option<f64>,
+    tolerance_angle_deg: Option<f64>,
+    angles: Option<&str>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyIdentification> {
+    if !(held_out > 0.0 && held_out <= 0.9) {
+        return Err(Refusal::argument("held_out", held_out, "a share above 0, up to 0.9").into());
+    }
+    let mut tolerance = Tolerance::default();
+    for (name, stated, place, scale) in [
+        ("tolerance_length_mm", tolerance_length_mm, &mut tolerance.length_mm, 1.0),
+        ("tolerance_angle_deg", tolerance_angle_deg, &mut tolerance.angle_rad, 1.0_f64.to_radians()),
+    ] {
+        if let Some(value) = stated {
+            *place = positive(name, value)? * scale;
+        }
+    }
+    for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
+        limit.map(|limit| positive(name, limit)).transpose()?;
+    }
+    let options = IdentifyOptions {
+        tolerance,
+        solver: solver_by_name(method).map_err(Refusal::from)?,
+        held_out,
+        seed,
+        fuse_readout,
+        limit_rmse_mm,
+        limit_max_mm,
+        stated_frames: None,
+    };
+    run(py, threads, progress, || {
+        tell("checking units");
+        let rows = dataset.of(&robot, angles)?;
+        let (name, nominal) = (&robot.sheet.name, &robot.model);
+        tell("placing the sensor");
+        let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
+        let share = |rows: &Dataset| split::random(rows, options.held_out, options.seed);
+        let found = identify(&rows, name, nominal, &frames, &share, &options)?;
+        Ok(PyIdentification { found: Arc::new(found), rows: Arc::new(rows) })
+    })
+}
+
+/// A number above 0.
+///
+/// # Errors
+/// Names the argument.
+pub(crate) fn positive(name: &str, value: f64) -> Result<f64, Refusal> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(value);
+    }
+    Err(Refusal::argument(name, value, "a number above 0"))
+}
+
+/// What a diagnosis found.
+#[pyclass(name = "Diagnosis", module = "truegrind", frozen)]
+pub(crate) struct PyDiagnosis {
+    found: Arc<Diagnosed>,
+    rows: Arc<Dataset>,
+}
+
+#[pymethods]
+impl PyDiagnosis {
+    /// The arm with the causes that are certain, for programs.
+    #[getter]
+    fn model(&self) -> PyResult<PyModel> {
+        Ok(PyModel::found(&self.found.estimated)?)
+    }
+
+    /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        crate::model::word(self.found.estimated.verdict.status)
+    }
+
+    /// Why, one sentence each.
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.found.estimated.verdict.reasons.clone()
+    }
+
+    /// The causes, most weighty first: dictionaries as in the JSON.
+    #[getter]
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
+        whole.get_item("findings")
+    }
+
+    /// RMS error on rows held out in turn, with geometry alone (mm).
+    #[getter]
+    fn geometry_rmse_mm(&self) -> f64 {
+        self.found.diagnosis.fits.geometric.cv_rmse_mm
+    }
+
+    /// The same with all causes (mm).
+    #[getter]
+    fn held_out_rmse_mm(&self) -> f64 {
+        self.found.diagnosis.fits.extended.cv_rmse_mm
+    }
+
+    /// What is left of structure that no cause explains, in a sentence; ``None`` where nothing is.
+    #[getter]
+    fn remaining(&self) -> Option<String> {
+        self.found.diagnosis.remaining.clone()
+    }
+
+    /// What a reader should know.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.found.diagnosis.notes.iter().chain(&self.rows.notes).cloned().collect()
+    }
+
+    /// Everything as JSON text, schema ``truegrind.diagnosis/1``: the bytes that ``truegrind diagnose --json`` writes.
+    fn to_json(&self) -> PyResult<String> {
+        let counted = self.found.diagnosis.clone().counted_from_0(&self.rows);
+        let value = serde_json::to_value(counted)
+            .map_err(|error| Refusal::new(crate::errors::Kind::Defect, error))?;
+        crate::json(&value)
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        format::html::document(&diagnosis::document(&self.found, &self.rows))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Diagnosis of {}: {} findings, held-out RMSE {:.4} mm, geometry alone {:.4} mm, verdict {}>",
+            self.found.diagnosis.dataset.robot,
+            self.found.diagnosis.findings.len(),
+            self.held_out_rmse_mm(),
+            self.geometry_rmse_mm(),
+            self.verdict()
+        )
+    }
+}
+
+/// Names the causes of what geometry does not explain. ``alpha`` is the chance of any false finding, ``most`` the most causes
+/// that are accepted, ``blocks`` the contiguous blocks that are held out in turn; ``also`` are further datasets of the same arm,
+/// on which the models are judged with only the frames refitted.
+#[pyfunction]
+#[pyo3(
+    name = "diagnose",
+    signature = (
+        dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, seed = 0, also = Vec::new(), angles = None,
+        threads = None, progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn diagnose_(
+    py: Python<'_>,
+    dataset: &PyDataset,
+    #[pyo3(from_py_with = robot)] robot: Robot,
+    alpha: f64,
+    most: usize,
+    blocks: usize,
+    smooth: bool,
+    seed: u64,
+    also: Vec<PyRef<'_, PyDataset>>,
+    angles: Option<&str>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyDiagnosis> {
+    if !(alpha > 0.0 && alpha <= 0.5) {
+        return Err(Refusal::argument("alpha", alpha, "a probability above 0, up to 0.5").into());
+    }
+    if blocks < 2 {
+        return Err(Refusal::argument("blocks", blocks, "at least 2").into());
+    }
+    let mut options = DiagnoseOptions { blocks, smooth, ..DiagnoseOptions::default() };
+    options.selection.alpha = alpha;
+    options.selection.most = most;
+    options.selection.seed = seed;
+    let others: Vec<&PyDataset> = also.iter().map(|other| &**other).collect();
+    run(py, threads, progress, || {
+        tell("checking units");
+        let rows = dataset.of(&robot, angles)?;
+        let (name, nominal) = (&robot.sheet.name, &robot.model);
+        let frames = starting_frames(&rows, nominal, &options.tolerance, true)?;
+        let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| tell(step))?;
+        for other in others {
+            let other = other.of(&robot, angles)?;
+            tell(&format!("judging on {}", other.file));
+            let frames = starting_frames(&other, nominal, &options.tolerance, true)?;
+            let (geometric, extended) = (&found.geometric.model, &found.extended.model);
+            let judged = transfer(&other, &frames, nominal, geometric, extended, &options.tolerance);
+            found.diagnosis.transfers.push(judged);
+        }
+        Ok(PyDiagnosis { found: Arc::new(found), rows: Arc::new(rows) })
+    })
+}

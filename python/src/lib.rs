@@ -1,0 +1,51 @@
+//! truegrind as a Python module: arrays in, arrays out, results as objects. What is computed is the library's; here arguments are
+//! read, files are opened and exceptions are raised, as the command line does for its own users.
+
+mod arm;
+mod arrays;
+mod dataset;
+mod errors;
+mod files;
+mod fits;
+mod model;
+mod others;
+mod programs;
+mod robot;
+mod running;
+
+use pyo3::prelude::*;
+use truegrind::report::format;
+
+use crate::errors::{Kind, Refusal};
+
+/// A result as JSON text, as the command line writes it.
+pub(crate) fn json(value: &serde_json::Value) -> PyResult<String> {
+    Ok(format::json::text(value).map_err(|error| Refusal::new(Kind::Defect, error))?)
+}
+
+/// A page in a frame of its own, so that it and the notebook keep their styles.
+pub(crate) fn framed(page: &str) -> String {
+    let page = page.replace('&', "&amp;").replace('"', "&quot;");
+    format!("<iframe srcdoc=\"{page}\" style=\"width:100%;height:36em;border:0\"></iframe>")
+}
+
+/// What the package is made of.
+#[pymodule(gil_used = false)]
+mod _truegrind {
+    #[pymodule_export]
+    use crate::dataset::PyDataset;
+    #[pymodule_export]
+    use crate::fits::{PyDiagnosis, PyIdentification, diagnose_, identify_};
+    #[pymodule_export]
+    use crate::model::PyModel;
+    #[pymodule_export]
+    use crate::others::{PyPlan, PySimulation, PyTrack, plan_, simulate, track_};
+    #[pymodule_export]
+    use crate::programs::{PyCompensation, PyDeviation, compensate_, deviation_};
+    #[pymodule_export]
+    use crate::robot::{PyArm, PyRobot, catalogue, forward_of, inverse_of};
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "as Python names it")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

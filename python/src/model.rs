@@ -1,0 +1,294 @@
+//! An estimated arm, and its file.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sha2::{Digest, Sha256};
+use truegrind::arm::estimated::RidingPoint;
+use truegrind::{Estimated, Judgement, Pose, robots};
+
+use crate::arm::{Acting, Stated, forward, inverse};
+use crate::arrays::{Numbers, joints, rows, shaped};
+use crate::errors::{Kind, Refusal};
+use crate::files;
+use crate::robot::PyArm;
+
+/// An estimated arm: the nominal one, everything that was identified, and how well it is known.
+#[pyclass(name = "Model", module = "truegrind", frozen)]
+pub(crate) struct PyModel {
+    pub(crate) arm: Arc<Estimated>,
+    /// Name for reports.
+    pub(crate) name: String,
+    /// Short hash of the file's bytes, which programs are marked with.
+    pub(crate) hash: String,
+}
+
+/// First twelve hex digits of the SHA-256.
+fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().take(6).map(|b| format!("{b:02x}")).collect()
+}
+
+/// A judgement as files write it.
+pub(crate) fn word(status: Judgement) -> &'static str {
+    match status {
+        Judgement::Pass => "pass",
+        Judgement::Fail => "fail",
+        Judgement::Doubtful => "doubtful",
+        Judgement::NotEvaluated => "not-evaluated",
+    }
+}
+
+impl PyModel {
+    /// A model that was just found.
+    pub(crate) fn found(arm: &Estimated) -> Result<Self, Refusal> {
+        let text = arm.to_toml()?;
+        Ok(Self { arm: Arc::new(arm.clone()), name: "model.toml".to_owned(), hash: hash(text.as_bytes()) })
+    }
+
+    /// A model from the text of its file.
+    fn read(text: &str, name: &str) -> Result<Self, Refusal> {
+        let told = |error: &dyn std::fmt::Display| {
+            let message = error.to_string();
+            let message = format!("{name}: {}; a model file is what Model.save writes", message.trim_end());
+            Refusal::new(Kind::Model, message).of_file(name)
+        };
+        let arm = Estimated::from_toml(text).map_err(|error| told(&error))?;
+        robots::agrees(&arm.robot, &arm.nominal)
+            .map_err(|error| Refusal::new(Kind::Model, format!("{name}: {error}")).of_file(name))?;
+        if arm.verdict.status == Judgement::Fail {
+            let why = arm.verdict.reasons.join("; ");
+            let message = format!("{name}: the fit behind this model failed ({why}); it is not used");
+            return Err(Refusal::new(Kind::Model, message).of_file(name));
+        }
+        Ok(Self { hash: hash(text.as_bytes()), name: name.to_owned(), arm: Arc::new(arm) })
+    }
+
+    pub(crate) fn acting(&self) -> Acting<'_> {
+        Acting { arm: &self.arm.model, nominal: &self.arm.nominal, condition: self.arm.condition }
+    }
+
+    /// Programs are corrected with a doubtful model only where that is asked for.
+    pub(crate) fn allowed(&self, allow_doubtful: bool) -> Result<(), Refusal> {
+        let verdict = &self.arm.verdict;
+        let why = || verdict.reasons.join("; ");
+        match verdict.status {
+            Judgement::Fail => {
+                let message =
+                    format!("{}: the fit behind this model failed ({}); it is not used", self.name, why());
+                Err(Refusal::new(Kind::Model, message))
+            }
+            Judgement::Doubtful if !allow_doubtful => Err(Refusal::new(
+                Kind::Model,
+                format!(
+                    "{}: this model is doubtful, programs are corrected with it only with allow_doubtful=True: {}",
+                    self.name,
+                    why()
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A model, or the file of one.
+pub(crate) fn named<'a>(model: &'a Bound<'_, PyAny>, kept: &'a mut Option<PyModel>) -> PyResult<&'a PyModel> {
+    if let Ok(model) = model.cast::<PyModel>() {
+        return Ok(model.get());
+    }
+    let path: PathBuf =
+        model.extract().map_err(|_| Refusal::argument("model", model, "a Model, or a model file"))?;
+    Ok(kept.insert(load(&path)?))
+}
+
+fn load(path: &Path) -> PyResult<PyModel> {
+    let text = files::read_text(path, Kind::Model)?;
+    Ok(PyModel::read(&text, &files::name(path))?)
+}
+
+#[pymethods]
+impl PyModel {
+    /// Model(path)
+    /// --
+    ///
+    /// The model of a file.
+    #[new]
+    fn new(path: PathBuf) -> PyResult<Self> {
+        load(&path)
+    }
+
+    /// The model of a file.
+    #[staticmethod]
+    #[pyo3(name = "load")]
+    fn load_(path: PathBuf) -> PyResult<Self> {
+        load(&path)
+    }
+
+    /// The model of a file's text; ``file`` is its name in messages and reports.
+    #[staticmethod]
+    #[pyo3(signature = (text, file = "model.toml"))]
+    fn from_toml(text: &str, file: &str) -> PyResult<Self> {
+        Ok(Self::read(text, file)?)
+    }
+
+    /// The text of the model's file.
+    fn to_toml(&self) -> PyResult<String> {
+        Ok(self.arm.to_toml().map_err(Refusal::from)?)
+    }
+
+    /// Writes the model's file; a doubtful model only where that is asked for, one of a failed fit never.
+    #[pyo3(signature = (path, *, allow_doubtful = false))]
+    fn save(&self, path: PathBuf, allow_doubtful: bool) -> PyResult<()> {
+        self.allowed(allow_doubtful)?;
+        files::write(&path, self.to_toml()?.as_bytes())
+    }
+
+    /// Name of the robot.
+    #[getter]
+    fn robot(&self) -> &str {
+        &self.arm.robot
+    }
+
+    /// ``pass``, ``doubtful``, ``fail`` or ``not-evaluated``.
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        word(self.arm.verdict.status)
+    }
+
+    /// Why, one sentence each.
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.arm.verdict.reasons.clone()
+    }
+
+    /// First twelve hex digits of the SHA-256 of the file that ``save`` writes or ``load`` read: corrected programs carry them.
+    #[getter]
+    fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// RMS error on rows that the fit did not see (mm).
+    #[getter]
+    fn held_out_rmse_mm(&self) -> f64 {
+        self.arm.geometry.held_out.rmse
+    }
+
+    /// The same with the data sheet's arm and a fitted sensor frame (mm).
+    #[getter]
+    fn held_out_rmse_before_mm(&self) -> f64 {
+        self.arm.registered.held_out.rmse
+    }
+
+    /// The arm that the controller computes with.
+    #[getter]
+    fn nominal(&self) -> PyArm {
+        let name = format!("nominal {}", self.arm.robot);
+        PyArm { name, model: self.arm.nominal.clone(), nominal: self.arm.nominal.clone() }
+    }
+
+    /// What was identified: dictionaries with name, unit, nominal, value, sigma, determined.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.arm.parameters.iter().map(|found| parameter(py, found)).collect()
+    }
+
+    /// Names of the parameters of the arm in the order of the covariance.
+    #[getter]
+    fn order(&self) -> Vec<String> {
+        self.arm.order.iter().map(ToString::to_string).collect()
+    }
+
+    /// Covariance of the arm's parameters (mm, rad), shape (p, p).
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let matrix = &self.arm.covariance;
+        let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+        Ok(PyArray2::from_vec2(py, &rows)?)
+    }
+
+    /// Poses of the flange in the base for controller angles (°) of shape (N, 6) or (6,): ``Poses(position_mm, rotation)``.
+    /// Mass (kg) and its centre on the flange (mm), temperature (°C) and hours since it was switched on replace those that the
+    /// model was measured under.
+    #[pyo3(signature = (q_deg, *, payload_kg = None, payload_centre_mm = None, temperature_c = None, time_h = None))]
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        q_deg: Numbers<'py>,
+        payload_kg: Option<f64>,
+        payload_centre_mm: Option<[f64; 3]>,
+        temperature_c: Option<f64>,
+        time_h: Option<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let stated = Stated { payload_kg, payload_centre_mm, temperature_c, time_h };
+        forward(py, &self.acting(), &q_deg, &stated)
+    }
+
+    /// Controller angles (°) with which this arm reaches poses of its flange: ``Solutions(q_deg, reached, why)``.
+    #[pyo3(signature = (position_mm, rotation, near_deg = None))]
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        position_mm: Numbers<'py>,
+        rotation: Numbers<'py>,
+        near_deg: Option<Numbers<'py>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        inverse(py, &self.acting(), &position_mm, &rotation, near_deg.as_ref(), &Stated::default())
+    }
+
+    /// Predicted standard deviation of a point on the flange (mm), for controller angles (°) of shape (N, 6) or (6,). The point,
+    /// such as a TCP, is stated in the flange (mm).
+    #[pyo3(signature = (q_deg, tool_mm = [0.0; 3]))]
+    fn sigma_mm<'py>(
+        &self,
+        py: Python<'py>,
+        q_deg: Numbers<'py>,
+        tool_mm: [f64; 3],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
+        let [x, y, z] = tool_mm;
+        let sigmas = py.detach(|| {
+            let flange_from_tool = Pose::translation(x, y, z);
+            let points: Vec<RidingPoint<'_>> = (0..q_deg.nrows())
+                .map(|row| RidingPoint { joints: joints(q_deg, row), flange_from_tool, carried: None })
+                .collect();
+            self.arm.position_sigmas_mm(&self.arm.model.at_condition(&self.arm.condition), &points)
+        });
+        shaped(py, PyArray1::from_vec(py, sigmas).into_any(), one)
+    }
+
+    /// Whether controller angles (°) of shape (N, 6) or (6,) lie where the arm was measured.
+    fn measured_at<'py>(&self, py: Python<'py>, q_deg: Numbers<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (q_deg, one) = rows("q_deg", q_deg.as_array(), 6)?;
+        let inside: Vec<bool> = py.detach(|| {
+            (0..q_deg.nrows()).map(|row| self.arm.region.outside(&joints(q_deg, row)).is_none()).collect()
+        });
+        shaped(py, PyArray1::from_vec(py, inside).into_any(), one)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Model of {}: held-out RMSE {:.4} mm, verdict {}>",
+            self.arm.robot,
+            self.arm.geometry.held_out.rmse,
+            word(self.arm.verdict.status)
+        )
+    }
+}
+
+/// One identified number as a dictionary.
+pub(crate) fn parameter<'py>(
+    py: Python<'py>,
+    found: &truegrind::EstimatedParameter,
+) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    out.set_item("name", &found.name)?;
+    out.set_item("unit", &found.unit)?;
+    out.set_item("nominal", found.nominal)?;
+    out.set_item("value", found.value)?;
+    out.set_item("sigma", found.sigma)?;
+    out.set_item("prior_sigma", found.prior_sigma)?;
+    out.set_item("determined", found.determined)?;
+    Ok(out)
+}

@@ -1,0 +1,407 @@
+//! Measurements of a stated arm, which poses to measure, and an arm over its life.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use pyo3::prelude::*;
+use truegrind::calibration::tracking::first_poses as first_of;
+use truegrind::math::work::tell;
+use truegrind::planning::poses::candidate::Bounds;
+use truegrind::planning::poses::drive::{Drive, draft};
+use truegrind::planning::poses::rows::Noise;
+use truegrind::planning::poses::schedule::Visits;
+use truegrind::planning::poses::space::Space;
+use truegrind::report::{format, planning, tracking};
+use truegrind::robots::Choice;
+use truegrind::{
+    Alarm, Frames, Pose, PosesOptions, PosesPlan, PosesWanted, Recipe, Robot, Sensor, Simulation,
+    TrackOptions, TrackState, Tracker, plan_poses, read_measurements, robots, write_rapid,
+};
+
+use crate::dataset::PyDataset;
+use crate::errors::{Kind, Refusal};
+use crate::fits::positive;
+use crate::model::{PyModel, named};
+use crate::programs::text;
+use crate::robot::{PyArm, from_name, robot};
+use crate::running::run;
+
+/// Measurements of an arm that is known in every detail.
+#[pyclass(name = "Simulation", module = "truegrind", frozen)]
+pub(crate) struct PySimulation {
+    made: Simulation,
+    rows: Arc<truegrind::Dataset>,
+    robot: String,
+}
+
+#[pymethods]
+impl PySimulation {
+    /// The measured rows.
+    #[getter]
+    fn dataset(&self) -> PyDataset {
+        PyDataset { rows: self.rows.clone(), odd_units: false }
+    }
+
+    /// The measurement file, with header.
+    #[getter]
+    fn csv(&self) -> &str {
+        &self.made.csv
+    }
+
+    /// The arm that was measured.
+    #[getter]
+    fn actual(&self) -> PyArm {
+        PyArm {
+            name: format!("actual {}", self.robot),
+            model: self.made.actual.clone(),
+            nominal: self.made.nominal.clone(),
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Simulation of {}: {} rows>", self.robot, self.made.rows.len())
+    }
+}
+
+/// Measurements of a stated "actual" arm, effects, noise and rounding included. ``recipe`` is a recipe file (TOML), or its text;
+/// ``seed`` replaces that of poses and noise.
+#[pyfunction]
+#[pyo3(signature = (recipe, *, seed = None, name = "simulated.csv"))]
+pub(crate) fn simulate(
+    py: Python<'_>,
+    recipe: &Bound<'_, PyAny>,
+    seed: Option<u64>,
+    name: &str,
+) -> PyResult<PySimulation> {
+    let (text, path) = text(recipe, Kind::Recipe)?;
+    let file = path.map_or("recipe.toml".to_owned(), |path| path.display().to_string());
+    run(py, None, None, || {
+        let mut recipe = Recipe::parse(&text, &file)?;
+        recipe.seed = seed.unwrap_or(recipe.seed);
+        let resolve = |name: &str| {
+            let found = from_name(Path::new(name), &Choice::default());
+            found.map(|(robot, _)| robot.model).map_err(|error| error.to_string())
+        };
+        let made = recipe.simulate(resolve)?;
+        let rows = read_measurements(name, made.csv.as_bytes(), &Default::default())?;
+        Ok(PySimulation { made, rows: Arc::new(rows), robot: recipe.robot.clone() })
+    })
+}
+
+/// Which poses to measure.
+#[pyclass(name = "Plan", module = "truegrind", frozen)]
+pub(crate) struct PyPlan {
+    plan: PosesPlan,
+    robot: Robot,
+    sensor: Sensor,
+    frames: Frames,
+    speed_mm_s: f64,
+    settle_s: f64,
+}
+
+impl PyPlan {
+    fn wanted(&self) -> PosesWanted<'_> {
+        PosesWanted { nominal: &self.robot.model, sensor: self.sensor, frames: &self.frames }
+    }
+}
+
+#[pymethods]
+impl PyPlan {
+    /// The poses in the order of measuring, one list for each column of the table.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let csv = format::csv::table(&planning::table(&self.plan, &self.wanted()));
+        py.import("truegrind._results")?.call_method1("table", (csv,))
+    }
+
+    /// The program that moves there (RAPID).
+    fn program(&self) -> PyResult<String> {
+        let drive = Drive {
+            robot: self.robot.sheet.name.clone(),
+            travel_mm_s: self.speed_mm_s,
+            settle_s: self.settle_s,
+            ..Drive::default()
+        };
+        let bytes = write_rapid(&draft(&self.plan, &self.wanted(), &drive))
+            .map_err(|error| Refusal::new(Kind::Plan, error))?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// Everything as JSON text, schema ``truegrind.plan/1``: the bytes that ``truegrind plan --json`` writes.
+    fn to_json(&self) -> PyResult<String> {
+        crate::json(&planning::json(&self.plan, &self.wanted(), &self.robot.sheet.name))
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        format::html::document(&planning::document(&self.plan, &self.wanted(), &self.robot.sheet.name))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __len__(&self) -> usize {
+        self.plan.rows.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Plan for {}: {} rows>", self.robot.sheet.name, self.plan.rows.len())
+    }
+}
+
+/// Where the sensor stands: x, y, z (mm), or x, y, z, qw, qx, qy, qz.
+fn place(name: &str, numbers: &[f64]) -> Result<Pose, Refusal> {
+    let expected = "x, y, z (mm), or x, y, z, qw, qx, qy, qz of a unit quaternion";
+    let wrong = || Refusal::argument(name, format!("{numbers:?}"), expected);
+    match *numbers {
+        [x, y, z] => Ok(Pose::translation(x, y, z)),
+        [x, y, z, w, i, j, k] => {
+            let turn = Quaternion::new(w, i, j, k);
+            if !((turn.norm() - 1.0).abs() <= 0.01) {
+                return Err(wrong());
+            }
+            Ok(Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::from_quaternion(turn)))
+        }
+        _ => Err(wrong()),
+    }
+}
+
+/// Which poses to measure, as a program that moves there. ``sensor`` is ``"cable"``, ``"position"`` or ``"pose"``; a cable needs
+/// its ``outlets_mm`` in the base, a tracker may stand anywhere. ``touched_point`` is the hook or reflector on the flange.
+#[pyfunction]
+#[pyo3(
+    name = "plan",
+    signature = (
+        robot, sensor, *, poses = 60, outlets_mm = None, sensor_frame = None, touched_point = None, sigma_mm = None,
+        sigma_angle_deg = 0.006, margin_deg = 6.0, floor_mm = 0.0, speed_mm_s = 200.0, settle_s = 2.0, candidates = 2000,
+        seed = 0, threads = None, progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn plan_(
+    py: Python<'_>,
+    #[pyo3(from_py_with = robot)] robot: Robot,
+    sensor: &str,
+    poses: usize,
+    outlets_mm: Option<Vec<[f64; 3]>>,
+    sensor_frame: Option<Vec<f64>>,
+    touched_point: Option<Vec<f64>>,
+    sigma_mm: Option<f64>,
+    sigma_angle_deg: f64,
+    margin_deg: f64,
+    floor_mm: f64,
+    speed_mm_s: f64,
+    settle_s: f64,
+    candidates: usize,
+    seed: u64,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyPlan> {
+    let sensor = match sensor {
+        "cable" => Sensor::Cable,
+        "position" => Sensor::Position,
+        "pose" => Sensor::Pose,
+        other => {
+            return Err(Refusal::argument("sensor", other, "\"cable\", \"position\" or \"pose\"").into());
+        }
+    };
+    if !(4..=2000).contains(&poses) {
+        return Err(Refusal::argument("poses", poses, "4 to 2000; some 50 to 100 are usual").into());
+    }
+    if candidates > 100_000 {
+        return Err(Refusal::argument("candidates", candidates, "at most 100000; 2000 are usual").into());
+    }
+    let outlets = outlets_mm.unwrap_or_default();
+    if sensor == Sensor::Cable && outlets.is_empty() {
+        let expected = "where in the robot's base the cable comes out, x, y, z (mm), once for each cable";
+        return Err(Refusal::argument("outlets_mm", "nothing", expected).into());
+    }
+    let mut frames = Frames::at_origin(outlets.len().max(1));
+    for (to, outlet) in frames.outlets_mm.iter_mut().zip(&outlets) {
+        *to = Vector3::from(*outlet);
+    }
+    if let Some(point) = &touched_point {
+        frames.flange_from_target = place("touched_point", point)?;
+    }
+    if let Some(frame) = &sensor_frame {
+        frames.base_from_sensor = place("sensor_frame", frame)?;
+    }
+    let reach_mm: f64 = robot.model.links[1..].iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum();
+    let approach_rad = 3.0_f64.to_radians();
+    let defaults = PosesOptions::default();
+    let reading_mm = sigma_mm.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
+    let options = PosesOptions {
+        poses,
+        noise: Noise {
+            reading_mm: positive("sigma_mm", reading_mm)?,
+            reading_rad: positive("sigma_angle_deg", sigma_angle_deg)?.to_radians(),
+        },
+        candidates: candidates.max(poses),
+        bounds: Bounds {
+            margin_rad: margin_deg.to_radians().max(approach_rad),
+            min_singularity: 0.05,
+            box_mm: None,
+            distance_mm: None,
+            clearance_mm: (sensor == Sensor::Cable).then_some(reach_mm / 12.0),
+            space: Space {
+                floor_mm: Some(floor_mm),
+                boxes_mm: Vec::new(),
+                radius_mm: reach_mm / 12.0,
+                approach_rad,
+            },
+        },
+        visits: Visits { repeats: 4, both_sides: 12, warm_up: 8, approach_rad, seconds_per_row: 12.0 },
+        decisive: 25.0,
+        seed,
+        ..defaults
+    };
+    let speed_mm_s = positive("speed_mm_s", speed_mm_s)?;
+    run(py, threads, progress, || {
+        tell(&format!("choosing {poses} of {candidates} poses"));
+        let wanted = PosesWanted { nominal: &robot.model, sensor, frames: &frames };
+        let plan = plan_poses(&wanted, &options)
+            .map_err(|error| Refusal::new(Kind::Plan, format!("{}: {error}", robot.sheet.name)))?;
+        Ok(PyPlan { plan, robot, sensor, frames, speed_mm_s, settle_s })
+    })
+}
+
+/// A model that is kept accurate as measurements come in.
+#[pyclass(name = "Track", module = "truegrind", frozen)]
+pub(crate) struct PyTrack {
+    tracker: Tracker,
+    fresh: usize,
+    alarms: Vec<Alarm>,
+}
+
+#[pymethods]
+impl PyTrack {
+    /// The model as it stands now.
+    #[getter]
+    fn model(&self) -> PyResult<PyModel> {
+        Ok(PyModel::found(&self.tracker.model())?)
+    }
+
+    /// Poses that were taken in, all together.
+    #[getter]
+    fn poses(&self) -> usize {
+        self.tracker.state().poses
+    }
+
+    /// Alarms that these measurements raised: dictionaries as in the JSON.
+    #[getter]
+    fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
+        whole.get_item("alarms")
+    }
+
+    /// The state, from which ``track(..., state=...)`` goes on.
+    #[getter]
+    fn state(&self) -> PyResult<String> {
+        Ok(self.tracker.state().to_toml().map_err(Refusal::from)?)
+    }
+
+    /// Everything as JSON text, schema ``truegrind.track/1``.
+    fn to_json(&self) -> PyResult<String> {
+        crate::json(&tracking::json(&self.tracker, self.fresh, &self.alarms))
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        format::html::document(&tracking::document(&self.tracker, self.fresh, &self.alarms, "the model"))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Track of {}: {} poses, {} of them new, {} alarms>",
+            self.tracker.robot(),
+            self.tracker.state().poses,
+            self.fresh,
+            self.alarms.len()
+        )
+    }
+}
+
+/// Keeps a model accurate as measurements come in: takes in the rows of one dataset, or of several in their order. ``state`` is
+/// what an earlier track ended with; ``first_poses`` place the sensor before tracking begins.
+#[pyfunction]
+#[pyo3(
+    name = "track",
+    signature = (
+        model, datasets, *, state = None, first_poses = None, sigma_mm = None, allow_odd_units = false, threads = None,
+        progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn track_(
+    py: Python<'_>,
+    model: &Bound<'_, PyAny>,
+    datasets: &Bound<'_, PyAny>,
+    state: Option<&str>,
+    first_poses: Option<usize>,
+    sigma_mm: Option<f64>,
+    allow_odd_units: bool,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyTrack> {
+    let mut kept = None;
+    let estimated = named(model, &mut kept)?;
+    let given: Vec<PyRef<'_, PyDataset>> = match datasets.extract::<PyRef<'_, PyDataset>>() {
+        Ok(one) => vec![one],
+        Err(_) => datasets.extract()?,
+    };
+    let given: Vec<&PyDataset> = given.iter().map(|dataset| &**dataset).collect();
+    let mut options = TrackOptions {
+        sigma_mm: sigma_mm.map(|sigma| positive("sigma_mm", sigma)).transpose()?,
+        ..TrackOptions::default()
+    };
+    if let Some(poses) = first_poses {
+        options.first_poses = poses.max(4);
+    }
+    run(py, threads, progress, || {
+        let arm = &estimated.arm;
+        let robot = robots::load(&arm.robot).ok();
+        let convention = robot.map(|robot| robot.sheet.joints.angles.into()).unwrap_or_default();
+        let rows = given.iter().map(|dataset| {
+            let odd = allow_odd_units || dataset.odd_units;
+            let rows = (*dataset.rows).clone();
+            truegrind::calibration::measurement::matching::matched(
+                rows,
+                &arm.robot,
+                &arm.nominal,
+                convention,
+                odd,
+            )
+        });
+        let rows = rows.collect::<Result<Vec<_>, _>>()?;
+        let mut tracker = match state {
+            Some(state) => {
+                let state = TrackState::from_toml(state)?;
+                if state.model_hash != estimated.hash {
+                    let message = "state: is the track of another model: give the model that it began with";
+                    return Err(Refusal::new(Kind::Track, message));
+                }
+                Tracker::resume(arm, state, "state")?
+            }
+            None => {
+                let first = first_of(&rows, options.first_poses)
+                    .ok_or_else(|| Refusal::new(Kind::Track, "no measurements to begin with"))?;
+                tell("placing the sensor");
+                Tracker::begin(arm, &estimated.hash, &first, &options)?
+            }
+        };
+        let before = tracker.state().poses;
+        let mut alarms = Vec::new();
+        for dataset in &rows {
+            tell(&format!("taking in {}", dataset.file));
+            alarms.extend(tracker.take(dataset)?);
+        }
+        let fresh = tracker.state().poses - before;
+        Ok(PyTrack { tracker, fresh, alarms })
+    })
+}

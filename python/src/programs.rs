@@ -1,0 +1,562 @@
+//! Programs: corrected for an arm, and how far they are off on it.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList, PyString, PyTuple};
+use truegrind::compensation::belonging::{cell_of_another, program_of_another};
+use truegrind::compensation::cell::Used;
+use truegrind::compensation::payload::Loads;
+use truegrind::compensation::placed::misplaced;
+use truegrind::compensation::reach::none_in_reach;
+use truegrind::compensation::setup::setup;
+use truegrind::compensation::taught::contradictions;
+use truegrind::math::work::tell;
+use truegrind::programs::rapid::task_list;
+use truegrind::report::compensation::{self as view, ProgramFile};
+use truegrind::report::{deviation as deviations, format};
+use truegrind::{
+    Acting, After, Cell, Circles, CompensateOptions, CompensatePlan, Compensated, Condition, Cuts, Emit,
+    Estimated, Judged, Listing, Mark, NcSetup, PathReport, Program, Status, SurfaceFile, compensate, judge,
+    robots,
+};
+
+use crate::arm::Stated;
+use crate::errors::{Kind, Refusal};
+use crate::files;
+use crate::fits::positive;
+use crate::model::{PyModel, named};
+use crate::robot::PyArm;
+use crate::running::run;
+
+/// The files of one program, each by the name that reports print.
+pub(crate) struct Sources {
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+}
+
+impl Sources {
+    /// The program as it is read; names without their folders, as on the controller.
+    fn task<'s>(&'s self, setup: &NcSetup) -> Program<'s> {
+        let plain: Vec<(&str, &[u8])> =
+            self.files.iter().map(|(name, bytes)| (last(name), bytes.as_slice())).collect();
+        Program::read(&plain, setup)
+    }
+
+    fn name(&self) -> String {
+        self.files.iter().map(|(name, _)| last(name)).collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn last(name: &str) -> &str {
+    Path::new(name).file_name().and_then(|name| name.to_str()).unwrap_or(name)
+}
+
+/// A program: a path, several paths of modules of one task, or a dictionary of names and texts.
+pub(crate) fn sources(given: &Bound<'_, PyAny>) -> PyResult<Sources> {
+    let mut out = Vec::new();
+    if let Ok(named) = given.cast::<PyDict>() {
+        for (name, text) in named.iter() {
+            let bytes = match text.cast::<PyBytes>() {
+                Ok(bytes) => bytes.as_bytes().to_vec(),
+                Err(_) => text.extract::<String>()?.into_bytes(),
+            };
+            out.push((name.extract()?, bytes));
+        }
+    } else if given.cast::<PyList>().is_ok() || given.cast::<PyTuple>().is_ok() {
+        for path in given.try_iter()? {
+            read(&path?, &mut out)?;
+        }
+    } else {
+        read(given, &mut out)?;
+    }
+    if out.is_empty() {
+        return Err(
+            Refusal::argument("program", "nothing", "a program's file, or several of one task").into()
+        );
+    }
+    Ok(Sources { files: out })
+}
+
+/// A file; a task list stands for the modules beside it that it names.
+fn read(given: &Bound<'_, PyAny>, out: &mut Vec<(String, Vec<u8>)>) -> PyResult<()> {
+    let path: PathBuf = given.extract().map_err(|_| {
+        Refusal::argument("program", given, "a path, a list of paths, or a dictionary of names and texts")
+    })?;
+    let bytes = files::read(&path)?;
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pgf")) {
+        out.push((path.display().to_string(), bytes));
+        return Ok(());
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for module in task_list::modules(&bytes) {
+        let plain = module.replace('\\', "/");
+        if plain.split('/').any(|part| part == "..") || Path::new(&plain).is_absolute() {
+            let message = format!(
+                "{}: {module}: stands outside the folder of that list: give its path",
+                path.display()
+            );
+            return Err(Refusal::new(Kind::Program, message).into());
+        }
+        let place = folder.join(plain);
+        out.push((place.display().to_string(), files::read(&place)?));
+    }
+    Ok(())
+}
+
+/// A text, or the file of one: what has a line end or `text:` in it is no path.
+pub(crate) fn text(given: &Bound<'_, PyAny>, kind: Kind) -> PyResult<(String, Option<PathBuf>)> {
+    if let Ok(text) = given.cast::<PyString>() {
+        let text = text.to_str()?;
+        if text.contains('\n') {
+            return Ok((text.to_owned(), None));
+        }
+    }
+    let path: PathBuf = given.extract()?;
+    Ok((files::read_text(&path, kind)?, Some(path)))
+}
+
+/// What is known of the cell.
+struct Place {
+    cell: Cell,
+    surface: Option<SurfaceFile>,
+}
+
+impl Place {
+    fn read(cell: Option<&Bound<'_, PyAny>>, surface: Option<PathBuf>) -> PyResult<Self> {
+        let cell = match cell {
+            None => Cell::default(),
+            Some(given) => {
+                let (text, path) = text(given, Kind::Cell)?;
+                let name = path.as_ref().map_or("cell".to_owned(), |path| path.display().to_string());
+                let cell = Cell::from_toml(&text).map_err(|error| {
+                    let message = format!(
+                        "{name}: {}; a cell file lists [[tool]] and [[wobj]]",
+                        error.to_string().trim_end()
+                    );
+                    Refusal::new(Kind::Cell, message).of_file(&name)
+                })?;
+                if let Some(first) = cell.open.first() {
+                    let message = format!("{name}: not filled in yet: {first}");
+                    return Err(Refusal::new(Kind::Cell, message).of_file(&name).into());
+                }
+                cell
+            }
+        };
+        let surface = surface.map(|path| read_surface(&path)).transpose()?;
+        let cell = match &surface {
+            Some(surface) => cell.with_surface(surface).map_err(Refusal::from)?,
+            None => cell,
+        };
+        Ok(Self { cell, surface })
+    }
+}
+
+fn read_surface(path: &Path) -> PyResult<SurfaceFile> {
+    let bytes = files::read(path)?;
+    let name = path.display().to_string();
+    let resolve = |mesh: &str| {
+        let beside = path.parent().unwrap_or(Path::new("")).join(mesh);
+        files::read(&beside).map_err(|error| error.to_string())
+    };
+    let read = SurfaceFile::read(&name, &bytes, resolve);
+    Ok(read.map_err(|error| Refusal::new(Kind::Program, error).of_file(&name))?)
+}
+
+/// What the robot file says of NC programs; a robot that is not of the catalogue says nothing.
+fn nc_setup(cell: &Cell, robot: &str) -> NcSetup {
+    setup(cell, robots::load(robot).ok().and_then(|robot| robot.sheet.orientation()))
+}
+
+/// Which files carry the mark of this model already.
+///
+/// # Errors
+/// Where one carries the mark of another.
+fn marked(listing: &Listing, sources: &Sources, hash: &str, again: bool) -> Result<Vec<bool>, Refusal> {
+    let mut out = vec![false; sources.files.len()];
+    for ((mark, (name, _)), marked) in listing.marks.iter().zip(&sources.files).zip(&mut out) {
+        let Some(mark) = mark else { continue };
+        if mark.model == hash {
+            *marked = true;
+        } else if !again {
+            let message = format!(
+                "{name}: already compensated with another model ({}): take the original program, or say again=True, with which \
+                 the corrections add up",
+                mark.model
+            );
+            return Err(Refusal::new(Kind::Program, message).of_file(name));
+        }
+    }
+    Ok(out)
+}
+
+/// A program, corrected.
+#[pyclass(name = "Compensation", module = "truegrind", frozen)]
+pub(crate) struct PyCompensation {
+    sources: Sources,
+    corrected: Vec<Vec<u8>>,
+    plan: CompensatePlan,
+    listing: Listing,
+    report: PathReport,
+    unused: Vec<String>,
+}
+
+impl PyCompensation {
+    fn files(&self) -> Vec<ProgramFile> {
+        let names = self.sources.files.iter();
+        names.map(|(name, _)| ProgramFile { file: name.clone(), output: None }).collect()
+    }
+}
+
+#[pymethods]
+impl PyCompensation {
+    /// The corrected files: bytes by name.
+    #[getter]
+    fn programs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        for ((name, _), bytes) in self.sources.files.iter().zip(&self.corrected) {
+            out.set_item(name, PyBytes::new(py, bytes))?;
+        }
+        Ok(out)
+    }
+
+    /// Whether any byte changes.
+    #[getter]
+    fn changed(&self) -> bool {
+        self.sources.files.iter().zip(&self.corrected).any(|((_, old), new)| old != new)
+    }
+
+    /// Writes the corrected files into a folder, or the one file to a path. No original is overwritten.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        let places: Vec<PathBuf> = match self.sources.files.as_slice() {
+            [_] if !path.is_dir() => vec![path],
+            all => {
+                std::fs::create_dir_all(&path)?;
+                all.iter().map(|(name, _)| path.join(last(name))).collect()
+            }
+        };
+        for place in &places {
+            let there = place.canonicalize().ok();
+            let same = |(name, _): &&(String, Vec<u8>)| {
+                there.is_some() && Path::new(name).canonicalize().ok() == there
+            };
+            if let Some((name, _)) = self.sources.files.iter().find(same) {
+                let message = format!("{name}: is the original program: give another place");
+                return Err(Refusal::new(Kind::Program, message).of_file(name).into());
+            }
+        }
+        places.iter().zip(&self.corrected).try_for_each(|(place, bytes)| files::write(place, bytes))
+    }
+
+    /// What became of each motion: dictionaries as in the JSON.
+    #[getter]
+    fn motions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let whole = py.import("json")?.call_method1("loads", (self.to_json()?,))?;
+        let out = PyList::empty(py);
+        for program in whole.get_item("programs")?.try_iter()? {
+            for motion in program?.get_item("motions")?.try_iter()? {
+                out.append(motion?)?;
+            }
+        }
+        Ok(out.into_any())
+    }
+
+    /// Numbers of motions by what became of them: changed, flagged, refused, left.
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        for (word, status) in [
+            ("changed", Status::Changed),
+            ("flagged", Status::Flagged),
+            ("refused", Status::Refused),
+            ("left", Status::Left),
+        ] {
+            out.set_item(word, self.plan.outcomes.iter().filter(|outcome| outcome.status == status).count())?;
+        }
+        Ok(out)
+    }
+
+    /// What was assumed of tools and work objects, and entries of the cell file that the program does not use.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.plan.notes.iter().chain(&self.unused).cloned().collect()
+    }
+
+    /// Everything as JSON text, schema ``truegrind.compensation/1``: the bytes that ``truegrind compensate --dry-run --json`` writes.
+    fn to_json(&self) -> PyResult<String> {
+        crate::json(&view::json(&self.plan, &self.listing, &self.files()))
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        let reports = std::slice::from_ref(&self.report);
+        format::html::document(&view::document(&self.plan, &self.listing, &self.files(), reports))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Compensation of {}: {}>", self.sources.name(), view::coverage(&self.plan))
+    }
+}
+
+/// Rewrites a program so that the estimated arm follows it. ``program`` is a path, a list of paths (modules of one task) or a
+/// dictionary of names and texts; ``cell`` a cell file or its text; ``surface`` the surface file that is ground. Nothing is
+/// written: ``Compensation.save`` does.
+#[pyfunction]
+#[pyo3(
+    name = "compensate",
+    signature = (
+        program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None, emit = "targets",
+        circles = "keep", tolerance_mm = 0.05, max_correction_mm = 10.0, partial = false, joint_targets = false, again = false,
+        allow_doubtful = false, threads = None, progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn compensate_(
+    py: Python<'_>,
+    program: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyAny>,
+    cell: Option<&Bound<'_, PyAny>>,
+    surface: Option<PathBuf>,
+    payload_kg: Option<f64>,
+    payload_centre_mm: Option<[f64; 3]>,
+    emit: &str,
+    circles: &str,
+    tolerance_mm: f64,
+    max_correction_mm: f64,
+    partial: bool,
+    joint_targets: bool,
+    again: bool,
+    allow_doubtful: bool,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyCompensation> {
+    let mut kept = None;
+    let estimated = named(model, &mut kept)?;
+    estimated.allowed(allow_doubtful)?;
+    let sources = sources(program)?;
+    let place = Place::read(cell, surface)?;
+    let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
+    let options = CompensateOptions {
+        emit: match emit {
+            "targets" => Emit::Targets,
+            "joints" => Emit::Joints,
+            other => return Err(Refusal::argument("emit", other, "\"targets\" or \"joints\"").into()),
+        },
+        circles: match circles {
+            "keep" => Circles::Keep,
+            "segments" => Circles::Segments,
+            other => return Err(Refusal::argument("circles", other, "\"keep\" or \"segments\"").into()),
+        },
+        tolerance_mm: positive("tolerance_mm", tolerance_mm)?,
+        max_correction_mm: positive("max_correction_mm", max_correction_mm)?,
+        joint_targets,
+        cuts: if partial { Cuts::Partial } else { Cuts::Whole },
+        condition: stated.on(&estimated.arm.model, &estimated.arm.condition)?,
+        points: true,
+        ..CompensateOptions::default()
+    };
+    let own_loads = payload_kg.is_none();
+    run(py, threads, progress, || corrected(sources, estimated, place, options, own_loads, again))
+}
+
+fn corrected(
+    sources: Sources,
+    model: &PyModel,
+    place: Place,
+    options: CompensateOptions,
+    own_loads: bool,
+    again: bool,
+) -> Result<PyCompensation, Refusal> {
+    let arm: &Estimated = &model.arm;
+    let Place { cell, surface } = place;
+    agreed(&sources, &cell, arm)?;
+    tell(&format!("reading {}", sources.name()));
+    let setup = nc_setup(&cell, &arm.robot);
+    let program = sources.task(&setup);
+    let listing = program.listing();
+    let marked = marked(listing, &sources, &model.hash, again)?;
+    if let Some(done) = marked.iter().position(|marked| *marked) {
+        let name = &sources.files[done].0;
+        let message = format!("{name} is already compensated with this model: give the original program");
+        return Err(Refusal::new(Kind::Program, message).of_file(name));
+    }
+    let found: Vec<String> = surface.iter().flat_map(|surface| misplaced(listing, surface)).collect();
+    if !found.is_empty() {
+        return Err(Refusal::new(Kind::Cell, format!("{}: {}", sources.name(), found.join("; "))));
+    }
+    let options = CompensateOptions { loads: own_loads.then(|| Loads::of(&program)), ..options };
+    let mark = Mark { version: env!("CARGO_PKG_VERSION").into(), model: model.hash.clone(), partial: false };
+    tell(&format!("rewriting {}", sources.name()));
+    let Compensated { mut plan, rewritten } = compensate(&program, arm, &cell, &options, Some(mark))?;
+    if let Some(motions) = none_in_reach(&plan) {
+        let message = format!(
+            "{}: {motions} motions and hardly one in reach of {} ({}): the program is another robot's, or its tool and work \
+             object are not where it is told (cell); give the model of the robot that runs it",
+            sources.name(),
+            arm.robot,
+            model.name
+        );
+        return Err(Refusal::new(Kind::Program, message));
+    }
+    if let Some(surface) = &surface {
+        plan.add_normals(surface);
+    }
+    let apply = |((_, source), file): (&(String, Vec<u8>), &truegrind::FileEdits)| {
+        file.edits.apply(source).map_err(|error| Refusal::new(Kind::Defect, error))
+    };
+    let corrected = sources.files.iter().zip(&rewritten.files).map(apply).collect::<Result<_, _>>()?;
+    let report = PathReport {
+        program: sources.name(),
+        model: model.name.clone(),
+        after: After::PredictedRemainder,
+        points: std::mem::take(&mut plan.points),
+        held_out_mm: Some(arm.geometry.held_out.rmse),
+    };
+    let unused = Used::by(listing, &cell).notes(&cell, surface.as_ref());
+    let listing = listing.clone();
+    drop((program, rewritten));
+    Ok(PyCompensation { sources, corrected, plan, listing, report, unused })
+}
+
+/// Nothing is corrected or judged with a cell or a program of another robot.
+fn agreed(sources: &Sources, cell: &Cell, arm: &Estimated) -> Result<(), Refusal> {
+    let (robot, nominal) = (&arm.robot, &arm.nominal);
+    if let Some(fault) = cell_of_another(cell, robot, nominal) {
+        return Err(Refusal::new(Kind::Cell, fault));
+    }
+    let fault = sources.files.iter().find_map(|(name, bytes)| {
+        program_of_another(last(name), bytes, robot, nominal).map(|fault| (name, fault))
+    });
+    fault.map_or(Ok(()), |(name, fault)| Err(Refusal::new(Kind::Program, fault).of_file(name)))
+}
+
+/// How far a program is off on an arm.
+#[pyclass(name = "Deviation", module = "truegrind", frozen)]
+pub(crate) struct PyDeviation {
+    reports: Vec<PathReport>,
+}
+
+#[pymethods]
+impl PyDeviation {
+    /// The points of the path, one list for each column of the table (mm, °); ``None`` where a value is absent.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        py.import("truegrind._results")?.call_method1("table", (self.to_csv(),))
+    }
+
+    /// The points as CSV text: the bytes that ``truegrind deviation --csv`` writes.
+    fn to_csv(&self) -> String {
+        format::csv::table(&deviations::whole_table(&self.reports))
+    }
+
+    /// Everything as JSON text, schema ``truegrind.deviation/1``: the bytes that ``truegrind deviation --json`` writes.
+    fn to_json(&self) -> PyResult<String> {
+        crate::json(&deviations::json(&self.reports))
+    }
+
+    /// The page, as HTML.
+    fn to_html(&self) -> String {
+        format::html::document(&deviations::document(&self.reports))
+    }
+
+    fn _repr_html_(&self) -> String {
+        crate::framed(&self.to_html())
+    }
+
+    fn __repr__(&self) -> String {
+        let points: usize = self.reports.iter().map(|report| report.points.len()).sum();
+        let name = self.reports.first().map_or("", |report| report.program.as_str());
+        format!("<Deviation of {name}: {points} points>")
+    }
+}
+
+/// How far a program is off under a model; nothing is rewritten. With ``intended``, the original program states what was meant,
+/// and ``program`` is what came of it. With ``actual`` (an ``Arm`` of a simulation) the programs are run on that arm.
+#[pyfunction]
+#[pyo3(
+    name = "deviation",
+    signature = (
+        program, model, *, intended = None, actual = None, cell = None, surface = None, payload_kg = None,
+        payload_centre_mm = None, threads = None, progress = None
+    )
+)]
+#[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
+pub(crate) fn deviation_(
+    py: Python<'_>,
+    program: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyAny>,
+    intended: Option<&Bound<'_, PyAny>>,
+    actual: Option<PyRef<'_, PyArm>>,
+    cell: Option<&Bound<'_, PyAny>>,
+    surface: Option<PathBuf>,
+    payload_kg: Option<f64>,
+    payload_centre_mm: Option<[f64; 3]>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyDeviation> {
+    let mut kept = None;
+    let estimated = named(model, &mut kept)?;
+    let programs = sources(program)?;
+    let originals = intended.map(sources).transpose()?;
+    let place = Place::read(cell, surface)?;
+    let stated = Stated { payload_kg, payload_centre_mm, ..Stated::default() };
+    let condition = stated.on(&estimated.arm.model, &estimated.arm.condition)?;
+    let actual = actual.as_deref();
+    let task = Run { estimated, actual, programs: &programs, originals: originals.as_ref(), condition };
+    run(py, threads, progress, || task.judged(&place, payload_kg.is_none()))
+}
+
+/// A program that is run on an arm.
+struct Run<'a> {
+    estimated: &'a PyModel,
+    actual: Option<&'a PyArm>,
+    programs: &'a Sources,
+    originals: Option<&'a Sources>,
+    condition: Condition,
+}
+
+impl Run<'_> {
+    fn judged(&self, place: &Place, own_loads: bool) -> Result<PyDeviation, Refusal> {
+        let Place { cell, surface } = place;
+        let arm: &Estimated = &self.estimated.arm;
+        agreed(self.programs, cell, arm)?;
+        let setup = nc_setup(cell, &arm.robot);
+        tell(&format!("reading {}", self.programs.name()));
+        let task = self.programs.task(&setup);
+        let original = self.originals.map(|original| original.task(&setup));
+        for program in original.iter().chain([&task]) {
+            let mut found = contradictions(program.listing(), cell, &arm.nominal);
+            found.extend(surface.iter().flat_map(|surface| misplaced(program.listing(), surface)));
+            if !found.is_empty() {
+                return Err(Refusal::new(Kind::Cell, found.join("; ")));
+            }
+        }
+        let loads = [original.as_ref().unwrap_or(&task), &task].map(|p| own_loads.then(|| Loads::of(p)));
+        let name = self.programs.name();
+        let (model, named, knowledge, after) = match self.actual {
+            Some(actual) => (&actual.model, format!("actual arm {}", actual.name), None, After::Achieved),
+            None => (&arm.model, self.estimated.name.clone(), Some(arm), After::PredictedRemainder),
+        };
+        let judged = Judged {
+            original: original.as_ref().map_or(task.listing(), |original| original.listing()),
+            rewritten: original.as_ref().map(|_| task.listing()),
+            cell,
+            surface: surface.as_ref().map(|surface| &surface.surface),
+            program: &name,
+            name: &named,
+            after,
+            loads: [loads[0].as_ref(), loads[1].as_ref()],
+        };
+        let acting = Acting { nominal: &arm.nominal, model, knowledge, condition: self.condition };
+        tell(&format!("running {name}"));
+        let report = judge(&judged, &acting);
+        if report.points.is_empty() {
+            let message = format!("{name}: no motion has a target that is known from the text");
+            return Err(Refusal::new(Kind::Program, message));
+        }
+        Ok(PyDeviation { reports: vec![report] })
+    }
+}

@@ -1,0 +1,99 @@
+//! Long work beside the interpreter: without its lock, with Ctrl-C and with a word on where it stands.
+
+use std::any::Any;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use truegrind::math::work::{Watch, watched};
+
+use crate::errors::{Kind, Refusal};
+
+/// How often the interpreter is asked whether Ctrl-C was pressed.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// More threads than any machine has processors only cost memory.
+const MOST_THREADS: usize = 1024;
+
+enum Event {
+    Step(String),
+    Done,
+}
+
+/// Runs `work` on threads of its own. `progress` is called with each step; what it raises, and Ctrl-C, ends the work at its next
+/// checkpoint and is raised here.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce() -> Result<T, Refusal> + Send,
+) -> PyResult<T> {
+    if threads.is_some_and(|n| !(1..=MOST_THREADS).contains(&n)) {
+        return Err(Refusal::argument("threads", threads.unwrap_or_default(), "1 to 1024").into());
+    }
+    let (send, receive) = channel();
+    let ended = send.clone();
+    let watch = Arc::new(Watch::telling(move |step| drop(send.send(Event::Step(step.to_owned())))));
+    let receive = Mutex::new(receive);
+    let (fault, joined) = std::thread::scope(|scope| {
+        let worker = scope.spawn(|| {
+            let done = watched(&watch, threads, work);
+            drop(ended.send(Event::Done));
+            done
+        });
+        let mut fault = None;
+        loop {
+            match py.detach(|| next(&receive)) {
+                Ok(Event::Done) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(Event::Step(step)) => {
+                    if let (Some(progress), None) = (progress, &fault)
+                        && let Err(error) = progress.call1((step,))
+                    {
+                        fault = Some(error);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if fault.is_none()
+                && let Err(error) = py.check_signals()
+            {
+                fault = Some(error);
+            }
+            if fault.is_some() {
+                watch.cancel();
+            }
+            if worker.is_finished() {
+                break;
+            }
+        }
+        (fault, py.detach(|| worker.join()))
+    });
+    if let Some(fault) = fault {
+        return Err(fault);
+    }
+    match joined {
+        Ok(Ok(Ok(done))) => done.map_err(PyErr::from),
+        Ok(Ok(Err(cancelled))) => Err(Refusal::new(Kind::Defect, cancelled).into()),
+        Ok(Err(pool)) => Err(Refusal::new(Kind::Defect, format!("no threads: {pool}")).into()),
+        Err(payload) => Err(defect(&*payload).into()),
+    }
+}
+
+fn next(receive: &Mutex<Receiver<Event>>) -> Result<Event, RecvTimeoutError> {
+    receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK)
+}
+
+/// A panic is a defect of truegrind, and no fault of what it was given.
+fn defect(payload: &(dyn Any + Send)) -> Refusal {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    Refusal::new(
+        Kind::Defect,
+        format!(
+            "a defect of truegrind {}, not of its input: please report it, with the call and the files that it was given ({})",
+            env!("CARGO_PKG_VERSION"),
+            text.unwrap_or_else(|| "no message".to_owned())
+        ),
+    )
+}

@@ -1,0 +1,92 @@
+"""Long work can be watched, and Ctrl-C ends it within 0.2 s."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import truegrind as tg
+
+SOON_S = 0.2
+
+
+@pytest.fixture(scope="module")
+def long_rows() -> tg.Dataset:
+    """So many rows that each piece of work takes seconds."""
+    arm = tg.Robot("abb-irb-120")
+    random = np.random.default_rng(3)
+    q = random.uniform(0.6 * arm.min_deg, 0.6 * arm.max_deg, (60_000, 6))
+    place = arm.forward(q + random.normal(0, 0.01, q.shape)).position_mm + random.normal(0, 0.02, (60_000, 3))
+    return tg.Dataset.from_numpy(q, position_mm=place)
+
+
+def interrupted_after(seconds: float, work) -> float:
+    """Runs `work`, presses Ctrl-C after a while and hands back how long it took to end."""
+    pressed = []
+
+    def press() -> None:
+        pressed.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(seconds, press)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        return time.perf_counter() - pressed[0]
+    finally:
+        timer.cancel()
+
+
+@pytest.mark.parametrize("after_s", [0.05, 0.4, 1.1])
+def test_ctrl_c_ends_a_long_fit(long_rows, after_s):
+    assert interrupted_after(after_s, lambda: tg.identify(long_rows, "abb-irb-120", method="pso")) < SOON_S
+
+
+@pytest.mark.parametrize("after_s", [0.3, 1.0, 2.0])
+def test_ctrl_c_ends_a_long_diagnosis(long_rows, after_s):
+    assert interrupted_after(after_s, lambda: tg.diagnose(long_rows, "abb-irb-120")) < SOON_S
+
+
+def test_what_is_done_is_told_step_by_step(cable):
+    steps: list[str] = []
+    tg.identify(cable, "abb-irb-120", progress=steps.append)
+    assert "fitting all rows" in steps and steps.index("placing the sensor") < steps.index("fitting all rows")
+
+
+def test_a_step_that_raises_ends_the_work(cable):
+    def stop(step: str) -> None:
+        raise RuntimeError(step)
+
+    with pytest.raises(RuntimeError):
+        tg.identify(cable, "abb-irb-120", progress=stop)
+
+
+def test_other_threads_go_on_meanwhile(cable):
+    """The interpreter's lock is released while rows are fitted."""
+    beats = []
+    ended = threading.Event()
+
+    def beat() -> None:
+        while not ended.is_set():
+            beats.append(time.perf_counter())
+            time.sleep(0.002)
+
+    beating = threading.Thread(target=beat)
+    beating.start()
+    begun = time.perf_counter()
+    tg.diagnose(cable, "abb-irb-120")
+    took = time.perf_counter() - begun
+    ended.set()
+    beating.join()
+    longest = max(np.diff(beats), default=took)
+    assert longest < max(0.25, 0.5 * took), (longest, took)
+
+
+@pytest.mark.parametrize("threads", [0, 5000])
+def test_a_number_of_threads_that_cannot_be(cable, threads):
+    with pytest.raises(tg.ArgumentError, match="threads"):
+        tg.identify(cable, "abb-irb-120", threads=threads)

@@ -1,0 +1,145 @@
+"""Rows from files, arrays and data frames: one set of checks, whatever they come from."""
+
+import numpy as np
+import pytest
+
+import truegrind as tg
+
+from conftest import DATA
+
+NAMES = [f"q{joint}" for joint in range(1, 7)]
+
+
+def columns() -> dict[str, np.ndarray]:
+    rows = np.genfromtxt(DATA / "irb120-tracker.csv", delimiter=",", names=True)
+    return {name: rows[name] for name in rows.dtype.names}
+
+
+def same(a: tg.Dataset, b: tg.Dataset) -> bool:
+    return np.array_equal(a.q_deg, b.q_deg) and np.array_equal(a.position_mm, b.position_mm)
+
+
+def test_a_file_and_its_bytes_are_the_same():
+    path = DATA / "irb120-tracker.csv"
+    a, b = tg.Dataset.from_csv(path), tg.Dataset.from_csv(path.read_bytes(), name=path.name)
+    assert same(a, b) and a.sha256 == b.sha256 and a.file == b.file == "irb120-tracker.csv"
+    assert a.sensor in ("position", "pose") and len(a) == len(a.q_deg)
+
+
+def test_arrays():
+    table = columns()
+    q = np.stack([table[name] for name in NAMES], axis=1)
+    place = np.stack([table[f"measured_{axis}"] for axis in "xyz"], axis=1)
+    given = tg.Dataset.from_numpy(np.asfortranarray(q), position_mm=place[::-1][::-1])
+    file = tg.Dataset.from_csv(DATA / "irb120-tracker.csv")
+    assert np.array_equal(given.q_deg, file.q_deg) and np.array_equal(given.position_mm, file.position_mm)
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars", "pyarrow", "dict"])
+def test_data_frames(library):
+    table = columns()
+    if library == "dict":
+        frame = table
+    elif library == "pyarrow":
+        frame = pytest.importorskip("pyarrow").table(table)
+    else:
+        frame = pytest.importorskip(library).DataFrame(table)
+    assert same(tg.Dataset.from_dataframe(frame), tg.Dataset.from_csv(DATA / "irb120-tracker.csv"))
+
+
+def test_gaps_and_text_of_a_data_frame():
+    arrow = pytest.importorskip("pyarrow")
+    count = 20
+    table = {name: np.linspace(10, 50, count) + place for place, name in enumerate(NAMES)}
+    table["L"] = np.linspace(300, 700, count)
+    table["temperature"] = [None if row % 3 == 0 else 20.0 + row for row in range(count)]
+    table["session"] = [None if row % 4 == 0 else "morning" for row in range(count)]
+    whole = arrow.table(table)
+    # In pieces, and beginning in the middle of a byte of marks.
+    parts = arrow.concat_tables([whole.slice(0, 7), whole.slice(7, 6), whole.slice(13)])
+    for frame in (whole, parts, whole.to_pandas() if _has("pandas") else whole):
+        rows = tg.Dataset.from_dataframe(frame)
+        assert len(rows) == count and rows.sensor == "cable"
+    table["q3"] = [None if row == 11 else 20.0 for row in range(count)]
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_dataframe(arrow.table(table))
+    assert (raised.value.row, raised.value.column, raised.value.found) == (11, "q3", "an empty cell")
+
+
+def _has(module: str) -> bool:
+    try:
+        __import__(module)
+    except ImportError:
+        return False
+    return True
+
+
+def test_errors_name_the_place():
+    text = b"q1,q2,q3,q4,q5,q6,L\n10,20,30,40,50,60,500\n10,20,30,40,fifty,60,500\n"
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_csv(text, name="poses.csv")
+    error = raised.value
+    assert isinstance(error, tg.TruegrindError) and isinstance(error, ValueError)
+    assert (error.file, error.row, error.column) == ("poses.csv", 3, "q5")
+    assert error.found == "`fifty`" and error.expected == "a finite number"
+    assert str(error).startswith("poses.csv, row 3, column q5: found `fifty`; expected a finite number")
+
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_numpy([[1, 2, 3, 4, 5, 6], [1, 2, np.nan, 4, 5, 6]], length_mm=[400, 500])
+    assert (raised.value.row, raised.value.column, raised.value.file) == (1, "q3", "numpy")
+
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_dataframe({"q1": [1.0], "length": [2.0]})
+    assert raised.value.row is None and "column q2 is missing" in raised.value.expected
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "words"),
+    [
+        (lambda: tg.Dataset.from_numpy(np.zeros((3, 7)), length_mm=np.zeros(3)), tg.ArgumentError, "(N, 6)"),
+        (lambda: tg.Dataset.from_numpy(np.zeros((3, 6)), length_mm=np.zeros(2)), tg.ArgumentError, "one for each row"),
+        (lambda: tg.Dataset.from_numpy(np.zeros((3, 6)), position_mm=np.zeros(3)), tg.ArgumentError, "position_mm"),
+        (lambda: tg.Dataset.from_numpy("abc", length_mm=[1]), tg.ArgumentError, "an array of numbers"),
+        (lambda: tg.Dataset.from_numpy(np.zeros((0, 6)), length_mm=[]), tg.DatasetError, "no rows"),
+        (lambda: tg.Dataset.from_numpy(np.zeros((3, 6))), tg.DatasetError, "no sensor"),
+        (lambda: tg.Dataset.from_dataframe(3), tg.DatasetError, "expected a data frame"),
+        (lambda: tg.Dataset.from_csv("nowhere.csv"), FileNotFoundError, "nowhere.csv"),
+        (lambda: tg.Dataset.from_csv(b"\x00\x01"), tg.DatasetError, "neither a text table"),
+        (lambda: tg.Robot("abb-irb-121"), tg.RobotError, "abb-irb-120"),
+        (lambda: tg.Robot.from_toml("[[robot]]\nnam = 1"), tg.RobotError, "robot.toml:2"),
+        (lambda: tg.Model.load("nowhere.toml"), FileNotFoundError, "nowhere.toml"),
+        (lambda: tg.Model.from_toml("a = 1"), tg.ModelError, "not a truegrind model"),
+        (lambda: tg.Robot("abb-irb-120").forward(np.zeros((2, 5))), tg.ArgumentError, "(2, 5)"),
+        (lambda: tg.Robot("abb-irb-120").forward(np.zeros((2, 2, 6))), tg.ArgumentError, "(2, 2, 6)"),
+        (lambda: tg.Robot("abb-irb-120").inverse(np.zeros(3), np.ones((3, 3))), tg.ArgumentError, "rotation"),
+        (lambda: tg.forward(7, np.zeros(6)), tg.ArgumentError, "a Robot, a Model or an Arm"),
+        (lambda: tg.simulate("robot = 1\n"), tg.RecipeError, "expected a string"),
+        (lambda: tg.plan("abb-irb-120", "cable"), tg.ArgumentError, "outlets_mm"),
+        (lambda: tg.plan("abb-irb-120", "eye"), tg.ArgumentError, "sensor"),
+    ],
+)
+def test_bad_input_is_refused_in_words(call, kind, words):
+    with pytest.raises(kind) as raised:
+        call()
+    assert words in str(raised.value)
+
+
+def test_wrong_units_and_arms_are_named(cable):
+    q, length = cable.q_deg, cable.length_mm
+    with pytest.raises(tg.DatasetError, match="radians") as raised:
+        tg.Dataset.from_numpy(np.radians(q), length_mm=length)
+    assert raised.value.expected == "degrees" and "allow_odd_units" in str(raised.value)
+    with pytest.raises(tg.DatasetError, match="allow_odd_units=True"):
+        tg.identify(tg.Dataset.from_numpy(q, length_mm=length / 25.4), "abb-irb-120")
+    with pytest.raises(tg.FitError):
+        tg.identify(tg.Dataset.from_numpy(q[:5], length_mm=length[:5]), "abb-irb-120")
+
+
+def test_errors_travel_between_processes():
+    import pickle
+
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_csv(b"q1,q2,q3,q4,q5,q6,L\n1,2,3,4,5,,6\n", name="a.csv")
+    again = pickle.loads(pickle.dumps(raised.value))
+    assert type(again) is tg.DatasetError and str(again) == str(raised.value)
+    assert (again.file, again.row, again.column) == ("a.csv", 2, "q6")

@@ -1,0 +1,105 @@
+"""Results as objects: pages for a notebook, files, and the example as it stands."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truegrind as tg
+
+from conftest import DATA, PROGRAMS
+
+
+def test_the_example_runs(capsys):
+    runpy.run_path(str(Path(__file__).resolve().parents[1] / "examples" / "from_rows_to_program.py"))
+    told = capsys.readouterr().out
+    assert "held-out RMSE" in told and "MODULE Grind" in told
+
+
+def test_every_result_has_a_page_and_json(identified, model, cable):
+    results = [
+        tg.Robot("abb-irb-120"),
+        identified,
+        tg.compensate(PROGRAMS / "told.mod", model, allow_doubtful=True),
+        tg.deviation(PROGRAMS / "told.mod", model),
+        tg.plan("abb-irb-120", "position", poses=8, candidates=100, touched_point=[20, 0, 50]),
+    ]
+    for result in results:
+        assert isinstance(json.loads(result.to_json()), dict)
+        page, shown = result.to_html(), result._repr_html_()
+        assert "<html" in page and shown.startswith("<iframe srcdoc=") and '"' not in shown[16:].split('" style')[0]
+        assert type(result).__name__ in repr(result)
+
+
+def test_what_was_found_is_at_hand(identified, model):
+    assert identified.held_out_rmse_mm < identified.held_out_rmse_before_mm
+    assert identified.held_out_max_mm >= identified.held_out_rmse_mm
+    held = identified.held_out
+    assert held["row"].shape == held["before_mm"].shape == held["after_mm"].shape
+    assert np.isclose(np.sqrt(np.mean(held["after_mm"] ** 2)), identified.held_out_rmse_mm)
+    names = {parameter["name"] for parameter in identified.parameters}
+    assert "link2.theta" in names and set(model.order) <= {p["name"] for p in model.parameters} | names
+    assert identified.verdict == model.verdict == identified.model.verdict
+
+
+def test_a_model_goes_to_a_file_and_back(tmp_path, model):
+    path = tmp_path / "arm.toml"
+    model.save(path, allow_doubtful=True)
+    again = tg.Model.load(path)
+    q = np.random.default_rng(0).uniform(-50, 50, (50, 6))
+    for ours, theirs in zip(model.forward(q), again.forward(q)):
+        assert np.abs(ours - theirs).max() < 1e-9
+    assert list(tmp_path.iterdir()) == [path]
+    assert again.hash == model.hash and again.robot == "abb-irb-120"
+
+
+def test_programs_are_never_overwritten(tmp_path, model):
+    program = tmp_path / "told.mod"
+    program.write_bytes((PROGRAMS / "told.mod").read_bytes())
+    done = tg.compensate(program, model, allow_doubtful=True)
+    assert done.changed and sum(done.counts.values()) == len(done.motions)
+    with pytest.raises(tg.ProgramError, match="is the original program"):
+        done.save(program)
+    with pytest.raises(tg.ProgramError, match="is the original program"):
+        done.save(tmp_path)
+    done.save(tmp_path / "real.mod")
+    assert (tmp_path / "real.mod").read_bytes() == done.programs[str(program)]
+    with pytest.raises(tg.ProgramError, match="already compensated with this model"):
+        tg.compensate(tmp_path / "real.mod", model, allow_doubtful=True)
+
+
+def test_what_must_not_be_corrected_is_refused(tmp_path, model):
+    with pytest.raises(tg.ArgumentError, match="nothing"):
+        tg.compensate({}, model, allow_doubtful=True)
+    with pytest.raises(FileNotFoundError):
+        tg.compensate(tmp_path / "nowhere.mod", model, allow_doubtful=True)
+    with pytest.raises(tg.CellError, match="not a cell file"):
+        tg.compensate(PROGRAMS / "told.mod", model, cell="no = such\nkey = 1\n", allow_doubtful=True)
+    with pytest.raises(tg.ArgumentError, match="tolerance_mm"):
+        tg.compensate(PROGRAMS / "told.mod", model, tolerance_mm=-1, allow_doubtful=True)
+
+
+def test_the_correction_helps_the_actual_arm():
+    """The whole way on a simulated arm, judged on the arm itself and not on the model."""
+    made = tg.simulate(DATA / "irb120-cable.toml")
+    found = tg.diagnose(made.dataset, "abb-irb-120")
+    source = PROGRAMS / "told.mod"
+    done = tg.compensate(source, found.model, allow_doubtful=True)
+    off = tg.deviation(done.programs, found.model, intended=source, actual=made.actual).points
+    pairs = [(b, a) for b, a in zip(off["before_norm_mm"], off["after_norm_mm"]) if a is not None]
+    before, after = np.array(pairs).T
+    assert np.mean(after) < 0.5 * np.mean(before)
+
+
+def test_a_track_goes_on_where_it_ended(cable, model):
+    q, length = cable.q_deg, cable.length_mm
+    split = len(q) * 2 // 3
+    parts = [tg.Dataset.from_numpy(q[a:b], length_mm=length[a:b], name=f"part {a}") for a, b in ((0, split), (split, None))]
+    first = tg.track(model, parts[0])
+    both = tg.track(model, parts, state=first.state)
+    whole = tg.track(model, parts)
+    assert both.poses == whole.poses == len(q)
+    assert both.model.to_toml() == whole.model.to_toml()
+    assert "<html" in whole.to_html() and isinstance(whole.alarms, list)

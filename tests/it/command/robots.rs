@@ -1,0 +1,83 @@
+//! Robots of one's own, in and out again.
+
+use std::fs;
+
+use super::{CABLE, folder, truegrind};
+
+const URDF: &str = include_str!("../../../crates/arm/tests/data/tool-turned.urdf");
+const TWO: &str = include_str!("../../../crates/arm/tests/data/two-arms.urdf");
+
+#[test]
+fn what_is_understood_of_a_file_is_told_and_goes_to_a_robot_file() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("arm.urdf"), URDF).unwrap();
+    fs::write(at.join("cell.urdf"), TWO).unwrap();
+    let (code, out, err) =
+        truegrind(at, &["robots", "--check", "arm.urdf", "-o", "arm.toml", "--html", "page.html"]);
+    assert_eq!(code, 0, "{err}");
+    for words in
+        ["zero pose: all joints at 0°", "(394.000, 0.000, 640.000) mm", "J4 +x", "Compare zero pose and axes"]
+    {
+        assert!(out.contains(words), "{words}: {out}");
+    }
+    let page = fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("the picture of the manual?"));
+    // The file and the robot file that was written of it are one robot to every verb.
+    let (_, ours, _) = truegrind(at, &["robots", "arm.toml"]);
+    let (_, theirs, _) = truegrind(at, &["robots", "arm.urdf"]);
+    assert_eq!(ours, theirs);
+
+    let (code, _, err) = truegrind(at, &["robots", "--check", "cell.urdf"]);
+    assert!(code == 2 && err.contains("2 arms of six joints"), "{err}");
+    let (code, _, err) = truegrind(
+        at,
+        &[
+            "robots",
+            "--check",
+            "cell.urdf",
+            "--base",
+            "left_base_link",
+            "--tip",
+            "left_tool0",
+            "-o",
+            "left.toml",
+        ],
+    );
+    assert_eq!(code, 0, "{err}");
+    let (code, _, err) = truegrind(at, &["robots", "--check", "arm.urdf", "-o", "arm.csv"]);
+    assert!(code == 2 && err.contains("ends in .toml"), "{err}");
+    let (code, _, err) = truegrind(at, &["identify", "none.csv", "--robot", "arm.step"]);
+    assert!(code == 2 && err.contains("arm.step"), "{err}");
+}
+
+/// What is exported is judged by itself: a model with effects is not its links.
+#[test]
+fn what_is_exported_says_its_own_error() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), CABLE).unwrap();
+    for (verb, model) in [("identify", "links.toml"), ("diagnose", "whole.toml")] {
+        let (code, _, err) =
+            truegrind(at, &[verb, "poses.csv", "--robot", "abb-irb-120", "-o", model, "--allow-doubtful"]);
+        assert!(code < 2, "{err}");
+    }
+    let export = |model: &str, more: &[&str]| truegrind(at, &[&["export", model, "--to"], more].concat());
+    let (code, out, err) = export("links.toml", &["urdf", "-o", "-"]);
+    assert!(code == 0 && out.contains("<!-- held-out error of these links: 0."), "{out}{err}");
+    let (code, out, err) = export("whole.toml", &["dh-csv", "-o", "-"]);
+    assert!(code == 1 && out.contains("# held-out error of these links alone: not evaluated"), "{out}{err}");
+    assert!(out.contains("# effects beyond rigid links are left out: joint-compliance"), "{out}");
+    let (code, out, err) = export("whole.toml", &["mdh-csv", "-o", "-", "--data", "poses.csv"]);
+    assert!(
+        code == 1 && out.contains("which the model was fitted to, so that this is no held-out error"),
+        "{out}{err}"
+    );
+    // And back in again.
+    let (code, _, err) = export("links.toml", &["urdf", "-o", "links.urdf"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = truegrind(at, &["robots", "--check", "links.urdf"]);
+    assert!(code == 0 && out.contains("zero pose"), "{out}{err}");
+    let (code, _, err) = export("nominal", &["urdf", "-o", "-"]);
+    assert!(code == 2 && err.contains("expected a model file"), "{err}");
+}
