@@ -9,9 +9,10 @@ use truegrind::calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
+use truegrind::math::work::tell as tell_step;
 use truegrind::report::diagnosis as view;
 
-use super::computation::{Common, on_threads};
+use super::computation::{Common, watching};
 use super::ending::Ending;
 use super::files::Batch;
 use super::identify::{DataArguments, read, write_model};
@@ -77,10 +78,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .iter()
         .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
-    let found = on_threads(arguments.common.threads, || {
-        let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| work.tell(step))?;
+    let found = watching(arguments.common.threads, &work, || {
+        let mut found = diagnosed(&dataset, &name, &robot.model, &options, &|step| tell_step(step))?;
         for other in &others {
-            work.tell(&format!("judging on {}", other.file));
+            tell_step(&format!("judging on {}", other.file));
             let frames = starting_frames(other, &robot.model, &options.tolerance, true)?;
             let models = [&robot.model, &found.geometric.model, &found.extended.model];
             let [nominal, geometric, extended] = models;

@@ -21,7 +21,7 @@ use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
-use super::computation::{Common, on_threads};
+use super::computation::{Common, on_threads, watching};
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
@@ -136,7 +136,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
     let found =
-        on_threads(arguments.common.threads, || identified(&dataset, &name, &robot.model, &options))??;
+        watching(arguments.common.threads, &work, || identified(&dataset, &name, &robot.model, &options))??;
     drop(work);
     for note in &dataset.notes {
         tell(format_args!("note: {note}"));
