@@ -5,7 +5,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use truegrind::{Condition, Inverse, InverseError, Joints, Model, Pose};
 
-use crate::arrays::{self, Numbers, joints, rows, shaped};
+use crate::arrays::{self, Numbers, Tuple, joints, rows, shaped};
 use crate::errors::{Kind, Refusal};
 use crate::model::PyModel;
 use crate::robot::{PyArm, PyRobot};
@@ -87,7 +87,7 @@ pub(crate) fn forward<'py>(
     let (position, rotation) = arrays::forward(py, acting.arm, &condition, q_deg)?;
     let position = shaped(py, position.into_any(), one)?;
     let rotation = shaped(py, rotation.into_any(), one)?;
-    arrays::named(py, "Poses", (position, rotation))
+    arrays::named(py, Tuple::Poses, (position, rotation))
 }
 
 /// Joints that reach poses of the flange, as the tuple `Solutions`.
@@ -141,7 +141,7 @@ pub(crate) fn inverse<'py>(
         solved.iter().map(|found| found.as_ref().err().map(ToString::to_string)).collect();
     debug_assert_eq!(q_deg.shape()[0], count);
     let (q_deg, reached) = (shaped(py, q_deg.into_any(), one)?, shaped(py, reached.into_any(), one)?);
-    arrays::named(py, "Solutions", (q_deg, reached, if one { None } else { Some(why) }))
+    arrays::named(py, Tuple::Solutions, (q_deg, reached, if one { None } else { Some(why) }))
 }
 
 /// Targets one after the other: each begins at the joints of the last that was reached.

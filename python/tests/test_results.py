@@ -81,16 +81,28 @@ def test_what_must_not_be_corrected_is_refused(tmp_path, model):
         tg.compensate(PROGRAMS / "told.mod", model, tolerance_mm=-1, allow_doubtful=True)
 
 
-def test_the_correction_helps_the_actual_arm():
-    """The whole way on a simulated arm, judged on the arm itself and not on the model."""
+def after_best_motion(found: np.ndarray, wanted: np.ndarray) -> float:
+    """What is left (mm RMS) after the rigid motion that fits best: no sensor whose place is fitted sees the arm's base."""
+    f, w = found - found.mean(axis=0), wanted - wanted.mean(axis=0)
+    u, _, v = np.linalg.svd(f.T @ w)
+    turn = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ v))]) @ v
+    return float(np.sqrt(np.mean(np.sum((f @ turn - w) ** 2, axis=1))))
+
+
+def test_the_whole_way_is_judged_on_the_actual_arm():
+    """On a simulated arm, and not on the model that was found of it."""
     made = tg.simulate(DATA / "irb120-cable.toml")
     found = tg.diagnose(made.dataset, "abb-irb-120")
+    q = made.dataset.q_deg
+    actual = made.actual.forward(q).position_mm
+    nominal = after_best_motion(tg.Robot("abb-irb-120").forward(q).position_mm, actual)
+    assert after_best_motion(found.model.forward(q).position_mm, actual) < 0.5 * nominal
     source = PROGRAMS / "told.mod"
     done = tg.compensate(source, found.model, allow_doubtful=True)
     off = tg.deviation(done.programs, found.model, intended=source, actual=made.actual).points
     pairs = [(b, a) for b, a in zip(off["before_norm_mm"], off["after_norm_mm"]) if a is not None]
     before, after = np.array(pairs).T
-    assert np.mean(after) < 0.5 * np.mean(before)
+    assert len(pairs) > 3 and np.mean(after) < np.mean(before)
 
 
 def test_a_track_goes_on_where_it_ended(cable, model):

@@ -13,9 +13,10 @@ use truegrind::calibration::identification::fit::summary_on;
 use truegrind::calibration::identification::identify::observe;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::measurement::dataset::Dataset;
+use truegrind::math::work::tell as tell_step;
 use truegrind::report::diagnosis as view;
 
-use super::computation::{Common, on_threads};
+use super::computation::{Common, watching};
 use super::ending::Ending;
 use super::files::Batch;
 use super::identify::{DataArguments, read, write_model};
@@ -86,12 +87,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .iter()
         .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
-    let found = on_threads(arguments.common.threads, || {
+    let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, true)?;
         let stated = arguments.stated.frames(&dataset)?;
         let (tolerance, frames) = arguments.held.held(&options.tolerance, stated.as_ref(), frames)?;
         let held = Options { tolerance, ..options.clone() };
-        let mut found = diagnose(&dataset, &name, &robot.model, &frames, &held, &|step| work.tell(step))?;
+        let mut found = diagnose(&dataset, &name, &robot.model, &frames, &held, &|step| tell_step(step))?;
         if let Some(stated) = &stated {
             let raw = raw_error(&dataset, &robot.model, stated);
             found.diagnosis.notes.push(format!(
@@ -100,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             ));
         }
         for other in &others {
-            work.tell(&format!("judging on {}", other.file));
+            tell_step(&format!("judging on {}", other.file));
             let frames = starting_frames(other, &robot.model, &options.tolerance, true)?;
             let models = [&robot.model, &found.geometric.model, &found.extended.model];
             let [nominal, geometric, extended] = models;

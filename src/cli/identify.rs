@@ -22,7 +22,7 @@ use truegrind::report::format;
 use truegrind::report::{identification as view, study as study_view};
 use truegrind::robots::Robot;
 
-use super::computation::{Common, on_threads};
+use super::computation::{Common, on_threads, watching};
 use super::ending::Ending;
 use super::files::{self, Batch};
 use super::inputs;
@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments)? };
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
-    let found = on_threads(arguments.common.threads, || {
+    let found = watching(arguments.common.threads, &work, || {
         let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
         let stated = options.stated_frames.as_ref();
         let (tolerance, frames) = arguments.held.held(&options.tolerance, stated, frames)?;

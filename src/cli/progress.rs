@@ -28,6 +28,12 @@ impl Work {
     pub(super) fn tell(&self, message: &str) {
         self.0.set_message(visible::line(message).into_owned());
     }
+
+    /// Shows what it is told, from whatever thread.
+    pub(super) fn listener(&self) -> impl Fn(&str) + Send + Sync + 'static {
+        let bar = self.0.clone();
+        move |message| bar.set_message(visible::line(message).into_owned())
+    }
 }
 
 impl Drop for Work {
