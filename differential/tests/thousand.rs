@@ -29,8 +29,8 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// shift of G92 under radius compensation; a whole circle with play; a joint that seemed to turn near the end of a line; a
 /// tool taught at poses whose least squares came out wrong; joints with play that turn where the wrist goes by itself, or on
 /// straight pieces and not on their arc; targets put in on a way that the arm cannot go; an arc whose path has a corner
-/// where a play is taken up.
-const ONCE_WRONG: [(Dialect, u64); 28] = [
+/// where a play is taken up; a load that is another by a computed call.
+const ONCE_WRONG: [(Dialect, u64); 29] = [
     (Dialect::Fanuc, 1_001_909),
     (Dialect::Fanuc, 1_001_375),
     (Dialect::Fanuc, 1_018_769),
@@ -59,6 +59,7 @@ const ONCE_WRONG: [(Dialect, u64); 28] = [
     (Dialect::Rapid, 3_004_043),
     (Dialect::Rapid, 5_004_543),
     (Dialect::Rapid, 5_005_503),
+    (Dialect::Rapid, 6_008_145),
 ];
 
 #[test]

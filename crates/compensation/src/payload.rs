@@ -193,10 +193,17 @@ impl<'t, 's> Walk<'t, 's> {
 
     /// What is held where each unit begins: nothing at the start of main; elsewhere what all calls agree on.
     fn entries(&self) -> Vec<Grip> {
-        let units = &self.task.symbols.units;
+        let symbols = &self.task.symbols;
+        let units = &symbols.units;
         let begins = |unit: usize| units[unit].routine.is_none() || self.is_main(unit);
         let mut entries: Vec<Option<Grip>> =
             (0..units.len()).map(|unit| begins(unit).then_some(Grip::Empty)).collect();
+        // What a computed name calls, and what interrupts, begins with whatever is held then.
+        let late = symbols.late.iter().flat_map(|late| late.iter().copied());
+        let interrupting = (0..).zip(&symbols.interrupts).filter(|(_, interrupts)| **interrupts);
+        for routine in late.chain(interrupting.map(|(routine, _)| routine)) {
+            entries[symbols.routines[routine as usize].unit as usize] = Some(Grip::Unknown);
+        }
         for _ in 0..=units.len() {
             let mut changed = false;
             for (callee, state, caller) in &self.calls {
@@ -400,6 +407,13 @@ impl<'t, 's> Walk<'t, 's> {
             [] => return Some(state),
             [routine] => routine,
             // One of several.
+            ref several if !self.silent => {
+                for routine in several {
+                    let callee = self.task.symbols.routines[*routine as usize].unit as usize;
+                    self.calls.push((callee, state, self.unit));
+                }
+                return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state });
+            }
             _ => return Some(if self.may_grip(unit, node) { Some(Grip::Unknown) } else { state }),
         };
         let callee = self.task.symbols.units.iter().position(|unit| unit.routine == Some(routine));

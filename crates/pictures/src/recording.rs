@@ -75,7 +75,7 @@ impl Recording {
     /// # Errors
     /// [`VisualError::Encoding`]; not known to happen.
     pub fn rrd(&self) -> Result<Vec<u8>, VisualError> {
-        Encoder::encode(self.messages.iter().map(Ok)).map_err(encoding)
+        encoded(&self.messages)
     }
 
     /// Sends the recording to a viewer that is running at `url`, such as [`VIEWER`].
@@ -136,6 +136,18 @@ impl Recording {
 /// Rerun's longer messages carry advice of their own.
 fn first_line(message: &str) -> String {
     message.lines().next().unwrap_or_default().trim().to_owned()
+}
+
+/// Without the index that Rerun writes behind the messages: its order is that of a hash, and another in every run. A viewer
+/// makes its own.
+fn encoded(messages: &[LogMsg]) -> Result<Vec<u8>, VisualError> {
+    let mut encoder = Encoder::local().map_err(encoding)?;
+    encoder.do_not_emit_footer();
+    for message in messages {
+        encoder.append(message).map_err(encoding)?;
+    }
+    encoder.finish().map_err(encoding)?;
+    encoder.into_inner().map_err(encoding)
 }
 
 fn encoding(error: impl std::fmt::Display) -> VisualError {
@@ -215,7 +227,7 @@ impl Store {
             let arrow = |c: &Chunk| Ok(LogMsg::ArrowMsg(store.clone(), c.to_arrow_msg().map_err(encoding)?));
             self.chunks.iter().map(arrow).collect::<Result<Vec<_>, _>>()
         };
-        let bytes = Encoder::encode(said(&name("content"))?.iter().map(Ok)).map_err(encoding)?;
+        let bytes = encoded(&said(&name("content"))?)?;
         let digest: String = Sha256::digest(&bytes).iter().take(16).map(|b| format!("{b:02x}")).collect();
         let store_id = name(&digest);
         let source = StoreSource::Other("truegrind".to_owned());

@@ -346,7 +346,15 @@ impl Comparison<'_> {
         let at = under(old.load, now.behind);
         let tip = tip(old);
         let off = |q: &[f64; 6], at: &Circumstance| {
-            difference(&(arm.actual_forward(q, at) * tip), &(intended * tip))
+            let [there, meant] = [arm.actual_forward(q, at) * tip, intended * tip];
+            let (mm, rad) = difference(&there, &meant);
+            match now.along.filter(|_| index + 1 < old.goals.len()) {
+                Some(along) => {
+                    let off = there.translation.vector - meant.translation.vector;
+                    ((off - along.into_inner() * along.dot(&off)).norm(), rad)
+                }
+                None => (mm, rad),
+            }
         };
         let (mm, rad) = off(joints, &at);
         let stated = Stated::of(row, arm, index + 1 < old.goals.len());

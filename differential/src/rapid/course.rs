@@ -28,6 +28,9 @@ pub struct Point {
     pub behind: [f64; 6],
     /// On which flanks the links lie, in words.
     pub flanks: String,
+    /// The direction in which the tool passes a point on its way, where it is held and that is followed: early or late is not
+    /// beside the path.
+    pub along: Option<Unit<Vector3<f64>>>,
     /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
     pub adrift: bool,
 }
@@ -74,7 +77,7 @@ impl<'a> Course<'a> {
                 }
             };
             let (behind, flanks, adrift) = ([0.0; 6], String::new(), self.adrift);
-            out.push(Point { flange, joints, behind, flanks, adrift });
+            out.push(Point { flange, joints, behind, flanks, along: None, adrift });
         }
         if !motion.monitored && motion.way != Way::Joint && !motion.wrist {
             self.along(motion, &mut out);
@@ -146,13 +149,18 @@ impl<'a> Course<'a> {
         };
         let mut passed = false;
         let passing = self.passing(motion, points);
+        let tip = |q: &[f64; 6]| tool_in_object(motion, &self.arm.nominal_forward(q)).translation.vector;
+        let mut before = self.joints;
         for (share, q) in way.iter().chain([&(1.0, end)]) {
             self.links.go(q);
             // The circle point, which is passed on the way; the tool need not be turned there as it is told.
             if count > 1 && !passed && *share >= passing {
                 passed = true;
                 (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
+                let gone = before.filter(|_| motion.tool.1).map(|before| tip(q) - tip(&before));
+                points[0].along = gone.and_then(|gone| Unit::try_new(gone, 1e-6));
             }
+            before = Some(*q);
         }
         let last = &mut points[count - 1];
         (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));

@@ -190,6 +190,21 @@ impl State {
             let found = format!("{} for {} outlets", self.zeros_mm.len(), self.outlets_mm.len());
             return wrong("zeros_mm", found, "one for each outlet");
         }
+        let poses = self.history.len();
+        for (key, before, fits, expected) in [
+            ("now.before", self.now.before, self.now.before == poses, "the poses of the history"),
+            (
+                "middle.before",
+                self.middle.before,
+                self.middle.before <= poses,
+                "no more than the poses of the history",
+            ),
+            ("reference.before", self.reference.before, self.reference.before == 0, "0"),
+        ] {
+            if !fits {
+                return wrong(key, format!("{before} with {poses} poses"), expected);
+            }
+        }
         let numbers = match self.sensor.as_str() {
             "cable" => 1,
             "position" => 3,

@@ -405,15 +405,17 @@ fn every_key_of_the_state_is_kept_or_refused_and_no_number_is_nan() {
     let dataset = with_jump(40, zero_of_joint_3());
     let rows = |n: usize| dataset.subset(&(0..n).collect::<Vec<_>>());
     // A change that was noticed, and few poses, so that there are not too many keys.
-    let options = Options { window: 3, history: 4, sigma_mm: Some(0.02), ..Options::default() };
+    let options = Options { window: 10, history: 24, sigma_mm: Some(0.02), ..Options::default() };
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &options).unwrap();
-    tracker.take(&rows(60)).unwrap();
+    let noticed = (41..110).find(|n| !tracker.take(&rows(*n)).unwrap().is_empty()).unwrap() + 6;
+    tracker.take(&rows(noticed)).unwrap();
     let state = tracker.state().to_toml().unwrap();
     assert!(state.contains("[[alarms]]") && state.contains("[[history]]"), "{state}");
+    let state = state.replace("alternatives = []", "alternatives = [\"link3.d\"]");
     let next = |text: &str| -> Result<String, String> {
         let state = State::from_toml(text).map_err(|error| error.to_string())?;
         let mut track = Tracker::resume(model(), state, "state.toml").map_err(|error| error.to_string())?;
-        let alarms = track.take(&rows(61)).map_err(|error| error.to_string())?;
+        let alarms = track.take(&rows(noticed + 1)).map_err(|error| error.to_string())?;
         let after = track.model().to_toml().map_err(|error| error.to_string())?;
         Ok(format!("{alarms:?}{after}{}", track.state().to_toml().map_err(|error| error.to_string())?))
     };

@@ -102,3 +102,16 @@ fn a_grip_changes_in_functions_by_names_in_traps_and_from_cycle_to_cycle() {
     let load0 = "PROC main()\n MoveL TARGET,v100,fine,t\\TLoad:=load0;\nENDPROC\n";
     assert_eq!(masses(load0), [Some(2.0)]);
 }
+
+/// The class: a call by which a routine begins with something else in the gripper than by the calls that name it.
+#[test]
+fn what_a_computed_name_or_an_interrupt_begins_with_is_not_known() {
+    let body = "PROC main()\n %\"go\"%;\n GripLoad part;\n go;\nENDPROC\nPROC go()\n m;\nENDPROC\n";
+    let (_, loads) = grips(body);
+    assert_eq!((loads.grips.as_slice(), loads.unknown()), (&[Grip::Unknown][..], 1));
+    let direct = body.replace(" %\"go\"%;\n", "");
+    assert_eq!(masses(&direct), [Some(5.0)]);
+    let late = body.replace("%\"go\"%", "CallByVar \"g\",1");
+    let (_, loads) = grips(&late.replace("go", "g1"));
+    assert_eq!(loads.unknown(), 1, "{:?}", loads.grips);
+}

@@ -75,6 +75,7 @@ fn listing(trees: &[RapidTree<'_>], symbols: &Symbols) -> (Listing, Vec<Statemen
     );
     lister.put_literals(&literals);
     lister.settle_modal();
+    lister.settle_placed();
     lister.other_uses();
     lister.declared_tools();
     (lister.listing, lister.statements)
@@ -247,18 +248,6 @@ impl<'a, 's> Lister<'a, 's> {
                 }
             }
         }
-        let begins_anywhere = |unit: &u32| {
-            let Some(routine) = units[*unit as usize].routine else { return true };
-            let called = |(from, site): &(u32, CallSite)| site.routine == routine && from != unit;
-            self.mains.contains(&routine)
-                || self.symbols.interrupts[routine as usize]
-                || !self.sites.iter().any(called)
-        };
-        if self.placed || self.placed_at_entry.iter().any(begins_anywhere) {
-            for motion in &mut self.listing.motions {
-                motion.left.get_or_insert(Reason::BeforeDisplacement);
-            }
-        }
     }
 
     /// The values of the targets that stand in the instructions as numbers.
@@ -284,6 +273,23 @@ impl<'a, 's> Lister<'a, 's> {
     }
 
     // ---- switches ----
+
+    /// Leaves the motions behind which a displacement may be counted, where that may be any.
+    fn settle_placed(&mut self) {
+        let units = &self.symbols.units;
+        let begins_anywhere = |unit: &u32| {
+            let Some(routine) = units[*unit as usize].routine else { return true };
+            let called = |(from, site): &(u32, CallSite)| site.routine == routine && from != unit;
+            self.mains.contains(&routine)
+                || self.symbols.interrupts[routine as usize]
+                || !self.sites.iter().any(called)
+        };
+        if self.placed || self.placed_at_entry.iter().any(begins_anywhere) {
+            for motion in &mut self.listing.motions {
+                motion.left.get_or_insert(Reason::BeforeDisplacement);
+            }
+        }
+    }
 
     /// Replaces "as at the entry" by what the entries are.
     fn settle_modal(&mut self) {

@@ -152,8 +152,9 @@ fn a_displacement_from_where_the_robot_stands_keeps_the_motions_of_every_way() {
              PROC main()\n{main}\nENDPROC\n{routines}\nENDMODULE\n"
         );
         let task = Task::read(&[("m.mod", source.as_bytes())]);
-        let before =
-            |motion: &truegrind_programs::motion::Motion| motion.left == Some(Reason::BeforeDisplacement);
+        // Behind a loop that displaces the next cycle is left for that already.
+        let stays = [Some(Reason::BeforeDisplacement), Some(Reason::Displacement)];
+        let before = |motion: &truegrind_programs::motion::Motion| stays.contains(&motion.left);
         task.listing.motions.iter().map(before).collect()
     };
     const GO: &str = "MoveL p,v100,fine,tool0;\n";
