@@ -52,6 +52,11 @@ impl Assessment {
         (self.registered[place].is_none()).then_some(self.cuts[place].shape_sigma_mm)
     }
 
+    /// Whether the shape of a motion's cut is corrected, and its place not.
+    pub(super) fn shape_alone(&self, motion: u32) -> bool {
+        self.place(motion).is_some_and(|place| self.cuts[place].judged == Placement::Shape)
+    }
+
     fn place(&self, motion: u32) -> Option<usize> {
         self.cut_of.get(motion as usize).copied().flatten().map(|place| place as usize)
     }

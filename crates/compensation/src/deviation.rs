@@ -95,7 +95,8 @@ pub struct PathPoint {
     pub before: Option<Deviation>,
     /// Where the arm goes with the rewritten program.
     pub after: Option<Deviation>,
-    /// Predicted standard deviation of the position (mm), from the covariance of the estimate.
+    /// Predicted standard deviation of the position (mm), from the covariance of the estimate; of the shape where that alone is
+    /// corrected.
     pub sigma_mm: Option<f64>,
     /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
     pub shape_sigma_mm: Option<f64>,

@@ -254,7 +254,7 @@ impl<'a> Targets<'a> {
     pub(super) fn plan(&mut self, refused: &BTreeMap<u32, Why>) -> Plan {
         let stays = self.settled(refused);
         let Self { listing, options, arms, mountings, assessment, solved, .. } = self;
-        let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, arms, options });
+        let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, assessment, arms, options });
         plan.placements.clone_from(&assessment.placements);
         plan.cuts.clone_from(&assessment.cuts);
         plan.chance_of_worse = assessment.chance;
@@ -369,6 +369,7 @@ struct Job<'a> {
     /// Motions that stay though their targets could be corrected.
     stays: &'a BTreeMap<u32, Why>,
     mountings: &'a Mountings,
+    assessment: &'a Assessment,
     arms: &'a Arms<'a>,
     options: &'a Options,
 }
@@ -628,7 +629,10 @@ fn work<'a>(
             outcome.after_mm = outcome.before_mm;
             outcome.sigma_mm = Some(to.sigma_mm);
             outcome.shape_sigma_mm = to.shape_sigma_mm;
-            options.points.then(|| path_point(motion, to, &job.mountings.list[to.mounted].real))
+            options.points.then(|| {
+                let real = &job.mountings.list[to.mounted].real;
+                path_point(motion, to, real, job.assessment.shape_alone(index as u32))
+            })
         }
         _ => None,
     };
@@ -742,7 +746,8 @@ fn new_target(target: &MotionTarget, solved: &Solved, motion: &Motion, options: 
     }
 }
 
-fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
+fn path_point(motion: &Motion, solved: &Solved, real: &Mounting, shape_alone: bool) -> PathPoint {
+    let of_shape = solved.shape_sigma_mm.filter(|_| shape_alone);
     let flange = real.flange_for(&solved.meant);
     let base_from_object = real.base_from_object(&flange);
     PathPoint {
@@ -759,7 +764,7 @@ fn path_point(motion: &Motion, solved: &Solved, real: &Mounting) -> PathPoint {
         joints_after: Some(solved.after),
         before: Some(solved.deviation_before),
         after: Some(solved.deviation_after),
-        sigma_mm: Some(solved.sigma_mm),
+        sigma_mm: Some(of_shape.unwrap_or(solved.sigma_mm)),
         shape_sigma_mm: solved.shape_sigma_mm,
         outside: solved.outside,
         status: Status::Changed,

@@ -437,6 +437,16 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             let worst = reports.iter().filter_map(|report| size(report, BEFORE)).reduce(f64::max);
             format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
         }
+        [(report, before, after)]
+            if report.after == After::PredictedRemainder && sigma_rms(report).is_some() =>
+        {
+            let sigma = sigma_rms(report).unwrap_or(0.0);
+            format!(
+                "The largest deviation goes from {before:.3} mm to an expected {:.3} mm (1σ); held-out error of the model {}",
+                after.hypot(sigma),
+                known(report.held_out_mm),
+            )
+        }
         [(report, before, after)] => format!(
             "The largest deviation goes from {before:.3} mm to {after:.*} mm ({}); predicted 1σ {}, held-out error of the \
              model {}",

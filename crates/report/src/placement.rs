@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::table::{Cell, Column, Table};
+use super::table::{Column, Table};
 use truegrind_compensation::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::rewrite::Plan;
 use truegrind_compensation::risk::CutRisk;
@@ -57,7 +57,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             Column::number("off_mm", "before", "mm", 3),
             Column::number("sigma_mm", "1σ", "mm", 3),
             Column::number("worse_percent", "worse", "%", 1),
-            Column::text("fate", ""),
+            Column::text("fate", "Outcome"),
         ],
     );
     let mut order: Vec<&CutRisk> = plan.cuts.iter().collect();
@@ -70,7 +70,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             cut.off_mm.into(),
             cut.sigma_mm.into(),
             (100.0 * cut.chance).into(),
-            if cut.left { "left as it is".into() } else { Cell::Missing },
+            if cut.left { "left as it is".into() } else { "corrected".into() },
         ]);
     }
     let more = order.len().saturating_sub(NAMED);
@@ -114,9 +114,12 @@ pub fn chance(plan: &Plan) -> Option<String> {
         p => format!("{p:.1} %"),
     };
     Some(format!(
-        "the probability that the corrected cuts are farther off than the cuts as they were is {}, of any one of them at most {}",
+        "the probability that the corrected cuts are farther off than the cuts as they were is {}, of any one of them {}",
         of(percent),
-        of(100.0 * largest)
+        match of(100.0 * largest) {
+            small if small.starts_with("under") => small,
+            other => format!("at most {other}"),
+        }
     ))
 }
 
