@@ -1,6 +1,11 @@
 //! Identification of 28 parameters on cable data: 1,042 rows to 1e-8 of the optimal cost, and a thousand times as many.
 //!
 //! `cargo bench --no-default-features --bench identification`; one thread, so wall time is CPU time.
+//!
+//! A row of a pass costs 620 operations for residual and 28 slopes (chain 354, moments 84, slopes 144), none of them fused, and
+//! 29 · 30 = 870 for its products with each other, two to an instruction; 112 bytes in, 232 through the second-level cache.
+//! At 2.9 GHz with two 512-bit units that is 13 + 9.5 ns: no pass over 1,042 rows takes less than 24 µs there.
+//! Reached on a shared Intel Xeon at 2.9 GHz: 62 µs, 39 % of that bound; the products reach 65 of 92 G/s, the rows 14 of 46.
 
 // A benchmark says what it measured.
 #![allow(clippy::print_stderr)]

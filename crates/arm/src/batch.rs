@@ -20,7 +20,9 @@ pub struct JointColumns {
 
 impl FromIterator<Joints> for JointColumns {
     fn from_iter<I: IntoIterator<Item = Joints>>(rows: I) -> Self {
-        let mut out = Self::default();
+        let rows = rows.into_iter();
+        let least = rows.size_hint().0;
+        let mut out = Self { angle_rad: std::array::from_fn(|_| Vec::with_capacity(least)) };
         for row in rows {
             for (column, angle) in out.angle_rad.iter_mut().zip(row.iter()) {
                 column.push(*angle);

@@ -17,6 +17,8 @@ mod foreign;
 pub mod sheet;
 pub mod validation;
 
+use std::sync::OnceLock;
+
 use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
 
@@ -60,13 +62,23 @@ impl Robot {
 
 /// Names of the arms that ship, in alphabetical order.
 pub fn catalogue() -> Vec<String> {
-    let mut names: Vec<String> = FILES
-        .iter()
-        .filter_map(|(file, text)| read(text, file).ok())
-        .flat_map(|content| content.robot.into_iter().map(|sheet| sheet.name))
+    let mut names: Vec<String> = (0..FILES.len())
+        .filter_map(|file| shipped(file).ok())
+        .flat_map(|content| content.robot.iter().map(|sheet| sheet.name.clone()))
         .collect();
     names.sort();
     names
+}
+
+/// What file `index` of the catalogue says; each is read once, by whoever asks first.
+fn shipped(index: usize) -> Result<&'static RobotFile, RobotError> {
+    static READ: [OnceLock<RobotFile>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
+    if let Some(content) = READ[index].get() {
+        return Ok(content);
+    }
+    let (file, text) = FILES[index];
+    let content = read(text, file)?;
+    Ok(READ[index].get_or_init(|| content))
 }
 
 /// An arm of the catalogue. Capitals do not matter.
@@ -80,10 +92,10 @@ pub fn catalogue() -> Vec<String> {
 /// # Ok::<(), robots::RobotError>(())
 /// ```
 pub fn load(name: &str) -> Result<Robot, RobotError> {
-    for (file, text) in FILES {
-        let sheets = read(text, file)?.robot;
-        if let Some(sheet) = sheets.into_iter().find(|sheet| sheet.name.eq_ignore_ascii_case(name.trim())) {
-            return Robot::new(sheet, file);
+    for (index, (file, _)) in FILES.iter().enumerate() {
+        let mut sheets = shipped(index)?.robot.iter();
+        if let Some(sheet) = sheets.find(|sheet| sheet.name.eq_ignore_ascii_case(name.trim())) {
+            return Robot::new(sheet.clone(), file);
         }
     }
     Err(RobotError::Unknown { name: name.to_owned(), known: catalogue().join(", ") })
@@ -112,14 +124,14 @@ pub fn agrees(name: &str, nominal: &Model) -> Result<(), NominalMismatch> {
         |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     let wanted = plain(name);
     let mut different = None;
-    for (file, text) in FILES {
-        let Ok(content) = read(text, file) else { continue };
-        for sheet in content.robot {
+    for (index, (file, _)) in FILES.iter().enumerate() {
+        let Ok(content) = shipped(index) else { continue };
+        for sheet in &content.robot {
             // The maker's own designation is as good as the catalogue's name.
             if wanted.is_empty() || (plain(&sheet.name) != wanted && plain(&sheet.model) != wanted) {
                 continue;
             }
-            let Ok(known) = Robot::new(sheet, file) else { continue };
+            let Ok(known) = Robot::new(sheet.clone(), file) else { continue };
             match validation::difference(nominal, &known.model) {
                 None => return Ok(()),
                 Some(place) => different = Some(place),

@@ -192,28 +192,48 @@ pub fn number(input: Bytes<'_>) -> Lexed<'_> {
             return prefixed;
         }
     }
-    let digits = |mut at: usize| {
-        while input.get(at).is_some_and(u8::is_ascii_digit) {
-            at += 1;
-        }
-        at
-    };
-    let whole = digits(0);
+    let whole = digits(input, 0);
     let mut end = whole;
     if input.get(end) == Some(&b'.') {
-        end = digits(end + 1);
+        end = digits(input, end + 1);
     }
     if end - usize::from(end > whole) == 0 {
         return Err(nom::Err::Error(()));
     }
     if matches!(input.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(input.get(end + 1), Some(b'+' | b'-')));
-        let exponent = digits(end + 1 + sign);
+        let exponent = digits(input, end + 1 + sign);
         if exponent > end + 1 + sign {
             end = exponent;
         }
     }
     take(end).parse(input)
+}
+
+/// Where the digits from `at` end. Eight bytes at a time: the lengths of numbers cannot be foreseen, and each loop over single
+/// digits would end with a branch that was guessed wrongly.
+#[inline]
+fn digits(input: Bytes<'_>, mut at: usize) -> usize {
+    while let Some(eight) = input.get(at..).and_then(<[u8]>::first_chunk::<8>) {
+        let others = no_digits(u64::from_le_bytes(*eight));
+        at += others.trailing_zeros() as usize / 8;
+        if others != 0 {
+            return at;
+        }
+    }
+    while input.get(at).is_some_and(u8::is_ascii_digit) {
+        at += 1;
+    }
+    at
+}
+
+/// The highest bit of each of eight bytes that is no digit.
+#[inline]
+fn no_digits(eight: u64) -> u64 {
+    const LOW: u64 = 0x7F7F_7F7F_7F7F_7F7F;
+    // Digits become 0 to 9, and with 0x76 more the highest bit is set from 10 on.
+    let value = eight ^ 0x3030_3030_3030_3030;
+    (((value & LOW) + 0x7676_7676_7676_7676) | value) & !LOW
 }
 
 /// An identifier or reserved word. Bytes from 0x80 belong to it: Latin-1 letters, and the pieces of letters of other

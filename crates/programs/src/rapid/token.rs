@@ -9,8 +9,16 @@ macro_rules! tokens {
         pub enum Token { $($plain,)* $($keyword,)* }
 
         /// The reserved word that these bytes spell in any case.
+        #[inline]
         pub fn keyword(text: &[u8]) -> Option<Token> {
-            let mut folded = [0_u8; 9];
+            /// For each first letter the lengths of the words that begin with it, as bits: most names are none by this
+            /// alone.
+            const LENGTHS: [u16; 32] = lengths(&[$($text,)*]);
+            let first = text.first().filter(|byte| byte.is_ascii_alphabetic())?;
+            if text.len() > LONGEST || (LENGTHS[usize::from(first & 31)] >> text.len()) & 1 == 0 {
+                return None;
+            }
+            let mut folded = [0_u8; LONGEST];
             let folded = folded.get_mut(..text.len())?;
             folded.copy_from_slice(text);
             folded.make_ascii_uppercase();
@@ -20,6 +28,19 @@ macro_rules! tokens {
             }
         }
     };
+}
+
+/// Bytes of the longest reserved word.
+const LONGEST: usize = 9;
+
+const fn lengths(words: &[&[u8]]) -> [u16; 32] {
+    let mut out = [0; 32];
+    let mut k = 0;
+    while k < words.len() {
+        out[(words[k][0] & 31) as usize] |= 1 << words[k].len();
+        k += 1;
+    }
+    out
 }
 
 tokens! {

@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 use truegrind_programs::motion::OpaqueReason;
-use truegrind_programs::rapid::lexer::lex;
+use truegrind_programs::rapid::lexer::{self, lex};
 use truegrind_programs::rapid::parser::parse;
+use truegrind_programs::rapid::token::keyword;
 
 pub(crate) const PROGRAM: &str = r#"%%%
   VERSION:1
@@ -194,4 +195,53 @@ fn a_large_file_is_split_into_the_same_tokens_on_any_number_of_threads() {
     for threads in [2, 3, 8] {
         assert!(told(threads) == one, "{threads} threads");
     }
+}
+
+/// Digits are read eight at a time: a number ends where it did byte by byte, whatever its length, whatever byte follows, and
+/// wherever the text ends.
+#[test]
+fn a_number_ends_at_its_last_digit_whatever_follows() {
+    for length in 1..20 {
+        let digits: Vec<u8> = (0..length).map(|k| b'0' + (7 * k + 1) as u8 % 10).collect();
+        assert_eq!(lexer::number(&digits).unwrap().1, digits);
+        for after in 0..=255_u8 {
+            if after.is_ascii_digit() || matches!(after, b'.' | b'e' | b'E') {
+                continue;
+            }
+            for tail in [&b""[..], b"1", b"123456789"] {
+                let text = [&digits[..], &[after], tail].concat();
+                let (rest, number) = lexer::number(&text).unwrap();
+                assert_eq!((number, rest), (&digits[..], &text[length..]), "{length} digits before {after}");
+            }
+        }
+        let text = [&digits[..], b".", &digits, b"E-", &digits, b","].concat();
+        assert_eq!(lexer::number(&text).unwrap().0, b",");
+    }
+}
+
+/// A name is a reserved word by its letters alone: in any case, and not where one letter more or less, or another, is there.
+#[test]
+fn reserved_words_are_told_from_names_that_are_nearly_theirs() {
+    let words = [
+        "ENDMODULE",
+        "SYSMODULE",
+        "TO",
+        "If",
+        "movel",
+        "VIEWONLY",
+        "v100",
+        "TryNext",
+        "xor",
+        "ALIAS",
+        "with",
+    ];
+    let reserved = |text: &[u8]| keyword(text).is_some();
+    for word in words {
+        let known = !matches!(word, "movel" | "v100");
+        assert_eq!(reserved(word.as_bytes()), known, "{word}");
+        assert_eq!(reserved(word.to_lowercase().as_bytes()), known, "{word}");
+        let longer = format!("{word}_");
+        assert!(!reserved(longer.as_bytes()) && !reserved(&[&[0xDC], word.as_bytes()].concat()), "{word}");
+    }
+    assert!(!reserved(b"") && !reserved(b"ENDMODUL") && !reserved(b"@ND") && !reserved(b"_R"));
 }
