@@ -13,7 +13,7 @@ use truegrind::planning::poses::rows::Noise;
 use truegrind::planning::poses::schedule::Visits;
 use truegrind::planning::poses::space::Space;
 use truegrind::report::{format, planning, tracking};
-use truegrind::robots::Choice;
+use truegrind::robots::foreign::Choice;
 use truegrind::{
     Alarm, Frames, Pose, PosesOptions, PosesPlan, PosesWanted, Recipe, Robot, Sensor, Simulation,
     TrackOptions, TrackState, Tracker, plan_poses, read_measurements, robots, write_rapid,

@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use truegrind::report::{format, robots as view};
-use truegrind::robots::{Choice, Kind as FileKind, read_any};
+use truegrind::robots::foreign::{Choice, Kind as FileKind, read_any};
 use truegrind::{ArmFile, Condition, Model, Robot, robots};
 
 use crate::arm::{Acting, Stated, acting, forward, inverse};

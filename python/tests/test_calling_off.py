@@ -13,6 +13,11 @@ import truegrind as tg
 SOON_S = 0.2
 
 
+def soon_s() -> float:
+    """0.2 s of a machine of one's own; on one that others work on, as much of it as one's share."""
+    return SOON_S * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
 @pytest.fixture(scope="module")
 def long_rows() -> tg.Dataset:
     """So many rows that each piece of work takes seconds."""
@@ -51,9 +56,9 @@ def ends_soon(seconds: float, work) -> None:
     took = []
     for _ in range(3):
         took.append(interrupted_after(seconds, work))
-        if took[-1] < SOON_S:
+        if took[-1] < soon_s():
             return
-    raise AssertionError(f"ended after {took} s, expected {SOON_S} s")
+    raise AssertionError(f"ended after {took} s, expected {soon_s()} s")
 
 
 @pytest.mark.parametrize("after_s", [0.02, 0.2, 0.8])

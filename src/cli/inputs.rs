@@ -6,7 +6,8 @@ use anyhow::{Context, anyhow, bail};
 use sha2::{Digest, Sha256};
 use truegrind::arm::estimated::{Estimated, Judgement};
 use truegrind::arm::model::Model;
-use truegrind::robots::{self, Choice, Kind, Robot, read_any};
+use truegrind::robots::foreign::{Choice, Kind, read_any};
+use truegrind::robots::{self, Robot};
 
 use super::files;
 use super::terminal::tell;

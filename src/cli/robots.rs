@@ -6,7 +6,8 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::report::format;
 use truegrind::report::robots as view;
-use truegrind::robots::{self, Choice, read_any};
+use truegrind::robots;
+use truegrind::robots::foreign::{Choice, read_any};
 
 use super::ending::Ending;
 use super::files::{self, Batch, is_stdout};

@@ -13,7 +13,7 @@
 
 mod error;
 pub mod export;
-mod foreign;
+pub mod foreign;
 pub mod sheet;
 pub mod validation;
 
@@ -23,7 +23,6 @@ use crate::model::Model;
 use sheet::{DataSheet, RobotFile};
 
 pub use error::{NominalMismatch, RobotError};
-pub use foreign::{Choice, Kind, Understood, read_any};
 
 /// The files of the catalogue: name for messages, text.
 const FILES: [(&str, &str); 7] = [

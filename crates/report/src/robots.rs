@@ -10,9 +10,10 @@ use super::table::{Cell, Column, Table};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::link::LinkModel;
 use truegrind_arm::model::Joints;
+use truegrind_arm::robots::Robot;
+use truegrind_arm::robots::foreign::Understood;
 use truegrind_arm::robots::sheet::{Angles, Dialect, Orientation, Point};
 use truegrind_arm::robots::validation;
-use truegrind_arm::robots::{Robot, Understood};
 
 /// Name, maker, designation, rated load, reach, repeatability and program language of each arm.
 pub fn catalogue_table(robots: &[Robot]) -> Table {

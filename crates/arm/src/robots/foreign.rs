@@ -7,6 +7,7 @@
 
 mod axes;
 mod chain;
+mod common;
 mod table;
 mod ur;
 mod urdf;
@@ -14,25 +15,14 @@ mod urdf;
 use nalgebra::{Matrix6, Vector3};
 
 use super::error::RobotError;
-use super::sheet::{
-    Angles, Convention, DataSheet, Dialect, FlangeSheet, JointSheet, Masses, Mounting, Sources,
-};
+use super::sheet::{Angles, Convention, DataSheet, FlangeSheet, JointSheet, Masses, Mounting, Sources};
 use super::{Robot, load, parse};
 use crate::condition::Condition;
 use crate::joints::Joints;
 use chain::Described;
+pub use common::Choice;
+use common::{refused, tidy};
 use truegrind_math::se3::{Pose, difference};
-
-/// What a file leaves open.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Choice {
-    /// The link that stands: the root of the tree where left out.
-    pub base: Option<String>,
-    /// The link that is the flange: `tool0` or `flange` where left out and there is one.
-    pub tip: Option<String>,
-    /// The log's third angle is that of the forearm against the ground, whatever joint 2 does, as FANUC controllers count it.
-    pub ground_joint_3: bool,
-}
 
 /// An arm, and what was understood of its file.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,7 +81,7 @@ impl Kind {
 /// An arm from a file of any kind that is known; `file` is its name, by whose ending the kind is told, and which messages name.
 ///
 /// ```
-/// use truegrind_arm::robots::{Choice, read_any};
+/// use truegrind_arm::robots::foreign::{Choice, read_any};
 ///
 /// // Craig's ("modified") table of an arm: twist and length belong to the joint before.
 /// let table = "convention,alpha_deg,a_mm,theta_deg,d_mm\n\
@@ -133,23 +123,6 @@ pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, R
     let (robot, notes) = robot(described, file, choice.ground_joint_3)?;
     let sentences = told(&robot, &notes);
     Ok(Understood { robot, kind, sentences })
-}
-
-/// Something that cannot be used, in a file of somebody else.
-fn refused(
-    file: &str,
-    key: impl Into<String>,
-    found: impl Into<String>,
-    expected: &'static str,
-    remedy: &'static str,
-) -> RobotError {
-    RobotError::Foreign {
-        file: file.into(),
-        key: key.into().into(),
-        found: found.into().into(),
-        expected,
-        remedy,
-    }
 }
 
 /// Our arm through the axes of a described one, compared with it.
@@ -228,11 +201,6 @@ fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robo
 /// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.
 fn name_of(file: &str) -> String {
     file.rsplit(['/', '\\']).next().unwrap_or(file).replace('.', "-")
-}
-
-/// What stands where a zero was meant.
-fn tidy(value: f64) -> f64 {
-    if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
 /// Our arm may differ from the file's own product of transforms by this (mm, and rad on a metre).
@@ -332,29 +300,4 @@ fn direction(v: &Vector3<f64>) -> String {
         }
     }
     format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z)
-}
-
-/// The language of a maker's programs, where a name tells the maker.
-fn maker_of(text: &str) -> (Option<Dialect>, &'static str) {
-    let text = text.to_lowercase();
-    for (word, maker, dialect) in [
-        ("abb", "ABB", Dialect::Rapid),
-        ("irb", "ABB", Dialect::Rapid),
-        ("kuka", "KUKA", Dialect::Krl),
-        ("fanuc", "FANUC", Dialect::Fanuc),
-        ("ur3", "Universal Robots", Dialect::Urscript),
-        ("ur5", "Universal Robots", Dialect::Urscript),
-        ("ur10", "Universal Robots", Dialect::Urscript),
-        ("ur16", "Universal Robots", Dialect::Urscript),
-        ("ur20", "Universal Robots", Dialect::Urscript),
-        ("ur30", "Universal Robots", Dialect::Urscript),
-        ("staubli", "Stäubli", Dialect::Val3),
-        ("motoman", "Yaskawa", Dialect::Inform),
-        ("yaskawa", "Yaskawa", Dialect::Inform),
-    ] {
-        if text.contains(word) {
-            return (Some(dialect), maker);
-        }
-    }
-    (None, "")
 }

@@ -4,7 +4,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model};
-use truegrind_arm::robots::{Choice, Kind, RobotError, Understood, load, parse, read_any, text};
+use truegrind_arm::robots::foreign::{Choice, Kind, Understood, read_any};
+use truegrind_arm::robots::{RobotError, load, parse, text};
 
 const TURNED: &str = include_str!("../data/tool-turned.urdf");
 const GRIPPER: &str = include_str!("../data/gripper.urdf");

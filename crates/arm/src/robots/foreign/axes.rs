@@ -10,7 +10,7 @@
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use super::chain::Described;
-use super::{refused, tidy};
+use super::common::{refused, tidy};
 use crate::link::{Link, LinkModel};
 use crate::robots::error::RobotError;
 use crate::robots::sheet::LinkSheet;

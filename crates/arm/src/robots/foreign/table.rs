@@ -11,7 +11,7 @@
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 use super::chain::{Described, Step, about_z};
-use super::{maker_of, refused};
+use super::common::{maker_of, refused};
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
 

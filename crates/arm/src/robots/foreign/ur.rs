@@ -11,7 +11,8 @@
 use nalgebra::Vector3;
 
 use super::chain::{Described, about_z, from_rpy};
-use super::{refused, table};
+use super::common::refused;
+use super::table;
 use crate::joints::Joints;
 use crate::robots::Robot;
 use crate::robots::error::RobotError;

@@ -11,7 +11,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::chain::{Described, Step, from_rpy};
-use super::{Choice, maker_of, refused};
+use super::common::{Choice, maker_of, refused};
 use crate::body::Body;
 use crate::robots::error::RobotError;
 use truegrind_math::se3::Pose;
