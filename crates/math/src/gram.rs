@@ -29,7 +29,7 @@ const TILE: usize = 4;
 /// # Panics
 /// Where the rows of a column are no multiple of [`WIDTH`], or `square` is not one of as many columns as there are.
 pub fn add_products(columns: &[f64], rows: usize, square: &mut [f64]) {
-    let size = if rows == 0 { 0 } else { columns.len() / rows };
+    let size = columns.len().checked_div(rows).unwrap_or(0);
     assert!(rows.is_multiple_of(WIDTH), "{rows} rows are not whole groups");
     assert!(columns.len() == size * rows && (rows == 0 || square.len() == size * size), "not a matrix");
     widest(Products { columns, rows, size, square });
