@@ -18,6 +18,8 @@ pub(super) struct Mountings {
     /// The place of each in the list, or why there is none.
     places: HashMap<(u32, u32), Result<usize, Why>>,
     pub(super) list: Vec<Mounted>,
+    /// The work object of each.
+    objects: Vec<u32>,
     /// External axes that carry the base.
     base: [bool; 6],
     /// What was assumed of external axes, and what the cell file contradicts.
@@ -26,8 +28,13 @@ pub(super) struct Mountings {
 
 impl Mountings {
     pub(super) fn of(listing: &Listing, arms: &Arms<'_>, cell: &Cell) -> Self {
-        let mut out =
-            Self { places: HashMap::new(), list: Vec::new(), base: [false; 6], assumed: Vec::new() };
+        let mut out = Self {
+            places: HashMap::new(),
+            list: Vec::new(),
+            objects: Vec::new(),
+            base: [false; 6],
+            assumed: Vec::new(),
+        };
         let teaching = Teaching::of(arms.nominal.arm(), arms.estimated.arm(), cell, listing);
         let typical = typical(listing);
         let mut allowance = Allowance::of(effort::FRAMES);
@@ -55,6 +62,7 @@ impl Mountings {
             let found = match found {
                 Ok(mounted) => {
                     out.list.push(mounted);
+                    out.objects.push(object);
                     Ok(out.list.len() - 1)
                 }
                 Err(fault) => {
@@ -123,13 +131,7 @@ impl Mountings {
 
     /// The work object of each mounting of the list.
     pub(super) fn objects(&self) -> Vec<u32> {
-        let mut out = vec![0; self.list.len()];
-        for ((_, object), place) in &self.places {
-            if let Ok(place) = place {
-                out[*place] = *object;
-            }
-        }
-        out
+        self.objects.clone()
     }
 
     pub(super) fn notes(&self) -> Vec<String> {

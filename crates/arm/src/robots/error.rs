@@ -8,7 +8,7 @@ use thiserror::Error;
 pub enum RobotError {
     /// The name is not in the catalogue.
     #[error(
-        "unknown robot \"{name}\", expected one of {known}; or give the path of a robot file of your own"
+        "unknown robot \"{name}\", expected one of {known}; or give the path of a robot file of your own (TOML file, URDF, table of link parameters, UR calibration)"
     )]
     Unknown {
         /// What was asked for.

@@ -118,7 +118,7 @@ pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, R
         Kind::Urdf => urdf::read(text, file, choice)?,
         Kind::Table => table::read(text, file)?,
         Kind::UrYaml => ur::read_yaml(text, file)?,
-        Kind::UrConf => ur::read_conf(text, file, |name| load(name))?,
+        Kind::UrConf => ur::read_conf(text, file, load)?,
     };
     let (robot, notes) = robot(described, file, choice.ground_joint_3)?;
     let sentences = told(&robot, &notes);

@@ -386,6 +386,8 @@ fn links_hundreds_of_metres_away_come_home() {
 }
 
 /// The driver's file: places of the joints in each other. Nominal UR10e, as its maker publishes it.
+// Digits as the driver's file prints them.
+#[allow(clippy::approx_constant)]
 #[test]
 fn the_drivers_file_is_read() {
     let places = [
