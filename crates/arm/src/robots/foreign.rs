@@ -1,7 +1,7 @@
 //! Arms that somebody else described: URDF files, tables of Denavit–Hartenberg parameters, the calibration files of Universal
 //! Robots.
 //!
-//! Whatever the form, six axes are read as lines in space at zero ([`axes`]), and our links are laid through them. So a table
+//! Whatever the form, six axes are read as lines in space at zero (`axes`), and our links are laid through them. So a table
 //! whose parallel axes put a link hundreds of metres away gives links of the arm's own size, and nothing depends on where somebody
 //! else put his frames. The outcome is compared with the file's own product of transforms before it is handed out.
 
