@@ -79,5 +79,6 @@ fn without_a_cause_the_written_arm_has_the_shape_of_geometrys() {
         geometry.shape,
         model.shape
     );
-    assert_eq!(case.worse(), [false, false]);
+    // Where base and flange stand no row tells: there the two arms differ by their tolerances alone, and either may be nearer.
+    assert!(!case.worse()[0]);
 }
