@@ -154,6 +154,9 @@ pub(crate) fn identify_(
             *place = positive(name, value)? * scale;
         }
     }
+    // As the command line has it: tolerances that are stated are taken as they are.
+    tolerance.zero_rad = tolerance.angle_rad;
+    tolerance.learned = tolerance_length_mm.is_none() && tolerance_angle_deg.is_none();
     for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
         limit.map(|limit| positive(name, limit)).transpose()?;
     }
