@@ -1,4 +1,8 @@
 //! The probability that a correction makes what it corrects worse.
+//!
+//! What is off by d (all coordinates of some points in one vector, mm) is corrected by the estimate of d. With P its error
+//! covariance, it gets worse where the error along d exceeds half of it: with c = |d| and s² = dᵀ P d / c² the probability is
+//! Φ(−c / 2s). P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs the one vector Jᵀ d alone.
 
 use nalgebra::DVector;
 

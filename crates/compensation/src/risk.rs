@@ -1,9 +1,7 @@
 //! The chance that a correction makes a cut worse than it is.
 //!
-//! A cut whose points are off by d (all its coordinates in one vector) is corrected by the estimate of d. With P its error
-//! covariance, the cut gets worse where the error along d exceeds half of it: with c = |d| and s² = dᵀ P d / c² the
-//! probability is Φ(−c / 2s). For a path whose shape alone is corrected, d is what its best rigid registration leaves.
-//! P = J Σ Jᵀ follows from the covariance Σ of the arm's parameters, so s² needs the one vector Jᵀ d alone.
+//! A path whose shape alone is corrected is judged by what its best rigid registration leaves. The probability itself is in
+//! `probability`.
 
 use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 

@@ -416,7 +416,11 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             };
             reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
         }
-        if let (Some(sigma), Some(rms)) = (sigma_rms(report), before_rms(report))
+        // Under a model that corrects no cut there is no correction to be sure of.
+        let corrects = cut(report).any(|p| !matches!(p.status, Fate::Left));
+        if !corrects {
+            reasons.push(format!("under {} every cut stays as it is", report.model));
+        } else if let (Some(sigma), Some(rms)) = (sigma_rms(report), before_rms(report))
             && sigma > rms
         {
             if status == Status::Good {

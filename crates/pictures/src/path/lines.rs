@@ -25,14 +25,17 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     let travel = strips(points, |p| Some((intended(p), usize::from(plan.cuts(p)))));
     let travel: Vec<_> = travel.into_iter().filter(|(kind, _)| *kind == 0).collect();
     plain(store, "path/travel", &travel, TRAVEL, 0.6)?;
+    let mut labels = Labels::over(points);
     for &k in &plan.befores {
         let name = if k == 0 { String::new() } else { format!("_{}", plan.names[k]) };
         let title = plan.before_name(scene, k);
-        run(store, plan, &scene.reports[k], |p| p.before, (&format!("before{name}"), &title, BEFORE))?;
+        let drawn = (format!("before{name}"), title, BEFORE);
+        run(store, plan, &scene.reports[k], |p| p.before, &drawn, &mut labels)?;
     }
     for (k, report) in scene.reports.iter().enumerate() {
         let title = format!("after · {}", report.model);
-        run(store, plan, report, |p| p.after, (&format!("after/{}", plan.names[k]), &title, after(k)))?;
+        let drawn = (format!("after/{}", plan.names[k]), title, after(k));
+        run(store, plan, report, |p| p.after, &drawn, &mut labels)?;
     }
     tool_axes(store, plan)?;
     marks(store, plan)?;
@@ -55,14 +58,47 @@ fn workpiece(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError
     store.fixed("workpiece", &mesh)
 }
 
+/// Where labels stand, so that none lies over another.
+struct Labels {
+    /// Intended places that have one.
+    taken: Vec<Point3<f64>>,
+    /// Nearer than this a second one is not shown (mm).
+    apart_mm: f64,
+}
+
+/// Labels are about so long, of the size of the path.
+const LABEL_LENGTH: f64 = 0.4;
+
+impl Labels {
+    fn over(points: &[PathPoint]) -> Self {
+        let size = points.iter().fold(0.0, |size: f64, p| {
+            size.max((intended(p) - points.first().map_or(Point3::origin(), intended)).norm())
+        });
+        Self { taken: Vec::new(), apart_mm: LABEL_LENGTH * size }
+    }
+
+    /// Whether a label at `place` is shown; the first there is.
+    fn take(&mut self, place: Point3<f64>) -> bool {
+        let free = self.taken.iter().all(|other| (other - place).norm() >= self.apart_mm);
+        if free {
+            self.taken.push(place);
+        }
+        free
+    }
+}
+
 /// One path, at true scale and exaggerated, with a label at its largest deviation.
 fn run(
     store: &mut Store,
     plan: &Plan<'_>,
     report: &PathReport,
     which: fn(&PathPoint) -> Option<Deviation>,
-    (name, title, colour): (&str, &str, Rgba),
+    (name, title, colour): &(String, String, Rgba),
+    labels: &mut Labels,
 ) -> Result<(), VisualError> {
+    let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
+    let largest = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm()));
+    let shown = largest.is_some_and(|(point, _)| labels.take(intended(point)));
     for (folder, times, width) in [("path", 1.0, 2.0), ("exaggerated", plan.times, 1.6)] {
         let coloured = strips(&report.points, |p| {
             let deviation = which(p).filter(|d| plan.cuts(p) && d.norm_mm().is_finite())?;
@@ -76,15 +112,12 @@ fn run(
                 .with_colors(coloured.iter().map(|(step, _)| Color::from(plan.scale.colour(*step))))
                 .with_radii([Radius::new_ui_points(width)]);
         store.fixed(format!("{folder}/{name}"), &lines)?;
-        let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
-        let Some((point, deviation)) = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm())) else {
-            continue;
-        };
+        let Some((point, deviation)) = largest else { continue };
         let label = Points3D::new([xyz(&reached(point, &deviation, times))])
             .with_radii([Radius::new_ui_points(3.5)])
-            .with_colors([Color::from(colour)])
+            .with_colors([Color::from(*colour)])
             .with_labels([format!("{title}: at most {:.3} mm", deviation.norm_mm())])
-            .with_show_labels(true);
+            .with_show_labels(shown);
         store.fixed(format!("{folder}/largest/{name}"), &label)?;
     }
     Ok(())
