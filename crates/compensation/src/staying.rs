@@ -34,9 +34,7 @@ pub(super) fn staying(
     let mut rounds = (MOST_VISITS / listing.motions.len().max(1)).clamp(FEWEST_ROUNDS, MOST_ROUNDS);
     loop {
         let before = stays.len();
-        for motion in strayed(listing, solved, mountings, options, &stays) {
-            stays.insert(motion, Why::NoCircle);
-        }
+        stays.extend(strayed(listing, solved, mountings, options, &stays));
         let solved_so_far = &*solved;
         let kept = |motion: u32| obstacle(motion, listing, solved_so_far, options, &stays);
         let more = match options.cuts {

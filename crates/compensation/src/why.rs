@@ -98,6 +98,11 @@ pub enum Why {
     /// The three points of a circular motion lie on a line, two of them coincide, or the circle through them leaves the way
     /// that was meant.
     NoCircle,
+    /// A circular motion that stays starts where it ends, and would become another circle.
+    BeforeCircle {
+        /// The line of that motion, from 1.
+        line: u32,
+    },
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
     WholeCircle,
     /// A joint stands outside the range in which it was measured.
@@ -173,6 +178,7 @@ impl Why {
             Why::CircleKept => "the circle stays a circle",
             Why::TooFast { .. } => "a joint turns faster than it can",
             Why::NoCircle => "no circle through its points keeps to the way that was meant",
+            Why::BeforeCircle { .. } => "a circular motion that stays starts where it ends",
             Why::WholeCircle => "a whole circle",
             Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
             Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
@@ -254,6 +260,11 @@ impl fmt::Display for Why {
                 )
             }
             Why::NoCircle => f.write_str("its three points make no circle, or none that keeps to the way that was meant"),
+            Why::BeforeCircle { line } => write!(
+                f,
+                "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
+                 circle"
+            ),
             Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
             Why::JointNotMeasured { joint, by_deg } => {
                 write!(

@@ -350,7 +350,8 @@ impl Comparison<'_> {
             let (mm, rad) = difference(&there, &meant);
             match now.along.filter(|_| index + 1 < old.goals.len()) {
                 Some(along) => {
-                    let off = there.translation.vector - meant.translation.vector;
+                    let passed = arm.actual_forward(now.passing.as_ref().unwrap_or(q), at) * tip;
+                    let off = passed.translation.vector - meant.translation.vector;
                     ((off - along.into_inner() * along.dot(&off)).norm(), rad)
                 }
                 None => (mm, rad),

@@ -17,6 +17,11 @@ const PIECES_OF_ARCS: usize = 640;
 /// A joint that would have to go farther from one piece to the next has no way there (rad).
 const FARTHEST: f64 = 0.6;
 
+/// Nearer points (mm), or such that its point and its end are seen from its start under a smaller angle (rad), make no arc: 0.1 mm
+/// and 1° (ABB, RAPID, limitations of `MoveC`).
+const NEAREST: f64 = 0.1;
+const NARROWEST: f64 = std::f64::consts::PI / 180.0;
+
 /// What the controller was told at one goal, and what follows.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -31,6 +36,8 @@ pub struct Point {
     /// The direction in which the tool passes a point on its way, where it is held and that is followed: early or late is not
     /// beside the path.
     pub along: Option<Unit<Vector3<f64>>>,
+    /// The joints on the way there, where that is followed: the tool is turned as the way turns it.
+    pub passing: Option<[f64; 6]>,
     /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
     pub adrift: bool,
 }
@@ -77,10 +84,13 @@ impl<'a> Course<'a> {
                 }
             };
             let (behind, flanks, adrift) = ([0.0; 6], String::new(), self.adrift);
-            out.push(Point { flange, joints, behind, flanks, along: None, adrift });
+            out.push(Point { flange, joints, behind, flanks, along: None, passing: None, adrift });
         }
         if !motion.monitored && motion.way != Way::Joint && !motion.wrist {
             self.along(motion, &mut out);
+        }
+        if motion.way == Way::Arc && !self.makes_arc(motion, &out) {
+            out.iter_mut().for_each(|point| point.joints = None);
         }
         if self.links.have_play() {
             self.follow(motion, &mut out);
@@ -90,6 +100,15 @@ impl<'a> Course<'a> {
         self.joints = end.joints;
         self.last = Some(end.flange);
         out
+    }
+
+    /// Whether the controller takes three points for an arc: it stops where they lie too near to each other or to a line.
+    fn makes_arc(&self, motion: &Motion, points: &[Point]) -> bool {
+        let (Some(from), [via, to]) = (&self.last, points) else { return true };
+        let place = |flange: &Pose| tool_in_object(motion, flange).translation.vector;
+        let from = place(from);
+        let [via, to] = [via, to].map(|point| place(&point.flange) - from);
+        via.norm() >= NEAREST && to.norm() >= NEAREST && via.angle(&to) >= NARROWEST
     }
 
     /// The joints that the controller takes: those of the configuration, or without it those nearest to where it is.
@@ -123,7 +142,9 @@ impl<'a> Course<'a> {
             let share = if k + 1 == count { 1.0 } else { passing };
             let near = way.iter().rev().find(|(s, _)| *s <= share).map_or(start, |(_, q)| *q);
             let reached = self.arm.nominal_nearest(&point.flange, &near);
-            point.joints = reached.filter(|q| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST));
+            // On its way through the circle point the tool may be turned far from what is told there.
+            let ends = k + 1 == count;
+            point.joints = reached.filter(|q| !ends || (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST));
         }
     }
 
@@ -150,17 +171,20 @@ impl<'a> Course<'a> {
         let mut passed = false;
         let passing = self.passing(motion, points);
         let tip = |q: &[f64; 6]| tool_in_object(motion, &self.arm.nominal_forward(q)).translation.vector;
-        let mut before = self.joints;
+        let mut before = self.joints.map(|joints| (0.0, joints));
         for (share, q) in way.iter().chain([&(1.0, end)]) {
-            self.links.go(q);
             // The circle point, which is passed on the way; the tool need not be turned there as it is told.
             if count > 1 && !passed && *share >= passing {
                 passed = true;
-                (points[0].behind, points[0].flanks) = (self.links.behind(q), self.links.flanks(q));
-                let gone = before.filter(|_| motion.tool.1).map(|before| tip(q) - tip(&before));
+                let there = before.map_or(*q, |before| part_of(before, (*share, *q), passing));
+                self.links.go(&there);
+                (points[0].behind, points[0].flanks) = (self.links.behind(&there), self.links.flanks(&there));
+                let gone = before.filter(|_| motion.tool.1).map(|(_, before)| tip(q) - tip(&before));
+                points[0].passing = Some(there);
                 points[0].along = gone.and_then(|gone| Unit::try_new(gone, 1e-6));
             }
-            before = Some(*q);
+            self.links.go(q);
+            before = Some((*share, *q));
         }
         let last = &mut points[count - 1];
         (last.behind, last.flanks) = (self.links.behind(&end), self.links.flanks(&end));
@@ -261,6 +285,12 @@ impl<'a> Course<'a> {
         }
         ((at(&q) - place).norm() < 1e-6).then_some(q)
     }
+}
+
+/// Joints at a share of the way between two samples of it.
+fn part_of(before: (f64, [f64; 6]), after: (f64, [f64; 6]), share: f64) -> [f64; 6] {
+    let part = ((share - before.0) / (after.0 - before.0)).clamp(0.0, 1.0);
+    std::array::from_fn(|j| before.1[j] + (after.1[j] - before.1[j]) * part)
 }
 
 /// The tool as seen from the object that it works on, but for where the object stands.

@@ -273,6 +273,38 @@ fn a_circle_whose_start_stays_is_no_other_circle() {
     assert!(strayed > 3, "{strayed}");
 }
 
+/// A circular motion that stays hangs on its start as well: where that is corrected, a circle that is small against the
+/// correction, closes, or has points that the text does not tell becomes another one.
+#[test]
+fn a_circle_that_stays_starts_where_it_did() {
+    let pose = |x: f64, y: f64| {
+        format!("[[{x},{y},420],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    };
+    let first = |seed: u64, circle: &str| {
+        let source = module(&format!(
+            "  ConfL \\Off;\n  MoveL {},v50,fine,tool0;\n  MoveL {},v50,fine,tool0;\n  MoveC {circle},v50,fine,tool0 \\Corr;\n",
+            pose(370.0, -5.0),
+            pose(374.0, 0.0)
+        ));
+        let options = Options { max_correction_mm: 50.0, tolerance_mm: 50.0, ..Options::default() };
+        let (planned, text) = rewrite(&source, &known(&perturbed(seed, 3.0)), &options);
+        assert!(text.contains(circle), "{text}");
+        let reasons: Vec<_> = planned.outcomes.iter().map(|outcome| outcome.reason).collect();
+        assert!(reasons[0].is_none() && planned.outcomes[0].before_mm.unwrap() > 0.5, "{reasons:?}");
+        assert!(matches!(reasons[2], Some(Why::Program(Reason::SensorGuided))), "{reasons:?}");
+        reasons[1]
+    };
+    let stays = |seed: u64, circle: &str| matches!(first(seed, circle), Some(Why::BeforeCircle { .. }));
+    let mut small = 0;
+    for seed in 11..19 {
+        assert!(!stays(seed, &format!("{},{}", pose(474.0, 100.0), pose(574.0, 0.0))));
+        assert!(stays(seed, &format!("{},{}", pose(474.0, 100.0), pose(374.0, 0.0))), "closed, seed {seed}");
+        assert!(stays(seed, &format!("{},Offs(p0,0,0,reg1)", pose(474.0, 100.0))), "not told, seed {seed}");
+        small += usize::from(stays(seed, &format!("{},{}", pose(374.5, 0.5), pose(375.0, 0.0))));
+    }
+    assert!(small > 3, "{small}");
+}
+
 #[test]
 fn every_circular_instruction_has_a_straight_form_of_the_same_process() {
     let source = include_str!("../../../../programs/circles.mod");

@@ -42,6 +42,8 @@ fn name(why: &Why) -> &'static str {
         Why::CircleKept => "circle kept",
         Why::TooFast { .. } => "too fast",
         Why::NoCircle => "no circle",
+        // tests/it/path.rs.
+        Why::BeforeCircle { .. } => "before circle",
         Why::WholeCircle => "whole circle",
         Why::JointNotMeasured { .. } => "joint not measured",
         Why::PartOfCut { .. } => "part of cut",
