@@ -29,8 +29,9 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// shift of G92 under radius compensation; a whole circle with play; a joint that seemed to turn near the end of a line; a
 /// tool taught at poses whose least squares came out wrong; joints with play that turn where the wrist goes by itself, or on
 /// straight pieces and not on their arc; targets put in on a way that the arm cannot go; an arc whose path has a corner
-/// where a play is taken up; a load that is another by a computed call.
-const ONCE_WRONG: [(Dialect, u64); 29] = [
+/// where a play is taken up; a load that is another by a computed call; a circle point that is passed with the tool turned
+/// otherwise than it is told there; an arc that stays and whose ends come to lie apart.
+const ONCE_WRONG: [(Dialect, u64); 32] = [
     (Dialect::Fanuc, 1_001_909),
     (Dialect::Fanuc, 1_001_375),
     (Dialect::Fanuc, 1_018_769),
@@ -60,6 +61,9 @@ const ONCE_WRONG: [(Dialect, u64); 29] = [
     (Dialect::Rapid, 5_004_543),
     (Dialect::Rapid, 5_005_503),
     (Dialect::Rapid, 6_008_145),
+    (Dialect::Rapid, 6_010_047),
+    (Dialect::Rapid, 6_017_382),
+    (Dialect::Rapid, 8_120_664),
 ];
 
 #[test]

@@ -1,5 +1,6 @@
 //! Where an arm was measured: joint ranges and a thinned cloud of poses, to tell a program that leaves it.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::joints::Joints;
@@ -54,6 +55,22 @@ fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     square(a, b).sqrt()
 }
 
+/// Poses that one thread takes at a time.
+const PORTION: usize = 8192;
+
+/// Takes one more sample into account: each pose's distance to the nearest of them, and the pose that is farthest, the last of
+/// several.
+fn farthest(nearest: &mut [f64], poses: &[[f64; 6]], sample: &[f64; 6]) -> Option<(usize, f64)> {
+    let last = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
+    let portions = nearest.par_chunks_mut(PORTION).zip(poses.par_chunks(PORTION)).enumerate();
+    let farthest = portions.filter_map(|(portion, (nearest, poses))| {
+        nearest.iter_mut().zip(poses).for_each(|(d, pose)| *d = d.min(distance(pose, sample)));
+        let indexed = nearest.iter().enumerate().map(|(k, d)| (portion * PORTION + k, *d));
+        indexed.max_by(last)
+    });
+    farthest.max_by(last)
+}
+
 impl Region {
     /// The region of measured joint vectors (rad); `sigma_mm` as in the field. Cost: 200 n distances.
     pub fn of(joints: &[Joints], sigma_mm: f64) -> Self {
@@ -74,12 +91,9 @@ impl Region {
         while samples_deg.len() < SAMPLES.min(degrees.len()) {
             let taken = degrees[next];
             samples_deg.push(taken);
-            for (d, q) in nearest.iter_mut().zip(&degrees) {
-                *d = d.min(distance(q, &taken));
-            }
-            let far = (0..degrees.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]));
-            match far.filter(|&i| nearest[i] > 0.0) {
-                Some(i) => next = i,
+            let far = farthest(&mut nearest, &degrees, &taken);
+            match far.filter(|&(_, d)| d > 0.0) {
+                Some((i, _)) => next = i,
                 None => break,
             }
         }

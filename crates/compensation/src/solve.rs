@@ -27,6 +27,7 @@ use super::segment::Way;
 use super::singular::{Replay, at_target};
 use super::why::Why;
 use truegrind_arm::estimated::{Carried, RidingPoint};
+use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
@@ -649,97 +650,23 @@ fn finish(
     work: &Work<'_>,
 ) -> Vec<Result<Solved, Why>> {
     let Work { mountings, assessment, options, .. } = *work;
-    let (nominal, acting) = (arms.nominal.arm(), &arms.acting);
-    let mut out: Vec<Result<Solved, Why>> = Vec::with_capacity(asked.len());
-    // What is still on its way, and where in `out` it belongs.
-    let mut open: Vec<(usize, Start)> = Vec::with_capacity(asked.len());
-    for (index, start) in starts.iter().enumerate() {
-        if let Ok(start) = start {
-            open.push((index, *start));
-        }
-        // A place holder for those on their way.
-        out.push(Err(start.as_ref().err().copied().unwrap_or(Why::JointTarget)));
-    }
-    let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
-    let real = |start: &Start| &mountings.list[start.mounted].real;
-    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
-    let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
-    let reached_before = acting.forward(&places_before, &before);
-    // Joints that reach what was meant.
-    let solutions = acting.each(&places, |place, items| match items {
-        None => acting.inverse(place).solve_beside(&flanges, &before),
-        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
-    });
-    let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
-    for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
-        match solution {
-            Ok(solution) => way.push(OnItsWay {
-                index: *index,
-                start: *start,
-                place: places[k],
-                flange: flanges[k],
-                after: solution.joints,
-                singularity: solution.singularity,
-                reached_before: real(start).target_of(&reached_before[k]),
-            }),
-            Err(error) => out[*index] = Err(Why::of_inverse(error)),
-        }
-    }
-    // What the controller is told, and where it goes when the told numbers are rounded.
-    let after: Vec<Joints> = way.iter().map(|w| w.after).collect();
-    let told_flanges = nominal.forward_many(&after);
-    let told: Vec<Pose> = way
-        .iter()
-        .zip(&told_flanges)
-        .map(|(w, flange)| mountings.list[w.start.mounted].told.target_of(flange))
-        .collect();
+    let acting = &arms.acting;
+    // A place holder for those on their way.
+    let waiting = |start: &Result<Start, Why>| Err(start.as_ref().err().copied().unwrap_or(Why::JointTarget));
+    let mut out: Vec<Result<Solved, Why>> = starts.iter().map(waiting).collect();
+    let way = on_their_way(starts, places, arms, mountings, &mut out);
     let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
-    let heard: Vec<Pose> = way
-        .iter()
-        .zip(&told)
-        .map(|(w, told)| {
-            mountings.list[w.start.mounted].told.flange_for(&rounded(told, options.position_decimals))
-        })
-        .collect();
-    let replayed =
-        if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
-    let mut last: Vec<Joints> = Vec::with_capacity(way.len());
-    let mut failed: Vec<Option<Why>> = vec![None; way.len()];
-    for (k, w) in way.iter().enumerate() {
-        last.push(match replayed.get(k) {
-            Some(Ok(reached)) if !joint_form(w) => reached.joints,
-            Some(Err(error)) if !joint_form(w) => {
-                failed[k] = Some(Why::of_inverse(*error));
-                w.after
-            }
-            _ => w.after,
-        });
-    }
+    let Replayed { told_flanges, told, heard, reached, last, failed } =
+        replayed(&way, &joint_form, arms, mountings, options);
+    let real = |start: &Start| &mountings.list[start.mounted].real;
     let places: Vec<usize> = way.iter().map(|w| w.place).collect();
     let reached_after = acting.forward(&places, &last);
     let tools: Vec<Pose> = way.iter().map(|w| real(&w.start).flange_from_tool(&w.flange)).collect();
-    // Against what each is known, for those that are asked.
-    let known = |against: Vec<Option<Option<&Carried>>>| -> Vec<Option<f64>> {
-        let Some(knowledge) = arms.knowledge else { return vec![None; way.len()] };
-        let (mut places_of, mut points) = (Vec::with_capacity(way.len()), Vec::with_capacity(way.len()));
-        let mut at = Vec::with_capacity(way.len());
-        for ((k, w), carried) in way.iter().enumerate().zip(against) {
-            let Some(carried) = carried else { continue };
-            points.push(RidingPoint { joints: w.after, flange_from_tool: tools[k], carried });
-            places_of.push(w.place);
-            at.push(k);
-        }
-        let found = acting.each(&places_of, |place, items| match items {
-            None => knowledge.position_sigmas_mm(acting.arm(place), &points),
-            Some(items) => knowledge.position_sigmas_mm(acting.arm(place), &picked(&points, items)),
-        });
-        let mut out = vec![None; way.len()];
-        at.into_iter().zip(found).for_each(|(k, sigma)| out[k] = Some(sigma));
-        out
-    };
-    let sigmas = known(way.iter().map(|w| Some(mountings.list[w.start.mounted].carried.as_ref())).collect());
     let cut_of = |w: &OnItsWay| asked[w.index].index;
-    let of_shape = known(way.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect());
+    let frames = way.iter().map(|w| Some(mountings.list[w.start.mounted].carried.as_ref())).collect();
+    let absolute = sigmas(&way, &tools, frames, arms);
+    let registered = way.iter().map(|w| assessment.registered(cut_of(w)).map(Some)).collect();
+    let of_shape = sigmas(&way, &tools, registered, arms);
     let mut near = Nearest::default();
     for (k, w) in way.iter().enumerate() {
         if let Some(why) = failed[k] {
@@ -750,7 +677,7 @@ fn finish(
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
-        let (conf, margins) = match replayed.get(k) {
+        let (conf, margins) = match reached.get(k) {
             Some(Ok(reached)) if !joint_form(w) => (reached.configuration, reached.margins()),
             _ => (arms.nominal.configuration(&w.after), arms.nominal.branch_margins(&w.after)),
         };
@@ -765,7 +692,7 @@ fn finish(
             margins: [w.start.margins, margins],
             deviation_before: in_object(&w.reached_before),
             deviation_after: in_object(&real.target_of(&reached_after[k])),
-            sigma_mm: sigmas[k].unwrap_or(0.0).hypot(in_play_mm),
+            sigma_mm: absolute[k].unwrap_or(0.0).hypot(in_play_mm),
             shape_sigma_mm: of_shape[k]
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
                 .map(|sigma| sigma.hypot(in_play_mm)),
@@ -785,6 +712,114 @@ fn finish(
         });
         out[w.index] = Ok(solved);
     }
+    out
+}
+
+/// The targets for which joints were found that reach what was meant; the others say in `out` why not.
+fn on_their_way(
+    starts: &[Result<Start, Why>],
+    places: [&[usize]; 2],
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    out: &mut [Result<Solved, Why>],
+) -> Vec<OnItsWay> {
+    let acting = &arms.acting;
+    let open: Vec<(usize, Start)> =
+        starts.iter().enumerate().filter_map(|(index, start)| Some((index, *start.as_ref().ok()?))).collect();
+    let before: Vec<Joints> = open.iter().map(|(_, s)| s.joints).collect();
+    let real = |start: &Start| &mountings.list[start.mounted].real;
+    let flanges: Vec<Pose> = open.iter().map(|(_, s)| real(s).flange_for(&s.meant)).collect();
+    let [places_before, places] = places.map(|all| open.iter().map(|(k, _)| all[*k]).collect::<Vec<usize>>());
+    let reached_before = acting.forward(&places_before, &before);
+    let solutions = acting.each(&places, |place, items| match items {
+        None => acting.inverse(place).solve_beside(&flanges, &before),
+        Some(items) => acting.inverse(place).solve_beside(&picked(&flanges, items), &picked(&before, items)),
+    });
+    let mut way: Vec<OnItsWay> = Vec::with_capacity(open.len());
+    for (k, ((index, start), solution)) in open.iter().zip(solutions).enumerate() {
+        match solution {
+            Ok(solution) => way.push(OnItsWay {
+                index: *index,
+                start: *start,
+                place: places[k],
+                flange: flanges[k],
+                after: solution.joints,
+                singularity: solution.singularity,
+                reached_before: real(start).target_of(&reached_before[k]),
+            }),
+            Err(error) => out[*index] = Err(Why::of_inverse(error)),
+        }
+    }
+    way
+}
+
+/// What the controller is told, and where it goes when the told numbers are rounded.
+struct Replayed {
+    told_flanges: Vec<Pose>,
+    told: Vec<Pose>,
+    /// The flanges of the rounded numbers.
+    heard: Vec<Pose>,
+    /// What it makes of them; empty where all are told as joints.
+    reached: Vec<Result<truegrind_arm::inverse::Reached, InverseError>>,
+    /// Its joints.
+    last: Vec<Joints>,
+    failed: Vec<Option<Why>>,
+}
+
+fn replayed(
+    way: &[OnItsWay],
+    joint_form: &dyn Fn(&OnItsWay) -> bool,
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    options: &Options,
+) -> Replayed {
+    let after: Vec<Joints> = way.iter().map(|w| w.after).collect();
+    let told_flanges = arms.nominal.arm().forward_many(&after);
+    let mounting = |w: &OnItsWay| &mountings.list[w.start.mounted].told;
+    let told: Vec<Pose> =
+        way.iter().zip(&told_flanges).map(|(w, flange)| mounting(w).target_of(flange)).collect();
+    let hears =
+        |(w, told): (&OnItsWay, &Pose)| mounting(w).flange_for(&rounded(told, options.position_decimals));
+    let heard: Vec<Pose> = way.iter().zip(&told).map(hears).collect();
+    let reached =
+        if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
+    let mut last: Vec<Joints> = Vec::with_capacity(way.len());
+    let mut failed: Vec<Option<Why>> = vec![None; way.len()];
+    for (k, w) in way.iter().enumerate() {
+        last.push(match reached.get(k) {
+            Some(Ok(reached)) if !joint_form(w) => reached.joints,
+            Some(Err(error)) if !joint_form(w) => {
+                failed[k] = Some(Why::of_inverse(*error));
+                w.after
+            }
+            _ => w.after,
+        });
+    }
+    Replayed { told_flanges, told, heard, reached, last, failed }
+}
+
+/// How well each point is known (mm) against what it is measured from; `None` where that is not asked for.
+fn sigmas(
+    way: &[OnItsWay],
+    tools: &[Pose],
+    against: Vec<Option<Option<&Carried>>>,
+    arms: &Arms<'_>,
+) -> Vec<Option<f64>> {
+    let Some(knowledge) = arms.knowledge else { return vec![None; way.len()] };
+    let (mut places, mut points) = (Vec::with_capacity(way.len()), Vec::with_capacity(way.len()));
+    let mut at = Vec::with_capacity(way.len());
+    for ((k, w), carried) in way.iter().enumerate().zip(against) {
+        let Some(carried) = carried else { continue };
+        points.push(RidingPoint { joints: w.after, flange_from_tool: tools[k], carried });
+        places.push(w.place);
+        at.push(k);
+    }
+    let found = arms.acting.each(&places, |place, items| match items {
+        None => knowledge.position_sigmas_mm(arms.acting.arm(place), &points),
+        Some(items) => knowledge.position_sigmas_mm(arms.acting.arm(place), &picked(&points, items)),
+    });
+    let mut out = vec![None; way.len()];
+    at.into_iter().zip(found).for_each(|(k, sigma)| out[k] = Some(sigma));
     out
 }
 

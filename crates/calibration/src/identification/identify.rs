@@ -158,26 +158,16 @@ pub fn identify(
     let outliers = outliers(&observed, start, &options.tolerance, options.solver_for_frames());
     let prepared = options.solver.prepared(nominal, dataset);
     let nominal = &prepared;
-    let start = Start { model: nominal, frames };
-    let observed = if outliers.rows.is_empty() {
-        observed
-    } else {
-        let mut set_aside = vec![false; dataset.rows.len()];
-        outliers.rows.iter().for_each(|(i, _)| set_aside[*i] = true);
-        let kept: Vec<usize> = (0..dataset.rows.len()).filter(|&i| !set_aside[i]).collect();
-        observed.subset(&kept)
-    };
+    let observed = without(observed, &outliers);
     let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
     tell("fitting without the rows that are held out");
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
-    let seed = options.seed;
     // Stages on the training rows: errors. Literal forms move frames first, then links without priors.
-    let mut registered =
-        fit(&fitted_rows, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
-    registered.task.forget_rows();
+    let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
+    let registered = stages.registered(&fitted_rows);
     let rmse_mm = summary_on(&fitted_rows, &registered.model, &registered.frames).rmse;
     if !(rmse_mm < WRONG_ARM_MM) {
         return Err(IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm });
@@ -190,16 +180,7 @@ pub fn identify(
         };
         (errors, held)
     };
-    let geometry_of = |rows: &Observed, registered: &Fitted| {
-        if options.solver.literal {
-            literal(rows, nominal, &registered.frames, options.solver, seed)
-        } else {
-            let frames = if options.solver.wants_registered() { &registered.frames } else { frames };
-            let from = Start { model: nominal, frames };
-            fit(rows, from, &everything, &options.solver.tolerance(&options.tolerance), options.solver, seed)
-        }
-    };
-    let mut training = geometry_of(&fitted_rows, &registered);
+    let mut training = stages.geometry(&fitted_rows, &registered);
     training.task.forget_rows();
     let ((registered_errors, before), (geometry_errors, after)) = (on(&registered), on(&training));
     let held_out = test
@@ -210,36 +191,31 @@ pub fn identify(
         .collect();
     // The model itself: all rows.
     tell("fitting all rows");
-    let mut registered =
-        fit(&observed, start, &sensing, &options.tolerance, options.solver_for_frames(), seed);
-    registered.task.forget_rows();
-    let geometry = geometry_of(&observed, &registered);
+    let registered = stages.registered(&observed);
+    let geometry = stages.geometry(&observed, &registered);
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let identifiability = geometry.identifiability();
     let parameters = parameter_table(&geometry, nominal);
+    let provenance = Provenance {
+        file: dataset.file.clone(),
+        sha256: dataset.sha256.clone(),
+        rows: observed.dataset.rows.len(),
+        set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
+        sensor: sensor_name(dataset.sensor).to_owned(),
+        method: options.solver.name.to_owned(),
+        seed: options.seed,
+        held_out: options.held_out,
+        sharpened: readout_fusion.is_ok(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
     let estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal.clone(),
         model: geometry.model.clone(),
         order: arm_of(&geometry),
         covariance: arm_covariance(&geometry),
-        provenance: Provenance {
-            file: dataset.file.clone(),
-            sha256: dataset.sha256.clone(),
-            rows: observed.dataset.rows.len(),
-            set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
-            sensor: sensor_name(dataset.sensor).to_owned(),
-            method: options.solver.name.to_owned(),
-            seed: options.seed,
-            held_out: options.held_out,
-            sharpened: readout_fusion.is_ok(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        },
-        parameters: parameters
-            .iter()
-            .filter(|p| p.name.starts_with("link") || p.name.starts_with("effect"))
-            .cloned()
-            .collect(),
+        provenance,
+        parameters: of_the_arm(&parameters),
         registered: registered_errors,
         geometry: geometry_errors,
         noise_floor_mm: noise_floor(&observed, &geometry),
@@ -285,6 +261,57 @@ pub fn identify(
         held_out,
         parameters,
     })
+}
+
+/// The rows but for those that are outliers.
+fn without(observed: Observed, outliers: &Outliers) -> Observed {
+    if outliers.rows.is_empty() {
+        return observed;
+    }
+    let rows = observed.dataset.rows.len();
+    let mut set_aside = vec![false; rows];
+    outliers.rows.iter().for_each(|(i, _)| set_aside[*i] = true);
+    let kept: Vec<usize> = (0..rows).filter(|&i| !set_aside[i]).collect();
+    observed.subset(&kept)
+}
+
+/// The stages of a fit, for whichever rows.
+struct Stages<'a> {
+    nominal: &'a Model,
+    frames: &'a Frames,
+    /// Parameters of the measurement.
+    sensing: &'a [Parameter],
+    /// These and the arm's.
+    everything: &'a [Parameter],
+    options: &'a Options,
+}
+
+impl Stages<'_> {
+    /// The nominal arm, with the frames fitted. Its rows are forgotten.
+    fn registered(&self, rows: &Observed) -> Fitted {
+        let Options { tolerance, seed, .. } = self.options;
+        let start = Start { model: self.nominal, frames: self.frames };
+        let mut fitted = fit(rows, start, self.sensing, tolerance, self.options.solver_for_frames(), *seed);
+        fitted.task.forget_rows();
+        fitted
+    }
+
+    /// The links too. Literal forms move frames first, then links without priors.
+    fn geometry(&self, rows: &Observed, registered: &Fitted) -> Fitted {
+        let Options { solver, tolerance, seed, .. } = self.options;
+        if solver.literal {
+            return literal(rows, self.nominal, &registered.frames, solver, *seed);
+        }
+        let frames = if solver.wants_registered() { &registered.frames } else { self.frames };
+        let start = Start { model: self.nominal, frames };
+        fit(rows, start, self.everything, &solver.tolerance(tolerance), solver, *seed)
+    }
+}
+
+/// The parameters of links and joints among those of a fit.
+fn of_the_arm(parameters: &[EstimatedParameter]) -> Vec<EstimatedParameter> {
+    let arm = |p: &&EstimatedParameter| p.name.starts_with("link") || p.name.starts_with("effect");
+    parameters.iter().filter(arm).cloned().collect()
 }
 
 impl Options {

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 
 use crate::identification::calibration::{Frames, Weight};
 use crate::measurement::dataset::{Dataset, Sensor};
+use rayon::prelude::*;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::jacobian::joint_jacobian;
 use truegrind_arm::model::Model;
@@ -209,12 +210,13 @@ pub fn angle_shares(
     }
     let still = Condition::default();
     let posed = model.at_condition(&still);
-    dataset
-        .rows
-        .iter()
-        .enumerate()
-        .map(|(i, row)| {
+    // Each row by itself, so the result does not depend on the number of threads.
+    (0..dataset.rows.len())
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|i| {
             checkpoint();
+            let row = &dataset.rows[i];
             let covariance = angles.of(i);
             if covariance.trace() == 0.0 {
                 return (0.0, 0.0);

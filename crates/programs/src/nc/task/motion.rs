@@ -2,6 +2,8 @@
 
 use std::sync::Arc as Shared;
 
+use nalgebra::UnitQuaternion;
+
 use super::super::arc::{Arc, Plane};
 use super::super::dialect::Dialect;
 use super::super::expression::Worth;
@@ -149,6 +151,30 @@ impl Lister<'_, '_> {
         })
     }
 
+    /// Where the axes stand at the end of a block.
+    fn ends_at(&self, said: &Said<'_>, from: &[Worth; 3]) -> [Worth; 3] {
+        let mut to = self.axis_values(said, &said.axes, from, self.state.unit_mm);
+        for (axis, to) in to.iter_mut().enumerate() {
+            let Some(index) = said.axes[axis] else { continue };
+            let increment = self.worth(&said.words[index]).1.unwrap_or(!self.state.absolute);
+            if !increment {
+                *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
+            }
+        }
+        to
+    }
+
+    /// Whether a target stands in the block as numbers.
+    fn origin(&self, said: &Said<'_>, value: &Result<TargetValue, Reason>) -> Origin {
+        let words = said.axes.iter().chain(&said.abc).chain(&said.rpy).chain(&said.vector);
+        let literal = words.flatten().all(|&index| self.literal(&said.words[index]).is_some());
+        match value {
+            Ok(_) if literal => Origin::Inline,
+            Ok(_) => Origin::Computed,
+            Err(_) => Origin::Unknown,
+        }
+    }
+
     /// Where a block goes.
     pub(super) fn motion(&mut self, said: &Said<'_>, machine: bool) {
         let heidenhain = self.dialect == Dialect::Heidenhain;
@@ -184,75 +210,24 @@ impl Lister<'_, '_> {
         let turn = self.turned(said, vector_words);
         // Position.
         let from = self.state.position;
-        let mut to = self.axis_values(said, &said.axes, &from, self.state.unit_mm);
-        for (axis, to) in to.iter_mut().enumerate() {
-            let Some(index) = said.axes[axis] else { continue };
-            let increment = self.worth(&said.words[index]).1.unwrap_or(!self.state.absolute);
-            if !increment {
-                *to = to.and_then(|value| self.state.shift[axis].map(|shift| value + shift));
-            }
-        }
-        let (name, kind) = match mode {
-            Mode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
-            Mode::Linear if heidenhain => ("L", MotionKind::Linear),
-            Mode::Circular(_) if heidenhain => ("C", MotionKind::Circular),
-            Mode::Rapid => ("G0", MotionKind::Joint),
-            Mode::Linear => ("G1", MotionKind::Linear),
-            Mode::Circular(false) => ("G2", MotionKind::Circular),
-            Mode::Circular(true) => ("G3", MotionKind::Circular),
-            Mode::Other(Reason::Cycle) => ("cycle", MotionKind::Unknown),
-            Mode::Other(_) | Mode::Unset | Mode::Lost(_) => ("path", MotionKind::Unknown),
-        };
+        let to = self.ends_at(said, &from);
+        let (name, kind) = name_and_kind(mode, heidenhain);
         let mut motion = self.listed(said, name, kind);
         let old_rotation = self.state.rotation(self.angles);
         self.state.turn = turn.0;
         (self.state.abc, self.state.rpy, self.state.vector, self.state.spin) = turn.1;
         let rotation = self.state.rotation(self.angles);
-        let target = |position: [Worth; 3], turn: Result<nalgebra::UnitQuaternion<f64>, Reason>| {
-            let position_mm = [position[0]?, position[1]?, position[2]?];
-            if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
-                return Err(Reason::BeyondReach);
-            }
-            let q = turn?;
-            let quaternion = [q.w, q.i, q.j, q.k];
-            Ok(TargetValue::Cartesian(RobTarget {
-                position_mm,
-                quaternion,
-                conf: [0; 4],
-                external: [None; 6],
-            }))
-        };
         let value = match said.lengthens {
             true => Err(Reason::RadiusCompensation),
             false => target(to, rotation),
         };
-        let literal = said
-            .axes
-            .iter()
-            .chain(&said.abc)
-            .chain(&said.rpy)
-            .chain(&said.vector)
-            .flatten()
-            .all(|&index| self.literal(&said.words[index]).is_some());
-        let origin = match value {
-            Ok(_) if literal => Origin::Inline,
-            Ok(_) => Origin::Computed,
-            Err(_) => Origin::Unknown,
-        };
+        let origin = self.origin(said, &value);
         let argument = self.argument(said);
         // The way round.
         let mut arc = None;
         if let Mode::Circular(positive) = mode {
             let found = self.arc(said, from, to, positive);
-            let middle = found.and_then(|arc| {
-                let (Ok(a), Ok(b)) = (all(from), all(to)) else { return Err(Reason::PositionUnknown) };
-                Ok(arc.at(a, b, 0.5).map(Ok))
-            });
-            let half = match (old_rotation, rotation) {
-                (Ok(a), Ok(b)) => Ok(a.try_slerp(&b, 0.5, 1e-9).unwrap_or(b)),
-                (Err(reason), _) | (_, Err(reason)) => Err(reason),
-            };
-            let via = middle.and_then(|middle| target(middle, half));
+            let via = middle(found, [from, to], [old_rotation, rotation]);
             let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
             motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
             arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
@@ -271,23 +246,15 @@ impl Lister<'_, '_> {
         // The words of this block that change what numbers mean come after a block that is put in before it.
         let alike = self.meaning == self.state.meaning();
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
-        let insertable = kind == MotionKind::Linear
-            && !said.others
+        let splits = alike
+            && !begins_something(said)
             && !heidenhain
             && !said.skippable
             && !motion.timed
-            && alike
-            && !begins_something(said)
             && before.start.iter().all(Option::is_some);
+        let insertable = splits && kind == MotionKind::Linear && !said.others;
         motion.insertable = insertable;
-        motion.straightens = arc.is_some()
-            && alike
-            && !begins_something(said)
-            && !heidenhain
-            && !said.skippable
-            && !said.opaque
-            && !motion.timed
-            && before.start.iter().all(Option::is_some);
+        motion.straightens = splits && arc.is_some() && !said.opaque;
         motion.axis = arc.map(|(arc, positive, _)| arc.plane.axis(positive));
         motion.by_radius = arc.is_some() && said.radius.is_some();
         let after = self.written_as(said, None);
@@ -597,6 +564,49 @@ impl Lister<'_, '_> {
             self.listing.zones.len() - 1
         }) as u32)
     }
+}
+
+/// What a motion of this mode is called in lists, and what kind it is.
+fn name_and_kind(mode: Mode, heidenhain: bool) -> (&'static str, MotionKind) {
+    match mode {
+        Mode::Rapid if heidenhain => ("L FMAX", MotionKind::Joint),
+        Mode::Linear if heidenhain => ("L", MotionKind::Linear),
+        Mode::Circular(_) if heidenhain => ("C", MotionKind::Circular),
+        Mode::Rapid => ("G0", MotionKind::Joint),
+        Mode::Linear => ("G1", MotionKind::Linear),
+        Mode::Circular(false) => ("G2", MotionKind::Circular),
+        Mode::Circular(true) => ("G3", MotionKind::Circular),
+        Mode::Other(Reason::Cycle) => ("cycle", MotionKind::Unknown),
+        Mode::Other(_) | Mode::Unset | Mode::Lost(_) => ("path", MotionKind::Unknown),
+    }
+}
+
+type Rotation = Result<UnitQuaternion<f64>, Reason>;
+
+/// The pose at these axes, turned so.
+fn target(position: [Worth; 3], rotation: Rotation) -> Result<TargetValue, Reason> {
+    let position_mm = all(position)?;
+    if !position_mm.iter().all(|coordinate| coordinate.abs() <= FARTHEST_MM) {
+        return Err(Reason::BeyondReach);
+    }
+    let q = rotation?;
+    let quaternion = [q.w, q.i, q.j, q.k];
+    Ok(TargetValue::Cartesian(RobTarget { position_mm, quaternion, conf: [0; 4], external: [None; 6] }))
+}
+
+/// The pose half way along an arc.
+fn middle(
+    arc: Result<Arc, Reason>,
+    [from, to]: [[Worth; 3]; 2],
+    rotations: [Rotation; 2],
+) -> Result<TargetValue, Reason> {
+    let arc = arc?;
+    let (Ok(a), Ok(b)) = (all(from), all(to)) else { return Err(Reason::PositionUnknown) };
+    let half = match rotations {
+        [Ok(a), Ok(b)] => Ok(a.try_slerp(&b, 0.5, 1e-9).unwrap_or(b)),
+        [Err(reason), _] | [_, Err(reason)] => Err(reason),
+    };
+    target(arc.at(a, b, 0.5).map(Ok), half)
 }
 
 fn all(values: [Worth; 3]) -> Result<[f64; 3], Reason> {
