@@ -31,6 +31,8 @@ mod manual;
 mod compensate;
 mod deviation;
 mod export;
+mod accept;
+mod measurement;
 mod demo;
 #[cfg(feature = "visual")]
 mod view;
@@ -57,6 +59,8 @@ enum Verb {
     Robots(robots::Arguments),
     /// Measurements of a stated "actual" arm, effects, noise and rounding included.
     Simulate(simulate::Arguments),
+    /// What belongs to a measurement before it is made: the empty table.
+    Measurement(measurement::Arguments),
     /// Fit the arm to measured poses: a model file, and what the data could tell.
     Identify(identify::Arguments),
     /// What the model of the arm gets wrong, and why: named causes, and a model extended by them.
@@ -75,6 +79,8 @@ enum Verb {
     Compensate(compensate::Arguments),
     /// How far programs are off under a model; nothing is rewritten.
     Deviation(deviation::Arguments),
+    /// Whether an estimated arm holds a tolerance at poses that it was not fitted to: a page for the file of the cell.
+    Accept(accept::Arguments),
     /// The links of an estimated arm in the formats of others: URDF, tables of link parameters, the kinematics of UR drivers.
     Export(export::Arguments),
     /// Show in Rerun what any of the above wrote.
@@ -118,6 +124,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Demo(arguments) => demo::run(&arguments),
         Verb::Robots(arguments) => robots::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
+        Verb::Measurement(arguments) => measurement::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
@@ -127,6 +134,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Cell(arguments) => cell::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),
+        Verb::Accept(arguments) => accept::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "visual")]
         Verb::View(arguments) => view::run(&arguments),

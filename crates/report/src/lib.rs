@@ -26,3 +26,4 @@ pub mod compensation;
 pub mod batch;
 pub mod robots;
 pub mod planning;
+pub mod acceptance;

@@ -170,17 +170,19 @@ impl<'a> Course<'a> {
         };
         let mut passed = false;
         let passing = self.passing(motion, points);
+        let whole = way.len() + 1 >= self.pieces(motion);
         let tip = |q: &[f64; 6]| tool_in_object(motion, &self.arm.nominal_forward(q)).translation.vector;
         let mut before = self.joints.map(|joints| (0.0, joints));
         for (share, q) in way.iter().chain([&(1.0, end)]) {
             // The circle point, which is passed on the way; the tool need not be turned there as it is told.
             if count > 1 && !passed && *share >= passing {
                 passed = true;
-                let there = before.map_or(*q, |before| part_of(before, (*share, *q), passing));
+                let between = before.filter(|_| whole).map(|before| part_of(before, (*share, *q), passing));
+                let there = between.unwrap_or(*q);
                 self.links.go(&there);
                 (points[0].behind, points[0].flanks) = (self.links.behind(&there), self.links.flanks(&there));
                 let gone = before.filter(|_| motion.tool.1).map(|(_, before)| tip(q) - tip(&before));
-                points[0].passing = Some(there);
+                points[0].passing = between;
                 points[0].along = gone.and_then(|gone| Unit::try_new(gone, 1e-6));
             }
             self.links.go(q);

@@ -10,6 +10,7 @@ mod archive;
 pub mod cell;
 pub mod csv;
 pub mod xlsx;
+pub mod template;
 mod columns;
 mod error;
 mod options;

@@ -2,6 +2,7 @@
 
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
+mod acceptance;
 mod measurement;
 mod identification;
 mod diagnosis;

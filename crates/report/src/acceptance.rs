@@ -1,0 +1,327 @@
+//! The acceptance of an estimated arm: may it be used at this tolerance, and how was that found out.
+
+use serde_json::{Value, json};
+
+use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
+use super::plot::{Axis, Graph, Histogram, Ink, Reference, Sample, Series};
+use super::status::Status;
+use super::table::{Cell, Column, Table};
+use truegrind_arm::estimated::Estimated;
+use truegrind_calibration::acceptance::{
+    Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, Uncertainty,
+};
+use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+
+/// What is said beside the measurement.
+#[derive(Debug, Clone, Default)]
+pub struct Statement {
+    /// Serial numbers and the like, by name, in the order in which they were stated.
+    pub serials: Vec<(String, String)>,
+    /// The model file, and the SHA-256 of its bytes.
+    pub model: Option<(String, String)>,
+    /// Whether the sensor's frame was stated.
+    pub frames_stated: bool,
+    /// Seed of the folds.
+    pub seed: u64,
+}
+
+/// The whole page.
+pub fn document(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Document {
+    let mut page = summary(found, dataset, estimated);
+    page.heading(2, "Errors");
+    page.figure(
+        frequency(found, dataset.sensor),
+        "The error of each row under the estimated arm, by a sensor frame that has not seen the row.",
+    );
+    page.figure(
+        by_row(found, dataset.sensor),
+        "The same by row, in the order of the file, with the tolerance.",
+    );
+    page.heading(2, "Circumstances");
+    page.push(circumstances(found, estimated));
+    page.heading(2, "How this was decided");
+    page.push(Block::List(method(found, said)));
+    page.push(Block::Details {
+        summary: format!("Errors of the {} rows", found.rows),
+        blocks: vec![row_table(found).excerpt(300).into()],
+    });
+    page.heading(2, "Where this came from");
+    page.push(provenance(found, dataset, estimated, said));
+    page
+}
+
+/// What fits a terminal.
+pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> Document {
+    let mut page = Document::new(format!("Acceptance of {}", estimated.robot));
+    page.subtitle = format!("{}, {} poses in {} rows", dataset.file, found.poses, found.rows);
+    page.push(verdict(found, dataset.sensor));
+    page.push(Block::KeyFigures(figures(found)));
+    page.push(table(found));
+    page.push(iso(found, dataset.sensor));
+    page
+}
+
+/// Whether a run ends well.
+pub fn is_accepted(found: &Acceptance) -> bool {
+    found.decision == Decision::Accepted
+}
+
+fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
+    let (max, limit, u) = (found.model.max, found.tolerance_mm, found.uncertainty_mm);
+    let (status, headline) = match found.decision {
+        Decision::Accepted => {
+            (Status::Good, format!("Accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm"))
+        }
+        Decision::Refused => (
+            Status::Bad,
+            format!("Not accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm"),
+        ),
+        Decision::Open => (
+            Status::Warning,
+            format!(
+                "Not decided: the largest error of {max:.3} mm lies within {u:.3} mm, the uncertainty of the sensor, of the \
+                 tolerance of {limit:.3} mm"
+            ),
+        ),
+        Decision::NotEvaluated => (
+            Status::NotEvaluated,
+            format!("Not evaluated: {} poses, at least {FEWEST_POSES} are asked for", found.poses),
+        ),
+    };
+    let mut reasons = Vec::new();
+    match found.uncertainty {
+        Uncertainty::Unknown => reasons.push(
+            "the uncertainty of the sensor is not known and left out: state it (--sensor-uncertainty), or repeat some poses"
+                .to_owned(),
+        ),
+        Uncertainty::Repeats => reasons.push(
+            "the uncertainty is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
+                .to_owned(),
+        ),
+        Uncertainty::Stated => {}
+    }
+    if sensor == Sensor::Cable {
+        reasons.push("a cable sees the error along itself alone: across it nothing is judged".to_owned());
+    }
+    Verdict::new(status, headline, reasons)
+}
+
+fn figures(found: &Acceptance) -> Vec<KeyFigure> {
+    let share = 100.0 * (1.0 - found.model.rmse / found.nominal.rmse);
+    let uncertainty = Some(found.uncertainty_mm).filter(|_| found.uncertainty != Uncertainty::Unknown);
+    vec![
+        KeyFigure::new("Largest error", found.model.max, 3, "mm")
+            .note(format!("arm of the data sheet: {:.3} mm", found.nominal.max)),
+        KeyFigure::new("RMS error", found.model.rmse, 3, "mm")
+            .note(format!("arm of the data sheet: {:.3} mm, {share:.0} % less", found.nominal.rmse)),
+        KeyFigure::new("Tolerance", found.tolerance_mm, 3, "mm"),
+        KeyFigure::new("Uncertainty of the sensor", uncertainty, 3, "mm").note("expanded, k = 2"),
+        KeyFigure::new("Poses", found.poses, 0, "").note("that the model was not fitted to"),
+    ]
+}
+
+/// Mean, standard deviation, RMS and largest error of both arms.
+pub fn table(found: &Acceptance) -> Table {
+    let mut table = Table::new(
+        "Errors",
+        vec![
+            Column::text("arm", "Arm"),
+            Column::number("mean_mm", "Mean", "mm", 4),
+            Column::number("mean_absolute_mm", "Mean |e|", "mm", 4),
+            Column::number("sd_mm", "SD", "mm", 4),
+            Column::number("rmse_mm", "RMS", "mm", 4),
+            Column::number("max_mm", "Largest", "mm", 4),
+            Column::count("rows", "Rows"),
+        ],
+    );
+    for (name, errors) in [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)] {
+        table.push([
+            name.into(),
+            errors.mean.into(),
+            errors.mean_absolute.into(),
+            errors.standard_deviation.into(),
+            errors.rmse.into(),
+            errors.max.into(),
+            errors.count.into(),
+        ]);
+    }
+    table
+}
+
+/// The error of each row.
+pub fn row_table(found: &Acceptance) -> Table {
+    let mut table =
+        Table::new("Rows", vec![Column::count("row", "Row"), Column::number("error_mm", "Error", "mm", 4)]);
+    for &(row, error) in &found.errors_mm {
+        table.push([row.into(), error.into()]);
+    }
+    table
+}
+
+/// Pose accuracy, repeatability and path accuracy, or why there are none.
+fn iso(found: &Acceptance, sensor: Sensor) -> Table {
+    let mut table = Table::new(
+        "ISO 9283",
+        vec![
+            Column::text("figure", "Figure"),
+            Column::number("value_mm", "Largest over the poses", "mm", 4),
+            Column::text("remark", "Remark"),
+        ],
+    );
+    let missing = || match sensor {
+        Sensor::Cable => "not evaluated: a cable sees no position".to_owned(),
+        _ => format!(
+            "not evaluated: {ISO_CYCLES} cycles at {ISO_POSES} poses are asked for, at most {} of one pose were measured",
+            found.most_cycles
+        ),
+    };
+    let remark = match &found.cycles {
+        Some(cycles) => format!("{} poses, at least {} cycles", cycles.poses, cycles.cycles),
+        None => missing(),
+    };
+    let [accuracy, repeatability] = match &found.cycles {
+        Some(cycles) => [Cell::from(cycles.accuracy_mm), Cell::from(cycles.repeatability_mm)],
+        None => [Cell::Missing, Cell::Missing],
+    };
+    table.push(["pose accuracy AP, under the model".into(), accuracy, remark.as_str().into()]);
+    table.push(["pose repeatability RP".into(), repeatability, remark.as_str().into()]);
+    table.push(["path accuracy AT".into(), Cell::Missing, "not evaluated: no path was measured".into()]);
+    table
+}
+
+fn circumstances(found: &Acceptance, estimated: &Estimated) -> Table {
+    let mut table = Table::new(
+        "",
+        vec![
+            Column::text("quantity", "Quantity"),
+            Column::text("unit", "Unit"),
+            Column::significant("least", "From", "", 4),
+            Column::significant("most", "To", "", 4),
+            Column::significant("model", "Of the model (median)", "", 4),
+        ],
+    );
+    let condition = &estimated.condition;
+    let rows = [
+        ("time (warm-up)", "h", condition.time_h),
+        ("temperature", "°C", condition.temperature_c),
+        ("payload", "kg", condition.payload_kg),
+    ];
+    for ((name, unit, model), range) in rows.into_iter().zip(found.conditions) {
+        let [least, most] = [0, 1].map(|k| Cell::from(range.map(|range| range[k])));
+        table.push([name.into(), unit.into(), least, most, model.into()]);
+    }
+    table.notes.push("– stands where nothing was logged.".to_owned());
+    table
+}
+
+fn method(found: &Acceptance, said: &Statement) -> Vec<String> {
+    let frames = if said.frames_stated {
+        "The sensor's frame was stated: nothing was fitted to these rows.".to_owned()
+    } else {
+        "The sensor's frame and its target were fitted in five folds: each row is judged with a frame that has not seen its pose. \
+         What all readings share (where the robot stands) is not judged so."
+            .to_owned()
+    };
+    let rule = format!(
+        "Accepted where largest error and uncertainty ({:.3} mm) lie within the tolerance together, not accepted where the largest \
+         error exceeds it by more than the uncertainty, else not decided (the rule of ISO 14253-1).",
+        found.uncertainty_mm
+    );
+    vec![frames, rule]
+}
+
+fn axis(sensor: Sensor) -> Axis {
+    Axis::new(if sensor == Sensor::Cable { "error, measured minus predicted" } else { "error" }, "mm")
+}
+
+fn frequency(found: &Acceptance, sensor: Sensor) -> String {
+    let errors: Vec<f64> = found.errors_mm.iter().map(|row| row.1).collect();
+    let samples = vec![Sample::new("estimated arm", errors).ink(Ink::Blue)];
+    Histogram { title: "Errors".to_owned(), x: axis(sensor), samples, bins: None }.svg()
+}
+
+fn by_row(found: &Acceptance, sensor: Sensor) -> String {
+    let points: Vec<[f64; 2]> = found.errors_mm.iter().map(|row| [row.0 as f64, row.1]).collect();
+    let limit = |mm: f64| Reference::Horizontal(mm, "tolerance".to_owned());
+    let mut references = vec![limit(found.tolerance_mm)];
+    if sensor == Sensor::Cable {
+        references.push(limit(-found.tolerance_mm));
+    }
+    Graph {
+        title: "Errors by row".to_owned(),
+        x: Axis::new("row of the file", ""),
+        y: axis(sensor),
+        series: vec![Series::points("estimated arm", points).ink(Ink::Blue)],
+        references,
+        ..Graph::default()
+    }
+    .svg()
+}
+
+fn provenance(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Provenance {
+    let mut page = Provenance { seed: Some(said.seed), ..Provenance::here() };
+    let known = |hash: &str| Some(hash.to_owned()).filter(|hash| !hash.is_empty());
+    page.sources.push(Source {
+        name: dataset.file.clone(),
+        role: "Measurements".to_owned(),
+        sha256: known(&dataset.sha256),
+        rows: Some(found.rows),
+    });
+    if let Some((name, hash)) = &said.model {
+        page.sources.push(Source {
+            name: name.clone(),
+            role: "Model".to_owned(),
+            sha256: known(hash),
+            rows: None,
+        });
+    }
+    page.sources.push(Source {
+        name: estimated.provenance.file.clone(),
+        role: "Measurements that the model was fitted to".to_owned(),
+        sha256: known(&estimated.provenance.sha256),
+        rows: Some(estimated.provenance.rows),
+    });
+    page.remarks.push(("Robot".to_owned(), estimated.robot.clone()));
+    page.remarks.extend(said.serials.iter().cloned());
+    page
+}
+
+/// Everything; schema `truegrind.acceptance/1`.
+pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Value {
+    let decision = match found.decision {
+        Decision::Accepted => "accepted",
+        Decision::Refused => "not accepted",
+        Decision::Open => "not decided",
+        Decision::NotEvaluated => "not evaluated",
+    };
+    let uncertainty = match found.uncertainty {
+        Uncertainty::Stated => "stated",
+        Uncertainty::Repeats => "repeated poses",
+        Uncertainty::Unknown => "unknown",
+    };
+    let [time_h, temperature_c, payload_kg] = found.conditions;
+    let serials: serde_json::Map<String, Value> =
+        said.serials.iter().map(|(name, text)| (name.clone(), json!(text))).collect();
+    json!({
+        "schema": "truegrind.acceptance/1",
+        "robot": estimated.robot,
+        "decision": decision,
+        "tolerance_mm": found.tolerance_mm,
+        "uncertainty": { "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty },
+        "poses": found.poses,
+        "rows": found.rows,
+        "nominal": found.nominal,
+        "model": found.model,
+        "iso_9283": found.cycles.map(|cycles| json!({
+            "poses": cycles.poses, "cycles": cycles.cycles, "ap_mm": cycles.accuracy_mm, "rp_mm": cycles.repeatability_mm,
+        })),
+        "conditions": { "time_h": time_h, "temperature_c": temperature_c, "payload_kg": payload_kg },
+        "serials": serials,
+        "measurements": { "file": dataset.file, "sha256": dataset.sha256 },
+        "model_file": said.model.as_ref().map(|(name, hash)| json!({ "file": name, "sha256": hash })),
+        "fitted_to": { "file": estimated.provenance.file, "sha256": estimated.provenance.sha256 },
+        "frames_stated": said.frames_stated,
+        "seed": said.seed,
+        "errors": found.errors_mm.iter().map(|(row, mm)| json!({ "row": row, "error_mm": mm })).collect::<Vec<_>>(),
+    })
+}

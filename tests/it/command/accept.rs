@@ -1,0 +1,97 @@
+//! The acceptance of a model as a user asks for it, and the empty table to begin with.
+
+use std::fs;
+
+use super::{folder, truegrind};
+
+const RECIPE: &str = include_str!("../../data/irb120-tracker.toml");
+const ROWS: &str = include_str!("../../data/irb120-tracker.csv");
+
+#[test]
+fn a_model_is_accepted_by_poses_of_its_own() {
+    let dir = folder();
+    let at = dir.path();
+    fs::write(at.join("poses.csv"), ROWS).unwrap();
+    // The same arm on another day.
+    fs::write(at.join("later.toml"), RECIPE.replace("seed = 121", "seed = 122")).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "later.toml", "-o", "later.csv"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, _, err) = truegrind(
+        at,
+        &["diagnose", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml", "--allow-doubtful"],
+    );
+    assert!(code < 2, "{err}");
+    let accept = |data: &str, more: &[&str]| {
+        truegrind(at, &[&["accept", data, "--model", "model.toml", "--tolerance"], more].concat())
+    };
+    let page = ["1", "--serial", "arm=120-503211", "--html", "page.html", "--json", "page.json"];
+    let (code, out, err) = accept("later.csv", &page);
+    assert!(code == 0 && out.contains("[ok] Accepted: the largest error is 0."), "{out}{err}");
+    assert!(out.contains("cycles at 5 poses are asked for"), "{out}");
+    let html = fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(html.contains("120-503211") && html.contains("<svg"));
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(at.join("page.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], "truegrind.acceptance/1");
+    assert_eq!((&json["decision"], &json["poses"]), (&"accepted".into(), &200.into()));
+    assert!(json["model"]["rmse"].as_f64().unwrap() < 0.5 * json["nominal"]["rmse"].as_f64().unwrap());
+    for file in ["measurements", "model_file", "fitted_to"] {
+        assert_eq!(json[file]["sha256"].as_str().unwrap().len(), 64, "{file}");
+    }
+
+    let (code, out, _) = accept("later.csv", &["0.001", "--sensor-uncertainty", "0.01"]);
+    assert!(code == 1 && out.contains("[failed] Not accepted"), "{out}");
+    let (code, _, err) = accept("poses.csv", &["1"]);
+    assert!(code == 2 && err.contains("the rows that the model was fitted to"), "{err}");
+    let few: String = fs::read_to_string(at.join("later.csv"))
+        .unwrap()
+        .lines()
+        .take(61)
+        .map(|l| format!("{l}\n"))
+        .collect();
+    fs::write(at.join("few.csv"), few).unwrap();
+    let (code, out, _) = accept("few.csv", &["1"]);
+    assert!(code == 1 && out.contains("[not evaluated] Not evaluated: 60 poses"), "{out}");
+    for (more, expected) in [
+        (vec!["0"], "expected a length above 0"),
+        (vec!["1", "--sensor-uncertainty", "-1"], "the uncertainty of the sensor"),
+        (vec!["1", "--serial", "arm"], "expected WHAT=TEXT"),
+        (vec!["1", "--rrd", "a.rrd"], "--rrd"),
+    ] {
+        let (code, _, err) = accept("later.csv", &more);
+        assert!(code == 2 && err.contains(expected), "{more:?}: {err}");
+    }
+}
+
+#[test]
+fn an_empty_table_says_what_belongs_where() {
+    let dir = folder();
+    let at = dir.path();
+    for (sensor, column) in [("cable", ",L,"), ("position", ",measured_z,"), ("pose", ",measured_qz,")] {
+        let name = format!("{sensor}.csv");
+        let (code, _, err) = truegrind(
+            at,
+            &["measurement", "template", "--robot", "abb-irb-120", "--sensor", sensor, "-o", &name],
+        );
+        assert_eq!(code, 0, "{err}");
+        let text = fs::read_to_string(at.join(&name)).unwrap();
+        assert!(text.starts_with("q1,q2,q3,q4,q5,q6,") && text.contains(column), "{text}");
+        assert_eq!(text.lines().count(), 1, "{text}");
+        assert!(err.contains("J1 −165 to 165°") && err.contains("controller"), "{err}");
+    }
+    // Filled in, with the columns that are not needed left empty, it is read.
+    let header = fs::read_to_string(at.join("cable.csv")).unwrap();
+    let rows: String = super::CABLE
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').take(7).collect();
+            let empty = header.split(',').count() - cells.len();
+            format!("{}{}\n", cells.join(","), ",".repeat(empty))
+        })
+        .collect();
+    fs::write(at.join("full.csv"), header + &rows).unwrap();
+    let (code, out, err) = truegrind(at, &["identify", "full.csv", "--robot", "abb-irb-120"]);
+    assert!(code < 2 && out.contains("sensor cable"), "{out}{err}");
+    let (code, _, err) = truegrind(at, &["measurement", "template", "--robot", "abb-irb-12"]);
+    assert!(code == 2 && err.contains("abb-irb-120"), "{err}");
+}
