@@ -328,7 +328,7 @@ pub(crate) fn diagnose_(
             tell(&format!("judging on {}", other.file));
             let frames = starting_frames(&other, nominal, &options.tolerance, true)?;
             let (geometric, extended) = (&found.geometric.model, &found.extended.model);
-            let judged = transfer(&other, &frames, nominal, geometric, extended, &options.tolerance);
+            let judged = transfer(&other, &frames, nominal, geometric, extended, &options.tolerance, options.fuse_readout);
             found.diagnosis.transfers.push(judged);
         }
         Ok(PyDiagnosis { found: Arc::new(found), rows: Arc::new(rows) })
