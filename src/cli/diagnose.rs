@@ -140,7 +140,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::diagnosis(&found, &dataset)?);
+        batch.add(path, super::recording::diagnosis(&found, &dataset, &arguments.data.robot)?);
     }
     let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;

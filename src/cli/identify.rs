@@ -175,7 +175,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::identification(&found, &dataset)?);
+        batch.add(path, super::recording::identification(&found, &dataset, &arguments.data.robot)?);
     }
     if let Some(splits) = arguments.compare_methods {
         let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));

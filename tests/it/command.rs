@@ -10,8 +10,11 @@ mod compare;
 mod defect;
 mod belonging;
 mod files;
+mod fits;
 mod manual;
 mod nc;
+#[cfg(feature = "visual")]
+mod pictures;
 mod robots;
 mod same;
 mod text;

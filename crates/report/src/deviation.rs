@@ -24,6 +24,9 @@ pub use summary::{block_table, registered_table};
 /// Rows of a point table on a page; the whole table belongs in the CSV file.
 const ROWS_ON_PAGE: usize = 150;
 
+/// Programs with an answer of their own on a terminal; of more the table tells.
+const ANSWERED: usize = 5;
+
 /// Models with a key figure of their own.
 const MODELS_IN_FIGURES: usize = 7;
 
@@ -197,6 +200,22 @@ fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
         std::cmp::Ordering::Equal => Some(low.to_string()),
         std::cmp::Ordering::Greater => None,
     }
+}
+
+/// What fits a terminal: the answer for each of a few programs, and the tables of all.
+pub fn summary(name: &str, reports: &[PathReport]) -> Document {
+    let mut page = Document::new(format!("Deviation of {name}"));
+    let programs = by_program(reports);
+    for (program, reports) in programs.iter().take(ANSWERED) {
+        let mut verdict = verdict(reports);
+        if programs.len() > 1 {
+            verdict.headline = format!("{program}: {}", verdict.headline);
+        }
+        page.push(verdict);
+    }
+    page.push(block_table(reports));
+    page.push(registered_table(reports));
+    page
 }
 
 /// The page: one section per program. Reports of one program with several models stand together.
