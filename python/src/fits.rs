@@ -6,6 +6,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truegrind::calibration::diagnosis::transfer::transfer;
+use truegrind::calibration::identification::verdict::Limits;
 use truegrind::math::work::tell;
 use truegrind::report::{diagnosis, format, identification};
 use truegrind::{
@@ -287,8 +288,8 @@ impl PyDiagnosis {
 #[pyo3(
     name = "diagnose",
     signature = (
-        dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, seed = 0, also = Vec::new(), angles = None,
-        threads = None, progress = None
+        dataset, robot, *, alpha = 0.01, most = 20, blocks = 10, smooth = false, fuse_readout = true, limit_rmse_mm = None,
+        limit_max_mm = None, seed = 0, also = Vec::new(), angles = None, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -300,6 +301,9 @@ pub(crate) fn diagnose_(
     most: usize,
     blocks: usize,
     smooth: bool,
+    fuse_readout: bool,
+    limit_rmse_mm: Option<f64>,
+    limit_max_mm: Option<f64>,
     seed: u64,
     also: Vec<PyRef<'_, PyDataset>>,
     angles: Option<&str>,
@@ -312,7 +316,13 @@ pub(crate) fn diagnose_(
     if blocks < 2 {
         return Err(Refusal::argument("blocks", blocks, "at least 2").into());
     }
-    let mut options = DiagnoseOptions { blocks, smooth, ..DiagnoseOptions::default() };
+    for (name, limit) in [("limit_rmse_mm", limit_rmse_mm), ("limit_max_mm", limit_max_mm)] {
+        if let Some(limit) = limit {
+            positive(name, limit)?;
+        }
+    }
+    let limits = Limits { rmse_mm: limit_rmse_mm, max_mm: limit_max_mm };
+    let mut options = DiagnoseOptions { blocks, smooth, fuse_readout, limits, ..DiagnoseOptions::default() };
     options.selection.alpha = alpha;
     options.selection.most = most;
     options.selection.seed = seed;
@@ -321,14 +331,22 @@ pub(crate) fn diagnose_(
         tell("checking units");
         let rows = dataset.of(&robot, angles)?;
         let (name, nominal) = (&robot.sheet.name, &robot.model);
-        let frames = starting_frames(&rows, nominal, &options.tolerance, true)?;
+        let frames = starting_frames(&rows, nominal, &options.tolerance, options.fuse_readout)?;
         let mut found = diagnose(&rows, name, nominal, &frames, &options, &|step| tell(step))?;
         for other in others {
             let other = other.of(&robot, angles)?;
             tell(&format!("judging on {}", other.file));
-            let frames = starting_frames(&other, nominal, &options.tolerance, true)?;
+            let frames = starting_frames(&other, nominal, &options.tolerance, options.fuse_readout)?;
             let (geometric, extended) = (&found.geometric.model, &found.extended.model);
-            let judged = transfer(&other, &frames, nominal, geometric, extended, &options.tolerance);
+            let judged = transfer(
+                &other,
+                &frames,
+                nominal,
+                geometric,
+                extended,
+                &options.tolerance,
+                options.fuse_readout,
+            );
             found.diagnosis.transfers.push(judged);
         }
         Ok(PyDiagnosis { found: Arc::new(found), rows: Arc::new(rows) })

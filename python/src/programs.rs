@@ -8,6 +8,7 @@ use truegrind::compensation::belonging::{cell_of_another, program_of_another};
 use truegrind::compensation::cell::Used;
 use truegrind::compensation::payload::Loads;
 use truegrind::compensation::placed::misplaced;
+use truegrind::compensation::placement::Placement;
 use truegrind::compensation::reach::none_in_reach;
 use truegrind::compensation::setup::setup;
 use truegrind::compensation::taught::contradictions;
@@ -302,15 +303,17 @@ impl PyCompensation {
 }
 
 /// Rewrites a program so that the estimated arm follows it. ``program`` is a path, a list of paths (modules of one task) or a
-/// dictionary of names and texts; ``cell`` a cell file or its text; ``surface`` the surface file that is ground. Nothing is
-/// written: ``Compensation.save`` does.
+/// dictionary of names and texts; ``cell`` a cell file or its text; ``surface`` the surface file that is ground. ``placement`` says
+/// whether the place of the path over each work object is corrected ("absolute"), its shape alone ("shape"), or the place only where
+/// the model knows it better than it is off ("auto"). A cut that the correction makes worse with a larger probability than
+/// ``max_risk`` stays as it is. Nothing is written: ``Compensation.save`` does.
 #[pyfunction]
 #[pyo3(
     name = "compensate",
     signature = (
         program, model, *, cell = None, surface = None, payload_kg = None, payload_centre_mm = None, emit = "targets",
-        circles = "keep", tolerance_mm = 0.05, max_correction_mm = 10.0, partial = false, joint_targets = false, again = false,
-        allow_doubtful = false, threads = None, progress = None
+        circles = "keep", tolerance_mm = 0.05, max_correction_mm = 10.0, partial = false, placement = "auto", max_risk = 0.1,
+        joint_targets = false, again = false, allow_doubtful = false, threads = None, progress = None
     )
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords, as the options of the command line")]
@@ -327,12 +330,17 @@ pub(crate) fn compensate_(
     tolerance_mm: f64,
     max_correction_mm: f64,
     partial: bool,
+    placement: &str,
+    max_risk: f64,
     joint_targets: bool,
     again: bool,
     allow_doubtful: bool,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyCompensation> {
+    if !(0.0..=1.0).contains(&max_risk) {
+        return Err(Refusal::argument("max_risk", max_risk, "a probability from 0 to 1").into());
+    }
     let mut kept = None;
     let estimated = named(model, &mut kept)?;
     estimated.allowed(allow_doubtful)?;
@@ -354,6 +362,16 @@ pub(crate) fn compensate_(
         max_correction_mm: positive("max_correction_mm", max_correction_mm)?,
         joint_targets,
         cuts: if partial { Cuts::Partial } else { Cuts::Whole },
+        placement: match placement {
+            "auto" => Placement::Auto,
+            "shape" => Placement::Shape,
+            "absolute" => Placement::Absolute,
+            other => {
+                let expected = "\"auto\", \"shape\" or \"absolute\"";
+                return Err(Refusal::argument("placement", other, expected).into());
+            }
+        },
+        max_risk,
         condition: stated.on(&estimated.arm.model, &estimated.arm.condition)?,
         points: true,
         ..CompensateOptions::default()

@@ -5,6 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::arm::model::Model;
+#[cfg(feature = "visual")]
+use truegrind::calibration::identification::register::starting_frames;
+#[cfg(feature = "visual")]
+use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::papers::experiment::{Experiment, Kind};
 use truegrind::papers::grinding::Actual;
@@ -84,14 +88,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.times.as_deref());
     Batch::check(&inputs, &targets)?;
-    if arguments.outputs.rrd.is_some() {
-        bail!("--rrd: an experiment has no recording; --html FILE writes a page with its plots");
-    }
     let experiment = if is_file {
         Experiment::parse(&files::read_text(Path::new(name))?, name)?
     } else {
         Experiment::by_name(name)?
     };
+    if arguments.outputs.rrd.is_some() && !experiment.takes_rows() {
+        bail!(
+            "--rrd: experiment {name} moves no arm, so there is nothing to draw; --html FILE has its plots"
+        );
+    }
     let kind = experiment.kind().ok_or_else(|| anyhow!("{name}: says nothing to run"))?;
     let seed = arguments.common.seed;
     let mut origin = Origin { seed, timings: arguments.timings, ..Origin::default() };
@@ -142,7 +148,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         })
     })??;
     drop(work);
-    arguments.outputs.print(&view::summary(&experiment, &results))?;
+    let summary = view::summary(&experiment, &results);
+    arguments.outputs.print(&summary)?;
     let times = view::times(&results);
     if let Some(times) = times.as_ref().filter(|_| arguments.timings) {
         tell_lines(&format::terminal::table(times, width()));
@@ -154,6 +161,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         || view::table(&results),
         || view::json(&experiment, &results, &origin),
     )?;
+    #[cfg(feature = "visual")]
+    if let (Some(path), Some(measured)) = (&arguments.outputs.rrd, &measured) {
+        let (dataset, nominal) = (&measured.dataset, &measured.nominal);
+        let compared = super::recording::Compared {
+            dataset,
+            nominal,
+            actual: measured.actual.as_ref(),
+            frames: &starting_frames(dataset, nominal, &Tolerance::default(), true)?,
+            robot: arguments.robot.as_deref().unwrap_or(&measured.robot),
+        };
+        batch.add(path, super::recording::comparison(&compared, &summary)?);
+    }
     if let (Some(path), Some(times)) = (&arguments.times, &times) {
         batch.add(path, format::csv::table(times));
     }

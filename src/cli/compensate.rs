@@ -419,8 +419,12 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
         if let (Some(path), Some(corrector)) = (&outputs.rrd, shop.corrector) {
             let bytes = super::recording::path(
                 &report.program,
-                &corrector.arm.model,
-                "estimated arm",
+                super::recording::Arms {
+                    real: &corrector.arm.model,
+                    is: "estimated arm",
+                    nominal: &corrector.arm.nominal,
+                    robot: arguments.robot.as_deref(),
+                },
                 shop.options.condition,
                 reports,
                 shop.surface.as_ref(),

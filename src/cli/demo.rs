@@ -152,8 +152,12 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
         place("demo.rrd"),
         super::recording::path(
             "truegrind demo",
-            &simulation.actual,
-            "simulated actual arm",
+            super::recording::Arms {
+                real: &simulation.actual,
+                is: "simulated actual arm",
+                nominal,
+                robot: None,
+            },
             condition,
             &reports[..1],
             Some(&surface),

@@ -14,7 +14,6 @@ use truegrind::compensation::deviation::{After, PathReport};
 use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
-use truegrind::report::document::Document;
 use truegrind::surfaces::SurfaceFile;
 
 use super::belonging;
@@ -120,10 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("none of {} programs has a motion whose target is known from the text", jobs.len());
     }
     let name = if several { format!("{} programs", jobs.len()) } else { reports[0].program.clone() };
-    let mut summary = Document::new(format!("Deviation of {name}"));
-    summary.push(view::block_table(&reports));
-    summary.push(view::registered_table(&reports));
-    arguments.outputs.print(&summary)?;
+    arguments.outputs.print(&view::summary(&name, &reports))?;
     let mut batch = Batch::sparing(&all);
     arguments.outputs.add_made(
         &mut batch,
@@ -134,7 +130,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
         let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
-        let bytes = super::recording::path(&name, &first.model, is, condition, &reports, surface.as_ref())?;
+        let arms = super::recording::Arms {
+            real: &first.model,
+            is,
+            nominal: &first.nominal,
+            robot: arguments.robot.as_deref(),
+        };
+        let bytes = super::recording::path(&name, arms, condition, &reports, surface.as_ref())?;
         batch.add(path, bytes);
     }
     batch.write()?;

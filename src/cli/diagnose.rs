@@ -19,7 +19,7 @@ use truegrind::report::diagnosis as view;
 use super::computation::{Common, watching};
 use super::ending::Ending;
 use super::files::Batch;
-use super::identify::{DataArguments, read, write_model};
+use super::identify::{DataArguments, FitArguments, read, write_model};
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::stated::{HeldArguments, StatedArguments};
@@ -54,6 +54,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
     #[command(flatten)]
+    asked: FitArguments,
+    #[command(flatten)]
     stated: StatedArguments,
     #[command(flatten)]
     held: HeldArguments,
@@ -75,11 +77,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.blocks < 2 {
         bail!("--blocks {}: expected at least 2", arguments.blocks);
     }
-    let (robot, dataset) = read(&arguments.data)?;
-    let mut options = Options { blocks: arguments.blocks, smooth: arguments.smooth, ..Options::default() };
+    let mut options = Options {
+        blocks: arguments.blocks,
+        smooth: arguments.smooth,
+        fuse_readout: !arguments.asked.raw_columns,
+        limits: arguments.asked.limits()?,
+        ..Options::default()
+    };
     options.selection.alpha = arguments.alpha;
     options.selection.most = arguments.most;
     options.selection.seed = arguments.common.seed;
+    let (robot, dataset) = read(&arguments.data)?;
     let name = robot.sheet.name.clone();
     let work = Work::start(format!("diagnosing {name} from {} rows", dataset.rows.len()));
     let others = arguments
@@ -88,13 +96,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
     let found = watching(arguments.common.threads, &work, || {
-        let frames = starting_frames(&dataset, &robot.model, &options.tolerance, true)?;
+        let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
         let stated = arguments.stated.frames(&dataset)?;
         let (tolerance, frames) = arguments.held.held(&options.tolerance, stated.as_ref(), frames)?;
         let held = Options { tolerance, ..options.clone() };
         let mut found = diagnose(&dataset, &name, &robot.model, &frames, &held, &|step| tell_step(step))?;
         if let Some(stated) = &stated {
-            let raw = raw_error(&dataset, &robot.model, stated);
+            let raw = raw_error(&dataset, &robot.model, stated, options.fuse_readout);
             found.diagnosis.notes.push(format!(
                 "with the frames as stated the data sheet's arm is {:.3} mm RMS off (raw error, nothing fitted)",
                 raw.rmse
@@ -102,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         }
         for other in &others {
             tell_step(&format!("judging on {}", other.file));
-            let frames = starting_frames(other, &robot.model, &options.tolerance, true)?;
+            let frames = starting_frames(other, &robot.model, &options.tolerance, options.fuse_readout)?;
             let models = [&robot.model, &found.geometric.model, &found.extended.model];
             let [nominal, geometric, extended] = models;
             found.diagnosis.transfers.push(transfer(
@@ -112,6 +120,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
                 geometric,
                 extended,
                 &options.tolerance,
+                options.fuse_readout,
             ));
         }
         anyhow::Ok(found)
@@ -131,7 +140,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::diagnosis(&found, &dataset)?);
+        batch.add(path, super::recording::diagnosis(&found, &dataset, &arguments.data.robot)?);
     }
     let unexplained = found.diagnosis.findings.iter().any(|f| f.effect == "unexplained");
     let ending = write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)?;
@@ -139,8 +148,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
 }
 
 /// What the data sheet's arm is off by with frames that were measured by other means.
-fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames) -> ErrorSummary {
-    summary_on(&observe(dataset, nominal, true).0, nominal, stated)
+fn raw_error(dataset: &Dataset, nominal: &Model, stated: &Frames, fuse: bool) -> ErrorSummary {
+    summary_on(&observe(dataset, nominal, fuse).0, nominal, stated)
 }
 
 /// The diagnosis, starting frames included.

@@ -102,7 +102,7 @@ fn judged(data: &Path, arm: &Estimated, bare: &Model) -> anyhow::Result<String> 
     let (_, rows) = read(&reading)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
-    let found = transfer(&rows, &frames, &arm.nominal, bare, &arm.model, &tolerance);
+    let found = transfer(&rows, &frames, &arm.nominal, bare, &arm.model, &tolerance, true);
     let seen = if rows.sha256 == arm.provenance.sha256 {
         "which the model was fitted to, so that this is no held-out error"
     } else {

@@ -13,6 +13,7 @@ use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::solver::{SOLVERS, by_name};
 use truegrind::calibration::identification::study::study;
 use truegrind::calibration::identification::tolerance::Tolerance;
+use truegrind::calibration::identification::verdict::Limits;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::calibration::measurement::import;
@@ -75,6 +76,32 @@ impl DataArguments {
     }
 }
 
+/// What is asked of a fit, of geometry alone or with causes.
+#[derive(Debug, Clone, Args)]
+pub(super) struct FitArguments {
+    /// Do not sharpen rounded angles by the controller's read-out.
+    #[arg(long)]
+    pub(super) raw_columns: bool,
+    /// The fit passes only with a held-out RMSE up to this (mm).
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    limit_rmse: Option<f64>,
+    /// The fit passes only with a held-out maximum up to this (mm).
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    limit_max: Option<f64>,
+}
+
+impl FitArguments {
+    /// The stated limits.
+    pub(super) fn limits(&self) -> anyhow::Result<Limits> {
+        for (name, limit) in [("--limit-rmse", self.limit_rmse), ("--limit-max", self.limit_max)] {
+            if let Some(limit) = limit.filter(|limit| !(*limit > 0.0 && limit.is_finite())) {
+                bail!("{name} {limit}: expected a length above 0 in mm");
+            }
+        }
+        Ok(Limits { rmse_mm: self.limit_rmse, max_mm: self.limit_max })
+    }
+}
+
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -95,15 +122,6 @@ pub(super) struct Arguments {
     /// Compare all methods over this many splits (seeds 0, 1, …).
     #[arg(long, value_name = "SPLITS")]
     compare_methods: Option<u64>,
-    /// Do not fuse_readout rounded angles by the controller's read-out.
-    #[arg(long)]
-    raw_columns: bool,
-    /// The fit passes only with a held-out RMSE up to this (mm).
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    limit_rmse: Option<f64>,
-    /// The fit passes only with a held-out maximum up to this (mm).
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    limit_max: Option<f64>,
     /// Tolerance of link lengths (mm), as a prior. Without it and --tolerance-angle the rows tell the tolerances, weighed by 1 mm
     /// and 0.3°.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -111,6 +129,8 @@ pub(super) struct Arguments {
     /// Tolerance of link angles and joint offsets (°), as a prior.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tolerance_angle: Option<f64>,
+    #[command(flatten)]
+    asked: FitArguments,
     #[command(flatten)]
     stated: StatedArguments,
     #[command(flatten)]
@@ -128,15 +148,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
-    for (name, limit) in [("--limit-rmse", arguments.limit_rmse), ("--limit-max", arguments.limit_max)] {
-        if let Some(limit) = limit
-            && !(limit > 0.0 && limit.is_finite())
-        {
-            bail!("{name} {limit}: expected a length above 0 in mm");
-        }
-    }
+    let limits = arguments.asked.limits()?;
     let (robot, dataset) = read(&arguments.data)?;
-    let options = Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments)? };
+    let options =
+        Options { stated_frames: arguments.stated.frames(&dataset)?, ..options(arguments, limits)? };
     let work = Work::start(format!("identifying {} from {} rows", robot.sheet.name, dataset.rows.len()));
     let name = robot.sheet.name.clone();
     let found = watching(arguments.common.threads, &work, || {
@@ -160,7 +175,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     )?;
     #[cfg(feature = "visual")]
     if let Some(path) = &arguments.outputs.rrd {
-        batch.add(path, super::recording::identification(&found, &dataset)?);
+        batch.add(path, super::recording::identification(&found, &dataset, &arguments.data.robot)?);
     }
     if let Some(splits) = arguments.compare_methods {
         let work = Work::start(format!("{} methods over {splits} splits", SOLVERS.len()));
@@ -205,7 +220,7 @@ pub(super) fn write_model(
     Ok(if poor { Ending::Flagged } else { Ending::Done })
 }
 
-fn options(arguments: &Arguments) -> anyhow::Result<Options> {
+fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
     let mut tolerance = Tolerance::default();
     for (stated, place, scale) in [
         (arguments.tolerance_length, &mut tolerance.length_mm, 1.0),
@@ -226,9 +241,9 @@ fn options(arguments: &Arguments) -> anyhow::Result<Options> {
         solver: by_name(&arguments.method)?,
         held_out: arguments.held_out,
         seed: arguments.common.seed,
-        fuse_readout: !arguments.raw_columns,
-        limit_rmse_mm: arguments.limit_rmse,
-        limit_max_mm: arguments.limit_max,
+        fuse_readout: !arguments.asked.raw_columns,
+        limit_rmse_mm: limits.rmse_mm,
+        limit_max_mm: limits.max_mm,
         stated_frames: None,
     })
 }

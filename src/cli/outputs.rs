@@ -30,7 +30,14 @@ pub(super) struct Outputs {
     pub(super) html: Option<PathBuf>,
     /// Rerun recording.
     #[arg(long, value_name = "FILE")]
+    #[cfg_attr(not(feature = "visual"), arg(value_parser = no_recordings))]
     pub(super) rrd: Option<PathBuf>,
+}
+
+/// A build without pictures says so, and does not pass over what was asked for.
+#[cfg(not(feature = "visual"))]
+fn no_recordings(_: &str) -> Result<PathBuf, String> {
+    Err("this build makes no recordings (it was made with --no-default-features); --html FILE writes a page".to_owned())
 }
 
 impl Outputs {

@@ -139,9 +139,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     targets.extend(arguments.output.as_deref());
     let inputs_of: Vec<&std::path::Path> = arguments.diagnosis.as_deref().into_iter().collect();
     Batch::check(&inputs_of, &targets)?;
-    if arguments.outputs.rrd.is_some() {
-        bail!("--rrd: a plan has no picture; `truegrind view POSES.mod --robot R` shows its program");
-    }
     let robot = inputs::robot(&arguments.robot)?;
     Batch::check(&inputs_of, &targets)?;
     arguments.output.as_deref().map_or(Ok(()), naming::rapid)?;
@@ -167,6 +164,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         || view::table(&planned, &wanted),
         || view::json(&planned, &wanted, name),
     )?;
+    #[cfg(feature = "visual")]
+    if let Some(path) = &arguments.outputs.rrd {
+        batch.add(path, super::recording::plan(&planned, &wanted, name, &arguments.robot)?);
+    }
     if let Some(path) = &arguments.output {
         let drive = Drive {
             robot: name.to_owned(),

@@ -102,9 +102,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     measurement_files(arguments)?.iter().try_for_each(|path| files::expect(path))?;
     Batch::check(&inputs_of_run, &targets)?;
-    if arguments.outputs.rrd.is_some() {
-        bail!("--rrd: a track has no recording; --html FILE writes a page");
-    }
     let options = options(arguments, &arm)?;
     if let Some(seconds) = arguments.follow.filter(|s| !(*s > 0.0 && s.is_finite())) {
         bail!("--follow {seconds}: expected seconds above 0");
@@ -208,7 +205,7 @@ impl Track<'_> {
             taking.as_secs_f64() * 1e3,
             taking.as_secs_f64() * 1e6 / fresh as f64
         ));
-        self.write(&tracker, fresh, &alarms)?;
+        self.write(&tracker, fresh, &alarms, &datasets)?;
         Ok(failed || !alarms.is_empty() || tracker.mostly_set_aside())
     }
 
@@ -229,7 +226,13 @@ impl Track<'_> {
         Ok(Some(Tracker::resume(self.arm, state, &name)?))
     }
 
-    fn write(&self, tracker: &Tracker, fresh: usize, alarms: &[Alarm]) -> anyhow::Result<()> {
+    fn write(
+        &self,
+        tracker: &Tracker,
+        fresh: usize,
+        alarms: &[Alarm],
+        datasets: &[Dataset],
+    ) -> anyhow::Result<()> {
         let arguments = self.arguments;
         let date = match &arguments.date {
             Some(date) => stamp(date)?,
@@ -255,6 +258,16 @@ impl Track<'_> {
             || view::table(tracker),
             || view::json(tracker, fresh, alarms),
         )?;
+        #[cfg(feature = "visual")]
+        if let Some(path) = &arguments.outputs.rrd {
+            let robot = arguments.robot.as_deref();
+            match super::recording::track(tracker, &self.arm.model, datasets, alarms, robot)? {
+                Some(bytes) => batch.add(path, bytes),
+                None => tell("note: --rrd: no pose is there to be drawn; nothing written to it"),
+            }
+        }
+        #[cfg(not(feature = "visual"))]
+        let _ = datasets;
         batch.add(self.state_path, tracker.state().to_toml()?);
         batch.write()
     }

@@ -29,7 +29,7 @@ use super::files::{self, Batch};
 use super::inputs::NamedModel;
 use super::programs::Programs;
 use super::progress::Work;
-use super::recording::recording;
+use super::recording::{Arms, meshes, recording};
 use super::{identify, inputs, programs};
 
 /// Arguments of `view`.
@@ -119,7 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             out.push(measurements(arguments, &file)?);
         }
         for file in of(Kind::Model) {
-            out.push(model(&file)?);
+            out.push(model(arguments, &file)?);
         }
         if !programs.is_empty() {
             out.push(program(arguments, &programs)?);
@@ -182,7 +182,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     };
     let Some((name, arm)) = stated else {
         let found = identify::identified(&dataset, &robot.sheet.name, &robot.model, &options)?;
-        return Ok(pictures::dataset_recording(&dataset, &found)?);
+        return Ok(pictures::dataset_recording(&dataset, &found, &meshes(arguments.robot.as_deref())?)?);
     };
     // The sensor may stand elsewhere than when the model was made: frames are fitted anew, for either arm.
     let frames = starting_frames(&dataset, &robot.model, &options.tolerance, options.fuse_readout)?;
@@ -205,6 +205,10 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         dataset: &dataset,
         arm: &arm.model,
         arm_is: &format!("{} as estimated in {name}", arm.robot),
+        nominal: Some(&arm.nominal),
+        meshes: &meshes(arguments.robot.as_deref())?,
+        keep_out_mm: &[],
+        answer: &[],
         frames: registered.as_ref(),
         residuals: &residuals,
         held_out: &[],
@@ -215,7 +219,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
 }
 
 /// A model: the arm at the poses that it was measured in, coloured by how far it stands from the nominal one there.
-fn model(file: &Path) -> anyhow::Result<Recording> {
+fn model(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording> {
     let named = inputs::model(&file.display().to_string())?;
     inputs::say_doubtful(&named);
     let NamedModel::Estimated { name, arm, .. } = named else {
@@ -264,6 +268,8 @@ fn model(file: &Path) -> anyhow::Result<Recording> {
     let scene = PathScene {
         title: &format!("{name}: {} as estimated", arm.robot),
         arm: &arm.model,
+        nominal: &arm.nominal,
+        meshes: &meshes(arguments.robot.as_deref())?,
         arm_is: "estimated arm",
         condition: arm.condition,
         reports: std::slice::from_ref(&report),
@@ -313,5 +319,6 @@ fn program(arguments: &Arguments, paths: &[PathBuf]) -> anyhow::Result<Recording
         bail!("{program}: no motion has a target that is known from the text and in reach");
     }
     let is = if knowledge.is_some() { "estimated arm" } else { "nominal arm" };
-    recording(&program, acting.model, is, condition, std::slice::from_ref(&report), surface.as_ref())
+    let arms = Arms { real: acting.model, is, nominal: &nominal, robot: arguments.robot.as_deref() };
+    recording(&program, arms, condition, std::slice::from_ref(&report), surface.as_ref())
 }

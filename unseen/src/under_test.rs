@@ -188,7 +188,7 @@ impl Reply {
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
             row.number = visit.row;
         }
-        let observed = prepare(&rows, &self.sheet).observed;
+        let observed = prepare(&rows, &self.sheet, true).observed;
         Ok([&self.found.geometric, &self.found.extended].map(|fit| {
             let errors = errors_on(&observed, &fit.model, &fit.frames);
             let counted = errors.iter().zip(visits).filter(|(_, visit)| visit.counted);

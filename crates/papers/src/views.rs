@@ -45,7 +45,23 @@ pub fn summary(experiment: &Experiment, results: &Results) -> Document {
         Results::SignedRank(tables) => signed_rank::summary(&mut page, tables),
         Results::Degradation(result) => degradation::summary(&mut page, result),
     }
+    answer_first(&mut page);
     page
+}
+
+/// The answer and its figures come before what was done and what is to be known of it.
+fn answer_first(page: &mut Document) {
+    let is_answer: [fn(&Block) -> bool; 2] =
+        [|block| matches!(block, Block::Verdict(_)), |block| matches!(block, Block::KeyFigures(_))];
+    for (place, is) in is_answer.into_iter().enumerate() {
+        let Some(found) = page.blocks.iter().position(is).filter(|found| *found > place) else { continue };
+        // An answer to a later section stays there.
+        if page.blocks[..found].iter().any(|block| matches!(block, Block::Heading(..))) {
+            continue;
+        }
+        let block = page.blocks.remove(found);
+        page.blocks.insert(place.min(found), block);
+    }
 }
 
 /// The page, with pictures.
@@ -58,6 +74,7 @@ pub fn document(experiment: &Experiment, results: &Results, origin: &Origin) -> 
         Results::SignedRank(tables) => signed_rank::summary(&mut page, tables),
         Results::Degradation(result) => degradation::page(&mut page, result, origin.timings),
     }
+    answer_first(&mut page);
     let source = origin.file.as_ref().map(|name| Source {
         name: name.clone(),
         role: "Measurements".to_owned(),

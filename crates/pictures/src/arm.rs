@@ -4,17 +4,19 @@
 //! column over time; its body is drawn once, in its own frame. In frame i the joint axis i and its origin do not move
 //! (T = Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β): the inverse's translation does not contain θ), so a link is the cylinder along d
 //! and the capsule along a, and a disc around the joint axis. Girths follow from the length of the whole arm; data sheets
-//! have no shapes. Joint effects and growth turn and move the frames, not the bodies.
+//! have no shapes. Where a robot file names meshes, they are drawn instead, each in the frame that it moves with. Joint effects
+//! and growth turn and move the frames, not the bodies.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rerun::components::{Color, FillMode, RotationQuat, Translation3D};
-use rerun::{Capsules3D, Cylinders3D, Points3D, Transform3D};
+use rerun::{Capsules3D, Cylinders3D, Mesh3D, Points3D, Transform3D};
 
 use super::colour::Rgba;
 use super::recording::{Store, VisualError};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::{Joints, Model, PreparedModel};
 use truegrind_math::se3::Pose;
+use truegrind_surfaces::Tessellation;
 
 /// Radius of each link over the length of the arm.
 const GIRTH: [f64; 6] = [0.056, 0.046, 0.042, 0.034, 0.028, 0.022];
@@ -40,10 +42,36 @@ impl Paint {
     pub(super) const SOLID: Paint =
         Paint { link: [205, 209, 215, 255], joint: [112, 120, 133, 255], tool: [150, 158, 170, 255] };
 
+    /// An arm of one colour.
+    pub(super) fn of([r, g, b, _]: Rgba) -> Paint {
+        let darker = |c: u8| (u16::from(c) * 7 / 10) as u8;
+        let joint = [darker(r), darker(g), darker(b), 255];
+        Paint { link: [r, g, b, 255], joint, tool: joint }
+    }
+
     /// A see-through arm of one colour.
     pub(super) fn ghost([r, g, b, _]: Rgba) -> Paint {
         Paint { link: [r, g, b, 64], joint: [r, g, b, 90], tool: [r, g, b, 110] }
     }
+}
+
+/// A mesh that shows a part of an arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkMesh {
+    /// The frame that it moves with: 0 is the base, i the end of link i.
+    pub frame: usize,
+    /// Where it lies in that frame.
+    pub pose: Pose,
+    /// Its triangles (mm), in its own axes.
+    pub triangles: Tessellation,
+}
+
+/// What all pictures of one arm have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Figure<'a> {
+    pub(super) model: &'a Model,
+    pub(super) condition: &'a Condition,
+    pub(super) meshes: &'a [LinkMesh],
 }
 
 /// Where an arm stands at one time.
@@ -57,36 +85,60 @@ pub(super) struct Stand {
     pub(super) flange_from_tool: Pose,
 }
 
-/// Draws `model` below the entity `root`, standing where `stands` say, in the order of time.
+/// Draws an arm below the entity `root`, standing where `stands` say, in the order of time.
 pub(super) fn draw(
     store: &mut Store,
     root: &str,
-    model: &Model,
-    condition: &Condition,
+    figure: Figure<'_>,
+    paint: &Paint,
+    (axis, stands): (&'static str, &[Stand]),
+) -> Result<(), VisualError> {
+    let arm = figure.model.at_condition(figure.condition);
+    let frames: Vec<[Pose; 7]> = stands.iter().map(|s| frames(&arm, &s.joints)).collect();
+    let posed = Posed { frames: &frames, flange: figure.model.flange };
+    draw_posed(store, root, figure, &posed, paint, (axis, stands))
+}
+
+/// The frames of an arm at each of its stands.
+pub(super) struct Posed<'a> {
+    pub(super) frames: &'a [[Pose; 7]],
+    pub(super) flange: Pose,
+}
+
+/// The same with frames that are known.
+pub(super) fn draw_posed(
+    store: &mut Store,
+    root: &str,
+    figure: Figure<'_>,
+    &Posed { frames, flange }: &Posed<'_>,
     paint: &Paint,
     (axis, stands): (&'static str, &[Stand]),
 ) -> Result<(), VisualError> {
     let Some(first) = stands.first() else { return Ok(()) };
-    let arm = model.at_condition(condition);
-    let length = length_mm(model);
-    foot(store, root, length, paint)?;
+    let length = length_mm(figure.model);
+    if !shown(store, root, 0, figure.meshes, paint)? {
+        foot(store, root, length, paint)?;
+    }
     let times: Vec<i64> = stands.iter().map(|s| s.time).collect();
-    let frames: Vec<[Pose; 7]> = stands.iter().map(|s| frames(&arm, &s.joints)).collect();
     let mut path = root.to_owned();
     for link in 0..6 {
         path = format!("{path}/link{}", link + 1);
         let poses: Vec<Pose> = frames.iter().map(|f| f[link].inverse() * f[link + 1]).collect();
         motion(store, &path, (axis, &times), &poses)?;
-        body(store, &path, link, &poses[0].inverse(), model, length, paint)?;
+        if !shown(store, &path, link + 1, figure.meshes, paint)? {
+            body(store, &path, link, &poses[0].inverse(), figure.model, length, paint)?;
+        }
     }
     path = format!("{path}/flange");
-    still(store, &path, &model.flange)?;
-    let disc = Cylinder {
-        from: Vector3::z() * (-FLANGE * length),
-        to: Vector3::zeros(),
-        radius: GIRTH[5] * length * 1.3,
-    };
-    cylinders(store, &format!("{path}/plate"), &[disc], paint.joint)?;
+    still(store, &path, &flange)?;
+    if figure.meshes.is_empty() {
+        let disc = Cylinder {
+            from: Vector3::z() * (-FLANGE * length),
+            to: Vector3::zeros(),
+            radius: GIRTH[5] * length * 1.3,
+        };
+        cylinders(store, &format!("{path}/plate"), &[disc], paint.joint)?;
+    }
     // The tool: logged where it changes.
     path = format!("{path}/tool");
     let mut last = None;
@@ -100,6 +152,28 @@ pub(super) fn draw(
     let tools: Vec<Pose> = changes.iter().map(|s| s.flange_from_tool).collect();
     motion(store, &path, (axis, &times), &tools)?;
     tool(store, &path, &first.flange_from_tool, length, paint)
+}
+
+/// Draws the meshes that move with a frame; whether there are any.
+fn shown(
+    store: &mut Store,
+    path: &str,
+    frame: usize,
+    meshes: &[LinkMesh],
+    paint: &Paint,
+) -> Result<bool, VisualError> {
+    let of_frame: Vec<&LinkMesh> = meshes.iter().filter(|mesh| mesh.frame == frame).collect();
+    for (k, mesh) in of_frame.iter().enumerate() {
+        let xyz = |v: Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
+        let vertices = mesh.triangles.vertices_mm.iter().map(|v| xyz((mesh.pose * v).coords));
+        let normals = mesh.triangles.normals.iter().map(|n| xyz(mesh.pose.rotation * n.into_inner()));
+        let drawn = Mesh3D::new(vertices)
+            .with_vertex_normals(normals)
+            .with_triangle_indices(mesh.triangles.triangles.iter().copied())
+            .with_albedo_factor(rerun::datatypes::Rgba32::from(paint.link));
+        store.fixed(format!("{path}/mesh{}", k + 1), &drawn)?;
+    }
+    Ok(!of_frame.is_empty())
 }
 
 /// All frames of the arm in its base: 0 is the base itself, i the end of link i.
@@ -123,9 +197,14 @@ pub(super) fn length_mm(model: &Model) -> f64 {
     model.links.iter().map(|l| l.a_mm.abs() + l.d_mm.abs()).sum::<f64>().max(1.0)
 }
 
-/// Points that an arm at `joints` takes up, for placing the eye.
-pub(super) fn extent(arm: &PreparedModel<'_>, joints: &Joints) -> Vec<Point3<f64>> {
-    frames(arm, joints).iter().map(|f| Point3::from(f.translation.vector)).collect()
+/// Points that an arm at `joints` takes up with its bodies, for placing the eye.
+pub(super) fn extent(arm: &PreparedModel<'_>, joints: &Joints, length: f64) -> Vec<Point3<f64>> {
+    let girth = FOOT[1] * length;
+    let around = |f: &Pose| {
+        let at = Point3::from(f.translation.vector);
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|v| v * girth).map(|v| [at + v, at - v])
+    };
+    frames(arm, joints).iter().flat_map(around).flatten().collect()
 }
 
 /// A pose that changes.

@@ -35,6 +35,8 @@ pub const STEPS: usize = 32;
 
 /// The program as it was: vermilion.
 pub const BEFORE: Rgba = [0xd5, 0x5e, 0x00, 255];
+/// The arm as the data sheet has it, drawn see-through.
+pub const GHOST: Rgba = [222, 228, 236, 255];
 /// The rewritten program under each model, in turn: sky blue, bluish green, orange, blue.
 pub const AFTER: [Rgba; 4] =
     [[0x56, 0xb4, 0xe9, 255], [0x00, 0x9e, 0x73, 255], [0xe6, 0x9f, 0x00, 255], [0x00, 0x72, 0xb2, 255]];

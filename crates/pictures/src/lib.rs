@@ -17,7 +17,7 @@
 //! by a counter instead and names the recording by its content, so the file of the same result is the same file.
 //!
 //! In reading order: [`colour`], [`recording`], `page` (the layout with which a recording opens), `legend`, `curve`,
-//! `markdown` and `arm` (what pages are made of), [`path`], [`measured`].
+//! `markdown`, `arm` and `shape` (what pages are made of), [`path`], [`measured`].
 
 pub mod colour;
 pub mod recording;
@@ -26,9 +26,11 @@ mod legend;
 mod curve;
 mod markdown;
 mod arm;
+mod shape;
 pub mod path;
 pub mod measured;
 
+pub use arm::LinkMesh;
 pub use measured::{MeasuredScene, dataset_recording, diagnosis_recording, measured_recording};
 pub use path::{PathScene, Workpiece, path_recording};
 pub use recording::{Recording, VisualError};

@@ -2,10 +2,12 @@
 //!
 //! | entity | what |
 //! |---|---|
-//! | `arm` | the arm at the logged joints, row by row |
+//! | `arm/at_row` | the arm at the logged joints, row by row |
+//! | `arm/nominal`, `arm/exaggerated` | the arm of the data sheet as a ghost, the real one with its differences exaggerated |
 //! | `touched` | the point that the sensor touches, at all rows, coloured by the size of the residual |
 //! | `read` | where a tracker saw it, at the row of the time axis |
-//! | `sensor/…` | outlets of cables and the cable of the row, or the tracker's frame |
+//! | `sensor/…` | outlets of cables and the cable of the row, or the tracker's frame and its ray |
+//! | `keep_out` | boxes that nothing shall enter |
 //! | `set_aside` | rows that were set aside as outliers |
 //! | `residual/…` | residuals over the rows, before and after, and of rows that were held out |
 //! | `joints/…` | logged joint angles over the rows |
@@ -16,14 +18,15 @@ mod words;
 
 use nalgebra::{Point3, Vector3};
 use rerun::components::{Color, MarkerShape, Radius};
-use rerun::{LineStrips3D, Points3D, TransformAxes3D};
+use rerun::{Boxes3D, LineStrips3D, Points3D, TransformAxes3D};
 
-use super::arm::{self, Paint, Stand};
+use super::arm::{self, Figure, LinkMesh, Paint, Stand};
 use super::colour::{BEFORE, INTENDED, JOINTS, REFUSED, Scale, after};
 use super::curve::{self, Pen, curve};
 use super::legend;
 use super::page::{Eye, Pane, View, page};
 use super::recording::{Recording, Store, VisualError};
+use super::shape::Shape;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::diagnose::Diagnosed;
@@ -52,7 +55,11 @@ const TOP_QUANTILE: f64 = 0.98;
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
-pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Recording, VisualError> {
+pub fn dataset_recording(
+    dataset: &Dataset,
+    found: &Identification,
+    meshes: &[LinkMesh],
+) -> Result<Recording, VisualError> {
     let estimated: &Estimated = &found.estimated;
     let observed = if found.readout_fusion.is_ok() {
         observe(dataset, &estimated.nominal, true).0
@@ -72,6 +79,10 @@ pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Re
         dataset,
         arm: &estimated.model,
         arm_is: &format!("{} as estimated", estimated.robot),
+        nominal: Some(&estimated.nominal),
+        meshes,
+        keep_out_mm: &[],
+        answer: &[],
         frames: Some(&found.geometry.frames),
         residuals: &residuals,
         held_out: &held_out,
@@ -85,7 +96,11 @@ pub fn dataset_recording(dataset: &Dataset, found: &Identification) -> Result<Re
 ///
 /// # Errors
 /// [`VisualError::Empty`] without rows.
-pub fn diagnosis_recording(dataset: &Dataset, found: &Diagnosed) -> Result<Recording, VisualError> {
+pub fn diagnosis_recording(
+    dataset: &Dataset,
+    found: &Diagnosed,
+    meshes: &[LinkMesh],
+) -> Result<Recording, VisualError> {
     let observed = &found.prepared.observed;
     let left = |stage: &str, model: &Model, frames: &Frames| Residuals {
         stage: stage.to_owned(),
@@ -99,6 +114,10 @@ pub fn diagnosis_recording(dataset: &Dataset, found: &Diagnosed) -> Result<Recor
         dataset,
         arm: &found.estimated.model,
         arm_is: &format!("{} with everything found", found.estimated.robot),
+        nominal: Some(&found.estimated.nominal),
+        meshes,
+        keep_out_mm: &[],
+        answer: &[],
         frames: Some(&found.extended.frames),
         residuals: &residuals,
         held_out: &[],
@@ -130,7 +149,13 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
     };
     let stands: Vec<Stand> = scene.dataset.rows.iter().map(stand).collect();
     let condition = scene.dataset.rows[0].condition;
-    arm::draw(&mut store, "arm", scene.arm, &condition, &Paint::SOLID, (AXIS, &stands))?;
+    let figure = |model| Figure { model, condition: &condition, meshes: scene.meshes };
+    arm::draw(&mut store, "arm/at_row", figure(scene.arm), &Paint::SOLID, (AXIS, &stands))?;
+    let shape = scene.nominal.and_then(|nominal| Shape::of(figure(nominal), figure(scene.arm), &stands));
+    if let (Some(shape), Some(nominal)) = (&shape, scene.nominal) {
+        shape.draw(&mut store, figure(nominal), AXIS)?;
+    }
+    keep_out(&mut store, scene)?;
     let touched: Vec<Point3<f64>> = scene
         .dataset
         .rows
@@ -144,8 +169,8 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
     if !scene.residuals.is_empty() {
         legend::draw(&mut store, &scale)?;
     }
-    store.fixed("summary", &rerun::TextDocument::from_markdown(words::markdown(scene)))?;
-    let page = layout(scene, &touched)?;
+    store.fixed("summary", &rerun::TextDocument::from_markdown(words::markdown(scene, shape.as_ref())))?;
+    let page = layout(scene, &touched, shape.as_ref())?;
     Recording::new("truegrind measurements", &scene.dataset.file, store, page)
 }
 
@@ -186,6 +211,23 @@ fn cloud(
         .with_labels(labels)
         .with_show_labels(scene.set_aside.len() <= 12);
     store.fixed("set_aside", &marks)
+}
+
+/// Boxes that nothing shall enter, as edges.
+fn keep_out(store: &mut Store, scene: &MeasuredScene<'_>) -> Result<(), VisualError> {
+    if scene.keep_out_mm.is_empty() {
+        return Ok(());
+    }
+    let ends = |[low, high]: &[[f64; 3]; 2]| {
+        let half = std::array::from_fn::<f32, 3, _>(|k| (0.5 * (high[k] - low[k])) as f32);
+        let middle = std::array::from_fn::<f32, 3, _>(|k| (0.5 * (high[k] + low[k])) as f32);
+        (middle, half)
+    };
+    let (middles, halves): (Vec<[f32; 3]>, Vec<[f32; 3]>) = scene.keep_out_mm.iter().map(ends).unzip();
+    let boxes = Boxes3D::from_centers_and_half_sizes(middles, halves)
+        .with_colors([Color::from(REFUSED)])
+        .with_radii([Radius::new_ui_points(1.5)]);
+    store.fixed("keep_out", &boxes)
 }
 
 /// Where the sensor stands, and what it reads at each row.
@@ -237,6 +279,14 @@ fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>])
         })
         .collect();
     let (times, places): (Vec<i64>, Vec<[f32; 3]>) = seen.into_iter().unzip();
+    let from = xyz(&Point3::from(frames.base_from_sensor.translation.vector));
+    let rays =
+        LineStrips3D::new(places.iter().map(|to| [from, *to])).columns_of_unit_batches().map_err(encoding)?;
+    store.over("sensor/ray", (AXIS, &times), rays)?;
+    let style = LineStrips3D::update_fields()
+        .with_colors([Color::from(BEFORE)])
+        .with_radii([Radius::new_ui_points(1.0)]);
+    store.fixed("sensor/ray", &style)?;
     let columns = Points3D::new(places).columns_of_unit_batches().map_err(encoding)?;
     store.over("read", (AXIS, &times), columns)?;
     let style =
@@ -246,7 +296,7 @@ fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>])
 
 fn curves(store: &mut Store, scene: &MeasuredScene<'_>) -> Result<(), VisualError> {
     for (k, stage) in scene.residuals.iter().enumerate() {
-        let colour = if k + 1 < scene.residuals.len() { BEFORE } else { after(0) };
+        let colour = if k == 0 && scene.residuals.len() > 1 { BEFORE } else { after(k.saturating_sub(1)) };
         let pen = Pen { name: &stage.stage, colour, width: 1.6 };
         curve(store, &format!("residual/{}", k + 1), AXIS, pen, &over(&stage.rows))?;
     }
@@ -272,9 +322,18 @@ fn over(rows: &[(usize, f64)]) -> Vec<(i64, f64)> {
     rows.iter().filter(|(_, e)| e.is_finite()).map(|(n, e)| (*n as i64, *e)).collect()
 }
 
-fn layout(scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<Store, VisualError> {
+fn layout(
+    scene: &MeasuredScene<'_>,
+    touched: &[Point3<f64>],
+    shape: Option<&Shape>,
+) -> Result<Store, VisualError> {
     let mut seen = touched.to_vec();
     seen.push(Point3::origin());
+    let posed = scene.arm.at_condition(&scene.dataset.rows[0].condition);
+    let (rows, length) = (&scene.dataset.rows, arm::length_mm(scene.arm));
+    for row in rows.iter().step_by((rows.len() / 12).max(1)) {
+        seen.extend(arm::extent(&posed, &row.joints, length));
+    }
     if let Some(frames) = scene.frames {
         let at_sensor = Point3::from(frames.base_from_sensor.translation.vector);
         match scene.dataset.rows[0].reading {
@@ -286,13 +345,24 @@ fn layout(scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<Store, V
             Reading::Position(_) | Reading::Pose(_) => {}
         }
     }
-    let eye = Eye::on(&seen, Vector3::new(0.8, -0.75, 0.45), 1.25);
+    let eye = Eye::on(&seen, Vector3::new(0.8, -0.75, 0.45), 1.6, 0.95);
+    let beside = ["+ /read", "+ /sensor/**", "+ /set_aside", "+ /keep_out"];
     let view = View::space(
         format!("{} [mm], row by row", scene.arm_is),
-        &["+ /arm/**", "+ /touched", "+ /read", "+ /sensor/**", "+ /set_aside"],
+        &[&["+ /arm/at_row/**", "+ /touched"], &beside[..]].concat(),
         &eye,
     );
-    let space = Pane::View(view);
+    let space = match shape {
+        Some(shape) => {
+            let bent = View::space(
+                format!("Orange: {} {} [mm], ghost: data sheet", scene.arm_is, shape.factor()),
+                &["+ /arm/nominal/**", "+ /arm/exaggerated/**", "+ /sensor/outlet", "+ /sensor/frame"],
+                &eye,
+            );
+            Pane::Tabs(vec![Pane::View(view), Pane::View(bent)])
+        }
+        None => Pane::View(view),
+    };
     let residuals = !scene.residuals.is_empty();
     let space = if residuals {
         Pane::Column(vec![
@@ -302,13 +372,20 @@ fn layout(scene: &MeasuredScene<'_>, touched: &[Point3<f64>]) -> Result<Store, V
     } else {
         space
     };
-    let joints = Pane::View(View::curves("Logged joint angles [°] over rows", &["+ /joints/**"], None));
+    let angles = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>());
+    let joints =
+        View::curves("Logged joint angles [°] over rows", &["+ /joints/**"], curve::range(angles, 6));
+    let joints = Pane::View(joints);
     let curves = if residuals {
         let name = match scene.dataset.rows[0].reading {
             Reading::Cable(_) => "Residual, model − reading [mm], over rows",
             Reading::Position(_) | Reading::Pose(_) => "Size of the residual [mm] over rows",
         };
-        Pane::Row(vec![(1.3, Pane::View(View::curves(name, &["+ /residual/**"], None))), (1.0, joints)])
+        let stages = scene.residuals.iter().flat_map(|r| r.rows.iter().map(|(_, e)| *e));
+        let values = stages.chain(scene.held_out.iter().map(|(_, e)| *e));
+        let names = scene.residuals.len() + usize::from(!scene.held_out.is_empty());
+        let view = View::curves(name, &["+ /residual/**"], curve::range(values, names));
+        Pane::Row(vec![(1.3, Pane::View(view)), (1.0, joints)])
     } else {
         joints
     };

@@ -86,7 +86,7 @@ impl View {
         )
     }
 
-    /// Curves over the time axis; `range` of the values where it shall not follow from them.
+    /// Curves over the time axis; `range` of the values, where it is known, with room for the legend above them.
     pub(super) fn curves(name: impl Into<String>, shows: &[&str], range: Option<[f64; 2]>) -> Self {
         let view = Self::new("TimeSeries", name, shows)
             .with("PlotLegend", &PlotLegend::new().with_corner(Corner2D::RightTop));
@@ -115,15 +115,29 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    /// The eye that sees all of `points` from `direction` (from them to the eye).
-    ///
-    /// Distance: Rerun's eye sees some 55° from top to bottom; `closeness` 1 has the ball around the points fill it.
-    pub(super) fn on(points: &[Point3<f64>], direction: Vector3<f64>, closeness: f64) -> Self {
+    /// The eye that sees all of `points` from `direction` (from them to the eye), in a view that is at least `wide` times as wide
+    /// as high; Rerun's eye sees some 55° from top to bottom. `closeness` 1 has them fill it from border to border.
+    pub(super) fn on(points: &[Point3<f64>], direction: Vector3<f64>, wide: f64, closeness: f64) -> Self {
         let (low, high) = bounds(points);
-        let target_mm = nalgebra::center(&low, &high);
-        let radius = (0.5 * (high - low).norm()).max(1.0);
-        let distance = radius / (0.5 * 55f64.to_radians()).sin() / closeness;
-        Self { position_mm: target_mm + direction.normalize() * distance, target_mm }
+        let middle = nalgebra::center(&low, &high);
+        let back = direction.normalize();
+        let side = Vector3::z().cross(&back).try_normalize(1e-6).unwrap_or_else(Vector3::x);
+        let up = back.cross(&side);
+        // What is seen of the box that is as deep as it is: its middle over both borders.
+        let half = |axis: &Vector3<f64>| {
+            let places = points.iter().map(|p| (p - middle).dot(axis));
+            let (low, high) = places.fold((0.0f64, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
+            (0.5 * (high - low), 0.5 * (high + low))
+        };
+        let ((_, right), (_, above)) = (half(&side), half(&up));
+        let target_mm = middle + side * right + up * above;
+        let slope = (0.5 * 55f64.to_radians()).tan() * closeness;
+        let distance = points.iter().fold(1.0f64, |distance, p| {
+            let off = p - target_mm;
+            let needed = (off.dot(&up).abs() / slope).max(off.dot(&side).abs() / (slope * wide));
+            distance.max(needed + off.dot(&back))
+        });
+        Self { position_mm: target_mm + back * distance, target_mm }
     }
 }
 

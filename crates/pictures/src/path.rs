@@ -4,13 +4,14 @@
 //!
 //! | entity | what |
 //! |---|---|
-//! | `arm/after` | the arm with the joints of the rewritten program |
-//! | `arm/before` | the arm with the joints of the program as it was |
-//! | `arm/exaggerated` | as before, with what the joints differ by times the scale factor |
+//! | `arm/nominal` | the arm as the data sheet has it, at the joints of the program as it was: a ghost |
+//! | `arm/exaggerated` | the real one at the same joints, its differences from that times a factor of their own |
+//! | `arm/after` | the real arm with the joints of the rewritten program |
+//! | `arm/before` | the same with the joints of the program as it was |
 //! | `workpiece` | the part, where its triangles are known |
 //! | `path/intended`, `path/travel` | where the tool shall cut, and how it moves between cuts |
 //! | `path/before`, `path/after/…` | where it goes, at true scale, coloured by the size of the deviation |
-//! | `exaggerated/…` | the same with deviations times the scale factor |
+//! | `exaggerated/…` | the same with deviations times the scale factor, before and after in colours of their own |
 //! | `tool_axes` | the direction in which the tool points, at some of the points |
 //! | `marks/flagged`, `marks/refused` | points with a warning, and points that were not rewritten |
 //! | `deviation/normal/…`, `deviation/size/…`, `deviation/angle/…` | curves over the path |
@@ -18,9 +19,8 @@
 //! | `summary`, `legend` | the figures in words, and the colours |
 //!
 //! Drawn to scale, deviations of a millimetre vanish on a part of a hand's width. They are therefore drawn times a
-//! factor as well, the same for all, which every name and label states. The arm that is drawn see-through follows the
-//! exaggerated path of the program as it was: its joints differ by the factor times the difference, which for such small
-//! turns moves the tool by the factor times the deviation.
+//! factor as well, the same for all, which every name and label states. The differences of the arm itself have a factor of their
+//! own, by which they show beside its length (`shape`).
 
 mod scene;
 mod curves;
@@ -35,6 +35,7 @@ use super::colour::BEFORE;
 use super::legend;
 use super::page::{Eye, Pane, View, bounds, page};
 use super::recording::{Recording, Store, VisualError};
+use truegrind_compensation::deviation::After;
 
 pub use self::scene::{AXIS, PathScene, Workpiece};
 
@@ -58,14 +59,15 @@ pub fn path_recording(scene: &PathScene<'_>) -> Result<Recording, VisualError> {
 
 fn arms(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
     let ghost = Paint::ghost(BEFORE);
-    for (root, paint, stands) in [
-        ("arm/after", &Paint::SOLID, &plan.after),
-        ("arm/before", &ghost, &plan.before),
-        ("arm/exaggerated", &ghost, &plan.exaggerated),
-    ] {
-        arm::draw(store, root, scene.arm, &scene.condition, paint, (AXIS, stands))?;
+    for (root, paint, stands) in
+        [("arm/after", &Paint::SOLID, &plan.after), ("arm/before", &ghost, &plan.before)]
+    {
+        arm::draw(store, root, scene.figure(scene.arm), paint, (AXIS, stands))?;
     }
-    Ok(())
+    match &plan.shape {
+        Some(shape) => shape.draw(store, scene.figure(scene.nominal), AXIS),
+        None => Ok(()),
+    }
 }
 
 fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> {
@@ -83,33 +85,51 @@ fn layout(scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<Store, VisualError> 
     let posed = scene.arm.at_condition(&scene.condition);
     let mut cell = part.clone();
     cell.push(Point3::origin());
-    for stand in plan.after.iter().step_by((plan.after.len() / 8).max(1)) {
-        cell.extend(arm::extent(&posed, &stand.joints));
+    let length = arm::length_mm(scene.arm);
+    for stands in [&plan.before, &plan.after] {
+        for stand in stands.iter().step_by((stands.len() / 8).max(1)) {
+            cell.extend(arm::extent(&posed, &stand.joints, length));
+        }
     }
-    let cell_eye = Eye::on(&cell, 0.45 * out - 0.95 * side + 0.38 * Vector3::z(), 1.25);
-    let part_eye = Eye::on(&part, 0.75 * out - 0.45 * side + 0.8 * Vector3::z(), 1.35);
-    let cell_view = View::space(
-        format!("Arm [mm] – grey: after, orange: before {factor}"),
-        &["+ /arm/after/**", "+ /arm/exaggerated/**", "+ /workpiece", "+ /path/intended", "+ /path/travel"],
-        &cell_eye,
-    );
+    let cell_eye = Eye::on(&cell, 0.45 * out - 0.95 * side + 0.38 * Vector3::z(), 1.0, 0.92);
+    let part_eye = Eye::on(&part, 0.75 * out - 0.45 * side + 0.8 * Vector3::z(), 1.0, 0.8);
+    let around = ["+ /workpiece", "+ /path/intended", "+ /path/travel"];
+    let with = |more: &[&'static str]| [&around[..], more].concat();
+    let arms =
+        View::space("Arm, true scale [mm]", &with(&["+ /arm/after/**", "+ /arm/before/**"]), &cell_eye);
+    let cell_view = match &plan.shape {
+        Some(shape) => {
+            let bent = View::space(
+                format!("Arm [mm] – orange: {} {}, ghost: data sheet", scene.arm_is, shape.factor()),
+                &with(&["+ /arm/nominal/**", "+ /arm/exaggerated/**"]),
+                &cell_eye,
+            );
+            Pane::Tabs(vec![Pane::View(bent), Pane::View(arms)])
+        }
+        None => Pane::View(arms),
+    };
+    let on_part = ["+ /workpiece", "+ /path/intended", "+ /tool_axes", "+ /marks/**"];
     let drawn = View::space(
         format!("Deviation {factor} [mm]"),
-        &["+ /workpiece", "+ /path/intended", "+ /exaggerated/**", "+ /tool_axes", "+ /marks/**"],
+        &[&on_part[..], &["+ /exaggerated/**"]].concat(),
         &part_eye,
     );
-    let true_scale = View::space(
-        "True scale [mm]",
-        &["+ /workpiece", "+ /path/**", "+ /tool_axes", "+ /marks/**", "+ /arm/after/**", "+ /arm/before/**"],
-        &part_eye,
-    );
+    let sized = |name: &str, shows: &[&'static str]| {
+        Pane::View(View::space(name, &[&["+ /workpiece"], shows].concat(), &part_eye))
+    };
+    let mut tabs =
+        vec![Pane::View(drawn), sized("Size before [mm]", &["+ /path/before/**", "+ /path/largest/before"])];
+    // What the solver leaves under its own model is nothing, and says nothing of the arm.
+    if scene.reports.iter().any(|report| report.after == After::Achieved) {
+        tabs.push(sized("Size after [mm]", &["+ /path/after/**", "+ /path/largest/after/**"]));
+    }
     let upper = Pane::Row(vec![
-        (1.0, Pane::View(cell_view)),
+        (1.0, cell_view),
         (
             1.0,
             Pane::Column(vec![
-                (6.0, Pane::Tabs(vec![Pane::View(drawn), Pane::View(true_scale)])),
-                (1.0, legend::pane("Colour: size of the deviation [mm]")),
+                (6.0, Pane::Tabs(tabs)),
+                (1.0, legend::pane("Colour in the tabs of sizes: deviation [mm]")),
             ]),
         ),
     ]);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyFigure, Verdict};
+use super::placement;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::Status as Fate;
@@ -55,6 +56,8 @@ pub struct Row {
     pub before_mm: Option<f64>,
     /// Largest predicted remainder of the rewritten motions (mm).
     pub after_mm: Option<f64>,
+    /// How far off the rewritten motions have to be expected: remainder and predicted 1σ, the largest (mm).
+    pub expected_mm: Option<f64>,
     /// Why it failed, or what to know about it.
     pub note: Option<String>,
     /// Why most of what was refused, else flagged or left, was so, with its share.
@@ -82,6 +85,7 @@ impl Row {
             opaque: listing.opaque.len(),
             before_mm: before.reduce(f64::max),
             after_mm: after.reduce(f64::max),
+            expected_mm: placement::expected_mm(plan),
             note: undeclared_note(listing),
             reason: most_usual(plan),
         }
@@ -97,6 +101,7 @@ impl Row {
             opaque: 0,
             before_mm: None,
             after_mm: None,
+            expected_mm: None,
             note,
             reason: None,
         }
@@ -110,6 +115,19 @@ impl Row {
             Ended::Unchanged | Ended::Already => Status::Warning,
             Ended::Failed => Status::Bad,
         }
+    }
+
+    /// What to know about it, and the reason of most of what was not done.
+    fn why(&self) -> Option<String> {
+        let both: Vec<&str> = [&self.note, &self.reason].into_iter().flatten().map(String::as_str).collect();
+        (!both.is_empty()).then(|| both.join("; "))
+    }
+
+    /// Whether nothing of it asks for a look before it runs.
+    fn is_clean(&self) -> bool {
+        let [all, _, flagged, refused, _] = self.motions;
+        let rewritten = matches!(self.ended, Ended::Changed) || all == 0 && self.ended == Ended::Unchanged;
+        rewritten && flagged + refused == 0
     }
 
     /// Share of its motions that is rewritten (%).
@@ -179,6 +197,7 @@ pub fn table(rows: &[Row]) -> Table {
             Column::number("covered_percent", "Covered", "%", 1),
             Column::number("before_mm", "largest before", "mm", 3),
             Column::number("after_mm", "largest remainder", "mm", 4),
+            Column::number("expected_mm", "expected after", "mm", 3),
             Column::count("opaque", "Not read"),
             Column::text("output", "Written to"),
             Column::text("note", "Note"),
@@ -192,9 +211,10 @@ pub fn table(rows: &[Row]) -> Table {
             row.covered_percent().into(),
             row.before_mm.into(),
             row.after_mm.into(),
+            row.expected_mm.into(),
             row.opaque.into(),
             row.output.clone().into(),
-            row.note.clone().or_else(|| row.reason.clone()).into(),
+            row.why().into(),
         ]);
         table.push(cells);
     }
@@ -204,8 +224,7 @@ pub fn table(rows: &[Row]) -> Table {
 /// The sum of all rows in one sentence.
 pub fn sum(rows: &[Row]) -> String {
     let with = |ended: Ended| rows.iter().filter(|row| row.ended == ended).count();
-    let motions: [usize; 5] = std::array::from_fn(|k| rows.iter().map(|row| row.motions[k]).sum());
-    let [all, changed, flagged, refused, left] = motions;
+    let [all, changed, flagged, refused, left] = totals(rows);
     let share = if all > 0 { 100.0 * (changed + flagged) as f64 / all as f64 } else { 0.0 };
     format!(
         "{} programs: {} changed, {} unchanged, {} already compensated, {} failed; {all} motions: {changed} changed, \
@@ -218,19 +237,62 @@ pub fn sum(rows: &[Row]) -> String {
     )
 }
 
-/// What fits a terminal: the sum, and the table.
-pub fn summary(rows: &[Row]) -> Document {
-    let mut page = Document::new(title(rows));
-    page.push(verdict(rows));
-    let mut table = table(&worst_first(rows));
-    // In a terminal only columns in which something stands.
+/// The table for people: the worst first, reasons beside the names, no folder that all share, no column in which nothing
+/// stands.
+fn read_table(rows: &[Row]) -> Table {
+    let rows = worst_first(rows);
+    let mut table = table(&rows);
+    let place = |key: &str, table: &Table| table.columns.iter().position(|column| column.key == key);
+    // Why, before how many.
+    if let Some(note) = place("note", &table) {
+        let mut column = table.columns.remove(note);
+        column.heading = "Reason".to_owned();
+        table.columns.insert(2, column);
+        for row in &mut table.rows {
+            let cell = row.remove(note);
+            row.insert(2, cell);
+        }
+    }
+    for (at, key, what) in [(0, "file", "Programs are in"), (1, "output", "Written to")] {
+        let names: Vec<&str> = rows
+            .iter()
+            .filter_map(|row| [Some(&row.file), row.output.as_ref()][at])
+            .map(String::as_str)
+            .collect();
+        let (Some(column), Some(folder)) = (place(key, &table), shared_folder(&names)) else { continue };
+        for row in &mut table.rows {
+            if let Cell::Text(name) = &mut row[column] {
+                *name = name.replace(folder, "");
+            }
+        }
+        table.notes.push(format!("{what} {folder}"));
+    }
     for column in (0..table.columns.len()).rev() {
         if table.rows.iter().all(|row| row[column] == Cell::Missing) {
             table.columns.remove(column);
             table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
         }
     }
-    page.push(table.excerpt(ROWS));
+    table.excerpt(ROWS)
+}
+
+/// The folder, with the stroke behind it, that all of several names begin with.
+fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
+    let (first, rest) = names.split_first().filter(|(_, rest)| !rest.is_empty())?;
+    let folder = first.rfind(['/', '\\']).map(|end| &first[..=end])?;
+    let held_by_all = |folder: &str| rest.iter().all(|name| name.starts_with(folder));
+    let mut folder = folder;
+    while !held_by_all(folder) {
+        folder = folder[..folder.len() - 1].rfind(['/', '\\']).map(|end| &folder[..=end])?;
+    }
+    (folder.len() > 1).then_some(folder)
+}
+
+/// What fits a terminal: the sum, and the table.
+pub fn summary(rows: &[Row]) -> Document {
+    let mut page = Document::new(title(rows));
+    page.push(verdict(rows));
+    page.push(read_table(rows));
     page
 }
 
@@ -242,16 +304,24 @@ pub fn document(rows: &[Row]) -> Document {
     let mut page = Document::new(title(rows));
     page.push(verdict(rows));
     let largest = |value: fn(&Row) -> Option<f64>| rows.iter().filter_map(value).reduce(f64::max);
-    let motions: usize = rows.iter().map(|row| row.motions[0]).sum();
+    let [motions, changed, flagged, ..] = totals(rows);
     page.push(vec![
-        KeyFigure::new("Programs", rows.len(), 0, ""),
-        KeyFigure::new("Motions", motions, 0, ""),
-        KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm"),
-        KeyFigure::new("Predicted remainder", largest(|row| row.after_mm), 4, "mm")
-            .note("largest of the rewritten motions"),
+        KeyFigure::new("Rewritten", changed + flagged, 0, "")
+            .note(format!("of {motions} motions, {flagged} of them flagged")),
+        KeyFigure::new("Largest before", largest(|row| row.before_mm), 3, "mm")
+            .note("as programmed, all motions"),
+        KeyFigure::new("Expected after", largest(|row| row.expected_mm), 3, "mm")
+            .note("1σ of the model: largest of what is rewritten"),
+        KeyFigure::new("To look at", rows.iter().filter(|row| !row.is_clean()).count(), 0, "")
+            .note(format!("of {} programs: failed, nothing rewritten, refused or flagged", rows.len())),
     ]);
-    page.push(table(&worst_first(rows)).excerpt(ROWS));
+    page.push(read_table(rows));
     page
+}
+
+/// Motions of all rows: all, changed, flagged, refused, left.
+fn totals(rows: &[Row]) -> [usize; 5] {
+    std::array::from_fn(|k| rows.iter().map(|row| row.motions[k]).sum())
 }
 
 fn title(rows: &[Row]) -> String {
@@ -262,31 +332,53 @@ fn title(rows: &[Row]) -> String {
 }
 
 fn verdict(rows: &[Row]) -> Verdict {
-    let failed = rows.iter().filter(|row| row.ended == Ended::Failed).count();
-    let doubtful: usize = rows.iter().map(|row| row.motions[2] + row.motions[3]).sum();
-    let rewritten: usize = rows.iter().map(|row| row.motions[1] + row.motions[2]).sum();
-    let (status, headline) = match (failed, doubtful) {
-        (0, _) if rewritten == 0 => (Status::NotEvaluated, "Nothing was rewritten"),
-        (0, 0) => (Status::Good, "Every program was done"),
-        (0, _) => (Status::Warning, "Every program was done; look at what was refused or flagged"),
-        _ => (Status::Bad, "Some programs could not be done"),
+    let failed: Vec<&Row> = rows.iter().filter(|row| row.ended == Ended::Failed).collect();
+    let [_, changed, flagged, refused, _] = totals(rows);
+    let may_run = rows.iter().filter(|row| row.ended == Ended::Changed && row.is_clean()).count();
+    let status = match (failed.len(), flagged + refused) {
+        (0, _) if changed + flagged == 0 => Status::NotEvaluated,
+        (0, 0) => Status::Good,
+        (0, _) => Status::Warning,
+        _ => Status::Bad,
+    };
+    let headline = match status {
+        Status::NotEvaluated => "Nothing was rewritten".to_owned(),
+        Status::Good => {
+            format!("Every program was done; {may_run} of {} are rewritten and may run", rows.len())
+        }
+        Status::Warning => format!(
+            "Every program was done; {may_run} of {} are rewritten and may run, look at what was refused or flagged before \
+             the others do",
+            rows.len()
+        ),
+        Status::Bad => format!(
+            "{} of {} programs could not be done; {may_run} of the others are rewritten and may run, look at what was refused \
+             or flagged before the rest does",
+            failed.len(),
+            rows.len()
+        ),
     };
     let mut reasons = vec![sum(rows)];
+    let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
+    let folder = shared_folder(&names).unwrap_or_default();
+    let named = |row: &Row, words: &str| {
+        let file = row.file.replace(folder, "");
+        // Many errors begin with the file's name.
+        match words.strip_prefix(&file) {
+            Some(rest) if rest.starts_with(':') => words.to_owned(),
+            _ => format!("{file}: {words}"),
+        }
+    };
     reasons.extend(
-        rows.iter()
-            .filter(|row| row.ended == Ended::Failed)
-            .take(20)
-            .map(|row| format!("{}: {}", row.file, row.note.as_deref().unwrap_or("failed"))),
+        failed.iter().take(FAILED_NAMED).map(|row| named(row, row.note.as_deref().unwrap_or("failed"))),
     );
-    // What would be needed is said in full: a table cuts it where a terminal is narrow.
+    // What would be needed is said in full.
     let missing: Vec<&Row> =
         rows.iter().filter(|row| row.ended == Ended::Unchanged && row.note.is_some()).collect();
     reasons.extend(missing.iter().take(MISSING_NAMED).filter_map(|row| {
         let note = row.note.as_ref()?;
-        Some(format!(
-            "{}: {note}; give the file that declares them, or a cell file (--cell) that says where they are",
-            row.file
-        ))
+        let remedy = "give the file that declares them, or a cell file (--cell) that says where they are";
+        Some(named(row, &format!("{note}; {remedy}")))
     }));
     if missing.len() > MISSING_NAMED {
         reasons.push(format!(
@@ -296,6 +388,9 @@ fn verdict(rows: &[Row]) -> Verdict {
     }
     Verdict::new(status, headline, reasons)
 }
+
+/// Programs that are named because they failed; the table has all.
+const FAILED_NAMED: usize = 20;
 
 /// Programs that are named for what is missing.
 const MISSING_NAMED: usize = 5;
@@ -308,7 +403,7 @@ pub fn json(rows: &[Row], programs: Vec<Value>) -> Value {
         .filter(|row| row.ended == Ended::Failed)
         .map(|row| json!({ "file": row.file, "error": row.note }))
         .collect();
-    let totals: [usize; 5] = std::array::from_fn(|k| rows.iter().map(|row| row.motions[k]).sum());
+    let totals = totals(rows);
     json!({
         "schema": "truegrind.compensation/1",
         "programs": programs,

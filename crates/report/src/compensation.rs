@@ -1,17 +1,21 @@
 //! What became of each motion of a program: the contract `truegrind.compensation/1`, the table, the reasons, the page.
 
+mod first;
+
 use serde_json::{Value, json};
 
+use self::first::key_figures;
 use super::deviation::{fate, fate_word, sections};
-use super::document::{Block, Document, KeyFigure, Verdict};
+use super::document::{Block, Document};
 use super::placement;
-use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::inverse::InverseError;
 use truegrind_compensation::deviation::{PathReport, Status as Fate};
 use truegrind_compensation::rewrite::{MotionOutcome, Plan};
 use truegrind_compensation::why::Why;
 use truegrind_programs::motion::{Listing, Place};
+
+pub use self::first::{coverage, verdict};
 
 /// One file of a program, by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,11 +29,11 @@ pub struct ProgramFile {
 /// Lines that a reason names before it says "and so many more".
 const LINES_NAMED: usize = 6;
 
-/// Rows of the table of motions on a page; the whole table belongs in the CSV file.
-const ROWS_ON_PAGE: usize = 150;
+/// Rows of the table of motions on a page, some eight sheets of paper; a longer table belongs in the CSV file.
+const ROWS_ON_PAGE: usize = 600;
 
-/// All, in the order in which a reader wants them.
-const FATES: [Fate; 4] = [Fate::Changed, Fate::Flagged, Fate::Refused, Fate::Left];
+/// Motions that are named as the farthest off.
+const FARTHEST: usize = 8;
 
 /// One row per motion. `files` in the order in which the listing counts them.
 pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
@@ -82,15 +86,33 @@ pub fn table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
 
 /// [`table`] for a page: not too long, and without columns in which nothing stands.
 fn page_table(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Table {
-    let mut table = table(plan, listing, files);
+    let mut table = without_empty_columns(table(plan, listing, files));
     table.title.clear();
+    table.excerpt(ROWS_ON_PAGE)
+}
+
+fn without_empty_columns(mut table: Table) -> Table {
     for column in (0..table.columns.len()).rev() {
         if table.rows.iter().all(|row| row[column] == Cell::Missing) {
             table.columns.remove(column);
             table.rows.iter_mut().for_each(|row| drop(row.remove(column)));
         }
     }
-    table.excerpt(ROWS_ON_PAGE)
+    table
+}
+
+/// The motions that are farthest off as programmed, the farthest first; `None` where no deviation is known.
+fn farthest(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Option<Table> {
+    let mut known: Vec<(f64, &MotionOutcome)> =
+        plan.outcomes.iter().filter_map(|outcome| Some((outcome.before_mm?, outcome))).collect();
+    known.sort_by(|a, b| b.0.total_cmp(&a.0));
+    known.truncate(FARTHEST);
+    let only =
+        Plan { outcomes: known.into_iter().map(|(_, outcome)| outcome.clone()).collect(), ..Plan::default() };
+    let mut table = without_empty_columns(table(&only, listing, files));
+    table.title = "Farthest off as programmed".to_owned();
+    table.notes.clear();
+    (!table.rows.is_empty()).then_some(table)
 }
 
 /// Reasons why motions were left, refused or flagged, with counts and first lines; the most frequent first within each
@@ -170,7 +192,7 @@ pub fn json(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Value {
 
 /// What fits a terminal: verdict with coverage, reasons, what could not be read, notes on tools and work objects.
 pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Document {
-    let mut page = heading(files);
+    let mut page = heading(plan, files);
     page.push(verdict(plan, listing));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
@@ -188,12 +210,15 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
 
 /// The page, with the deviation of the path where reports are given.
 pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: &[PathReport]) -> Document {
-    let mut page = heading(files);
+    let mut page = heading(plan, files);
     page.push(verdict(plan, listing));
     page.push(key_figures(plan));
     let reasons = reason_table(plan, listing, files);
     if !reasons.rows.is_empty() {
         page.push(reasons);
+    }
+    if let Some(farthest) = farthest(plan, listing, files) {
+        page.push(farthest);
     }
     let placed = placement::sentences(plan);
     if !placed.is_empty() {
@@ -230,6 +255,25 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     page
 }
 
+fn heading(plan: &Plan, files: &[ProgramFile]) -> Document {
+    let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
+    let mut page = Document::new(match names.as_slice() {
+        // The name alone: where it lies is in the tables and the JSON.
+        [name] => format!("Compensation of {}", name.rsplit(['/', '\\']).next().unwrap_or(name)),
+        _ => format!("Compensation of {} files", names.len()),
+    });
+    let outputs: Vec<&str> = files.iter().filter_map(|file| file.output.as_deref()).collect();
+    page.subtitle = match outputs.as_slice() {
+        [] => "nothing was written".to_owned(),
+        outputs => {
+            let same = plan.outcomes.iter().all(|o| matches!(o.status, Fate::Left | Fate::Refused));
+            let as_it_was = if same { ", byte for byte as it was" } else { "" };
+            format!("written to {}{as_it_was}", outputs.join(", "))
+        }
+    };
+    page
+}
+
 /// Regions that could not be read.
 pub fn opaque_table(listing: &Listing, files: &[ProgramFile]) -> Table {
     let mut table = Table::new(
@@ -244,159 +288,6 @@ pub fn opaque_table(listing: &Listing, files: &[ProgramFile]) -> Table {
         ]);
     }
     table
-}
-
-/// One sentence: how many motions were changed, flagged, refused and left, with their shares.
-pub fn coverage(plan: &Plan) -> String {
-    let all = plan.outcomes.len();
-    if all == 0 {
-        return "the program holds no motion".to_owned();
-    }
-    let parts: Vec<String> = FATES
-        .iter()
-        .map(|&fate| {
-            let found = count(plan, fate);
-            format!("{found} {} ({})", fate_word(fate), share(found, all))
-        })
-        .collect();
-    format!("{all} motions: {}", parts.join(", "))
-}
-
-/// Share in per cent: never 100 % where something is missing, never 0 % where something is there.
-fn share(part: usize, all: usize) -> String {
-    let percent = 100.0 * part as f64 / all as f64;
-    if part < all && percent > 99.9 {
-        "> 99.9 %".to_owned()
-    } else if part > 0 && percent < 0.1 {
-        "< 0.1 %".to_owned()
-    } else if part == all || part == 0 {
-        format!("{percent:.0} %")
-    } else {
-        format!("{percent:.1} %")
-    }
-}
-
-fn count(plan: &Plan, fate: Fate) -> usize {
-    plan.outcomes.iter().filter(|outcome| outcome.status == fate).count()
-}
-
-fn heading(files: &[ProgramFile]) -> Document {
-    let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
-    let mut page = Document::new(match names.as_slice() {
-        // The name alone: where it lies is in the tables and the JSON.
-        [name] => format!("Compensation of {}", name.rsplit(['/', '\\']).next().unwrap_or(name)),
-        _ => format!("Compensation of {} files", names.len()),
-    });
-    let outputs: Vec<&str> = files.iter().filter_map(|file| file.output.as_deref()).collect();
-    page.subtitle = match outputs.as_slice() {
-        [] => "nothing was written".to_owned(),
-        outputs => format!("written to {}", outputs.join(", ")),
-    };
-    page
-}
-
-/// How a rewrite is judged, the same on the terminal, on the page and in the exit code.
-pub fn verdict(plan: &Plan, listing: &Listing) -> Verdict {
-    let (refused, flagged) = (count(plan, Fate::Refused), count(plan, Fate::Flagged));
-    let written = count(plan, Fate::Changed) + flagged;
-    let (left, cuts) = placement::left(plan);
-    let same = !plan.outcomes.is_empty() && plan.outcomes.iter().all(|o| o.reason == Some(Why::Same));
-    let (status, headline) = match (written, refused + flagged) {
-        (0, 0) if same => {
-            (Status::NotEvaluated, "Nothing was rewritten: every number is right to its last decimal")
-        }
-        (0, 0) if left > 0 => (
-            Status::NotEvaluated,
-            "Nothing was rewritten: the measurement does not tell the arm well enough where the program cuts",
-        ),
-        (0, 0) => (Status::NotEvaluated, "Nothing was rewritten"),
-        (0, _) => (Status::Bad, "Nothing could be rewritten"),
-        (_, 0) if left > 0 => (
-            Status::Warning,
-            "Rewritten, but for cuts where the measurement does not tell the arm well enough: they stay as they are",
-        ),
-        (_, 0) => (Status::Good, "Everything that can be rewritten is rewritten"),
-        _ => (Status::Warning, "Rewritten, but look at what was refused or flagged before the program runs"),
-    };
-    let mut reasons = vec![coverage(plan)];
-    if left > 0 {
-        reasons.push(format!(
-            "{left} of {cuts} cuts stay as they are, since the correction makes them worse with a larger probability than \
-             --max-risk takes"
-        ));
-    }
-    reasons.extend(placement::chance(plan));
-    if refused > 0 && written > 0 {
-        reasons.push(
-            "a refused motion goes where it always went: between it and its rewritten neighbours the path steps by the \
-             correction"
-                .to_owned(),
-        );
-    }
-    let steps = count_why(plan, |why| matches!(why, Why::PartOfCut { .. } | Why::Step { .. }));
-    if steps > 0 {
-        reasons.push(format!(
-            "{steps} motions could be corrected but stay, since another motion of their cut stays: half a correction would be \
-             a step in the part"
-        ));
-    }
-    if !listing.opaque.is_empty() {
-        reasons.push(format!(
-            "regions that could not be read and stay as they are: {}; a motion in them is not corrected",
-            listing.opaque.len()
-        ));
-    }
-    let inserted: usize = plan.outcomes.iter().map(|outcome| outcome.inserted).sum();
-    if inserted > 0 {
-        reasons.push(format!(
-            "{inserted} targets put in, so that straight lines stay straight within the tolerance"
-        ));
-    }
-    Verdict::new(status, headline, reasons)
-}
-
-fn count_why(plan: &Plan, is: impl Fn(&Why) -> bool) -> usize {
-    plan.outcomes.iter().filter(|outcome| outcome.reason.as_ref().is_some_and(&is)).count()
-}
-
-fn key_figures(plan: &Plan) -> Vec<KeyFigure> {
-    let all = plan.outcomes.len();
-    let worst = |value: fn(&MotionOutcome) -> Option<f64>, only: fn(Fate) -> bool| {
-        plan.outcomes.iter().filter(|o| only(o.status)).filter_map(value).reduce(f64::max)
-    };
-    let rewritten: fn(Fate) -> bool = |fate| matches!(fate, Fate::Changed | Fate::Flagged);
-    let mut figures: Vec<KeyFigure> = FATES
-        .iter()
-        .map(|&fate| {
-            let found = count(plan, fate);
-            let mut word = fate_word(fate).to_owned();
-            word[..1].make_ascii_uppercase();
-            let figure = KeyFigure::new(word, found, 0, "");
-            if all > 0 { figure.note(format!("{} of {all} motions", share(found, all))) } else { figure }
-        })
-        .collect();
-    figures.push(
-        KeyFigure::new("Largest before", worst(|o| o.before_mm, |_| true), 3, "mm").note("all motions"),
-    );
-    let shape = placement::leads_with_shape(plan);
-    let sigma = move |o: &MotionOutcome| if shape { o.shape_sigma_mm } else { o.sigma_mm };
-    let expected = plan
-        .outcomes
-        .iter()
-        .filter(|o| rewritten(o.status))
-        .filter_map(|o| Some(o.after_mm?.hypot(sigma(o)?)))
-        .reduce(f64::max);
-    figures.push(KeyFigure::new("Expected after", expected, 3, "mm").note(if shape {
-        "of the shape, 1σ: largest of the rewritten motions"
-    } else {
-        "1σ: largest of the rewritten motions"
-    }));
-    if let Some(chance) = plan.chance_of_worse {
-        figures.push(
-            KeyFigure::new("Chance to be worse", 100.0 * chance, 1, "%").note("the corrected cuts together"),
-        );
-    }
-    figures
 }
 
 fn motion<'a>(outcome: &MotionOutcome, listing: &'a Listing) -> (Place, &'a str) {

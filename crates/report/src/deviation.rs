@@ -24,6 +24,9 @@ pub use summary::{block_table, registered_table};
 /// Rows of a point table on a page; the whole table belongs in the CSV file.
 const ROWS_ON_PAGE: usize = 150;
 
+/// Programs with an answer of their own on a terminal; of more the table tells.
+const ANSWERED: usize = 5;
+
 /// Models with a key figure of their own.
 const MODELS_IN_FIGURES: usize = 7;
 
@@ -197,6 +200,22 @@ fn range(numbers: impl Iterator<Item = usize>) -> Option<String> {
         std::cmp::Ordering::Equal => Some(low.to_string()),
         std::cmp::Ordering::Greater => None,
     }
+}
+
+/// What fits a terminal: the answer for each of a few programs, and the tables of all.
+pub fn summary(name: &str, reports: &[PathReport]) -> Document {
+    let mut page = Document::new(format!("Deviation of {name}"));
+    let programs = by_program(reports);
+    for (program, reports) in programs.iter().take(ANSWERED) {
+        let mut verdict = verdict(reports);
+        if programs.len() > 1 {
+            verdict.headline = format!("{program}: {}", verdict.headline);
+        }
+        page.push(verdict);
+    }
+    page.push(block_table(reports));
+    page.push(registered_table(reports));
+    page
 }
 
 /// The page: one section per program. Reports of one program with several models stand together.
@@ -460,20 +479,30 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             known(report.held_out_mm),
         ),
         [(first, ..), ..] => {
-            let spread = |values: Vec<f64>, decimals: usize| {
-                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                let (low, high) = (format!("{low:.decimals$}"), format!("{high:.decimals$}"));
-                if low == high { format!("{low} mm") } else { format!("{low}–{high} mm") }
+            let of = |pick: fn(&f64, &f64) -> std::cmp::Ordering| {
+                judged.iter().map(|(report, _, after)| (after, report)).min_by(|a, b| pick(a.0, b.0))
             };
+            let decimals = decimals(first.after);
+            let under = |found: Option<(&f64, &&PathReport)>| match found {
+                Some((after, report)) => format!("{after:.decimals$} mm under {}", report.model),
+                None => known(None),
+            };
+            let before = judged.iter().map(|(_, before, _)| *before).fold(0.0, f64::max);
             format!(
-                "The largest deviation goes from {} to {} ({}), depending on the model",
-                spread(judged.iter().map(|j| j.1).collect(), 3),
-                spread(judged.iter().map(|j| j.2).collect(), decimals(first.after)),
+                "The largest deviation goes from {before:.3} mm to {} at best, and to {} at worst ({})",
+                under(of(|a, b| a.total_cmp(b))),
+                under(of(|a, b| b.total_cmp(a))),
                 meaning(first.after),
             )
         }
     };
+    if judged.is_empty() && !reports.is_empty() {
+        reasons.push(
+            "`truegrind compensate` with the same model writes the program that takes out what the model knows of it; what \
+             lies within the predicted 1σ it does not know"
+                .to_owned(),
+        );
+    }
     Verdict::new(status, headline, reasons)
 }
 
@@ -486,35 +515,40 @@ fn before_rms(report: &PathReport) -> Option<f64> {
 
 fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     let mut figures = Vec::new();
-    let note = |report: &PathReport, side: Side, what: &str| match report.block(side) {
-        Some(block) => {
-            let decimals = if what == meaning(After::PredictedRemainder) { 4 } else { 3 };
-            format!("{what}, mean |d| {:.decimals$} mm", block.all.mean_absolute)
-        }
-        None => what.to_owned(),
+    let block = |report: &PathReport, side: Side| report.block(side);
+    let mean = |report: &PathReport, side: Side| {
+        block(report, side).map_or_else(String::new, |b| format!(", mean |d| {:.3} mm", b.all.mean_absolute))
     };
-    let max = |report: &PathReport, side: Side| report.block(side).map(|block| block.all.max);
+    let max = |report: &PathReport, side: Side| block(report, side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
-        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note(
-            first,
-            BEFORE,
-            "as programmed",
-        )));
+        let note = format!("as programmed{}", mean(first, BEFORE));
+        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note));
     }
     for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
-        let label = if reports.len() > 1 {
-            format!("Largest after, {}", report.model)
-        } else {
-            "Largest after".into()
+        let (label, after, note) = match report.after {
+            After::Achieved => {
+                ("Largest after", max(report, AFTER), format!("achieved{}", mean(report, AFTER)))
+            }
+            // What the solver leaves says nothing of the arm: what it has to be expected to do does.
+            After::PredictedRemainder => {
+                let expected =
+                    max(report, AFTER).zip(sigma_rms(report)).map(|(after, sigma)| after.hypot(sigma));
+                ("Expected after", expected, "1σ of the model, RMS over the cut".to_owned())
+            }
         };
-        figures.push(KeyFigure::new(label, max(report, AFTER), decimals(report.after), "mm").note(note(
-            report,
-            AFTER,
-            meaning(report.after),
-        )));
+        let label = if reports.len() > 1 { format!("{label}, {}", report.model) } else { label.to_owned() };
+        figures.push(KeyFigure::new(label, after, 3, "mm").note(note));
     }
     if let [report] = reports {
-        figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));
+        if !has(report, AFTER) {
+            let shape = report.registered_rms_mm(BEFORE);
+            figures.push(KeyFigure::new("Of it the shape", shape, 3, "mm").note(
+                "RMS after the best rigid registration: what is left where the path is adjusted in place",
+            ));
+        }
+        if report.after == After::Achieved || !has(report, AFTER) {
+            figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));
+        }
         figures.push(
             KeyFigure::new("Held-out error of the model", report.held_out_mm, 3, "mm")
                 .note("RMSE on rows it never saw"),

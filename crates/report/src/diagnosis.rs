@@ -121,7 +121,8 @@ pub fn summary(found: &Diagnosed) -> Document {
         ),
         causes,
     ));
-    page.push(vec![
+    let mut figures = super::identification::promise(found.benefit.as_ref());
+    figures.extend([
         KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm")
             .note(format!("geometry alone: {:.3} mm", fits.geometric.cv_rmse_mm)),
         KeyFigure::new("On contiguous blocks", fits.extended.cv_blocks_rmse_mm, 3, "mm")
@@ -133,10 +134,11 @@ pub fn summary(found: &Diagnosed) -> Document {
             diagnosis.findings.iter().filter(|f| f.confidence == Confidence::Identified).count()
         )),
     ]);
-    page.push(stage_table(diagnosis));
+    page.push(figures);
     if !diagnosis.findings.is_empty() {
         page.push(finding_table(diagnosis));
     }
+    page.push(stage_table(diagnosis));
     if !diagnosis.transfers.is_empty() {
         page.push(transfer_table(diagnosis));
     }

@@ -16,6 +16,7 @@ use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
 use super::number::Precision;
 use super::status::Status;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
+use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::measurement::dataset::Dataset;
 
@@ -217,7 +218,9 @@ pub fn judged(estimated: &Estimated) -> Verdict {
     let errors =
         format!("held-out error {after:.3} mm RMSE, where registered frames alone leave {before:.3} mm");
     let (status, headline) = match estimated.verdict.status {
-        Judgement::Pass => (Status::Good, format!("The model meets the stated limits: {errors}")),
+        Judgement::Pass => {
+            (Status::Good, format!("The model may be used, it meets the stated limits: {errors}"))
+        }
         Judgement::Fail => (Status::Bad, format!("The fit may not be used as a model: {errors}")),
         Judgement::Doubtful => (
             Status::Warning,
@@ -225,10 +228,28 @@ pub fn judged(estimated: &Estimated) -> Verdict {
         ),
         Judgement::NotEvaluated => (
             Status::NotEvaluated,
-            format!("Nothing speaks against the model, but no limits were stated: {errors}"),
+            format!("The model may be used, nothing speaks against it (no limits were stated): {errors}"),
         ),
     };
-    Verdict::new(status, headline, estimated.verdict.reasons.iter().cloned())
+    let mut reasons = estimated.verdict.reasons.clone();
+    if matches!(status, Status::Good | Status::NotEvaluated) {
+        reasons.push(
+            "what to do: correct programs with it (`truegrind compensate`), inside the measured region"
+                .to_owned(),
+        );
+    }
+    Verdict::new(status, headline, reasons)
+}
+
+/// How far off programs are before and after, as far as the rows promise.
+pub(super) fn promise(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
+    let Some(benefit) = benefit else { return Vec::new() };
+    vec![
+        KeyFigure::new("Programs before", benefit.nominal_mm, 3, "mm")
+            .note("expected RMS inside the measured region, apart from where base and flange are placed"),
+        KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm")
+            .note(format!("expected RMS; better with a probability of {:.1} %", 100.0 * benefit.chance)),
+    ]
 }
 
 fn key_figures(found: &Identification) -> Vec<KeyFigure> {
@@ -238,7 +259,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
     let floor = KeyFigure::new("Noise floor", estimated.noise_floor_mm, 3, "mm");
     let used = estimated.provenance.rows;
     let rank = found.identifiability.as_ref();
-    vec![
+    let mut figures = promise(found.benefit.as_ref());
+    figures.extend([
         KeyFigure::new("Held-out RMSE", after.rmse, 3, "mm")
             .note(format!("{}: {:.3} mm", "registered frames alone", before.rmse)),
         KeyFigure::new("Gain of the model", gain, 0, "%").note("registered frames to geometry, held out"),
@@ -260,7 +282,8 @@ fn key_figures(found: &Identification) -> Vec<KeyFigure> {
                 None => String::new(),
             },
         ),
-    ]
+    ]);
+    figures
 }
 
 fn provenance(found: &Identification, dataset: &Dataset) -> Provenance {

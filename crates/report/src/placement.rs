@@ -3,8 +3,9 @@
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
+use truegrind_compensation::deviation::Status;
 use truegrind_compensation::placement::{ObjectPlacement, Placement};
-use truegrind_compensation::rewrite::Plan;
+use truegrind_compensation::rewrite::{MotionOutcome, Plan};
 use truegrind_compensation::risk::CutRisk;
 use truegrind_programs::motion::Listing;
 
@@ -103,6 +104,28 @@ pub fn left(plan: &Plan) -> (usize, usize) {
 /// Predicted 1σ that counts for a motion: of the shape where its cut is judged by that, else of its place.
 pub fn leads_with_shape(plan: &Plan) -> bool {
     plan.placements.iter().any(|placement| placement.taken == Placement::Shape)
+}
+
+fn rewritten(plan: &Plan) -> impl Iterator<Item = &MotionOutcome> {
+    plan.outcomes.iter().filter(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+}
+
+/// Largest deviation of what is rewritten, as programmed (mm); where the shape alone is corrected, of the shape. `None` where
+/// nothing is rewritten.
+pub fn before_mm(plan: &Plan) -> Option<f64> {
+    rewritten(plan).filter_map(|outcome| outcome.before_mm).reduce(f64::max)
+}
+
+/// Largest deviation of all motions as programmed (mm).
+pub fn largest_mm(plan: &Plan) -> Option<f64> {
+    plan.outcomes.iter().filter_map(|outcome| outcome.before_mm).reduce(f64::max)
+}
+
+/// How far off what is rewritten has to be expected (mm): what the solver leaves and the predicted 1σ, the largest of all.
+pub fn expected_mm(plan: &Plan) -> Option<f64> {
+    let shape = leads_with_shape(plan);
+    let sigma = |outcome: &MotionOutcome| if shape { outcome.shape_sigma_mm } else { outcome.sigma_mm };
+    rewritten(plan).filter_map(|outcome| Some(outcome.after_mm?.hypot(sigma(outcome)?))).reduce(f64::max)
 }
 
 /// The chance that what is written gets worse, in words; `None` where nothing is known of it.

@@ -135,14 +135,23 @@ fn rows_of(plan: &Plan, purpose: Purpose) -> usize {
 }
 
 fn verdict(plan: &Plan) -> Verdict {
-    let mut reasons = vec![format!(
+    let minutes = plan.rows.last().map_or(0.0, |row| 60.0 * row.time_h);
+    let mut reasons = vec![
+        format!(
+            "what to do: run the program slowly first, then take one reading at each of the {} rows, in their order (about \
+             {minutes:.0} min)",
+            plan.rows.len()
+        ),
+        "poses stay within joint limits and clear of singularities".to_owned(),
+    ];
+    reasons.push(format!(
         "{} rows at {} poses: {} from the other side, {} repeated, {} for warm-up",
         plan.rows.len(),
         plan.poses.len(),
         rows_of(plan, Purpose::OtherSide),
         rows_of(plan, Purpose::Repeat),
         rows_of(plan, Purpose::WarmUp)
-    )];
+    ));
     let quality = &plan.quality;
     reasons.push(format!(
         "after one visit to each pose the model says what is read elsewhere to {:.3} mm (1σ); after as many random poses: \
@@ -163,10 +172,16 @@ fn verdict(plan: &Plan) -> Verdict {
     ));
     let rough = plan.rows.iter().filter(|row| row.rough_way).count();
     if rough > 0 {
-        reasons.push(format!("{rough} times the cable has to be unhooked on the way"));
+        reasons.insert(
+            1,
+            format!("{rough} times the cable has to be unhooked on the way: the table of rows says where"),
+        );
     }
-    let status = if rough == 0 { Status::Good } else { Status::Warning };
-    Verdict::new(status, "The plan stays within joint limits and clear of singularities", reasons)
+    let (status, headline) = match rough {
+        0 => (Status::Good, "The program may run: links and target keep out of what was stated"),
+        _ => (Status::Warning, "The program may run, if the cable is unhooked where it would be in the way"),
+    };
+    Verdict::new(status, headline, reasons)
 }
 
 /// What fits a terminal.
@@ -182,15 +197,15 @@ pub fn document(plan: &Plan, wanted: &Wanted<'_>, robot: &str) -> Document {
     let mut page = Document::new(format!("What to measure on {robot}"));
     page.push(verdict(plan));
     page.push(vec![
-        KeyFigure::new("Rows", plan.rows.len(), 0, ""),
-        KeyFigure::new("Poses", plan.poses.len(), 0, ""),
-        KeyFigure::new("Reading elsewhere, predicted 1σ", plan.quality.reading_sigma_mm, 3, "mm"),
-        KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm"),
+        KeyFigure::new("Rows", plan.rows.len(), 0, "").note(format!("at {} poses", plan.poses.len())),
+        KeyFigure::new("Left unknown after it", plan.quality.reading_sigma_mm, 3, "mm")
+            .note("predicted 1σ of a reading anywhere else"),
+        KeyFigure::new("After random poses", plan.quality.random_reading_sigma_mm, 3, "mm")
+            .note(format!("as many, {} of them", plan.poses.len())),
+        KeyFigure::new("Effects decided", plan.decidable.iter().filter(|d| d.is_decided()).count(), 0, "")
+            .note(format!("of {}, at sizes met in practice", plan.decidable.len())),
     ]);
-    page.paragraph(
-        "No program can know what else stands in the cell: state it as boxes (--keep-out). Run the program slowly first, then take \
-         one reading at every row, in their order.",
-    );
+    page.paragraph("No program can know what else stands in the cell: state it as boxes (--keep-out).");
     page.push(effect_table(plan));
     page.heading(2, "Rows");
     page.push(table(plan, wanted).excerpt(ROWS_ON_PAGE));

@@ -9,6 +9,7 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_calibration::tracking::state::Consumed;
 use truegrind_calibration::tracking::{Alarm, Tracker};
+use truegrind_math::statistics::median;
 
 /// What the terminal shows.
 pub fn summary(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) -> Document {
@@ -38,7 +39,7 @@ pub fn document(tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) 
         Graph {
             title: "Normalised innovations squared of the latest poses".to_owned(),
             x: Axis::new("pose of the history", ""),
-            y: Axis::new("NIS", ""),
+            y: Axis::log("NIS", ""),
             series: vec![Series::points("", points)],
             references: vec![Reference::Horizontal(rows_per_pose(tracker), "expected mean".to_owned())],
             ..Graph::default()
@@ -74,7 +75,7 @@ fn rows_per_pose(tracker: &Tracker) -> f64 {
 fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], model: &str) {
     let state = tracker.state();
     let (status, headline) = match alarms.len() {
-        0 => (Status::Good, format!("{fresh} new poses taken in, no change noticed")),
+        0 => (Status::Good, format!("{fresh} new poses taken in, no change noticed: programs stay right")),
         1 => (Status::Warning, format!("{fresh} new poses taken in, one change noticed")),
         n => (Status::Warning, format!("{fresh} new poses taken in, {n} changes noticed")),
     };
@@ -92,14 +93,25 @@ fn head(page: &mut Document, tracker: &Tracker, fresh: usize, alarms: &[Alarm], 
     } else {
         (status, headline)
     };
+    if status == Status::Warning {
+        reasons.push(
+            "what to do: where the arm itself moved, correct the programs anew with the model that was written; where sensor or \
+             target did, mount them firmly"
+                .to_owned(),
+        );
+    }
     page.push(Verdict::new(status, headline, reasons));
     let nis: Vec<f64> = state.history.iter().map(|s| s.nis).filter(|n| n.is_finite()).collect();
-    let mean = (!nis.is_empty()).then(|| nis.iter().sum::<f64>() / nis.len() as f64);
+    // One pose after a new mounting is worth a million: a mean would speak of nothing else.
+    let usual = (!nis.is_empty()).then(|| median(&nis));
+    let degrees = rows_per_pose(tracker);
+    let expected = degrees * (1.0 - 2.0 / (9.0 * degrees)).powi(3);
     page.push(vec![
         KeyFigure::new("Poses in all", state.poses, 0, "").note(format!("{} set aside", state.accidents)),
-        KeyFigure::new("Mean NIS of the latest", mean, 2, "")
-            .note(format!("{} expected", rows_per_pose(tracker))),
-        KeyFigure::new("Changes in all", state.alarms.len(), 0, ""),
+        KeyFigure::new("Surprise of the latest poses", usual, 2, "").note(format!(
+            "median of the normalised innovations squared; {expected:.1} where arm, sensor and noise are what they are taken for"
+        )),
+        KeyFigure::new("Changes in all", state.alarms.len(), 0, "").note(format!("{} in these poses", alarms.len())),
     ]);
     page.paragraph(format!("Model written: {model}"));
 }

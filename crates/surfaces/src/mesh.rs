@@ -117,6 +117,43 @@ impl Mesh {
         Self::new(vertices, facets, options)
     }
 
+    /// The triangles of an STL file alone, for drawing: each with its own corners, millimetres by `unit_mm` along each axis.
+    /// They need not close, nor be seen from above.
+    ///
+    /// # Errors
+    /// Bytes that are not STL, and vertices that are not finite.
+    pub fn triangles_of_stl(bytes: &[u8], unit_mm: [f64; 3]) -> Result<Tessellation, SurfaceError> {
+        let wrong = |problem: String| SurfaceError::Mesh {
+            problem,
+            remedy: "export it again as binary STL".to_owned(),
+        };
+        let read = stl_io::read_stl(&mut std::io::Cursor::new(recognised(bytes)?))
+            .map_err(|error| wrong(format!("cannot be read as STL ({error})")))?;
+        let corner = |at: usize| -> Point3<f64> {
+            let v = read.vertices[at].0;
+            Point3::from(std::array::from_fn::<f64, 3, _>(|k| f64::from(v[k]) * unit_mm[k]))
+        };
+        let mut out = Tessellation { vertices_mm: Vec::new(), normals: Vec::new(), triangles: Vec::new() };
+        // A mirrored axis turns every triangle round.
+        let turned = unit_mm.iter().product::<f64>() < 0.0;
+        for face in &read.faces {
+            let mut corners = face.vertices.map(corner);
+            if turned {
+                corners.swap(1, 2);
+            }
+            if corners.iter().any(|c| !c.iter().all(|v| v.is_finite())) {
+                return Err(wrong("has a vertex that is not finite".to_owned()));
+            }
+            let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let Some(normal) = Unit::try_new(across, 1e-12) else { continue };
+            let first = out.vertices_mm.len() as u32;
+            out.vertices_mm.extend(corners);
+            out.normals.extend([normal; 3]);
+            out.triangles.push([first, first + 1, first + 2]);
+        }
+        Ok(out)
+    }
+
     /// Makes a mesh from vertices in mm and facets, three indices each, counter-clockwise seen from outside. Of
     /// `options`, the unit is not used.
     ///

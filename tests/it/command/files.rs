@@ -134,6 +134,9 @@ fn verbs() -> Vec<Verb> {
                 "--blocks",
                 "--smooth",
                 "--also",
+                "--raw-columns",
+                "--limit-rmse",
+                "--limit-max",
                 "--sensor-frame",
                 "--outlet",
                 "--cable-zero",
@@ -157,10 +160,9 @@ fn verbs() -> Vec<Verb> {
                 "why.json",
             ],
             inputs: &["robot.toml", "why.json"],
-            outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html"],
+            outputs: &["-o", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
-                "--rrd",
                 "--robot",
                 "--sensor",
                 "--poses",
@@ -196,7 +198,7 @@ fn verbs() -> Vec<Verb> {
         Verb {
             base: &["compare", "data.csv", "--robot", "robot.toml", "--experiment", "mine.toml"],
             inputs: &["data.csv", "robot.toml", "mine.toml"],
-            outputs: &["--times", "--json", "--csv", "--parquet", "--md", "--html"],
+            outputs: &["--times", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
                 "--robot",
@@ -207,7 +209,6 @@ fn verbs() -> Vec<Verb> {
                 "--angles",
                 "--allow-odd-units",
                 "--timings",
-                "--rrd",
                 "--seed",
                 "--threads",
             ],
@@ -215,7 +216,7 @@ fn verbs() -> Vec<Verb> {
         Verb {
             base: &["track", "data.csv", "--model", "model.toml", "--robot", "robot.toml"],
             inputs: &["data.csv", "model.toml", "robot.toml"],
-            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html"],
+            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[
                 "--model",
@@ -228,7 +229,6 @@ fn verbs() -> Vec<Verb> {
                 "--drift",
                 "--angles",
                 "--allow-odd-units",
-                "--rrd",
                 "--seed",
                 "--threads",
             ],
@@ -236,7 +236,7 @@ fn verbs() -> Vec<Verb> {
         Verb {
             base: &["track", "days", "--model", "model.toml", "-o", "made-tracks"],
             inputs: &["days/one.csv", "days/two.csv"],
-            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html"],
+            outputs: &["--state", "--json", "--csv", "--parquet", "--md", "--html", "--rrd"],
             needs: &[],
             others: &[],
         },

@@ -96,7 +96,8 @@ fn everything(at: &Path, threads: &str) {
         ),
     ] {
         let mut outputs = if threaded { pages(stem) } else { Vec::new() };
-        if cfg!(feature = "visual") && ["id", "why", "one", "dev"].contains(&stem) {
+        if cfg!(feature = "visual") && ["id", "why", "plan", "compare", "track", "one", "dev"].contains(&stem)
+        {
             outputs.push(format!("--rrd={stem}.rrd"));
         }
         let mut arguments: Vec<&str> = verb;

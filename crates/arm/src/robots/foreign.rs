@@ -34,6 +34,21 @@ pub struct Understood {
     /// What a reader should compare with the manual, one sentence each: joints, zero pose, axes, flange, and what was taken from
     /// the file beside.
     pub sentences: Vec<String>,
+    /// Meshes that the file names for drawing; none where it names none.
+    pub visuals: Vec<Visual>,
+}
+
+/// A mesh that a file names for drawing a link. Nothing is computed from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visual {
+    /// The frame that it moves with: 0 is the base, i the end of link i.
+    pub frame: usize,
+    /// Where it lies in that frame.
+    pub pose: Pose,
+    /// Its file, as it is named there.
+    pub file: String,
+    /// Millimetres for each of its units, along its own axes.
+    pub unit_mm: [f64; 3],
 }
 
 /// A kind of file.
@@ -113,21 +128,32 @@ pub fn read_any(text: &str, file: &str, choice: &Choice) -> Result<Understood, R
         Kind::Toml => {
             let robot = parse(text, file)?;
             let sentences = told(&robot, &[]);
-            return Ok(Understood { robot, kind, sentences });
+            return Ok(Understood { robot, kind, sentences, visuals: Vec::new() });
         }
         Kind::Urdf => urdf::read(text, file, choice)?,
         Kind::Table => table::read(text, file)?,
         Kind::UrYaml => ur::read_yaml(text, file)?,
         Kind::UrConf => ur::read_conf(text, file, load)?,
     };
-    let (robot, notes) = robot(described, file, choice.ground_joint_3)?;
+    let (robot, notes, visuals) = robot(described, file, choice.ground_joint_3)?;
     let sentences = told(&robot, &notes);
-    Ok(Understood { robot, kind, sentences })
+    Ok(Understood { robot, kind, sentences, visuals })
 }
 
 /// Our arm through the axes of a described one, compared with it.
-fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robot, Vec<String>), RobotError> {
+fn robot(
+    described: Described,
+    file: &str,
+    ground_joint_3: bool,
+) -> Result<(Robot, Vec<String>, Vec<Visual>), RobotError> {
     let laid = axes::laid(&described, file)?;
+    let visuals = described.visuals.iter().map(|shown| Visual {
+        frame: shown.joints,
+        pose: laid.frames[shown.joints].inverse() * shown.place,
+        file: shown.file.clone(),
+        unit_mm: shown.unit_mm,
+    });
+    let visuals = visuals.collect();
     let mut notes = described.notes.clone();
     if let Some(note) = laid.note() {
         notes.push(note);
@@ -195,7 +221,7 @@ fn robot(described: Described, file: &str, ground_joint_3: bool) -> Result<(Robo
     };
     let robot = Robot::new(sheet, file)?;
     compared(&robot, &described, &laid.base, &map, file)?;
-    Ok((robot, notes))
+    Ok((robot, notes, visuals))
 }
 
 /// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.

@@ -80,6 +80,44 @@ fn a_turned_tool_and_whatever_is_fixed_belong_to_the_links() {
     assert_eq!((again.model, again.sheet.name.as_str()), (found.model, "turned-urdf"));
 }
 
+/// Meshes move with the frames of their links, whatever frames we lay through the arm; what hangs on a finger is none of the arm's.
+#[test]
+fn meshes_are_named_with_the_frames_that_they_move_with() {
+    let visual = |file: &str| {
+        format!(
+            "<visual><origin xyz=\"0.01 0.02 0.03\"/><geometry><mesh filename=\"{file}\" scale=\"0.001 0.001 0.001\"/>\
+             </geometry></visual>"
+        )
+    };
+    let mut text = GRIPPER.to_owned();
+    for link in ["base_link", "link_3", "flange", "finger_a"] {
+        let empty = format!("<link name=\"{link}\"/>");
+        assert!(text.contains(&empty), "{link}");
+        text =
+            text.replace(&empty, &format!("<link name=\"{link}\">{}</link>", visual(&format!("{link}.stl"))));
+    }
+    let found = read(&text, "gripper.urdf", &Choice::default());
+    let named: Vec<(usize, &str)> = found.visuals.iter().map(|v| (v.frame, v.file.as_str())).collect();
+    assert_eq!(named, [(0, "base_link.stl"), (3, "link_3.stl"), (6, "flange.stl")]);
+    assert_eq!(found.visuals[0].unit_mm, [1.0; 3], "metres times the scale");
+    let arm = found.robot.model.at_condition(&Condition::default());
+    let place = |visual: usize, joints: &Joints| {
+        let chain = arm.frames(joints);
+        let i = found.visuals[visual].frame;
+        let at = found.visuals[visual].pose.translation.vector;
+        let (y, z) = (Vector3::from(chain.y[i - 1]), Vector3::from(chain.z[i]));
+        Vector3::from(chain.origin[i]) + y.cross(&z) * at.x + y * at.y + z * at.z
+    };
+    // Joint 3 lies at (20, 0, 570) and turns about y.
+    let off = place(1, &Joints::zeros()) - Vector3::new(30.0, 20.0, 600.0);
+    assert!(off.norm() < 1e-9, "{off}");
+    let mut turned = Joints::zeros();
+    turned[2] = std::f64::consts::FRAC_PI_2;
+    let off = place(1, &turned) - Vector3::new(50.0, 20.0, 560.0);
+    assert!(off.norm() < 1e-9, "{off}");
+    assert!(read(GRIPPER, "gripper.urdf", &Choice::default()).visuals.is_empty());
+}
+
 /// Masses stand where the links are, what is fixed to a link with it.
 #[test]
 fn masses_are_taken_with_their_places() {

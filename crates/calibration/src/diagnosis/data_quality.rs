@@ -6,7 +6,7 @@ use super::rows::Prepared;
 use super::selection::BLOCKS;
 use super::validation::{StageError, Validation};
 use super::words;
-use crate::identification::rounding::angle_shares;
+use crate::identification::rounding::{NotFused, angle_shares};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split;
 
@@ -42,14 +42,25 @@ pub(super) fn rounding_finding(
                 1.0 / report.narrowed.max(1e-6)
             ),
         ),
-        Err(_) => (
-            Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
-            format!(
-                "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; there is no read-out to fuse_readout them",
-                step.to_degrees(),
-                share.sqrt()
-            ),
-        ),
+        Err(why) => {
+            let there =
+                matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm.is_some());
+            let read_out = match why {
+                _ if there => "the read-out was not used to sharpen them (--raw-columns)",
+                NotFused::Nothing => "there is no read-out to sharpen them",
+                NotFused::Mismatch { .. } => {
+                    "the read-out contradicts them, so it was not used to sharpen them"
+                }
+            };
+            (
+                Gain { cv_rmse_before_mm: before, cv_rmse_after_mm: before },
+                format!(
+                    "all angles are multiples of {:.4}°, worth {:.3} mm at the sensor; {read_out}",
+                    step.to_degrees(),
+                    share.sqrt()
+                ),
+            )
+        }
     };
     Some(Finding {
         effect: "angle-rounding".to_owned(),

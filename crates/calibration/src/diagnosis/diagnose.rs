@@ -17,7 +17,7 @@ use super::stories::{self, Story, Worth};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
 use super::written::written;
-use crate::identification::benefit::benefit;
+use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, frame_parameters};
 use crate::identification::identify::{
@@ -26,7 +26,7 @@ use crate::identification::identify::{
 use crate::identification::network::with_network;
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::Hearing;
+use crate::identification::verdict::{Hearing, Limits};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Disturbance};
 use crate::measurement::split;
@@ -47,6 +47,10 @@ pub struct Options {
     pub blocks: usize,
     /// Whether a smooth correction may follow what no cause explains.
     pub smooth: bool,
+    /// Whether rounded angles are sharpened by the controller's read-out.
+    pub fuse_readout: bool,
+    /// What the held-out error of the written model (random folds) is held against.
+    pub limits: Limits,
 }
 
 impl Default for Options {
@@ -61,6 +65,8 @@ impl Default for Options {
             selection: selection::Options::default(),
             blocks: BLOCKS,
             smooth: false,
+            fuse_readout: true,
+            limits: Limits::default(),
         }
     }
 }
@@ -76,6 +82,8 @@ pub struct Diagnosed {
     pub extended: Extended,
     /// The arm for compensation; its verdict says whether it may be used.
     pub estimated: Estimated,
+    /// What that arm promises programs; absent where its equations have no solution.
+    pub benefit: Option<Benefit>,
     /// The rows as they were fitted.
     pub prepared: Prepared,
     /// Rows set aside, as indices of the data set.
@@ -102,7 +110,7 @@ pub fn diagnose(
     tell: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosed, DiagnoseError> {
     let floor = split::noise_floor(dataset);
-    let prepared = prepare(dataset, nominal_arm);
+    let prepared = prepare(dataset, nominal_arm, options.fuse_readout);
     let subject =
         Subject { observed: &prepared.observed, nominal: nominal_arm, frames, tolerance: &options.tolerance };
     let mut notes = Vec::new();
@@ -304,7 +312,7 @@ pub fn diagnose(
     let written = written(&subject, &extended, &certain, of_all);
     let mut written_stages = stages;
     written_stages[2] = validation.stage(&written);
-    let estimated = estimated(
+    let (estimated, benefit) = estimated(
         dataset,
         robot,
         nominal_arm,
@@ -322,6 +330,7 @@ pub fn diagnose(
         geometric,
         extended,
         estimated,
+        benefit,
         prepared,
         set_aside,
         finding_of_cause,
@@ -419,7 +428,7 @@ fn estimated(
     set_aside: &[usize],
     options: &Options,
     prepared: &Prepared,
-) -> Estimated {
+) -> (Estimated, Option<Benefit>) {
     let fitted = Fitted::from(extended);
     let parameters = parameter_table(&fitted, nominal_arm);
     let order = arm_of(&fitted);
@@ -460,18 +469,22 @@ fn estimated(
         condition: mean_condition(dataset),
     };
     let mut estimated = with_region(estimated, &subject.observed.dataset, &fitted);
-    estimated.verdict = judge(&fitted, &subject.observed.dataset, &estimated, &parameters, stages);
-    estimated
+    let rows = &subject.observed.dataset;
+    // Links and what the model promises are held against the tolerance of arms, not against the wide priors of a diagnosis.
+    let plausible = Tolerance::default();
+    let benefit = benefit(&fitted, rows, &estimated, &plausible, lack(&fitted, rows, &stages[2]));
+    estimated.verdict = judge(&fitted, rows.sensor, benefit.as_ref(), &parameters, stages, &options.limits);
+    (estimated, benefit)
 }
 
-/// Every verdict of an identification, and that findings may not make geometry worse. Links and what the model promises are
-/// held against the tolerance of arms, not against the wide priors of a diagnosis.
+/// Every verdict of an identification, and that findings may not make geometry worse.
 fn judge(
     fitted: &Fitted,
-    dataset: &Dataset,
-    estimated: &Estimated,
+    sensor: Sensor,
+    benefit: Option<&Benefit>,
     parameters: &[EstimatedParameter],
     stages: &[StageError; 3],
+    limits: &Limits,
 ) -> Verdict {
     let mut hearing = Hearing::default();
     if fitted.termination().is_converged() {
@@ -485,12 +498,10 @@ fn judge(
             stages[2].random.rmse, stages[1].random.rmse
         ));
     }
-    let plausible = Tolerance::default();
-    hearing.strange_links(parameters, &plausible, SURE);
+    hearing.strange_links(parameters, &Tolerance::default(), SURE);
     hearing.held_out(stages[0].random.rmse, stages[2].random.rmse);
-    let benefit = benefit(fitted, dataset, estimated, &plausible, lack(fitted, dataset, &stages[2]));
-    hearing.benefit(benefit.as_ref(), dataset.sensor);
-    hearing.tell("held-out error not evaluated: no limits were stated");
+    hearing.benefit(benefit, sensor);
+    hearing.limits(limits, &stages[2].random);
     hearing.verdict()
 }
 

@@ -76,8 +76,8 @@ pub struct Prepared {
     pub sides_from_order: bool,
 }
 
-/// Prepares a data set.
-pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
+/// Prepares a data set; rounded angles are sharpened by the controller's read-out where that is wanted (`fuse`).
+pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     let mismatch = mismatches(dataset, nominal);
     let mut rows = dataset.clone();
     let silent = dataset.rows.iter().all(|r| r.condition.approach == [0; 6]);
@@ -94,7 +94,8 @@ pub fn prepare(dataset: &Dataset, nominal: &Model) -> Prepared {
     let good: Vec<usize> =
         (0..rows.rows.len()).filter(|i| mismatch.rows.iter().all(|(m, _)| m != i)).collect();
     let mut kept = rows.subset(&good);
-    let (observed, readout_fusion) = match fuse_readout(&mut kept, nominal) {
+    let fused = if fuse { fuse_readout(&mut kept, nominal) } else { Err(NotFused::Nothing) };
+    let (observed, readout_fusion) = match fused {
         Ok((report, covariances)) => {
             let mut observed = logged.clone();
             for ((&i, row), covariance) in good.iter().zip(&kept.rows).zip(covariances) {

@@ -14,7 +14,7 @@ use truegrind_arm::model::Model;
 use truegrind_math::statistics::ErrorSummary;
 
 /// Root mean square errors (mm) of data sheet, geometry and extended model on `other`, frames fitted to it, links and effects
-/// as they are.
+/// as they are. `fuse_readout`: as the models were made.
 pub fn transfer(
     other: &Dataset,
     frames: &Frames,
@@ -22,8 +22,9 @@ pub fn transfer(
     geometric: &Model,
     extended: &Model,
     tolerance: &Tolerance,
+    fuse_readout: bool,
 ) -> Transfer {
-    let prepared = prepare(other, nominal);
+    let prepared = prepare(other, nominal, fuse_readout);
     let none: [Cause; 0] = [];
     let rmse = |model: &Model| {
         let subject = Subject { observed: &prepared.observed, nominal: model, frames, tolerance };

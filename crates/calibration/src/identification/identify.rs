@@ -16,7 +16,7 @@ use crate::identification::rounding::{
 use crate::identification::solver::{Family, SOLVERS, Solver};
 use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
-use crate::identification::verdict::Hearing;
+use crate::identification::verdict::{Hearing, Limits};
 use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{self, Split};
 use truegrind_arm::condition::Condition;
@@ -562,19 +562,7 @@ fn judge(case: &Case<'_>, options: &Options) -> Verdict {
     if !options.solver.literal {
         hearing.benefit(case.benefit, case.sensor);
     }
-    for (name, limit, found) in
-        [("RMSE", options.limit_rmse_mm, held), ("maximum", options.limit_max_mm, case.after.held_out.max)]
-    {
-        let Some(limit) = limit else { continue };
-        hearing.limits_stated = true;
-        if found <= limit {
-            hearing.tell(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
-        } else {
-            hearing.fail(format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
-        }
-    }
-    if !hearing.limits_stated {
-        hearing.tell("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
-    }
+    let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
+    hearing.limits(&limits, &case.after.held_out);
     hearing.verdict()
 }

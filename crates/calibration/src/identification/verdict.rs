@@ -9,6 +9,7 @@ use crate::identification::benefit::{Benefit, ScaleError};
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement, Verdict};
+use truegrind_math::statistics::ErrorSummary;
 
 /// Least probability of a benefit with which a model is not doubtful.
 pub const LEAST_CHANCE: f64 = 0.96;
@@ -29,8 +30,16 @@ pub struct Hearing {
     failures: Vec<String>,
     doubts: Vec<String>,
     others: Vec<String>,
-    /// Whether limits were stated.
-    pub limits_stated: bool,
+    limits_stated: bool,
+}
+
+/// Limits of the held-out error beyond which a fit fails (mm); none where nothing is stated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Of the RMSE.
+    pub rmse_mm: Option<f64>,
+    /// Of the largest error.
+    pub max_mm: Option<f64>,
 }
 
 impl Hearing {
@@ -71,6 +80,24 @@ impl Hearing {
             self.fail(format!(
                 "geometry is worse than registered frames on held-out rows: {model_mm:.3} against {registered_mm:.3} mm RMSE"
             ));
+        }
+    }
+
+    /// Fails where a stated limit of the held-out error is missed, and says where none is stated.
+    pub fn limits(&mut self, limits: &Limits, held_out: &ErrorSummary) {
+        for (name, limit, found) in
+            [("RMSE", limits.rmse_mm, held_out.rmse), ("maximum", limits.max_mm, held_out.max)]
+        {
+            let Some(limit) = limit else { continue };
+            self.limits_stated = true;
+            if found <= limit {
+                self.tell(format!("held-out {name} {found:.3} mm is within the stated {limit} mm"));
+            } else {
+                self.fail(format!("held-out {name} {found:.3} mm exceeds the stated {limit} mm"));
+            }
+        }
+        if !self.limits_stated {
+            self.tell("held-out error not evaluated: no limits were stated (--limit-rmse, --limit-max)");
         }
     }
 

@@ -9,7 +9,7 @@ use truegrind_math::statistics::ErrorSummary;
 
 impl Tracker {
     /// The arm and the sensor's frames as they stand now.
-    pub(super) fn standing(&self) -> (Model, Frames) {
+    pub fn standing(&self) -> (Model, Frames) {
         let task = Calibration::new(
             &Dataset::new("track", Sensor::Position, Vec::new()),
             &self.begun.model,

@@ -1,5 +1,6 @@
 //! What is to be drawn of a measurement file.
 
+use crate::arm::LinkMesh;
 use truegrind_arm::model::Model;
 use truegrind_calibration::diagnosis::finding::Diagnosis;
 use truegrind_calibration::identification::calibration::Frames;
@@ -24,6 +25,14 @@ pub struct MeasuredScene<'a> {
     pub arm: &'a Model,
     /// What that arm is, in words.
     pub arm_is: &'a str,
+    /// The arm of the data sheet, drawn as a ghost beside the other with its differences exaggerated; where known.
+    pub nominal: Option<&'a Model>,
+    /// Meshes that show the links, where a robot file names them; else links are bars.
+    pub meshes: &'a [LinkMesh],
+    /// Boxes that nothing shall enter: two corners each (mm, base).
+    pub keep_out_mm: &'a [[[f64; 3]; 2]],
+    /// The answer in words, where there is more to be said than the file's (Markdown, lines of a list).
+    pub answer: &'a [String],
     /// How the sensor stands to the arm, where known.
     pub frames: Option<&'a Frames>,
     /// What each stage leaves, the best one last; may be empty.

@@ -4,12 +4,13 @@ use std::fmt::Write;
 
 use super::scene::MeasuredScene;
 use crate::markdown::{cell, line, number, with_sigma};
+use crate::shape::Shape;
 use truegrind_arm::estimated::{EstimatedParameter, Judgement};
 use truegrind_calibration::diagnosis::finding::{Confidence, Diagnosis};
 use truegrind_calibration::identification::identify::{Identification, sensor_name};
 use truegrind_math::statistics::ErrorSummary;
 
-pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
+pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> String {
     let dataset = scene.dataset;
     let mut text = format!("# {}\n\n", line(&dataset.file));
     let _ = writeln!(
@@ -19,6 +20,12 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
         sensor_name(dataset.sensor),
         line(scene.arm_is)
     );
+    for sentence in scene.answer {
+        let _ = writeln!(text, "- {}", line(sentence));
+    }
+    if !scene.answer.is_empty() {
+        text.push('\n');
+    }
     if let Some(found) = scene.identification {
         verdict(&mut text, found);
         errors(&mut text, found);
@@ -34,6 +41,17 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>) -> String {
         parameters(&mut text, &found.parameters);
     }
     text.push_str("\n## What is drawn\n\n- Grey arm: at the logged joints of the row.\n");
+    if let Some(shape) = shape {
+        let _ = writeln!(
+            text,
+            "- Second tab: the ghost is the arm as the data sheet has it, the orange one {}, its differences {}.",
+            line(scene.arm_is),
+            shape.factor()
+        );
+    }
+    if !scene.keep_out_mm.is_empty() {
+        text.push_str("- Purple boxes: what nothing shall enter.\n");
+    }
     if scene.residuals.is_empty() {
         text.push_str("- Points: where the flange stood, all rows.\n");
     } else {

@@ -88,7 +88,7 @@ fn marks(store: &mut Store, plan: &Plan<'_>) -> Result<(), VisualError> {
 
 fn after_name(report: &PathReport) -> String {
     let kind = match report.after {
-        After::PredictedRemainder => "predicted remainder",
+        After::PredictedRemainder => "what the solver leaves",
         After::Achieved => "achieved",
     };
     format!("after · {} ({kind})", report.model)
@@ -104,18 +104,35 @@ fn over(report: &PathReport, figure: impl Fn(&PathPoint) -> Option<f64>) -> Vec<
     report.points.iter().filter_map(at).collect()
 }
 
+/// From the lowest to the highest of what a plot shows, with room for its legend.
+fn range(scene: &PathScene<'_>, figure: Figure, with_sigma: bool, both_ways: bool) -> Option<[f64; 2]> {
+    let points = || scene.reports.iter().flat_map(|r| &r.points);
+    let deviations = points().flat_map(|p| [p.before, p.after]).flatten().filter_map(|d| figure(&d));
+    let sigmas = points().filter_map(|p| p.sigma_mm).filter(|_| with_sigma);
+    let below = sigmas.clone().map(|s| -s).filter(|_| both_ways);
+    let names = 1 + scene.reports.len() + if with_sigma { 1 + usize::from(both_ways) } else { 0 };
+    curve::range(deviations.chain(sigmas).chain(below), names)
+}
+
 /// The curves' part of the page.
 pub(super) fn panes(scene: &PathScene<'_>) -> Pane {
-    let view = |name: &str, folder: &str| {
-        Pane::View(View::curves(name, &[format!("+ /{folder}/**").as_str()], None))
+    let view = |name: &str, folder: &str, range: Option<[f64; 2]>| {
+        Pane::View(View::curves(name, &[format!("+ /{folder}/**").as_str()], range))
     };
-    let size = view("Size of the deviation [mm] over the path", "deviation/size");
+    let of_size = range(scene, |d| Some(d.norm_mm()), true, false);
+    let size = view("Size of the deviation [mm] over the path", "deviation/size", of_size);
+    let of_angle = range(scene, |d| Some(d.angle_rad.to_degrees()), false, false);
+    let changes = scene.reports.first().into_iter().flat_map(|report| &report.points).filter_map(|p| {
+        let change = p.joints_after? - p.joints_before?;
+        Some([change.min().to_degrees(), change.max().to_degrees()])
+    });
     let others = [
-        view("Angle of the tool's deviation [°]", "deviation/angle"),
-        view("Change of the joints, after − before [°]", "joints/change"),
+        view("Angle of the tool's deviation [°]", "deviation/angle", of_angle),
+        view("Change of the joints, after − before [°]", "joints/change", curve::range(changes.flatten(), 6)),
     ];
     if scene.reports.iter().any(has_normals) {
-        let normal = view("Deviation along the normal [mm] over the path", "deviation/normal");
+        let of_normal = range(scene, |d| d.normal_mm, true, true);
+        let normal = view("Deviation along the normal [mm] over the path", "deviation/normal", of_normal);
         let second = Pane::Tabs(std::iter::once(size).chain(others).collect());
         Pane::Row(vec![(1.0, normal), (1.0, second)])
     } else {

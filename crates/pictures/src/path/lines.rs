@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rerun::components::{Color, Radius};
 use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 
-use super::scene::{PathScene, Plan, intended, reached};
+use super::scene::{PathScene, Plan, expected_mm, intended, reached};
 use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
 use crate::legend;
 use crate::recording::{Store, VisualError};
@@ -29,12 +29,14 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     for &k in &plan.befores {
         let name = if k == 0 { String::new() } else { format!("_{}", plan.names[k]) };
         let title = plan.before_name(scene, k);
-        let drawn = (format!("before{name}"), title, BEFORE);
+        let drawn = Run { name: format!("before{name}"), title, colour: BEFORE, expected: None };
         run(store, plan, &scene.reports[k], |p| p.before, &drawn, &mut labels)?;
     }
     for (k, report) in scene.reports.iter().enumerate() {
-        let title = format!("after · {}", report.model);
-        let drawn = (format!("after/{}", plan.names[k]), title, after(k));
+        let title =
+            if scene.reports.len() > 1 { format!("after · {}", report.model) } else { "after".to_owned() };
+        let expected = expected_mm(plan, report);
+        let drawn = Run { name: format!("after/{}", plan.names[k]), title, colour: after(k), expected };
         run(store, plan, report, |p| p.after, &drawn, &mut labels)?;
     }
     tool_axes(store, plan)?;
@@ -87,36 +89,57 @@ impl Labels {
     }
 }
 
+/// How one path is drawn.
+struct Run {
+    /// Its entity.
+    name: String,
+    /// What its label begins with.
+    title: String,
+    colour: Rgba,
+    /// What has to be expected of it, where that is another thing than what the points say (mm).
+    expected: Option<f64>,
+}
+
 /// One path, at true scale and exaggerated, with a label at its largest deviation.
 fn run(
     store: &mut Store,
     plan: &Plan<'_>,
     report: &PathReport,
     which: fn(&PathPoint) -> Option<Deviation>,
-    (name, title, colour): &(String, String, Rgba),
+    Run { name, title, colour, expected }: &Run,
     labels: &mut Labels,
 ) -> Result<(), VisualError> {
     let drawn = report.points.iter().filter(|p| plan.cuts(p)).filter_map(|p| which(p).map(|d| (p, d)));
     let largest = drawn.max_by(|a, b| a.1.norm_mm().total_cmp(&b.1.norm_mm()));
     let shown = largest.is_some_and(|(point, _)| labels.take(intended(point)));
-    for (folder, times, width) in [("path", 1.0, 2.0), ("exaggerated", plan.times, 1.6)] {
+    for (folder, times, width) in [("path", 1.0, 2.5), ("exaggerated", plan.times, 1.8)] {
+        // At true scale the colour is all that tells the size; exaggerated, it tells which is which.
+        let by_size = folder == "path";
         let coloured = strips(&report.points, |p| {
             let deviation = which(p).filter(|d| plan.cuts(p) && d.norm_mm().is_finite())?;
-            Some((reached(p, &deviation, times), plan.scale.step(deviation.norm_mm())))
+            let step = if by_size { plan.scale.step(deviation.norm_mm()) } else { 0 };
+            Some((reached(p, &deviation, times), step))
         });
+        let paint = |step: usize| Color::from(if by_size { plan.scale.colour(step) } else { *colour });
         if coloured.is_empty() {
             continue;
         }
         let lines =
             LineStrips3D::new(coloured.iter().map(|(_, strip)| strip.iter().map(xyz).collect::<Vec<_>>()))
-                .with_colors(coloured.iter().map(|(step, _)| Color::from(plan.scale.colour(*step))))
+                .with_colors(coloured.iter().map(|(step, _)| paint(*step)))
                 .with_radii([Radius::new_ui_points(width)]);
         store.fixed(format!("{folder}/{name}"), &lines)?;
         let Some((point, deviation)) = largest else { continue };
         let label = Points3D::new([xyz(&reached(point, &deviation, times))])
             .with_radii([Radius::new_ui_points(3.5)])
             .with_colors([Color::from(*colour)])
-            .with_labels([format!("{title}: at most {:.3} mm", deviation.norm_mm())])
+            .with_labels([format!(
+                "{title}: {}",
+                expected.map_or_else(
+                    || format!("{:.3} mm", deviation.norm_mm()),
+                    |mm| format!("{mm:.3} mm expected (1σ)")
+                )
+            )])
             .with_show_labels(shown);
         store.fixed(format!("{folder}/largest/{name}"), &label)?;
     }

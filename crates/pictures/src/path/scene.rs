@@ -2,13 +2,14 @@
 
 use nalgebra::Point3;
 
-use crate::arm::Stand;
+use crate::arm::{Figure, LinkMesh, Stand};
 use crate::colour::{self, Scale};
 use crate::page::bounds;
 use crate::recording::VisualError;
+use crate::shape::Shape;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
-use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport};
+use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport};
 use truegrind_math::se3::Pose;
 use truegrind_surfaces::Tessellation;
 
@@ -17,9 +18,6 @@ pub const AXIS: &str = "path point";
 
 /// Exaggerated deviations shall reach this part of the size of the path.
 const REACH: f64 = 0.15;
-
-/// No joint of the exaggerated arm turns farther than this from the arm after (rad).
-const FARTHEST_RAD: f64 = 1.0;
 
 /// A part in the cell.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +35,10 @@ pub struct PathScene<'a> {
     pub title: &'a str,
     /// The arm whose frames are drawn: the one that the deviations belong to.
     pub arm: &'a Model,
+    /// The arm of the data sheet, as the controller believes it to be: drawn as a ghost beside the other.
+    pub nominal: &'a Model,
+    /// Meshes that show the links, where a robot file names them; else links are bars.
+    pub meshes: &'a [LinkMesh],
     /// What that arm is, in words: "simulated actual arm", "estimated arm of model.toml".
     pub arm_is: &'a str,
     /// The circumstances under which it runs.
@@ -45,6 +47,13 @@ pub struct PathScene<'a> {
     pub reports: &'a [PathReport],
     /// The part, where known.
     pub workpiece: Option<Workpiece<'a>>,
+}
+
+impl<'a> PathScene<'a> {
+    /// How an arm of this scene is drawn.
+    pub(super) fn figure(&'a self, model: &'a Model) -> Figure<'a> {
+        Figure { model, condition: &self.condition, meshes: self.meshes }
+    }
 }
 
 /// What all parts of the picture share.
@@ -63,10 +72,11 @@ pub(super) struct Plan<'a> {
     pub(super) times: f64,
     /// Size of the intended path (mm).
     pub(super) extent_mm: f64,
-    /// Joints along the path: after, before, exaggerated.
+    /// Joints along the path, after and before.
     pub(super) after: Vec<Stand>,
     pub(super) before: Vec<Stand>,
-    pub(super) exaggerated: Vec<Stand>,
+    /// The arm of the data sheet and the real one with its differences exaggerated, at the joints before.
+    pub(super) shape: Option<Shape>,
 }
 
 impl<'a> Plan<'a> {
@@ -97,11 +107,8 @@ impl<'a> Plan<'a> {
             };
             first.points.iter().filter_map(stand).collect::<Vec<Stand>>()
         };
-        let exaggerated = |p: &PathPoint| {
-            let (before, after) = (p.joints_before?, p.joints_after?);
-            let turn = (before - after) * times;
-            (turn.amax() <= FARTHEST_RAD).then_some(after + turn)
-        };
+        let before = stands(&|p| p.joints_before);
+        let shape = Shape::of(scene.figure(scene.nominal), scene.figure(scene.arm), &before);
         Ok(Self {
             first,
             names: names(scene.reports),
@@ -111,8 +118,8 @@ impl<'a> Plan<'a> {
             times,
             extent_mm,
             after: stands(&|p| p.joints_after),
-            before: stands(&|p| p.joints_before),
-            exaggerated: stands(&exaggerated),
+            before,
+            shape,
         })
     }
 
@@ -134,6 +141,18 @@ impl<'a> Plan<'a> {
             "before".to_owned()
         }
     }
+}
+
+/// The largest of what has to be expected of a path after the correction (mm): what is left and the predicted 1σ. `None` where
+/// what is left was achieved on an arm, or σ is not known.
+pub(super) fn expected_mm(plan: &Plan<'_>, report: &PathReport) -> Option<f64> {
+    if report.after == After::Achieved {
+        return None;
+    }
+    let cut = report.points.iter().filter(|p| plan.cuts(p));
+    cut.filter_map(|p| Some(p.after?.norm_mm().hypot(p.sigma_mm?)))
+        .filter(|mm| mm.is_finite())
+        .reduce(f64::max)
 }
 
 /// Where the tool shall be, in the base.

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::scene::{PathScene, Plan};
+use super::scene::{PathScene, Plan, expected_mm};
 use crate::markdown::{cell, line, number};
 use crate::recording::{Store, VisualError};
-use truegrind_compensation::deviation::{After, Block, PathPoint, PathReport, Status};
+use truegrind_compensation::deviation::{After, Block, Deviation, PathPoint, PathReport, Status};
 
 pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) -> Result<(), VisualError> {
     store.fixed("summary", &TextDocument::from_markdown(markdown(scene, plan)))
@@ -18,11 +18,28 @@ fn markdown(scene: &PathScene<'_>, plan: &Plan<'_>) -> String {
     let first = plan.first;
     let _ = writeln!(text, "Program **{}**, {} points.\n", line(&first.program), first.points.len());
     let _ = writeln!(text, "Arm: {}.\n", line(scene.arm_is));
+    answer(&mut text, plan);
     block(&mut text, scene, plan);
     meaning(&mut text, scene);
     fate(&mut text, first);
     colours(&mut text, scene, plan);
     text
+}
+
+/// How far off it is before and after, in one line.
+fn answer(text: &mut String, plan: &Plan<'_>) {
+    let report = plan.first;
+    let cut = || report.points.iter().filter(|p| plan.cuts(p));
+    let largest = |which: fn(&PathPoint) -> Option<Deviation>| {
+        cut().filter_map(|p| which(p).map(|d| d.norm_mm())).filter(|mm| mm.is_finite()).reduce(f64::max)
+    };
+    let Some(before) = largest(|p| p.before) else { return };
+    let after = match (expected_mm(plan, report), largest(|p| p.after)) {
+        (Some(mm), Some(_)) => format!(", an expected **{mm:.3} mm** (1σ) after"),
+        (None, Some(mm)) if report.after == After::Achieved => format!(", **{mm:.3} mm** after"),
+        _ => String::new(),
+    };
+    let _ = writeln!(text, "The tool is off by up to **{before:.3} mm** before{after}.\n");
 }
 
 /// Figures down, methods across: as narrow as a panel.
@@ -32,7 +49,8 @@ fn block(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
         columns.push((plan.before_name(scene, k), scene.reports[k].block(|p| p.before)));
     }
     for report in scene.reports {
-        columns.push((format!("after · {}", report.model), report.block(|p| p.after)));
+        let left = if report.after == After::PredictedRemainder { " (remainder)" } else { "" };
+        columns.push((format!("after · {}{left}", report.model), report.block(|p| p.after)));
     }
     let normal =
         plan.first.points.iter().any(|p| p.before.or(p.after).is_some_and(|d| d.normal_mm.is_some()));
@@ -116,19 +134,23 @@ fn fate(text: &mut String, report: &PathReport) {
 fn colours(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
     let factor = plan.factor();
     let _ = writeln!(text, "## What is drawn\n");
-    let ghost = if plan.exaggerated.is_empty() {
-        ""
-    } else {
-        " Orange, see-through: the same arm before, its deviation "
-    };
-    let ghost = if ghost.is_empty() { String::new() } else { format!("{ghost}{factor}.") };
+    if let Some(shape) = &plan.shape {
+        let _ = writeln!(
+            text,
+            "- Ghost: the arm as the data sheet has it, what the controller believes. Orange arm: the {}, its differences {}. \
+             Both at the joints before.",
+            line(scene.arm_is),
+            shape.factor()
+        );
+    }
     let _ = writeln!(
         text,
-        "- Grey arm: after.{ghost}\n\
+        "- Tab *Arm, true scale*: grey with the joints after, orange with those before.\n\
          - White line: intended path; grey line: moves that do not cut.\n\
-         - Coloured lines: the path before and after, deviations drawn {factor} (tab *True scale*: ×1); dark blue is 0, \
-         yellow {top} mm.\n\
+         - Lines beside it: orange before, {after} after, deviations {factor}. Tabs of sizes: true scale, dark blue is 0, yellow \
+         {top} mm.\n\
          - Light arrows: where the tool points.",
+        after = if scene.reports.len() > 1 { "other colours" } else { "blue" },
         top = plan.scale.top_mm
     );
     if plan.first.points.iter().any(|p| p.status == Status::Flagged) {

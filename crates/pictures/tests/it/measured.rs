@@ -76,6 +76,10 @@ fn rows_sensor_and_residuals_are_drawn() {
         dataset: &dataset,
         arm: &arm,
         arm_is: "abb-irb-120",
+        nominal: None,
+        meshes: &[],
+        keep_out_mm: &[],
+        answer: &[],
         frames: Some(&frames),
         residuals: &residuals,
         held_out: &[(3, 0.2), (8, -0.1)],
@@ -129,6 +133,10 @@ fn a_file_alone_is_a_picture_too() {
         dataset: &dataset,
         arm: &arm,
         arm_is: "abb-irb-120",
+        nominal: None,
+        meshes: &[],
+        keep_out_mm: &[],
+        answer: &[],
         frames: None,
         residuals: &[],
         held_out: &[],
@@ -153,6 +161,10 @@ fn no_rows_no_picture() {
         dataset: &dataset,
         arm: &arm,
         arm_is: "abb-irb-120",
+        nominal: None,
+        meshes: &[],
+        keep_out_mm: &[],
+        answer: &[],
         frames: None,
         residuals: &[],
         held_out: &[],
@@ -171,7 +183,7 @@ fn a_diagnosis_says_in_its_picture_what_it_found() {
     let start = starts(&dataset, &arm()).unwrap().remove(0);
     let found = diagnose::diagnose(&dataset, "abb-irb-120", &arm(), &start, &options, &|_| {}).unwrap();
     assert!(!found.diagnosis.findings.is_empty());
-    let text = Read::of(&diagnosis_recording(&dataset, &found).unwrap().rrd().unwrap()).summary();
+    let text = Read::of(&diagnosis_recording(&dataset, &found, &[]).unwrap().rrd().unwrap()).summary();
     for finding in &found.diagnosis.findings {
         assert!(text.contains(&finding.cause), "{}: {text}", finding.cause);
     }

@@ -14,6 +14,9 @@ const STYLE: &str = include_str!("page.css");
 /// Sections from which a page gets a table of contents.
 const SECTIONS_FOR_CONTENTS: usize = 4;
 
+/// A cell longer than this is a sentence.
+const SENTENCE: usize = 40;
+
 /// Rows from which a table scrolls inside the page.
 const ROWS_TO_SCROLL: usize = 24;
 
@@ -59,6 +62,13 @@ pub fn table(table: &Table) -> String {
         ));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
+    // Sentences need room: a browser would give it to the columns beside them.
+    let sentences: Vec<bool> = (0..table.columns.len())
+        .map(|column| {
+            let words = table.columns[column].alignment() == Alignment::Left;
+            words && (0..table.rows.len()).any(|row| table.shown(row, column).chars().count() > SENTENCE)
+        })
+        .collect();
     for row in 0..table.rows.len() {
         html.push_str("<tr>");
         for (index, column) in table.columns.iter().enumerate() {
@@ -68,7 +78,8 @@ pub fn table(table: &Table) -> String {
                 }
                 _ => escape(&table.shown(row, index)),
             };
-            html.push_str(&format!("<td{}>{shown}</td>", side(column.alignment())));
+            let class = if sentences[index] { " class=\"words\"" } else { side(column.alignment()) };
+            html.push_str(&format!("<td{class}>{shown}</td>"));
         }
         html.push_str("</tr>\n");
     }

@@ -8,13 +8,16 @@ use crate::document::{Block, Document};
 use crate::status::Status;
 use crate::table::{Alignment, Table};
 
-/// Columns of words are shortened to this before a table is cut into blocks.
+/// Columns of words are made as narrow as this before a table is cut into blocks.
 const NARROWEST_TEXT: usize = 12;
+/// A cell longer than this is a sentence, and is not read in a column narrower than that.
+const SENTENCE: usize = 40;
+const NARROWEST_SENTENCE: usize = 24;
 const GAP: usize = 2;
 
 /// The table as lines of at most `width` characters. Where it is wider, folders that all paths of a column share are left
-/// out, then columns of words are shortened with `…`, but names never so far that two of them look the same; where that does
-/// not suffice, the table continues below with its first column repeated.
+/// out, then cells of words go on in further lines; where that does not suffice, the table continues below with its first
+/// column repeated. Nothing is cut off.
 pub fn table(table: &Table, width: usize) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
@@ -32,16 +35,20 @@ pub fn table(table: &Table, width: usize) -> String {
         columns.clone().for_each(|column| leave_out_folders(&mut lines[1..], column));
         widths = widest(&lines);
     }
-    shrink(table, &mut widths, width, distinct_from(&lines[1..], width));
+    shrink(table, &mut widths, width);
     for block in blocks(&widths, width) {
         if !text.is_empty() && block.first() == Some(&0) && block.get(1).is_some_and(|&second| second > 1) {
             text.push('\n');
         }
         for (index, line) in lines.iter().enumerate() {
-            push_line(
-                &mut text,
-                block.iter().map(|&c| fit(&line[c], widths[c], table.columns[c].alignment())),
-            );
+            let cells: Vec<Vec<String>> = block.iter().map(|&c| pieces(&line[c], widths[c])).collect();
+            for row in 0..cells.iter().map(Vec::len).max().unwrap_or(1) {
+                let cell = |(place, &c): (usize, &usize)| {
+                    let piece = cells[place].get(row).map_or("", String::as_str);
+                    fit(piece, widths[c], table.columns[c].alignment())
+                };
+                push_line(&mut text, block.iter().enumerate().map(cell));
+            }
             if index == 0 {
                 push_line(&mut text, block.iter().map(|&c| "─".repeat(widths[c])));
             }
@@ -142,17 +149,18 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
 }
 
 /// Takes characters from the widest column of words until the table fits or no such column can give any.
-fn shrink(table: &Table, widths: &mut [usize], width: usize, names: usize) {
+fn shrink(table: &Table, widths: &mut [usize], width: usize) {
     let whole = widths.to_vec();
     let words = |c: usize| table.columns[c].alignment() == Alignment::Left;
     while total(widths.iter().copied()) > width {
-        let least = |c: usize| if c == 0 { names.max(NARROWEST_TEXT) } else { NARROWEST_TEXT };
         let widest = (0..widths.len())
-            .filter(|&c| words(c) && widths[c] > least(c))
+            .filter(|&c| {
+                words(c) && widths[c] > if whole[c] > SENTENCE { NARROWEST_SENTENCE } else { NARROWEST_TEXT }
+            })
             .max_by_key(|&c| (widths[c], std::cmp::Reverse(c)));
         match widest {
             Some(column) => widths[column] -= 1,
-            // It goes on below in any case: then nothing is gained by cutting more than the widest.
+            // It goes on below in any case: then nothing is gained by breaking more than the widest.
             None => {
                 let most = (width.saturating_sub(GAP) / 2).max(NARROWEST_TEXT);
                 (0..widths.len())
@@ -162,20 +170,6 @@ fn shrink(table: &Table, widths: &mut [usize], width: usize, names: usize) {
             }
         }
     }
-}
-
-/// The least width of the first column at which two different cells look different, at most what leaves room for others.
-fn distinct_from(rows: &[Vec<String>], width: usize) -> usize {
-    let most = width.saturating_sub(width / 3);
-    let names: Vec<&str> = rows.iter().filter_map(|row| row.first()).map(String::as_str).collect();
-    let different = |width: Option<usize>| {
-        let shown = names
-            .iter()
-            .map(|name| width.map_or_else(|| (*name).to_owned(), |w| fit(name, w, Alignment::Left)));
-        shown.collect::<std::collections::BTreeSet<String>>().len()
-    };
-    let all = different(None);
-    (NARROWEST_TEXT..most).find(|&width| different(Some(width)) == all).unwrap_or(most)
 }
 
 /// Leaves out the folders that all paths of a column begin with.
@@ -235,14 +229,44 @@ fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
     text.push('\n');
 }
 
-fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
-    let length = length(cell);
-    if length > width {
-        let mut short: String = cell.chars().take(width.saturating_sub(1)).collect();
-        short.push('…');
-        return short;
+/// A cell in lines of at most `width` characters, broken between words; a longer word behind a stroke, a hyphen or the like,
+/// else anywhere.
+fn pieces(cell: &str, width: usize) -> Vec<String> {
+    if length(cell) <= width {
+        return vec![cell.to_owned()];
     }
-    let blank = " ".repeat(width - length);
+    let width = width.max(1);
+    let mut lines = vec![String::new()];
+    for word in cell.split(' ') {
+        let mut word = word;
+        let line = &lines[lines.len() - 1];
+        let joined = length(line) + usize::from(!line.is_empty()) + length(word);
+        if joined > width && !line.is_empty() {
+            lines.push(String::new());
+        }
+        loop {
+            let last = lines.len() - 1;
+            let line = &mut lines[last];
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            if length(word) <= width.saturating_sub(length(line)) {
+                line.push_str(word);
+                break;
+            }
+            let hard = word.char_indices().nth(width).map_or(word.len(), |(at, _)| at);
+            let soft = word[..hard].rfind(['/', '\\', '-', '_', ',', ';']).map(|at| at + 1);
+            let (head, rest) = word.split_at(soft.unwrap_or(hard));
+            line.push_str(head);
+            word = rest;
+            lines.push(String::new());
+        }
+    }
+    lines
+}
+
+fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
+    let blank = " ".repeat(width.saturating_sub(length(cell)));
     match alignment {
         Alignment::Left => format!("{cell}{blank}"),
         Alignment::Right => format!("{blank}{cell}"),

@@ -194,12 +194,12 @@ fn a_verdict_is_one_sentence_with_its_reasons() {
     let head = |found: &Identification| terminal::document(&view::summary(found), 300);
     found.estimated.verdict.reasons = vec!["because".to_owned()];
     for (status, badge, sentence) in [
-        (Judgement::Pass, "[ok]", "The model meets the stated limits"),
+        (Judgement::Pass, "[ok]", "The model may be used, it meets the stated limits"),
         (Judgement::Fail, "[failed]", "The fit may not be used as a model"),
         (
             Judgement::NotEvaluated,
             "[not evaluated]",
-            "Nothing speaks against the model, but no limits were stated",
+            "The model may be used, nothing speaks against it (no limits were stated)",
         ),
     ] {
         found.estimated.verdict.status = status;

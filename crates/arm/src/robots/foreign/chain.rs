@@ -37,8 +37,23 @@ pub(super) struct Described {
     pub(super) dialect: Option<Dialect>,
     /// Where the numbers come from.
     pub(super) source: String,
+    /// Meshes that the file names for drawing.
+    pub(super) visuals: Vec<Shown>,
     /// What a reader should know.
     pub(super) notes: Vec<String>,
+}
+
+/// A mesh that a file names for drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shown {
+    /// How many of the six joints move it.
+    pub(super) joints: usize,
+    /// Where it lies in the file's base with all joints at zero.
+    pub(super) place: Pose,
+    /// Its file, as it is named.
+    pub(super) file: String,
+    /// Millimetres for each of its units, along its own axes.
+    pub(super) unit_mm: [f64; 3],
 }
 
 impl Described {

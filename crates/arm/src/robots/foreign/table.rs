@@ -232,6 +232,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<Described, RobotError> {
         designation: String::new(),
         dialect,
         source: format!("{file}, {word} table of link parameters"),
+        visuals: Vec::new(),
         notes: vec![format!("the table is read as {word}")],
     })
 }

@@ -35,6 +35,7 @@ fn described(steps: [super::chain::Step; 6], after: Pose, file: &str, what: &str
         designation: String::new(),
         dialect: Some(Dialect::Urscript),
         source: format!("{file}, {what}"),
+        visuals: Vec::new(),
         notes: Vec::new(),
     }
 }

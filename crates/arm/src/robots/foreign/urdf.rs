@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::chain::{Described, Step, from_rpy};
+use super::chain::{Described, Shown, Step, from_rpy};
 use super::common::{Choice, maker_of, refused};
 use crate::body::Body;
 use crate::robots::error::RobotError;
@@ -58,6 +58,15 @@ struct Tree<'a> {
     masses: BTreeMap<&'a str, Body>,
     links: Vec<&'a str>,
     meshes: usize,
+    /// Link, and where a mesh is drawn in its frame.
+    visuals: Vec<(&'a str, Drawn)>,
+}
+
+/// A mesh of a link.
+struct Drawn {
+    origin: Pose,
+    file: String,
+    scale: [f64; 3],
 }
 
 /// The arm of a description.
@@ -228,6 +237,14 @@ fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
     Ok((mass_kg > 0.0).then(|| Body { mass_kg, centre_mm: centre.into() }))
 }
 
+/// The mesh of a `<visual>`; boxes, cylinders and balls are left to us.
+fn drawn(visual: &Node<'_, '_>, file: &str) -> Result<Option<Drawn>, RobotError> {
+    let mesh = child(visual, "geometry").and_then(|geometry| child(&geometry, "mesh"));
+    let Some(name) = mesh.and_then(|mesh| mesh.attribute("filename")) else { return Ok(None) };
+    let scale = numbers(mesh, "scale", [1.0; 3], file)?;
+    Ok(Some(Drawn { origin: origin(visual, file)?, file: name.to_owned(), scale }))
+}
+
 impl<'a> Tree<'a> {
     fn of(root: &Node<'a, '_>, file: &'a str) -> Result<Self, RobotError> {
         let mut tree = Self {
@@ -237,6 +254,7 @@ impl<'a> Tree<'a> {
             masses: BTreeMap::new(),
             links: Vec::new(),
             meshes: 0,
+            visuals: Vec::new(),
         };
         for node in root.children().filter(Node::is_element) {
             match node.tag_name().name() {
@@ -245,6 +263,9 @@ impl<'a> Tree<'a> {
                     tree.links.push(name);
                     if let Some(body) = body(&node, file)? {
                         tree.masses.insert(name, body);
+                    }
+                    for visual in node.children().filter(|inner| inner.has_tag_name("visual")) {
+                        tree.visuals.extend(drawn(&visual, file)?.map(|drawn| (name, drawn)));
                     }
                     tree.meshes += node.descendants().filter(|inner| inner.has_tag_name("mesh")).count();
                 }
@@ -542,7 +563,10 @@ impl<'a> Tree<'a> {
             None => "masses are not stated of every link, and not taken".to_owned(),
         });
         if self.meshes > 0 {
-            notes.push(format!("{} meshes are named; they are not used", self.meshes));
+            notes.push(format!(
+                "{} meshes are named; recordings draw those of the links that are STL, nothing is computed from them",
+                self.meshes
+            ));
         }
         if maker == "FANUC" {
             notes.push(
@@ -565,8 +589,29 @@ impl<'a> Tree<'a> {
             designation: robot.to_owned(),
             dialect,
             source: format!("{}, URDF, links {base} to {tip}", self.file),
+            visuals: self.shown(base, &moving),
             notes,
         })
+    }
+
+    /// The meshes of the arm's links and of what is fixed to them.
+    fn shown(&self, base: &str, moving: &[usize]) -> Vec<Shown> {
+        let shown = |(link, drawn): &(&str, Drawn)| {
+            let path = self.path(base, link)?;
+            let own = self.moving(&path);
+            // What hangs on a finger does not belong to the arm.
+            if !moving.starts_with(&own) {
+                return None;
+            }
+            let frame = path.iter().fold(Pose::identity(), |pose, joint| pose * self.joints[*joint].before);
+            Some(Shown {
+                joints: own.len(),
+                place: frame * drawn.origin,
+                file: drawn.file.clone(),
+                unit_mm: drawn.scale.map(|scale| 1000.0 * scale),
+            })
+        };
+        self.visuals.iter().filter_map(shown).collect()
     }
 
     /// What turns with each joint and no further: its link and whatever is fixed to it. `None` where one has no mass.

@@ -128,7 +128,7 @@ fn rows_whose_columns_contradict_each_other_are_named() {
     }
     let rows: Vec<usize> = mismatches(&data, &nominal).rows.iter().map(|r| r.0).collect();
     assert_eq!(rows, [7, 31]);
-    let prepared = prepare(&data, &nominal);
+    let prepared = prepare(&data, &nominal, true);
     assert!(prepared.readout_fusion.is_ok(), "the other rows are sharpened without them");
     assert_eq!(
         prepared.observed.dataset.rows[7].joints, data.rows[7].joints,
@@ -147,7 +147,7 @@ fn fitted(rows: usize, then: impl FnOnce(&Subject<'_>, &Extended)) {
         Hidden::Tool { from: 20, to: 50, mm: [0.8, -0.3, 0.2] },
     ];
     let data = run(&nominal, &hidden, &setup).dataset;
-    let prepared = prepare(&data, &nominal);
+    let prepared = prepare(&data, &nominal, true);
     let frames = scenarios::frames(&data, &nominal);
     let options = Options::default();
     let subject = Subject {
