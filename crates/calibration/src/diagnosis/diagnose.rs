@@ -12,10 +12,12 @@ use super::picture::Picture;
 use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::selection::{self, Accepted, BLOCKS, Selection};
+use super::shadow::{Shadows, beyond_noise_mm};
 use super::something_else::Left;
-use super::stories::{self, Story, Worth};
+use super::stories::{self, Story};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
+use super::worth::Worth;
 use super::written::written;
 use crate::identification::benefit::benefit;
 use crate::identification::calibration::Frames;
@@ -253,12 +255,20 @@ pub fn diagnose(
         set_aside: &aside,
     };
     let (findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
+    let worth = Worth::new(&searched, &found, &whole);
+    let shadows = Shadows {
+        causes: &found.causes,
+        confirmations: &outcome.confirmations,
+        worth: &worth,
+        field_mm: outcome.discrepancy.field_mm(),
+        beyond_noise_mm: floor
+            .map_or(0.0, |floor| beyond_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, floor.freedom)),
+    };
     let mut stories = stories::told(
         stories::of(findings, &finding_of_cause, pictures),
         &outcome.confirmations,
         &outcome.discrepancy,
-        &Worth::new(&searched, &found, &whole.design),
-        &found.causes,
+        &shadows,
         stages[1].fitted.rmse,
     );
     if smoothed.is_some() {
