@@ -302,7 +302,7 @@ impl Kind {
 
 impl Truth {
     /// Marks a finding: its meaning and the numbers that it has for joints. Of a coupling, driver and driven joint, the driven one
-    /// counts; where links grow or bend the numbers are those of links.
+    /// counts, and of a gear error that depends on two joints the first, whose gear it is; where links grow or bend the numbers are those of links.
     pub fn mark(&self, effect: &str, meaning: Meaning, joints: Option<&[usize]>) -> Mark {
         let family = match meaning {
             Meaning::SomethingElse => return Mark::None,
@@ -314,6 +314,7 @@ impl Truth {
         }
         let told = match joints {
             Some([_, driven]) if effect == "joint-coupling" => &[*driven],
+            Some([gear, _]) if effect == "gear-two-joints" => &[*gear],
             Some(joints) => joints,
             None => &[],
         };

@@ -17,7 +17,8 @@
 //!    explains; rounding and contradicting columns; what the rows cannot show.
 //! 9. [`discrepancy`] with [`marginal`]: what no cause describes, as random functions beside the causes. `confirmation`: a cause
 //!    is identified only if it wins beside those and comes back in [`halves`] of the rows.
-//! 10. `stories`: one finding for each story, ranked by what it is worth; `something_else`: what is left; `written`: the arm
+//! 10. `stories`: one finding for each story, ranked by what it is `worth`, in doubt where it may be a part of something larger
+//!     (`shadow`); `something_else`: what is left; `written`: the arm
 //!     for compensation.
 //! 11. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
@@ -34,6 +35,8 @@ pub mod discrepancy;
 pub mod halves;
 pub mod marginal;
 mod confirmation;
+mod worth;
+mod shadow;
 mod stories;
 mod something_else;
 mod written;

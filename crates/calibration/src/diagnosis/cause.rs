@@ -2,6 +2,7 @@
 
 use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
+use crate::measurement::sensor::form::Form;
 use truegrind_arm::effect::Effect;
 
 /// What may be wrong.
@@ -11,6 +12,17 @@ pub enum Cause {
     Arm(Effect),
     /// In the measurement: fitted, and left behind.
     Measurement(Disturbance),
+}
+
+/// A part of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// What yields under load.
+    Spring,
+    /// What transmits the motion.
+    Gear,
+    /// What reverses late.
+    Play,
 }
 
 /// Knots of an error map over a turn: a smooth curve.
@@ -93,13 +105,63 @@ impl Cause {
         }
     }
 
-    /// Whether it is a fault of the sensor of which only the shape is known, not the law.
+    /// Whether only the shape of it is known, not the law: a form.
     pub fn is_roughly_described(&self) -> bool {
-        let form = match self {
-            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form,
-            _ => return false,
+        matches!(self, Cause::Measurement(Disturbance { kind: Kind::Form(_), .. }))
+    }
+
+    /// Whether it is a fault of a cable and of what leads it.
+    pub fn is_of_the_cable(&self) -> bool {
+        match self {
+            Cause::Measurement(Disturbance { kind: Kind::Sag, .. }) => true,
+            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => {
+                matches!(form, Form::Pulley | Form::Drum)
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether it follows the clock or the thermometer.
+    pub fn follows_warmth(&self) -> bool {
+        match self {
+            Cause::Arm(effect) => matches!(effect, Effect::ThermalDrift(_)),
+            Cause::Measurement(d) => matches!(d.course, Course::Clock { .. } | Course::Thermometer { .. }),
+        }
+    }
+
+    /// Whether it is in the arm: one of its effects, or a form that its model does not carry.
+    pub fn is_of_the_arm(&self) -> bool {
+        match self {
+            Cause::Arm(_) => true,
+            Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.is_of_the_arm(),
+            Cause::Measurement(_) => false,
+        }
+    }
+
+    /// The part of the arm that it sends to: what yields, gear or play, and the joint that has it.
+    pub fn part(&self) -> Option<(Part, usize)> {
+        let joint = match self {
+            Cause::Arm(Effect::JointCoupling(c)) => c.joint,
+            _ => *self.joints().first()?,
         };
-        !form.is_of_the_arm()
+        let part = match self {
+            Cause::Arm(Effect::JointCompliance(_) | Effect::LumpedCompliance(_)) => Part::Spring,
+            Cause::Arm(Effect::Backlash(_)) => Part::Play,
+            Cause::Measurement(Disturbance { kind: Kind::Form(Form::Stiffness { .. }), .. }) => Part::Spring,
+            _ => Part::Gear,
+        };
+        Some((part, joint))
+    }
+
+    /// Whether both are in the arm, or push the same thing of the measurement.
+    pub fn moves_the_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Cause::Arm(_), Cause::Arm(_)) => true,
+            (Cause::Measurement(a), Cause::Measurement(b)) => {
+                std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
+            }
+            _ => false,
+        }
     }
 
     /// Whether two causes would be told to a technician as the same thing: same name, same joints, rows that overlap.

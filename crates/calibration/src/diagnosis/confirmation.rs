@@ -31,6 +31,7 @@ use super::intervals::Strip;
 use super::score::{Score, log_p_of, score_columns, score_projected};
 use super::selection::{Accepted, Options, already};
 use crate::measurement::sensor::disturbance::{Course, Disturbance};
+use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
 
 /// How a cause came out.
@@ -55,14 +56,26 @@ pub(super) struct Confirmation {
 /// Halves in which a cause may fail to come back.
 const MISSED: usize = 1;
 
+/// Squared correlation of a joint's side with its last step from which they are the same.
+const ALIKE: f64 = 0.9;
+
 /// Twice the log Bayes factor by which a cause must be ahead of its rivals beside what no cause describes.
 const AHEAD: f64 = 6.0;
 
 impl Confirmation {
     /// Whether it may be called identified, as far as this goes.
     pub(super) fn is_confirmed(&self) -> bool {
-        let enough = self.asked == 0 || self.came_back + MISSED >= self.asked;
-        self.beside && self.plausible && self.ahead >= AHEAD && enough && self.changed <= MISSED
+        self.beside && self.plausible && self.ahead >= AHEAD && self.recurs() && self.changed <= MISSED
+    }
+
+    /// Whether it carries itself and has a size that nature has, sure or not.
+    pub(super) fn is_there(&self) -> bool {
+        self.beside && self.plausible
+    }
+
+    /// Whether it comes back in the halves that could tell; where none could, nobody has seen it come back.
+    fn recurs(&self) -> bool {
+        self.came_back > 0 && self.came_back + MISSED >= self.asked
     }
 
     /// Why it may not be called identified.
@@ -85,7 +98,11 @@ impl Confirmation {
                 self.ahead
             ));
         }
-        if self.came_back + MISSED < self.asked {
+        if self.asked == 0 {
+            out.push(
+                "it is too weak to be seen in half of the rows, so it could not be found again".to_owned(),
+            );
+        } else if !self.recurs() {
             out.push(format!(
                 "searched again, it came back in {} of {} halves of the rows that could tell",
                 self.came_back, self.asked
@@ -209,11 +226,23 @@ impl Confirming<'_> {
             .collect()
     }
 
-    /// Sides that were taken from the order of the rows say nothing that a reading before rest does not say too.
+    /// Sides that were taken from the order of the rows say nothing that a reading before rest does not say too: where that was
+    /// found, or where the joint went by steps of one size, so that side and step are the same.
     fn told_otherwise(&self, cause: &Cause) -> bool {
+        let Cause::Arm(Effect::Backlash(backlash)) = cause else { return false };
         self.sides_from_order
-            && cause.name() == "backlash"
-            && self.found.causes.iter().any(|c| c.name() == "unsettled")
+            && (self.found.causes.iter().any(|c| c.name() == "unsettled") || self.steps_alike(backlash.joint))
+    }
+
+    /// Whether the steps of a joint, where it moved, are nearly of one size.
+    fn steps_alike(&self, joint: usize) -> bool {
+        let rows = self.subject.observed.dataset.rows.iter();
+        let steps = rows.filter_map(|row| Some(row.motion.as_ref()?.step[joint].abs()));
+        let (mut count, mut sum, mut square) = (0.0, 0.0, 0.0);
+        for step in steps.filter(|step| *step > 1e-6) {
+            (count, sum, square) = (count + 1.0, sum + step, square + step * step);
+        }
+        sum * sum > ALIKE * count * square
     }
 
     fn places(&self, causes: &[usize]) -> Vec<usize> {

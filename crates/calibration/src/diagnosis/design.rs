@@ -19,6 +19,7 @@ use super::extension::{Extended, Subject};
 use crate::identification::calibration::Calibration;
 use crate::measurement::dataset::{Reading, Sensor};
 use crate::measurement::sensor::disturbance::sag_mm;
+use crate::measurement::split;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
 use truegrind_math::work::checkpoint;
@@ -42,6 +43,8 @@ pub struct Slopes {
     pub by_sag: DVector<f64>,
     /// What a whitened residual is worth in mm; 0 for orientations.
     pub mm: Vec<f64>,
+    /// Number of the pose of each observation: readings of one pose share what the model gets wrong there.
+    pub poses: Vec<usize>,
 }
 
 /// See the module page. Scalar rows are ordered observation by observation.
@@ -182,6 +185,7 @@ impl Linear {
             by_scale,
             by_sag,
             mm,
+            poses: split::pose_of_rows(dataset),
         });
         let observations = dataset.rows.len();
         Self {

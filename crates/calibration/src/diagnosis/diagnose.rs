@@ -12,10 +12,12 @@ use super::picture::Picture;
 use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::selection::{self, Accepted, BLOCKS, Selection};
+use super::shadow::{Shadows, beyond_noise_mm};
 use super::something_else::Left;
-use super::stories::{self, Story, Worth};
+use super::stories::{self, Story};
 use super::testability::not_testable;
 use super::validation::{StageError, Validation, nominal};
+use super::worth::Worth;
 use super::written::written;
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
@@ -157,7 +159,7 @@ pub fn diagnose(
     let wild = remaining::outliers(&extended);
     let set_aside: Vec<usize> = wild.iter().map(|(i, _)| *i).collect();
     tell("holding rows out");
-    let validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
+    let mut validation = Validation::of(&subject, &set_aside, options.selection.seed, options.blocks);
     let mut stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
     // What does not carry over to rows that were not seen together with it is no knowledge.
     while stages[2].blocks.rmse > stages[1].blocks.rmse
@@ -170,14 +172,64 @@ pub fn diagnose(
             stages[1].blocks.rmse
         ));
         accepted.remove(weakest);
-        let without = |subject: &Subject<'_>, fitted: &Extended| {
-            let mut causes = fitted.causes.clone();
-            causes.remove(weakest);
-            fit(subject, &causes, Freedom::All, Some(fitted))
-        };
-        extended = without(&subject, &extended);
-        found = if thinned.is_some() { without(&searched, &found) } else { extended.clone() };
+        extended = without(&subject, &extended, &[weakest]);
+        found = if thinned.is_some() { without(&searched, &found, &[weakest]) } else { extended.clone() };
         stages[2] = validation.stage(&extended);
+    }
+    tell("looking whether the causes come back in halves of the rows");
+    let confirm = |found: &Extended, accepted: &[Accepted]| {
+        let linear = Linear::of(&searched, found);
+        let whole = linear.whole();
+        let confirming = Confirming {
+            subject: &searched,
+            found,
+            linear: &linear,
+            accepted,
+            pool: &left,
+            options: &options.selection,
+            families,
+            sides_from_order: prepared.sides_from_order,
+            raw: &whole.design,
+        };
+        let outcome = confirming.outcome();
+        (linear, whole, outcome)
+    };
+    let (mut linear, mut whole, mut outcome) = confirm(&found, &accepted);
+    // Rows of all the data for each one in which causes were looked for.
+    let stride = dataset.rows.len().div_ceil(searched.observed.dataset.rows.len().max(1));
+    let reach = outcome.discrepancy.reach;
+    if reach > 0 {
+        tell("holding out stretches of rows, as they resemble those before them");
+        notes.push(format!(
+            "readings resemble those up to {} rows before them: rows are held out in stretches, with that many rows on either side left out of \
+             the fit",
+            reach * stride
+        ));
+        validation = Validation::in_order(
+            &subject,
+            &set_aside,
+            options.selection.seed,
+            options.blocks,
+            reach * stride,
+        );
+        stages = [&registered, &geometric, &extended].map(|fit| validation.stage(fit));
+        let passing: Vec<usize> = (0..found.causes.len())
+            .filter(|&k| found.causes[k].rows().is_some() && !outcome.confirmations[k].is_confirmed())
+            .collect();
+        if !passing.is_empty() {
+            let lasting = without(&subject, &extended, &passing);
+            let stage = validation.stage(&lasting);
+            let excursions = outcome.discrepancy.correlation > NOISE_ITSELF;
+            if excursions || stage.random.rmse < stages[2].random.rmse * PASSING {
+                extended = lasting;
+                stages[2] = stage;
+                found =
+                    if thinned.is_some() { without(&searched, &found, &passing) } else { extended.clone() };
+                let mut place = 0..;
+                accepted.retain(|_| !place.next().is_some_and(|k| passing.contains(&k)));
+                (linear, whole, outcome) = confirm(&found, &accepted);
+            }
+        }
     }
     let structure = remaining::structure(&subject, &extended, &set_aside);
     let mut smoothed = None;
@@ -199,9 +251,8 @@ pub fn diagnose(
         Step { added: "data sheet, frames fitted".to_owned(), cv_rmse_mm: stages[0].random.rmse },
         Step { added: "geometry".to_owned(), cv_rmse_mm: stages[1].random.rmse },
     ];
-    let linear = Linear::of(&searched, &found);
-    let whole = linear.whole();
-    let held = FoldErrors::of(&linear, &split::folds(&searched.observed.dataset, 5, options.selection.seed));
+    let held =
+        FoldErrors::of(&linear, &split::purged(&searched.observed.dataset, 5, reach, options.selection.seed));
     let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
     let context = Context {
         subject: &searched,
@@ -212,25 +263,20 @@ pub fn diagnose(
         set_aside: &aside,
     };
     let (findings, finding_of_cause, pictures) = context.findings(&accepted, &mut steps);
-    tell("looking whether the causes come back in halves of the rows");
-    let confirming = Confirming {
-        subject: &searched,
-        found: &found,
-        linear: &linear,
-        accepted: &accepted,
-        pool: &left,
-        options: &options.selection,
-        families,
-        sides_from_order: prepared.sides_from_order,
-        raw: &whole.design,
+    let worth = Worth::new(&searched, &found, &whole);
+    let shadows = Shadows {
+        causes: &found.causes,
+        confirmations: &outcome.confirmations,
+        worth: &worth,
+        field_mm: outcome.discrepancy.field_mm(),
+        beyond_noise_mm: floor
+            .map_or(0.0, |floor| beyond_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, floor.freedom)),
     };
-    let outcome = confirming.outcome();
     let mut stories = stories::told(
         stories::of(findings, &finding_of_cause, pictures),
         &outcome.confirmations,
         &outcome.discrepancy,
-        &Worth::new(&searched, &found, &whole.design),
-        &found.causes,
+        &shadows,
         stages[1].fitted.rmse,
     );
     if smoothed.is_some() {
@@ -336,6 +382,21 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// Shifts that do not come back are fitted noise where readings resemble those before them, unless the error on rows that were
+/// held out with their neighbours is larger without them by this factor.
+const PASSING: f64 = 1.1;
+
+/// Correlation with the row before, beside smooth courses, from which the noise itself is correlated, and shifts that do not come
+/// back are its excursions whatever the held-out error says: their rows were chosen to hold them.
+const NOISE_ITSELF: f64 = 0.3;
+
+/// A fit without some of its causes.
+fn without(subject: &Subject<'_>, fitted: &Extended, dropped: &[usize]) -> Extended {
+    let kept = fitted.causes.iter().enumerate().filter(|(k, _)| !dropped.contains(k));
+    let causes: Vec<Cause> = kept.map(|(_, cause)| cause.clone()).collect();
+    fit(subject, &causes, Freedom::All, Some(fitted))
 }
 
 /// The accepted cause of least merit that is not about rows.

@@ -15,12 +15,13 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::correlated::{correlation, filter};
+use super::correlated::{correlation, filter, reach};
 use super::design::{Linear, Slopes};
 use super::extension::Subject;
 use super::marginal::{self, Variances};
 use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::split;
 use truegrind_arm::model::Model;
 
 /// What a group of functions moves, and by what it changes.
@@ -88,6 +89,8 @@ pub struct Functions {
     pub columns: DMatrix<f64>,
     /// Which columns belong to which group.
     pub groups: Vec<(Group, std::ops::Range<usize>)>,
+    /// Number of the pose of each observation.
+    poses: Vec<usize>,
 }
 
 impl Functions {
@@ -96,7 +99,8 @@ impl Functions {
         let dataset = &subject.observed.dataset;
         let slopes = &linear.slopes;
         let (n, per) = (linear.observations, linear.per);
-        let mut out = Self { columns: DMatrix::zeros(n * per, 0), groups: Vec::new() };
+        let poses = split::pose_of_rows(dataset);
+        let mut out = Self { columns: DMatrix::zeros(n * per, 0), groups: Vec::new(), poses };
         let courses = cosines(n);
         let frame: Vec<DVector<f64>> = columns_of(&slopes.by_frame);
         let single = |slope: &DVector<f64>| vec![slope.clone()];
@@ -207,6 +211,8 @@ pub struct Discrepancy {
     pub noise: f64,
     /// Correlation of what is left from one row to the next; 0 where it is none.
     pub correlation: f64,
+    /// Over how many rows what is left resembles itself; 0 where it does not.
+    pub reach: usize,
 }
 
 impl Discrepancy {
@@ -221,9 +227,12 @@ impl Discrepancy {
     ) -> Self {
         let rho = before.map_or(0.0, |b| b.correlation);
         let mut out = Self::with(functions, linear, dropped, numbers, rho, before);
+        if let Some(before) = before.filter(|b| b.correlation != 0.0) {
+            out.reach = before.reach;
+        }
         if rho == 0.0 && out.correlation != 0.0 {
-            let rho = out.correlation;
-            out = Self::with(functions, linear, dropped, numbers, rho, Some(&out));
+            let (rho, reach) = (out.correlation, out.reach);
+            out = Self { reach, ..Self::with(functions, linear, dropped, numbers, rho, Some(&out)) };
         }
         if out.speaks() { out } else { out.silent() }
     }
@@ -281,10 +290,13 @@ impl Discrepancy {
             kept.iter().map(|&(k, size)| functions.columns.column(k) * size).collect();
         let columns =
             if scaled.is_empty() { DMatrix::zeros(design.rows(), 0) } else { DMatrix::from_columns(&scaled) };
-        let correlation = if rho == 0.0 { correlation(&left, linear.per, numbers) } else { rho };
+        let correlation =
+            if rho == 0.0 { correlation(&left, linear.per, numbers, &functions.poses) } else { rho };
+        let reach =
+            if rho == 0.0 && correlation != 0.0 { reach(&left, linear.per, &functions.poses) } else { 0 };
         let push_mm =
             push_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
-        Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation }
+        Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation, reach }
     }
 
     /// What depends on the pose alone is worth so much (mm RMS).

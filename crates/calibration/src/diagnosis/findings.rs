@@ -78,6 +78,11 @@ impl Context<'_> {
                     && f.rows.is_none()
                     && f.joints == pendant(&cause.joints())
             });
+            // What grows in the arm and what moves in the sensor are two stories, though both have the clock's name.
+            let told = told.filter(|place| {
+                let first = places.iter().position(|p| p == place).unwrap_or(index);
+                self.extended.causes[first].moves_the_same(cause)
+            });
             if let Some(place) = told {
                 findings[place].cause = format!("{}; {}", findings[place].cause, finding.cause);
                 findings[place].parameters.extend(finding.parameters);
@@ -91,15 +96,25 @@ impl Context<'_> {
         (findings, places, pictures)
     }
 
-    /// For a harmonic of a joint that moved through too small a part of its period: the joint's error map, which is any
-    /// smooth curve.
+    /// Whether a joint moved through so small a part of a turn, or of a harmonic's period, that any error of the joint looks like
+    /// this one.
+    fn is_any_curve(&self, cause: &Cause) -> bool {
+        let range = |joint: usize| Columns::of(&self.subject.observed.dataset).range_rad[joint];
+        match cause {
+            Cause::Arm(Effect::GearEccentricity(h) | Effect::GearTransmission(h)) => {
+                range(h.joint) * h.order < SHORT_ARC
+            }
+            Cause::Arm(Effect::GearMap(map)) => range(map.joint) < SHORT_ARC,
+            _ => false,
+        }
+    }
+
+    /// For a harmonic of such a joint: the joint's error map, which is any smooth curve.
     fn any_curve(&self, cause: &Cause) -> Option<Candidate> {
         let Cause::Arm(Effect::GearEccentricity(harmonic)) = cause else { return None };
-        let dataset = &self.subject.observed.dataset;
-        let range = Columns::of(dataset).range_rad[harmonic.joint];
-        (range * harmonic.order < SHORT_ARC).then(|| {
+        self.is_any_curve(cause).then(|| {
             let map = JointMap { joint: harmonic.joint, knots_rad: vec![0.0; MAP_KNOTS] };
-            Candidate::arm(Effect::GearMap(map), dataset, self.subject.nominal)
+            Candidate::arm(Effect::GearMap(map), &self.subject.observed.dataset, self.subject.nominal)
         })
     }
 
@@ -143,9 +158,16 @@ impl Context<'_> {
                 },
             );
         }
-        if let Some(map) = self.any_curve(cause) {
+        let mut doubts = Vec::new();
+        if self.is_any_curve(cause) {
             // Over a small part of a turn every smooth error of a joint looks alike.
             clear = false;
+            doubts.push(
+                "its joint moved through so small a part of a turn that any fault of the joint looks like this"
+                    .to_owned(),
+            );
+        }
+        if let Some(map) = self.any_curve(cause) {
             if !alternatives.iter().any(|a| a.effect == map.cause.name()) {
                 alternatives.push(Alternative {
                     effect: map.cause.name().to_owned(),
@@ -180,7 +202,7 @@ impl Context<'_> {
             non_centrality: Some(lambda),
             gain: Gain { cv_rmse_before_mm: before_mm, cv_rmse_after_mm: after_mm },
             worth_mm: None,
-            doubts: Vec::new(),
+            doubts,
             sessions: Vec::new(),
             alternatives,
             remedy: words::remedy(cause.name()).to_owned(),

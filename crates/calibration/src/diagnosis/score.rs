@@ -6,7 +6,8 @@
 //! - evidence gain − ln det(I + S Λ⁻¹), twice the log Bayes factor against its absence (Laplace): what a candidate with many
 //!   parameters, or none that this data could see, has to pay;
 //! - the p-value takes the smaller of gᵀS⁺g under the model's own noise and under the scatter that the residuals really
-//!   have, row by row (White 1980, heteroskedasticity-consistent): noise that depends on the pose is no evidence;
+//!   have, pose by pose (White 1980, heteroskedasticity-consistent; by clusters, Liang and Zeger 1986): noise that depends on the
+//!   pose is no evidence;
 //! - non-centrality λ = cᵀ S c of a stated size c: what the data would show of it.
 
 use nalgebra::{DMatrix, DVector};
@@ -151,8 +152,8 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
     (sum, freedom)
 }
 
-/// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over observations
-/// of the outer products.
+/// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over poses of the outer
+/// products, since readings of one pose are no two witnesses of what the model gets wrong there.
 fn scatter_statistic(
     design: &Design,
     columns: &DMatrix<f64>,
@@ -165,14 +166,15 @@ fn scatter_statistic(
     let mut pure = design.pure(columns, projected);
     pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
     let left = &design.residual - &pure * step;
-    let mut scatter = DMatrix::zeros(k, k);
-    for i in 0..design.observations {
-        let mut g = DVector::zeros(k);
+    let poses = &design.slopes.poses;
+    let mut by_pose = DMatrix::zeros(k, poses.iter().max().map_or(0, |p| p + 1));
+    for (i, &pose) in poses.iter().enumerate().take(design.observations) {
+        let mut g = by_pose.column_mut(pose);
         for s in i * design.per..(i + 1) * design.per {
-            g += pure.row(s).transpose() * left[s];
+            g.axpy(left[s], &pure.row(s).transpose(), 1.0);
         }
-        scatter += &g * g.transpose();
     }
+    let scatter = &by_pose * by_pose.transpose();
     let Some((values, vectors)) = eigen(&scatter) else { return 0.0 };
     let largest = values.iter().copied().fold(0.0, f64::max);
     let mut sum = 0.0;

@@ -4,15 +4,13 @@
 //! time"), and so do shifts that cannot be told from a smooth course; what is worth little is summed up without the name of
 //! a part.
 
-use super::catalogue::Candidate;
-use super::cause::Cause;
 use super::confirmation::Confirmation;
-use super::design::Design;
 use super::discrepancy::Discrepancy;
-use super::extension::{Extended, Subject};
 use super::finding::{Confidence, Finding, Gain, Session};
 use super::picture::Picture;
+use super::shadow::Shadows;
 use super::words;
+use super::worth::Worth;
 
 /// A finding with what stands behind it.
 #[derive(Debug, Clone)]
@@ -48,20 +46,26 @@ pub(super) fn told(
     mut stories: Vec<Story>,
     confirmations: &[Confirmation],
     discrepancy: &Discrepancy,
-    worth: &Worth,
-    causes: &[Cause],
+    shadows: &Shadows<'_>,
     geometric_mm: f64,
 ) -> Vec<Story> {
+    let worth = shadows.worth;
     for story in &mut stories {
         // A story of several causes is confirmed with one of them.
         if !story.causes.iter().any(|&k| confirmations[k].is_confirmed()) {
             story.finding.confidence = Confidence::Ambiguous;
-            story.finding.doubts =
-                story.causes.first().map(|&k| confirmations[k].doubts()).unwrap_or_default();
+            let first = story.causes.first();
+            story.finding.doubts.extend(first.map(|&k| confirmations[k].doubts()).unwrap_or_default());
         }
         story.finding.worth_mm = Some(worth.of(&story.causes));
     }
-    overshadow(&mut stories, confirmations, discrepancy, worth, causes);
+    for story in &mut stories {
+        let doubts = shadows.on(&story.causes);
+        if !doubts.is_empty() {
+            story.finding.confidence = Confidence::Ambiguous;
+            story.finding.doubts.extend(doubts);
+        }
+    }
     let smooth = discrepancy.in_time();
     let is_shift = |s: &Story| s.finding.rows.is_some();
     let drowned = |s: &Story| smooth && s.causes.iter().all(|&k| !confirmations[k].beside);
@@ -77,30 +81,6 @@ pub(super) fn told(
         merge(&mut stories, small, worth, small_disturbances);
     }
     stories
-}
-
-/// Smooth causes of the arm that are worth less than what nothing describes, or than a fault of the sensor that is only
-/// roughly described, may be parts of those: they are not certain.
-fn overshadow(
-    stories: &mut [Story],
-    confirmations: &[Confirmation],
-    discrepancy: &Discrepancy,
-    worth: &Worth,
-    causes: &[Cause],
-) {
-    let rough = (0..causes.len())
-        .filter(|&k| causes[k].is_roughly_described() && confirmations[k].is_confirmed())
-        .map(|k| worth.of(&[k]))
-        .fold(discrepancy.field_mm(), f64::max);
-    for story in stories {
-        let smooth = story.causes.iter().all(|&k| causes[k].is_smooth());
-        if smooth && story.finding.worth_mm.is_some_and(|mm| mm < rough) {
-            story.finding.confidence = Confidence::Ambiguous;
-            story.finding.doubts.push(format!(
-                "it is worth less than the {rough:.3} mm of what is only roughly described, and may be a part of that"
-            ));
-        }
-    }
 }
 
 /// Of each cause whether it is certain enough to move programs.
@@ -219,36 +199,5 @@ fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
         sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy(SMALL_DISTURBANCES).to_owned(),
-    }
-}
-
-/// How many millimetres causes push the readings by.
-pub(super) struct Worth {
-    /// What each cause does to each scalar row (mm), 0 for orientations.
-    pushes: Vec<Vec<f64>>,
-    observations: usize,
-}
-
-impl Worth {
-    /// Of the causes of `fit`; candidates are made of the slopes of `raw`.
-    pub(super) fn new(subject: &Subject<'_>, fit: &Extended, raw: &Design) -> Self {
-        let pushes = fit
-            .causes
-            .iter()
-            .map(|cause| {
-                let values = nalgebra::DVector::from_vec(cause.values());
-                let push = Candidate::of(cause, subject).columns(raw) * values;
-                push.iter().zip(&raw.slopes.mm).map(|(v, mm)| v * mm).collect()
-            })
-            .collect();
-        Self { pushes, observations: raw.observations }
-    }
-
-    /// Of some of the causes together (mm RMS over the observations).
-    pub(super) fn of(&self, causes: &[usize]) -> f64 {
-        let rows = self.pushes.first().map_or(0, Vec::len);
-        let square: f64 =
-            (0..rows).map(|s| causes.iter().map(|&k| self.pushes[k][s]).sum::<f64>().powi(2)).sum();
-        (square / self.observations.max(1) as f64).sqrt()
     }
 }

@@ -23,7 +23,7 @@ use truegrind_math::statistics::ErrorSummary;
 pub struct StageError {
     /// On the rows of the fit.
     pub fitted: ErrorSummary,
-    /// Over five random folds.
+    /// Over five random folds, purged where rows resemble those before them.
     pub random: ErrorSummary,
     /// Over contiguous blocks.
     pub blocks: ErrorSummary,
@@ -44,10 +44,21 @@ pub struct Validation {
 impl Validation {
     /// Splits of the rows that are not set aside.
     pub fn of(subject: &Subject<'_>, set_aside: &[usize], seed: u64, blocks: usize) -> Self {
+        Self::in_order(subject, set_aside, seed, blocks, 0)
+    }
+
+    /// The same where rows that are up to `reach` apart in the file resemble each other: the random folds are purged.
+    pub fn in_order(
+        subject: &Subject<'_>,
+        set_aside: &[usize],
+        seed: u64,
+        blocks: usize,
+        reach: usize,
+    ) -> Self {
         let n = subject.observed.dataset.rows.len();
         let kept: Vec<usize> = (0..n).filter(|i| !set_aside.contains(i)).collect();
         let rows = subject.observed.subset(&kept);
-        let random = split::folds(&rows.dataset, 5, seed);
+        let random = split::purged(&rows.dataset, 5, reach, seed);
         let blocks = split::blocks(&rows.dataset, blocks);
         Self { kept, rows, random, blocks }
     }
@@ -109,7 +120,15 @@ impl Validation {
             .random
             .par_iter()
             .zip(&parts)
-            .map(|(split, part)| refitted(split, part))
+            .map(|(split, part)| {
+                let purged = neither(split, self.kept.len());
+                if purged.is_empty() {
+                    return refitted(split, part);
+                }
+                let mut out = rows_of(&purged)?;
+                out.add(part);
+                refitted(split, &out)
+            })
             .collect::<Option<Vec<_>>>()?;
         let blocks = self
             .blocks

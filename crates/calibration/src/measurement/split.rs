@@ -147,20 +147,63 @@ pub fn folds(data: &Dataset, folds: usize, seed: u64) -> Vec<Split> {
     complements(data.rows.len(), test)
 }
 
+/// Folds of rows that resemble those before and after them: stretches of rows, shared out at random over `folds` folds, and
+/// rows within `reach` of a held-out row are left out of the fit, as are repetitions of held-out poses. Test rows cover
+/// every row once. With a `reach` of 0, or where too few stretches of that length fit, these are random [`folds`].
+///
+/// Random folds leave a held-out row between two rows of the fit that share its error, so they promise too little error for
+/// rows that come later. Source: purged cross-validation, López de Prado 2018; h-block cross-validation, Burman, Chow and
+/// Nolan 1994.
+pub fn purged(data: &Dataset, folds: usize, reach: usize, seed: u64) -> Vec<Split> {
+    let n = data.rows.len();
+    let stretch = (2 * reach).max(1);
+    let k = folds.clamp(1, n.max(1));
+    if reach == 0 || n < 2 * k * stretch {
+        return self::folds(data, folds, seed);
+    }
+    let stretches: Vec<Vec<usize>> =
+        (0..n.div_ceil(stretch)).map(|b| (b * stretch..n.min((b + 1) * stretch)).collect()).collect();
+    let mut test: Vec<Vec<usize>> = vec![Vec::new(); k];
+    for rows in shuffled(stretches, seed) {
+        if let Some(fold) = test.iter_mut().min_by_key(|fold| fold.len()) {
+            fold.extend(rows);
+        }
+    }
+    let pose_of = pose_of_rows(data);
+    test.into_iter()
+        .map(|mut test| {
+            test.sort_unstable();
+            let mut near = vec![false; n];
+            let mut held = vec![false; n];
+            for &i in &test {
+                near[i.saturating_sub(reach)..n.min(i + reach + 1)].fill(true);
+                held[pose_of[i]] = true;
+            }
+            let train = (0..n).filter(|&i| !near[i] && !held[pose_of[i]]).collect();
+            Split { train, test }
+        })
+        .collect()
+}
+
+/// Number of the pose of each row, in the order of [`poses`].
+pub fn pose_of_rows(data: &Dataset) -> Vec<usize> {
+    let mut out = vec![0; data.rows.len()];
+    for (p, rows) in poses(data).iter().enumerate() {
+        rows.iter().for_each(|&i| out[i] = p);
+    }
+    out
+}
+
 /// Cross-validation over contiguous blocks of rows: what drifts or jumps while measuring shows here and hides in
 /// random folds. Repetitions of a test pose in other blocks are left out of the fit.
 pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
     let n = data.rows.len();
     let k = blocks.clamp(1, n.max(1));
-    let poses = poses(data);
-    let mut pose_of = vec![0; n];
-    for (p, rows) in poses.iter().enumerate() {
-        rows.iter().for_each(|&i| pose_of[i] = p);
-    }
+    let pose_of = pose_of_rows(data);
     (0..k)
         .map(|b| {
             let test: Vec<usize> = (b * n / k..(b + 1) * n / k).collect();
-            let mut held = vec![false; poses.len()];
+            let mut held = vec![false; n];
             test.iter().for_each(|&i| held[pose_of[i]] = true);
             let train = (0..n).filter(|&i| !held[pose_of[i]]).collect();
             Split { train, test }
@@ -168,13 +211,13 @@ pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
         .collect()
 }
 
-fn shuffled(mut poses: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
+fn shuffled(mut groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Fisher and Yates.
-    for i in (1..poses.len()).rev() {
-        poses.swap(i, rng.random_range(0..=i));
+    for i in (1..groups.len()).rev() {
+        groups.swap(i, rng.random_range(0..=i));
     }
-    poses
+    groups
 }
 
 fn sorted(mut train: Vec<usize>, mut test: Vec<usize>) -> Split {
@@ -206,7 +249,8 @@ pub struct NoiseFloor {
 }
 
 /// The noise floor from repeated poses: √(Σ |r − r̄|² / Σ (n − 1)) over poses with the same outlet and approach.
-/// `None` where no pose was repeated. Drift between the repetitions counts as noise.
+/// `None` where no pose was repeated. Drift between the repetitions counts as noise. Rows that were copied show no noise: readings
+/// equal to the last digit count once, where the others scatter too widely for that to be chance, or where there are no others.
 ///
 /// ```
 /// use truegrind_calibration::measurement::import::{Options, read};
@@ -220,7 +264,7 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    let (mut square, mut count, mut freedom) = (0.0, 0, 0);
+    let mut repeated: Vec<Vec<Vector3<f64>>> = Vec::new();
     for pose in poses(data) {
         let mut alike: BTreeMap<(usize, [i8; 6]), Vec<Vector3<f64>>> = BTreeMap::new();
         for i in pose {
@@ -231,12 +275,52 @@ pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
                 Reading::Pose(pose) => pose.translation.vector,
             });
         }
-        for readings in alike.values().filter(|r| r.len() > 1) {
-            let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
-            square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
-            freedom += readings.len() - 1;
-            count += 1;
-        }
+        repeated.extend(alike.into_values().filter(|readings| readings.len() > 1));
+    }
+    let all = pooled(&repeated)?;
+    let without: Vec<Vec<Vector3<f64>>> = repeated.iter().map(|readings| different(readings)).collect();
+    let own = pooled(&without);
+    let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest_mm(&repeated));
+    if copied { own } else { Some(all) }
+}
+
+/// Scatter over the finest difference of readings from which two readings that are equal to the last digit are copies, not chance.
+const NO_CHANCE: f64 = 10.0;
+
+/// Pooled scatter of readings of the same pose.
+fn pooled(repeated: &[Vec<Vector3<f64>>]) -> Option<NoiseFloor> {
+    let (mut square, mut count, mut freedom) = (0.0, 0, 0);
+    for readings in repeated.iter().filter(|r| r.len() > 1) {
+        let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
+        square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
+        freedom += readings.len() - 1;
+        count += 1;
     }
     (freedom > 0).then(|| NoiseFloor { sigma_mm: (square / freedom as f64).sqrt(), poses: count, freedom })
+}
+
+/// Readings, those that equal an earlier one left out.
+fn different(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut out: Vec<Vector3<f64>> = Vec::with_capacity(readings.len());
+    for reading in readings {
+        if !out.contains(reading) {
+            out.push(*reading);
+        }
+    }
+    out
+}
+
+/// The smallest difference of a coordinate between readings of one pose that is not 0 (mm).
+fn finest_mm(repeated: &[Vec<Vector3<f64>>]) -> f64 {
+    let mut finest = f64::INFINITY;
+    for readings in repeated {
+        for axis in 0..3 {
+            let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();
+            values.sort_by(f64::total_cmp);
+            // Readings that differ by rounding of the last bit are equal.
+            let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-9);
+            finest = steps.fold(finest, f64::min);
+        }
+    }
+    finest
 }

@@ -65,6 +65,7 @@ fn plain(n: usize, residual: impl Fn(usize) -> f64) -> Design {
         by_scale: DVector::zeros(n),
         by_sag: DVector::zeros(n),
         mm: vec![1.0; n],
+        poses: (0..n).collect(),
     };
     let basis = DMatrix::from_element(1, n, q);
     Design {

@@ -140,3 +140,50 @@ fn a_part_shares_its_rows_until_it_is_changed() {
     assert_eq!(part.rows.last(), Some(&whole.rows[0]));
     assert_eq!(part.rows.iter().rev().step_by(2).count(), 2);
 }
+
+/// A row of a file that stands there twice says nothing about the noise: of readings equal to the last digit one counts, unless the
+/// readings are so coarse that equal ones are chance.
+#[test]
+fn copied_rows_are_no_noise_floor() {
+    let data = repeated();
+    let floor = split::noise_floor(&data).unwrap();
+    let with = |more: &dyn Fn(&Row) -> Option<Row>| {
+        let mut rows: Vec<Row> = data.rows.iter().cloned().collect();
+        rows.extend(data.rows.iter().filter_map(more));
+        Dataset { rows: rows.into(), ..data.clone() }
+    };
+    assert_eq!(split::noise_floor(&with(&|row| Some(row.clone()))), Some(floor));
+    // Once each, and each copied: no pose was read again.
+    let first = Dataset { rows: data.rows[..100].to_vec().into(), ..data.clone() };
+    let twice: Vec<Row> = first.rows.iter().chain(first.rows.iter()).cloned().collect();
+    assert_eq!(split::noise_floor(&Dataset { rows: twice.into(), ..first }), None);
+    // A cable that reads half millimetres reads the same one again and again.
+    let coarse = |row: &Row| match row.reading {
+        Reading::Cable(length) => {
+            Row { reading: Reading::Cable((2.0 * length).round() / 2.0), ..row.clone() }
+        }
+        _ => row.clone(),
+    };
+    let rough: Vec<Row> = data.rows.iter().map(coarse).collect();
+    let rough = split::noise_floor(&Dataset { rows: rough.into(), ..data.clone() }).unwrap();
+    assert_eq!(rough.freedom, floor.freedom);
+}
+
+/// Rows that resemble those beside them in the file: no row of a fit stands within the reach of one that is held out, and every row
+/// is held out once. Random folds have both on every side of a held-out row.
+#[test]
+fn purged_folds_leave_out_what_stands_beside_a_held_out_row() {
+    let data = repeated();
+    let purged = split::purged(&data, 5, 3, 1);
+    let mut tested: Vec<usize> = purged.iter().flat_map(|f| f.test.clone()).collect();
+    tested.sort_unstable();
+    assert_eq!(tested, (0..200).collect::<Vec<_>>());
+    for fold in &purged {
+        let apart = |i: usize| fold.test.iter().map(|&t| t.abs_diff(i)).min().unwrap();
+        assert!(fold.train.iter().all(|&i| apart(i) > 3));
+        assert!(fold.train.iter().all(|&i| !fold.test.contains(&((i + 100) % 200))), "a pose on both sides");
+        assert!(fold.train.len() > 60, "{} rows are left to fit", fold.train.len());
+    }
+    assert_eq!(split::purged(&data, 5, 0, 1), split::folds(&data, 5, 1));
+    assert_eq!(split::purged(&data, 5, 100, 1), split::folds(&data, 5, 1), "too few rows for such stretches");
+}
