@@ -230,17 +230,63 @@ impl Ways<'_> {
     fn forbid_behind(&mut self, staying: &HashSet<usize>, allowance: &mut Allowance) -> bool {
         let mut stay = staying.clone();
         let samples = self.samples(staying.len());
-        for motion in 0..if stay.is_empty() { 0 } else { self.listing.motions.len() } {
-            let previous = self.listing.motions[motion].previous.map(|previous| previous as usize);
-            if previous.is_some_and(|previous| stay.contains(&previous))
+        let mut found = false;
+        for motion in 0..self.listing.motions.len() {
+            let Some(previous) = self.listing.motions[motion].previous.map(|previous| previous as usize)
+            else {
+                continue;
+            };
+            if stay.contains(&previous)
                 && !self.left.contains_key(&(motion as u32))
                 && let Some(why) = self.judge(motion, samples, allowance)
             {
                 self.solved.forbid(motion, why);
                 stay.insert(motion);
+                found = true;
+            }
+            if self.leads_astray(motion, samples, allowance) {
+                let line = self.listing.motions[motion].place.line;
+                self.solved.forbid(previous, Why::BeforeSingularWay { line });
+                stay.insert(previous);
+                found = true;
             }
         }
-        stay.len() > staying.len()
+        found
+    }
+
+    /// Whether a motion stays and starts where another one is corrected, such that its way comes too close to a singularity from
+    /// there.
+    fn leads_astray(&self, index: usize, samples: usize, allowance: &mut Allowance) -> bool {
+        let left = Cell::new(samples);
+        within(allowance, || self.strayed_way(index, &left)).is_some()
+    }
+
+    fn strayed_way(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
+        let motion = &self.listing.motions[index];
+        let stays = self.left.contains_key(&(index as u32)) || self.corrected(index).is_none();
+        let curve = matches!(motion.kind, MotionKind::Linear | MotionKind::Circular);
+        if !stays || !curve || motion.modal.wrist_interpolation == Switch::On {
+            return None;
+        }
+        let to = self.solved.of(index).last()?.as_ref().ok()?;
+        let from = self.from(motion).filter(|from| from.corrected)?;
+        let told = self.mountings.list[to.mounted].told;
+        let start = from.joints().map(|joints| told.target_of(&self.arms.nominal.arm().forward(&joints)));
+        let far = way(&start[1], &to.meant, &self.arms.nominal) * LEVER;
+        if motion.kind == MotionKind::Linear && clear(&from.margins(), &margins(to, false), far) {
+            return None;
+        }
+        let curves = match (motion.kind, self.solved.of(index)) {
+            (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.meant)),
+            (_, [Ok(via), _]) => {
+                let round = |start| Curve::round(start, &via.meant, to.meant, motion);
+                [round(start[0])?, round(start[1])?]
+            }
+            _ => return None,
+        };
+        let cost = cost(&curves[1], &told, &self.arms.nominal);
+        let walk = Walk { nominal: &self.arms.nominal, told, curves, cost, samples, options: self.options };
+        walk.between(&walk.reached(0.0, from.joints()[1]), &walk.reached(1.0, to.before))
     }
 
     /// The motion with its last target, if it is to be corrected.

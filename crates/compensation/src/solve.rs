@@ -498,7 +498,43 @@ fn starts(
         along(&asked[run.clone()], &mut near, arms, mountings, &mut allowance, &mut out[run]);
         motion = end;
     }
+    guess_unsure(listing, asked, first, arms, mountings, &mut out);
     out
+}
+
+/// Where a configuration may be checked or not, by the way on which the program comes there, it is guessed as where it is not: from a
+/// start that the text does not tell, or that is guessed itself.
+fn guess_unsure(
+    listing: &Listing,
+    asked: &[Asked<'_>],
+    first: &[usize],
+    arms: &Arms<'_>,
+    mountings: &Mountings,
+    out: &mut Starts,
+) {
+    for (index, motion) in listing.motions.iter().enumerate() {
+        if motion.left.is_some() || monitored(motion) != Switch::Either {
+            continue;
+        }
+        let before = match motion.previous.map(|previous| previous as usize) {
+            None => Some(Guess::Here),
+            Some(previous) => match out[first[previous]..first[previous + 1]].last() {
+                Some(Ok(start)) => (start.guess != Guess::No).then_some(Guess::Before),
+                _ => Some(Guess::Here),
+            },
+        };
+        let Some(guess) = before else { continue };
+        for at in first[index]..first[index + 1] {
+            let several = || {
+                Told::of(&asked[at], mountings).is_some_and(|told| arms.nominal.all(&told.flange).len() > 1)
+            };
+            if let Ok(start) = &mut out[at]
+                && several()
+            {
+                start.guess = guess;
+            }
+        }
+    }
 }
 
 /// Shortest and longest run of targets that are taken together.

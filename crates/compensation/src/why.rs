@@ -103,6 +103,11 @@ pub enum Why {
         /// The line of that motion, from 1.
         line: u32,
     },
+    /// A motion that stays starts where it ends, and would come too close to a singularity from there.
+    BeforeSingularWay {
+        /// The line of that motion, from 1.
+        line: u32,
+    },
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
     WholeCircle,
     /// A joint stands outside the range in which it was measured.
@@ -179,6 +184,9 @@ impl Why {
             Why::TooFast { .. } => "a joint turns faster than it can",
             Why::NoCircle => "no circle through its points keeps to the way that was meant",
             Why::BeforeCircle { .. } => "a circular motion that stays starts where it ends",
+            Why::BeforeSingularWay { .. } => {
+                "a motion that stays and passes a singularity starts where it ends"
+            }
             Why::WholeCircle => "a whole circle",
             Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
             Why::JointJump { .. } => "near a singularity the correction turns a joint too far",
@@ -264,6 +272,11 @@ impl fmt::Display for Why {
                 f,
                 "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
                  circle"
+            ),
+            Why::BeforeSingularWay { line } => write!(
+                f,
+                "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
+                 singularity"
             ),
             Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
             Why::JointNotMeasured { joint, by_deg } => {

@@ -344,7 +344,7 @@ impl Comparison<'_> {
             payload_centre_mm: load.1,
         };
         let at = under(old.load, now.behind);
-        let tip = tip(old);
+        let tip = tip(old, intended);
         let off = |q: &[f64; 6], at: &Circumstance| {
             let [there, meant] = [arm.actual_forward(q, at) * tip, intended * tip];
             let (mm, rad) = difference(&there, &meant);
@@ -432,7 +432,7 @@ fn in_object(motion: &Motion, flange: &Pose) -> Pose {
     }
 }
 
-/// The point that counts, on the flange.
-fn tip(motion: &Motion) -> Pose {
-    if motion.tool.1 { motion.tool.2 } else { motion.object.2 * motion.object.3 }
+/// The point that counts, on the flange: the tool's, or that of the part at a tool that stands.
+fn tip(motion: &Motion, intended: &Pose) -> Pose {
+    if motion.tool.1 { motion.tool.2 } else { intended.inverse() * motion.tool.2 }
 }

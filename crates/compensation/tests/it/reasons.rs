@@ -44,6 +44,8 @@ fn name(why: &Why) -> &'static str {
         Why::NoCircle => "no circle",
         // tests/it/path.rs.
         Why::BeforeCircle { .. } => "before circle",
+        // tests/it/singular.rs.
+        Why::BeforeSingularWay { .. } => "before singular way",
         Why::WholeCircle => "whole circle",
         Why::JointNotMeasured { .. } => "joint not measured",
         Why::PartOfCut { .. } => "part of cut",
