@@ -13,7 +13,7 @@ use super::cause::{Cause, MAP_KNOTS};
 use super::design::Design;
 use super::extension::Subject;
 use crate::identification::calibration::{Frames, rotations, shifts};
-use crate::measurement::dataset::{Dataset, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::sensor::form::Form;
 use crate::measurement::split;
@@ -402,6 +402,17 @@ pub fn measurement_candidates(subject: &Subject<'_>) -> Vec<Candidate> {
 const NEIGHBOURS: [(usize, usize); 10] =
     [(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 5), (5, 4)];
 
+/// A drum between the shortest and the longest of the lengths that were read.
+fn drum(dataset: &Dataset) -> Form {
+    let lengths = dataset.rows.iter().filter_map(|row| match row.reading {
+        Reading::Cable(length) if length.is_finite() => Some(length),
+        _ => None,
+    });
+    let (low, high) =
+        lengths.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), l| (low.min(l), high.max(l)));
+    Form::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
+}
+
 /// Forms that the columns allow, with the variants tried of each.
 fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
     let mut out = Vec::new();
@@ -418,7 +429,7 @@ fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
     let pairs = NEIGHBOURS.into_iter().filter(|&(a, b)| moves(a) && moves(b));
     out.extend(pairs.map(|(joint, other)| (Form::TwoJointGear { joint, other }, 1.0)));
     if dataset.sensor == Sensor::Cable {
-        out.extend([(Form::Pulley, 1.0), (Form::Drum, 1.0)]);
+        out.extend([(Form::Pulley, 1.0), (drum(dataset), 1.0)]);
     } else {
         out.push((Form::Refraction, 1.0));
         out.extend([false, true].map(|second| (Form::Nest { second }, 2.0)));

@@ -115,7 +115,7 @@ impl Cause {
         match self {
             Cause::Measurement(Disturbance { kind: Kind::Sag, .. }) => true,
             Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => {
-                matches!(form, Form::Pulley | Form::Drum)
+                matches!(form, Form::Pulley | Form::Drum { .. })
             }
             _ => false,
         }

@@ -86,6 +86,15 @@ impl Shadows<'_> {
         out
     }
 
+    /// What the largest fault of the sensor that is only roughly described is worth, the arm's geometry left as it is (mm).
+    fn faults_of_the_sensor_mm(&self) -> f64 {
+        let of_sensor = |k: &usize| {
+            let cause = &self.causes[*k];
+            cause.is_roughly_described() && !cause.is_of_the_arm() && self.confirmations[*k].is_there()
+        };
+        (0..self.causes.len()).filter(of_sensor).map(|k| self.worth.of(&[k])).fold(0.0, f64::max)
+    }
+
     fn others<'a>(&'a self, causes: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
         (0..self.causes.len()).filter(|k| !causes.contains(k) && self.confirmations[*k].is_confirmed())
     }

@@ -199,7 +199,7 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
             "the cable's length depends on its direction, as over a pulley or through a worn outlet"
                 .to_owned()
         }
-        Form::Drum => {
+        Form::Drum { .. } => {
             "the cable's reading is not in proportion to its length, as from a drum wound in layers"
                 .to_owned()
         }

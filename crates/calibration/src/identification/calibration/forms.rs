@@ -101,14 +101,8 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
             let u = away.normalize();
             second_degree(&u).map(|v| u * v).to_vec()
         }),
-        Form::Drum => {
-            let lengths: Vec<f64> = dataset
-                .rows
-                .iter()
-                .map(|row| ((posed.forward(&row.joints) * touched).coords - sensor(row)).norm())
-                .collect();
-            let (low, high) =
-                lengths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        Form::Drum { from_mm, to_mm } => {
+            let (low, high) = (f64::from(from_mm), f64::from(to_mm));
             pushed(&|_, away| {
                 let (d, u) = (away.norm(), away.normalize());
                 // From −1 to 1, as Legendre's polynomials have it.

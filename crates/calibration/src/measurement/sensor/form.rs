@@ -34,8 +34,14 @@ pub enum Form {
     Refraction,
     /// A cable that is led over a pulley: harmonics of second degree of its direction.
     Pulley,
-    /// A cable wound in layers: the square and the cube of its length.
-    Drum,
+    /// A cable wound in layers: the square and the cube of its length, as Legendre's polynomials between two lengths. Those belong to
+    /// the form, not to the rows that it is asked about: else some of the rows would be told another push than all of them.
+    Drum {
+        /// The shorter length (mm).
+        from_mm: u32,
+        /// The longer length (mm).
+        to_mm: u32,
+    },
     /// A target whose centre depends on the direction from which it is seen: first or second degree in that direction.
     Nest {
         /// Whether the second degree takes part.
@@ -61,7 +67,7 @@ impl Form {
             Form::TwoJointGear { .. } => "gear-two-joints",
             Form::Refraction => "air-refraction",
             Form::Pulley => "cable-pulley",
-            Form::Drum => "cable-drum",
+            Form::Drum { .. } => "cable-drum",
             Form::Nest { .. } => "target-nest",
         }
     }
@@ -113,7 +119,7 @@ impl Form {
                 out
             }
             Form::Pulley => listed(&["xy", "yz", "zx", "x² − y²", "3z² − 1"], "mm"),
-            Form::Drum => listed(&["square of the length", "cube of the length"], "mm"),
+            Form::Drum { .. } => listed(&["square of the length", "cube of the length"], "mm"),
             Form::Nest { second: false } => listed(&FIRST, "mm"),
             Form::Nest { second: true } => {
                 let products = ["xy", "yz", "zx", "x² − y²", "3z² − 1"];
@@ -133,7 +139,7 @@ impl Form {
             Form::Stiffness { .. } => [1e-6, 1e-7][parameter.min(1)],
             Form::TwoJointGear { .. } => 3e-4,
             Form::Refraction => 5e-6,
-            Form::Pulley | Form::Drum => 0.5,
+            Form::Pulley | Form::Drum { .. } => 0.5,
             Form::Nest { .. } => 0.05,
         }
     }

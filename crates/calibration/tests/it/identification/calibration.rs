@@ -130,7 +130,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
     }
     let of_pose = [Form::Stiffness { joint: 1 }, Form::TwoJointGear { joint: 2, other: 3 }];
     let of_sensor = match sensor {
-        Sensor::Cable => [Form::Pulley, Form::Drum],
+        Sensor::Cable => [Form::Pulley, Form::Drum { from_mm: 500, to_mm: 1200 }],
         _ => [Form::Refraction, Form::Nest { second: true }],
     };
     let of_motion = [Form::Latency, Form::LastStep, Form::SlowReading];
