@@ -234,7 +234,7 @@ pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Resul
 }
 
 /// More triangles than these no picture of an arm needs, and a viewer is slow with.
-const MOST_TRIANGLES: usize = 400_000;
+const MOST_TRIANGLES: usize = 150_000;
 
 /// The meshes that a robot file names, so far as they are there and are STL; none of a robot of the catalogue. What is not drawn is
 /// said.
