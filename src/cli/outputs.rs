@@ -37,7 +37,8 @@ pub(super) struct Outputs {
 /// A build without pictures says so, and does not pass over what was asked for.
 #[cfg(not(feature = "visual"))]
 fn no_recordings(_: &str) -> Result<PathBuf, String> {
-    Err("this build makes no recordings (it was made with --no-default-features); --html FILE writes a page".to_owned())
+    Err("this build makes no recordings (it was made with --no-default-features); --html FILE writes a page"
+        .to_owned())
 }
 
 impl Outputs {
