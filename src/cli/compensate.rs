@@ -730,6 +730,8 @@ fn outputs_of(
     };
     let several = several || programs.files.len() > 1;
     if !several && !output.is_dir() {
+        // That it is an input weighs more than how it is called.
+        Batch::check(&[], &[output])?;
         if let [(source, bytes)] = programs.files.as_slice() {
             naming::like_its_source(output, source, bytes)?;
         }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use truegrind::arm::condition::Condition;
+use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::diagnose::Diagnosed;
 use truegrind::calibration::identification::calibration::Frames;
@@ -130,15 +131,17 @@ pub(super) fn plan(plan: &Plan, wanted: &Wanted<'_>, name: &str, robot: &str) ->
 /// and the one that it has now leave of them.
 pub(super) fn track(
     tracker: &Tracker,
-    begun: &Model,
+    arm: &Estimated,
     datasets: &[Dataset],
     alarms: &[Alarm],
     robot: Option<&str>,
 ) -> anyhow::Result<Option<Vec<u8>>> {
     let Some(first) = datasets.first() else { return Ok(None) };
+    let begun = &arm.model;
     let (model, frames) = tracker.standing();
-    let seen: BTreeSet<(&str, usize)> =
-        tracker.state().history.iter().map(|seen| (seen.file.as_str(), seen.row)).collect();
+    // One wild pose would flatten all others.
+    let tame = tracker.state().history.iter().filter(|seen| seen.nis < WILD);
+    let seen: BTreeSet<(&str, usize)> = tame.map(|seen| (seen.file.as_str(), seen.row)).collect();
     let mut rows: Vec<Row> = Vec::new();
     for dataset in datasets {
         let shown = dataset.rows.iter().filter(|row| seen.contains(&(dataset.file.as_str(), row.number)));
@@ -166,12 +169,15 @@ pub(super) fn track(
     if answer.is_empty() {
         answer.push("no change was noticed".to_owned());
     }
-    answer.push("shown: the latest poses, since sensor and target stand as they do now".to_owned());
+    answer.push(
+        "shown: the latest poses, since sensor and target stand as they do now, but for what was set aside"
+            .to_owned(),
+    );
     let scene = MeasuredScene {
         dataset: &dataset,
         arm: &model,
         arm_is: &format!("{} as tracked", tracker.robot()),
-        nominal: Some(begun),
+        nominal: Some(&arm.nominal),
         meshes: &meshes(robot)?,
         keep_out_mm: &[],
         answer: &answer,
@@ -184,6 +190,9 @@ pub(super) fn track(
     };
     Ok(Some(pictures::measured_recording(&scene)?.rrd()?))
 }
+
+/// A pose whose normalised innovation squared is beyond this belongs to another mounting, or to none.
+const WILD: f64 = 1e3;
 
 /// What an experiment was made on.
 pub(super) struct Compared<'a> {

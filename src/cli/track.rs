@@ -261,7 +261,7 @@ impl Track<'_> {
         #[cfg(feature = "visual")]
         if let Some(path) = &arguments.outputs.rrd {
             let robot = arguments.robot.as_deref();
-            match super::recording::track(tracker, &self.arm.model, datasets, alarms, robot)? {
+            match super::recording::track(tracker, self.arm, datasets, alarms, robot)? {
                 Some(bytes) => batch.add(path, bytes),
                 None => tell("note: --rrd: no pose is there to be drawn; nothing written to it"),
             }

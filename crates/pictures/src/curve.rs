@@ -9,7 +9,7 @@ use super::recording::{Store, VisualError};
 /// From the lowest to the highest value, with room above for a legend of `names` lines; `None` of nothing.
 pub(super) fn range(values: impl IntoIterator<Item = f64>, names: usize) -> Option<[f64; 2]> {
     /// Part of a plot's height that a line of the legend takes.
-    const LINE: f64 = 0.10;
+    const LINE: f64 = 0.09;
     let mut ends: Option<[f64; 2]> = None;
     for value in values.into_iter().filter(|v| v.is_finite()) {
         let [low, high] = ends.unwrap_or([value; 2]);
@@ -17,7 +17,7 @@ pub(super) fn range(values: impl IntoIterator<Item = f64>, names: usize) -> Opti
     }
     let [low, high] = ends?;
     let span = (high - low).max(1e-3 * high.abs()).max(1e-9);
-    let room = (LINE * (names + 1) as f64).min(0.7);
+    let room = (LINE * (names + 1) as f64).min(0.45);
     Some([low - 0.06 * span, high + span * room / (1.0 - room)])
 }
 

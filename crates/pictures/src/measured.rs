@@ -345,7 +345,7 @@ fn layout(
             Reading::Position(_) | Reading::Pose(_) => {}
         }
     }
-    let eye = Eye::on(&seen, Vector3::new(0.8, -0.75, 0.45), 1.6, 0.95);
+    let eye = Eye::on(&seen, Vector3::new(0.8, -0.75, 0.45), 1.6, 0.85);
     let beside = ["+ /read", "+ /sensor/**", "+ /set_aside", "+ /keep_out"];
     let view = View::space(
         format!("{} [mm], row by row", scene.arm_is),

@@ -19,6 +19,13 @@ fn every_verb_that_has_an_arm_records_it() {
     let at = dir.path();
     fs::write(at.join("data.csv"), CABLE).unwrap();
     let robot = ["--robot", "abb-irb-120"];
+    fs::write(
+        at.join("mine.toml"),
+        "name = \"mine\"\ntitle = \"Mine\"\npaper = \"ours\"\n[methods]\nreference = \"B\"\n[methods.protocol]\nrows = \
+         60\nheld_out = 0.2\ncases = 2\n[[methods.method]]\nid = \"A\"\nname = \"EKF\"\nsolver = \"ekf\"\ntreatment = \
+         \"sound\"\n[[methods.method]]\nid = \"B\"\nname = \"LM\"\nsolver = \"lm\"\ntreatment = \"sound\"\n",
+    )
+    .unwrap();
     for (stem, verb) in [
         ("id", [&["identify", "data.csv", "-o", "model.toml"][..], &robot].concat()),
         (
@@ -41,7 +48,7 @@ fn every_verb_that_has_an_arm_records_it() {
             .concat(),
         ),
         ("track", vec!["track", "data.csv", "--model", "model.toml", "-o", "tracks"]),
-        ("compare", vec!["compare", "--experiment", "ltlm-table-6", "--rows", "40"]),
+        ("compare", [&["compare", "data.csv", "--experiment", "mine.toml"][..], &robot].concat()),
     ] {
         let picture = format!("{stem}.rrd");
         let (code, _, err) = truegrind(at, &[&verb[..], &["--rrd", &picture]].concat());
