@@ -65,10 +65,16 @@ impl Shadows<'_> {
         let smooth = all(&Cause::is_smooth);
         let mut out = Vec::new();
         let rough = self.rough_mm(causes, smooth);
+        let (whole, sensor) = (self.worth.of(causes), self.faults_of_the_sensor_mm());
         if own < rough {
             out.push(format!(
-                "beside the geometry it explains {own:.4} mm, less than the {rough:.4} mm of what is only roughly described, and may be a part \\
-                 of that"
+                "beside the geometry it explains {own:.4} mm, less than the {rough:.4} mm of what is only roughly described, and may be a \
+                 part of that"
+            ));
+        } else if smooth && whole < sensor {
+            out.push(format!(
+                "it is worth {whole:.4} mm, less than the {sensor:.4} mm of a fault of the sensor that is only roughly described, and may \
+                 be a part of that"
             ));
         }
         if own < self.beyond_noise_mm {

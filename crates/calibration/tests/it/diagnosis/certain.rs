@@ -17,6 +17,8 @@ use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::finding::{Confidence, Finding};
 use truegrind_calibration::diagnosis::halves::{HALVES, halves, is_path};
 use truegrind_calibration::diagnosis::marginal::variances;
+use truegrind_calibration::diagnosis::rows::prepare;
+use truegrind_calibration::identification::fit::errors_on;
 use truegrind_calibration::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use truegrind_calibration::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 
@@ -92,6 +94,26 @@ fn readings_that_resemble_the_one_before_are_no_cause() {
         let named: Vec<&str> = identified(&found).iter().map(|f| f.effect.as_str()).collect();
         assert!(named.is_empty(), "{sensor:?} {seed}: {named:?}");
     }
+}
+
+/// Whoever reads the held-out error expects it of the next rows of the same arm. Where readings resemble those before them, a row that is
+/// held out alone stands between two that share its error, and shifts that follow the noise look as if they carried over.
+#[test]
+fn the_held_out_error_is_that_of_fresh_rows_where_noise_is_correlated() {
+    let mut ratios = Vec::new();
+    for seed in [31, 33] {
+        let mut all = run(&arm(), &[], &setup(Sensor::Position, 600, seed)).dataset;
+        correlate(&mut all, 0.8, 0.08, seed);
+        let rows: Vec<Row> = all.rows.iter().take(300).cloned().collect();
+        let mut fresh: Vec<Row> = all.rows.iter().skip(300).cloned().collect();
+        let found = diagnosed(&Dataset { rows: rows.clone().into(), ..all.clone() });
+        fresh.iter_mut().zip(&rows).for_each(|(row, before)| row.number = before.number);
+        let observed = prepare(&Dataset { rows: fresh.into(), ..all.clone() }, &arm(), true).observed;
+        let errors = errors_on(&observed, &found.extended.model, &found.extended.frames);
+        let mean = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
+        ratios.push(found.diagnosis.fits.extended.cv_rmse_mm / mean.sqrt());
+    }
+    assert!(ratios.iter().all(|ratio| (0.85..1.15).contains(ratio)), "{ratios:?}");
 }
 
 #[test]
