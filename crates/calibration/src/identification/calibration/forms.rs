@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::frames::Frames;
-use crate::measurement::dataset::{Dataset, Motion, Row, Sensor};
+use crate::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::form::{Form, second_degree};
 use truegrind_arm::condition::Condition;
@@ -103,8 +103,10 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
         }),
         Form::Drum { from_mm, to_mm } => {
             let (low, high) = (f64::from(from_mm), f64::from(to_mm));
-            pushed(&|_, away| {
-                let (d, u) = (away.norm(), away.normalize());
+            pushed(&|row, away| {
+                let u = away.normalize();
+                // The length that was read: it stays where it is when outlet and zero are found elsewhere.
+                let d = if let Reading::Cable(length) = row.reading { length } else { away.norm() };
                 // From −1 to 1, as Legendre's polynomials have it.
                 let t = (2.0 * d - low - high) / (high - low).max(1.0);
                 vec![u * (0.5 * (3.0 * t * t - 1.0)), u * (0.5 * (5.0 * t * t * t - 3.0 * t))]
