@@ -167,17 +167,16 @@ impl Context<'_> {
                     .to_owned(),
             );
         }
-        if let Some(map) = self.any_curve(cause) {
-            if !alternatives.iter().any(|a| a.effect == map.cause.name()) {
-                alternatives.push(Alternative {
-                    effect: map.cause.name().to_owned(),
-                    joints: pendant(&map.cause.joints()),
-                    rows: None,
-                    cv_rmse_mm: held
-                        .rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
-                    beaten_by: own.own.merit - score(&without, &map).merit,
-                });
-            }
+        if let Some(map) = self.any_curve(cause)
+            && !alternatives.iter().any(|a| a.effect == map.cause.name())
+        {
+            alternatives.push(Alternative {
+                effect: map.cause.name().to_owned(),
+                joints: pendant(&map.cause.joints()),
+                rows: None,
+                cv_rmse_mm: held.rmse_mm(Some((&map.columns(&without), &map.cause.sizes())), self.set_aside),
+                beaten_by: own.own.merit - score(&without, &map).merit,
+            });
         }
         let values = DVector::from_iterator(own.own.estimate.len(), own.own.estimate.iter().copied());
         let lambda = non_centrality(&own.own.information, &values);
