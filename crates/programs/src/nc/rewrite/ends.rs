@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::slots::{said, slots};
 use super::stays_in_place;
-use crate::motion::{MotionKind, Reason};
+use crate::motion::{MotionKind, Reason, WorkObjectValue};
 use crate::nc::task::{Needs, Task};
 use crate::rewrite::{Change, Outcome};
 
@@ -27,11 +27,12 @@ impl Task<'_> {
             }
             let (file, circular) = (motion.place.file, motion.kind == MotionKind::Circular);
             let Some(at) = motion.previous.or((index as u32).checked_sub(1)) else { continue };
+            let turns = self.turns_between(at, index as u32);
             let before = &mut self.listing.motions[at as usize];
             if before.place.file != file {
                 continue;
             }
-            held[at as usize] |= axes;
+            held[at as usize] |= if turns { ALL } else { axes };
             if before.kind != MotionKind::Circular && before.reason().is_none() {
                 before.left = Some(if circular { Reason::BeforeLeftArc } else { Reason::BeforeLeftPath });
             }
@@ -69,7 +70,8 @@ impl Task<'_> {
             if self.listing.motions[before as usize].place.file != motion.place.file {
                 continue;
             }
-            held[before as usize] |= axes;
+            let mixed = axes != 0 && self.turns_between(before, index);
+            held[before as usize] |= if mixed { ALL } else { axes };
             let perhaps =
                 self.listing.motions[before as usize].conditional || self.written[before as usize].may_lack;
             if needs == Needs::Tangent || perhaps {
@@ -92,6 +94,24 @@ impl Task<'_> {
             }
         }
         fixed
+    }
+
+    /// Whether the axes of one motion point elsewhere than those of another (ROT, another work offset), or that is not known: then
+    /// each axis of the one hangs on all of the other.
+    fn turns_between(&self, one: u32, other: u32) -> bool {
+        let listing = &self.listing;
+        let [Some(a), Some(b)] = [one, other].map(|index| listing.motions[index as usize].work_object) else {
+            return false;
+        };
+        match [a, b].map(|frame| listing.work_objects[frame as usize].value.as_ref()) {
+            [Ok(a), Ok(b)] => {
+                let turn = |frame: &WorkObjectValue| {
+                    frame.user_frame.pose().rotation * frame.object_frame.pose().rotation
+                };
+                turn(a).angle_to(&turn(b)) > 1e-9
+            }
+            _ => true,
+        }
     }
 
     /// The axes in which a motion must begin where it always did: those that its own way hangs on, and those of `held`,

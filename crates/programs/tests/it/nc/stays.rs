@@ -41,6 +41,18 @@ fn the_start_of_a_path_that_is_left_stays() {
     check(LinuxCnc, &[("X10\nX20\nG5.1 X30 Y5 I2 J3", &[None, path, other])]);
 }
 
+/// What a path that stays needs of one axis hangs on every axis of the motions before a turn of the frame.
+#[test]
+fn a_turned_frame_passes_on_every_axis() {
+    let (path, open) = (left(BeforeLeftPath), left(PositionUnknown));
+    let cip = "CIP X40 Y0 I1=30 J1=10 K1=50";
+    let turned = format!("X10 Y5\n$P_PFRAME=CTRANS(X,10)\nX20\nAROT Z90\nY=30 Z5\n{cip}");
+    let plain = format!("X10 Y5\nX20 Y10 Z1\nX30 Y12 Z2\n{cip}");
+    let listed = [path, open, open, left(NotFollowed)];
+    // Without a turn each axis stands for itself: what states all of them ends where it says.
+    check(Siemens, &[(&turned, &listed), (&plain, &[None, None, path, left(NotFollowed)])]);
+}
+
 #[test]
 fn words_that_such_a_path_leaves_out_hold_what_they_held() {
     assert_eq!(
