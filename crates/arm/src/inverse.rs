@@ -37,7 +37,6 @@ use crate::joints::{self, Joints, Limits};
 use truegrind_math::se3::Pose;
 use truegrind_math::spectral;
 
-pub use self::path::Reached;
 pub use self::solution::{InverseError, Singularity, SingularityDistances, Solution};
 pub use self::structure::Branch;
 

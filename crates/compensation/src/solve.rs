@@ -692,7 +692,7 @@ fn finish(
     let mut out: Vec<Result<Solved, Why>> = starts.iter().map(waiting).collect();
     let way = on_their_way(starts, places, arms, mountings, &mut out);
     let joint_form = |w: &OnItsWay| as_joints(asked[w.index].motion, asked[w.index].target, options.emit);
-    let Replayed { told_flanges, told, heard, reached, last, failed } =
+    let Replayed { told_flanges, told, heard, branches, last, failed } =
         replayed(&way, &joint_form, arms, mountings, options);
     let real = |start: &Start| &mountings.list[start.mounted].real;
     let places: Vec<usize> = way.iter().map(|w| w.place).collect();
@@ -713,10 +713,7 @@ fn finish(
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
-        let (conf, margins) = match reached.get(k) {
-            Some(Ok(reached)) if !joint_form(w) => (reached.configuration, reached.margins()),
-            _ => (arms.nominal.configuration(&w.after), arms.nominal.branch_margins(&w.after)),
-        };
+        let (conf, margins) = branches[k];
         let mut solved = Solved {
             mounted: w.start.mounted,
             meant,
@@ -795,8 +792,8 @@ struct Replayed {
     told: Vec<Pose>,
     /// The flanges of the rounded numbers.
     heard: Vec<Pose>,
-    /// What it makes of them; empty where all are told as joints.
-    reached: Vec<Result<truegrind_arm::inverse::Reached, InverseError>>,
+    /// Configuration and margins of what it makes of them.
+    branches: Vec<(Configuration, [f64; 3])>,
     /// Its joints.
     last: Vec<Joints>,
     failed: Vec<Option<Why>>,
@@ -820,18 +817,23 @@ fn replayed(
     let reached =
         if way.iter().all(joint_form) { Vec::new() } else { arms.nominal.reach_seeded(&heard, &after) };
     let mut last: Vec<Joints> = Vec::with_capacity(way.len());
+    let mut branches = Vec::with_capacity(way.len());
     let mut failed: Vec<Option<Why>> = vec![None; way.len()];
+    let of_joints =
+        |joints: &Joints| (arms.nominal.configuration(joints), arms.nominal.branch_margins(joints));
     for (k, w) in way.iter().enumerate() {
-        last.push(match reached.get(k) {
-            Some(Ok(reached)) if !joint_form(w) => reached.joints,
-            Some(Err(error)) if !joint_form(w) => {
+        let (joints, branch) = match reached.get(k).filter(|_| !joint_form(w)) {
+            Some(Ok(reached)) => (reached.joints, (reached.configuration, reached.margins())),
+            Some(Err(error)) => {
                 failed[k] = Some(Why::of_inverse(*error));
-                w.after
+                (w.after, of_joints(&w.after))
             }
-            _ => w.after,
-        });
+            None => (w.after, of_joints(&w.after)),
+        };
+        last.push(joints);
+        branches.push(branch);
     }
-    Replayed { told_flanges, told, heard, reached, last, failed }
+    Replayed { told_flanges, told, heard, branches, last, failed }
 }
 
 /// How well each point is known (mm) against what it is measured from; `None` where that is not asked for.

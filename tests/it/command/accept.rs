@@ -27,11 +27,12 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     let page = ["1", "--serial", "arm=120-503211", "--html", "page.html", "--json", "page.json"];
     let (code, out, err) = accept("later.csv", &page);
     assert!(code == 0 && out.contains("[ok] Accepted: the largest error is 0."), "{out}{err}");
-    assert!(out.contains("cycles at 5 poses are asked for"), "{out}");
     let html = fs::read_to_string(at.join("page.html")).unwrap();
     assert!(html.contains("120-503211") && html.contains("<svg"));
+    assert!(html.contains("30 cycles at 5 poses are asked for, at most 1 of one pose were measured"));
     let json: serde_json::Value = serde_json::from_slice(&fs::read(at.join("page.json")).unwrap()).unwrap();
     assert_eq!(json["schema"], "truegrind.acceptance/1");
+    assert!(json["iso_9283"].is_null());
     assert_eq!((&json["decision"], &json["poses"]), (&"accepted".into(), &200.into()));
     assert!(json["model"]["rmse"].as_f64().unwrap() < 0.5 * json["nominal"]["rmse"].as_f64().unwrap());
     for file in ["measurements", "model_file", "fitted_to"] {
