@@ -27,7 +27,6 @@ use super::segment::Way;
 use super::singular::{Replay, at_target};
 use super::why::Why;
 use truegrind_arm::estimated::{Carried, RidingPoint};
-use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::model::Joints;
