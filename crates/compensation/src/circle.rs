@@ -6,8 +6,9 @@
 //! pieces, gone by the estimated arm, is farther from the intended arc than the tolerance.
 //! Stops: after [`ROUNDS`] raises, or where the arm cannot go; the circle then stays.
 
+use super::arms::Arms;
 use super::curve::{Curve, between};
-use super::rewrite::{Arms, Emit, Options};
+use super::options::{Emit, Options};
 use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, STEPS, extra_of, largest};
 use super::singular::leaps;
 use truegrind_arm::model::Joints;

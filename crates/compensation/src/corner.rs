@@ -13,8 +13,8 @@
 
 use nalgebra::Vector3;
 
+use super::arms::Arms;
 use super::curve::{Curve, beside, between};
-use super::rewrite::Arms;
 use super::segment::{Ends, STEPS, largest_from};
 use super::slack::Slack;
 use truegrind_arm::model::Joints;

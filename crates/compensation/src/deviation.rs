@@ -152,14 +152,31 @@ pub struct Block {
 }
 
 impl PathReport {
-    /// Signed deviations of the cut points that have one, before or after.
-    pub fn signed_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Vec<f64> {
-        let cut = |p: &&PathPoint| p.cutting || !self.has_cuts();
-        self.points.iter().filter(cut).filter_map(|p| which(p).map(|d| d.signed_mm())).collect()
+    /// The points by which a path is judged: the cut, or all where nothing cuts.
+    pub fn cut(&self) -> impl Iterator<Item = &PathPoint> {
+        let any = self.points.iter().any(|point| point.cutting);
+        self.points.iter().filter(move |point| point.cutting || !any)
     }
 
-    fn has_cuts(&self) -> bool {
-        self.points.iter().any(|p| p.cutting)
+    /// Signed deviations of the cut points that have one, before or after.
+    pub fn signed_mm(&self, which: fn(&PathPoint) -> Option<Deviation>) -> Vec<f64> {
+        self.cut().filter_map(|p| which(p).map(|d| d.signed_mm())).collect()
+    }
+
+    /// Root mean square of the predicted 1σ over the cut (mm); `None` where no point has one.
+    pub fn sigma_rms_mm(&self) -> Option<f64> {
+        let squares: Vec<f64> = self.cut().filter_map(|point| point.sigma_mm.map(|s| s * s)).collect();
+        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    }
+
+    /// How far off the cut has to be expected after the correction (mm): what is left and the predicted 1σ, the largest of all
+    /// points. `None` where what is left was achieved on an arm, or σ is not known.
+    pub fn expected_mm(&self) -> Option<f64> {
+        if self.after == After::Achieved {
+            return None;
+        }
+        let each = self.cut().filter_map(|p| Some(p.after?.norm_mm().hypot(p.sigma_mm?)));
+        each.filter(|mm| mm.is_finite()).reduce(f64::max)
     }
 
     /// The Table-8 block; `None` without deviations.

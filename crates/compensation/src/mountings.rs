@@ -2,10 +2,11 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::arms::Arms;
 use super::cell::{Carries, Cell};
+use super::configured::configured;
 use super::effort;
 use super::mounting::{Mounted, Mounting, Mounts, mount};
-use super::rewrite::{Arms, configured};
 use super::taught::Teaching;
 use super::why::Why;
 use truegrind_arm::inverse::effort::{Allowance, within};

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::rewrite::Plan;
+use super::outcome::Plan;
 use truegrind_surfaces::SurfaceFile;
 
 /// A point this close to the surface is on it (mm).

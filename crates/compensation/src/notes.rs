@@ -1,7 +1,8 @@
 //! What a plan says beside its motions: what was not looked at or taken on trust, what backlash and loads mean here.
 
-use super::rewrite::{Arms, Options};
-use super::solve::SolvedTargets;
+use super::arms::Arms;
+use super::options::Options;
+use super::solved::SolvedTargets;
 use truegrind_arm::effect::Effect;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, Switch};
 

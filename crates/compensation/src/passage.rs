@@ -1,11 +1,12 @@
 //! The way from the motion before to the end of a motion: how far it leaves the intended one, and what is put in for it.
 
+use super::arms::Arms;
 use super::circle::Circle;
 use super::corner::{Ways, corner_bend};
 use super::curve::{CLOSED_MM, Curve};
-use super::rewrite::{Arms, Circles, Emit, Options};
+use super::options::{Circles, Emit, Options};
 use super::segment::{Ends, Path, gap, insertions, joint_bend, straight_bend};
-use super::solve::Solved;
+use super::solved::Solved;
 use super::why::Why;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Motion, MotionKind, Switch};

@@ -1,6 +1,6 @@
 //! Whether an arm is that of a program at all.
 
-use super::rewrite::Plan;
+use super::outcome::Plan;
 use super::why::Why;
 use truegrind_arm::inverse::InverseError;
 

@@ -10,9 +10,11 @@
 
 use std::collections::BTreeMap;
 
+use super::arms::Arms;
+use super::as_it_is::{AsItIs, Guess};
 use super::assessment::{Assessment, Chosen, Knowing, assessed};
 use super::cell::Cell;
-use super::circumstance::Circumstances;
+use super::configured::monitored;
 use super::corner::{CUT_MM, cut_of_lines};
 use super::cut::Cuts;
 use super::deviation::{PathPoint, Status};
@@ -20,196 +22,24 @@ use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::notes::{load_notes, open_notes, play_note};
+use super::options::may_change;
 use super::passage::{Passage, corner};
-use super::payload::{Load, Loads};
-use super::placement::{Commanded, ObjectPlacement, Placement, Wanted};
-use super::risk::CutRisk;
+use super::placement::{Commanded, Wanted};
 use super::segment::{Ends, Path, middles_off};
-use super::solve::{AsItIs, Guess, Solved, SolvedTargets, as_joints, solve_all, take_room};
+use super::solve::{solve_all, take_room};
+use super::solved::{Solved, SolvedTargets, as_joints};
 use super::speed::{Pace, fastest};
 use super::staying::{obstacle, staying};
 use super::why::Why;
-use truegrind_arm::condition::Condition;
-use truegrind_arm::effect::Effect;
 use truegrind_arm::estimated::Estimated;
-use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::inverse::InverseError;
 use truegrind_arm::inverse::effort::{Allowance, within};
-use truegrind_arm::inverse::{Inverse, InverseError};
-use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::region::Outside;
-use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{
-    Listing, Motion, MotionKind, MotionTarget, RobTarget, Role, Switch, TargetValue,
-};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, Role, Switch, TargetValue};
 use truegrind_programs::rewrite::{Change, NewTarget};
 
-/// What is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Emit {
-    /// Moved robtargets: the program keeps its form.
-    #[default]
-    Targets,
-    /// Joint targets, for controllers whose own model should have no say.
-    Joints,
-}
-
-/// What becomes of circular motions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Circles {
-    /// Three corrected points make a circle again; the path is checked by sampling it.
-    #[default]
-    Keep,
-    /// Straight pieces within the tolerance, where the language and the arm allow it.
-    Segments,
-}
-
-/// Bounds of a rewrite.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// What is written.
-    pub emit: Emit,
-    /// What becomes of circular motions.
-    pub circles: Circles,
-    /// How far the path between two targets may leave the intended line (mm).
-    pub tolerance_mm: f64,
-    /// Largest correction of a position that is written (mm).
-    pub max_correction_mm: f64,
-    /// Largest correction of an orientation that is written (rad).
-    pub max_turn_rad: f64,
-    /// A pose with a smaller distance to singularity is refused (scaled smallest singular value, of order sin θ5 / 10).
-    pub min_singularity: f64,
-    /// How far a correction may turn a joint: so many times the size of the correction, which is the shift of the flange
-    /// over half the length of the arm's links (so that it is in rad) plus its turn (rad). An arm far from singularities
-    /// needs once that, hardly ever five times; 1/sin θ5 and the like make it more near a singularity.
-    pub joint_gain: f64,
-    /// A joint may turn by this for any correction (rad), so that rounding and small corrections are let through where
-    /// what they cost does no harm.
-    pub joint_free_rad: f64,
-    /// Whether joint targets are rewritten too: a home position says joints, not a pose.
-    pub joint_targets: bool,
-    /// Decimals of positions as they will be written, to state what rounding leaves.
-    pub position_decimals: u8,
-    /// What circumstances the program will run under. The sides from which joints come follow from its motion.
-    pub condition: Condition,
-    /// What the program says that the arm carries; absent where the payload of `condition` counts throughout.
-    pub loads: Option<Loads>,
-    /// What becomes of a cut of which not every motion can be corrected.
-    pub cuts: Cuts,
-    /// Whether the place of a path is corrected, or its shape alone.
-    pub placement: Placement,
-    /// A cut that the correction makes worse with a larger probability is left.
-    pub max_risk: f64,
-    /// Whether motions are flagged one by one ([`Why::OpenStart`]) that rest on a configuration which the controller does not
-    /// check, from a start that the text does not tell. Otherwise a note says where such a way begins.
-    pub open_starts: bool,
-    /// Whether [`Plan::points`] are filled: tables and pictures of the path need them, the rewrite itself does not.
-    pub points: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            emit: Emit::Targets,
-            circles: Circles::Keep,
-            tolerance_mm: 0.05,
-            max_correction_mm: 10.0,
-            max_turn_rad: 2.0_f64.to_radians(),
-            min_singularity: 1e-3,
-            joint_gain: 8.0,
-            joint_free_rad: 0.5_f64.to_radians(),
-            joint_targets: false,
-            position_decimals: 4,
-            condition: Condition::default(),
-            loads: None,
-            cuts: Cuts::Whole,
-            placement: Placement::Auto,
-            max_risk: 0.1,
-            open_starts: false,
-            points: true,
-        }
-    }
-}
-
-/// What became of one motion, for the contract's JSON and the table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MotionOutcome {
-    /// Index into the listing.
-    pub motion: u32,
-    /// What became of it.
-    pub status: Status,
-    /// Why.
-    pub reason: Option<Why>,
-    /// Deviation of its end before and after (mm).
-    pub before_mm: Option<f64>,
-    /// See `before_mm`; a predicted remainder.
-    pub after_mm: Option<f64>,
-    /// Predicted standard deviation of its place (mm).
-    pub sigma_mm: Option<f64>,
-    /// The same of the shape of its cut, after the best rigid registration (mm); absent outside cuts.
-    pub shape_sigma_mm: Option<f64>,
-    /// Largest bend of the path to this end that is left between targets (mm).
-    pub bend_mm: Option<f64>,
-    /// Targets put in before it.
-    pub inserted: usize,
-}
-
-/// A planned rewrite.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Plan {
-    /// What shall change.
-    pub changes: Vec<Change>,
-    /// One entry for each motion of the listing.
-    pub outcomes: Vec<MotionOutcome>,
-    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`].
-    pub points: Vec<PathPoint>,
-    /// What was assumed of tools and work objects.
-    pub notes: Vec<String>,
-    /// What was done about the place of each work object.
-    pub placements: Vec<ObjectPlacement>,
-    /// What is known of each cut.
-    pub cuts: Vec<CutRisk>,
-    /// Probability that the cuts that are corrected get worse, taken together; absent where nothing is known of them.
-    pub chance_of_worse: Option<f64>,
-}
-
-/// The two arms and their inverses, shared by all targets.
-pub(super) struct Arms<'a> {
-    pub(super) nominal: Inverse<'a>,
-    /// The arm in the middle of every play, under the stated condition.
-    pub(super) estimated: Inverse<'a>,
-    /// The same under each condition that the program brings about.
-    pub(super) acting: Circumstances<'a>,
-    pub(super) knowledge: Option<&'a Estimated>,
-}
-
-impl<'a> Arms<'a> {
-    pub(super) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
-        let arms = Self::simulated(&estimated.nominal, &estimated.model, condition);
-        Self { knowledge: Some(estimated), ..arms }
-    }
-
-    pub(super) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
-        let condition = Condition { approach: [0; 6], ..*condition };
-        Self {
-            nominal: Inverse::new(nominal, &Condition::default(), nominal),
-            estimated: Inverse::new(actual, &condition, nominal),
-            acting: Circumstances::new(actual, nominal, &condition),
-            knowledge: None,
-        }
-    }
-
-    /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
-    pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
-        let model = self.estimated.arm().model;
-        let Some(loads) = loads.filter(|_| model.effects.iter().any(Effect::needs_torque)) else {
-            return Vec::new();
-        };
-        let motions = listing.motions.iter().enumerate();
-        motions.map(|(index, motion)| loads.at(index, motion, listing, model)).collect()
-    }
-}
+pub use super::options::{Circles, Emit, Options};
+pub use super::outcome::{MotionOutcome, Plan};
 
 /// Plans the rewrite of a program.
 ///
@@ -381,57 +211,6 @@ struct Portion {
     changes: Vec<Change>,
     outcomes: Vec<MotionOutcome>,
     points: Vec<PathPoint>,
-}
-
-/// The joints that the controller takes for a flange pose with a target's configuration.
-pub(super) fn configured(
-    nominal: &Inverse<'_>,
-    flange: &Pose,
-    target: &RobTarget,
-    monitored: Switch,
-    near: Option<&Joints>,
-) -> Result<Joints, Why> {
-    let [cf1, cf4, cf6, cfx] = target.conf;
-    let wanted = Configuration { cf1, cf4, cf6, cfx };
-    if monitored == Switch::Off
-        && let Some(near) = near
-    {
-        return nominal.solve_near(flange, near).map(|s| s.joints).map_err(Why::of_inverse);
-    }
-    match nominal.solve_configured(flange, &wanted, near) {
-        Ok(solution) => Ok(solution.joints),
-        // Some arms do not use cfx: the quarter turns alone may still single out one solution.
-        Err(error @ InverseError::OtherConfiguration { nearest, .. }) => {
-            let all = nominal.all(flange);
-            // Where no configuration reaches it, none was asked for in vain: what forbids the nearest is the reason.
-            if all.is_empty() {
-                let other = nominal.solve_configured(flange, &nearest, near).err();
-                return Err(Why::of_inverse(other.unwrap_or(error)));
-            }
-            let mut fitting = all.iter().filter(|s| wanted.overshoot_rad(&s.joints) <= 1e-6);
-            match (fitting.next(), fitting.next(), monitored) {
-                (Some(only), None, _) => Ok(only.joints),
-                // Not monitored and nothing to be near to: the branch that keeps to the quarters best.
-                (_, _, Switch::Off) => all
-                    .iter()
-                    .min_by(|a, b| {
-                        wanted.overshoot_rad(&a.joints).total_cmp(&wanted.overshoot_rad(&b.joints))
-                    })
-                    .map(|s| s.joints)
-                    .ok_or_else(|| Why::of_inverse(error)),
-                _ => Err(Why::of_inverse(error)),
-            }
-        }
-        Err(error) => Err(Why::of_inverse(error)),
-    }
-}
-
-/// Whether the controller checks the configuration of a motion.
-pub(super) fn monitored(motion: &Motion) -> Switch {
-    match motion.kind {
-        MotionKind::Joint => motion.modal.conf_joint,
-        _ => motion.modal.conf_linear,
-    }
 }
 
 /// The corrected end of a motion, where its last target was worked out.
@@ -663,11 +442,6 @@ fn work<'a>(
     let change = Change { motion: index as u32, targets: new_targets, before: passage.before.clone() };
     let status = if flag.is_some() { Status::Flagged } else { Status::Changed };
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
-}
-
-/// Whether a motion is of a kind that is rewritten at all.
-pub(super) fn may_change(motion: &Motion, options: &Options) -> bool {
-    motion.left.is_none() && (motion.kind != MotionKind::AbsoluteJoint || options.joint_targets)
 }
 
 /// Why a corrected target must not be written.

@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
+use super::arms::Arms;
 use super::circumstance::picked;
 use super::curve::{beside, between};
 use super::mounting::Mounted;
-use super::rewrite::{Arms, Emit, Options};
+use super::options::{Emit, Options};
 use super::singular::leaps;
 use super::slack::Slack;
 use truegrind_arm::model::Joints;

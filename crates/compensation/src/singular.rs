@@ -17,12 +17,14 @@ use std::collections::{BTreeMap, HashSet};
 
 use rayon::prelude::*;
 
+use super::arms::Arms;
+use super::configured::{configured, monitored};
 use super::curve::Curve;
 use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
-use super::rewrite::{Arms, Emit, Options, configured, may_change, monitored};
-use super::solve::{Solved, SolvedTargets, as_joints};
+use super::options::{Emit, Options, may_change};
+use super::solved::{Solved, SolvedTargets, as_joints};
 use super::why::Why;
 use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::inverse::{Inverse, InverseError};

@@ -5,8 +5,8 @@
 //! at the ends are not looked at: a motion that is flagged here is slowed down or stopped by the controller.
 //! Checked against: the analytic joint speed of a circle about axis 1.
 
+use super::arms::Arms;
 use super::curve::Curve;
-use super::rewrite::Arms;
 use super::segment::Ends;
 use truegrind_programs::motion::SpeedValue;
 

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use super::arms::Arms;
 use super::cut::{self, Cuts};
 use super::deviation::Status;
 use super::effort;
 use super::mountings::Mountings;
-use super::rewrite::{Arms, Options};
+use super::options::Options;
 use super::singular::forbid_ways;
-use super::solve::{Solved, SolvedTargets};
+use super::solved::{Solved, SolvedTargets};
 use super::strayed::strayed;
 use super::why::Why;
 use truegrind_arm::inverse::InverseError;

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 
 use super::curve::{CLOSED_MM, Curve};
 use super::mountings::Mountings;
-use super::rewrite::{Options, may_change};
+use super::options::{Options, may_change};
 use super::segment::gap;
-use super::solve::{Solved, SolvedTargets};
+use super::solved::{Solved, SolvedTargets};
 use super::why::Why;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, TargetValue};

@@ -1,7 +1,8 @@
 //! A program without an arm to correct it for: nothing changes, and each motion says what the text tells of it.
 
 use super::deviation::Status;
-use super::rewrite::{MotionOutcome, Options, Plan, may_change};
+use super::options::{Options, may_change};
+use super::outcome::{MotionOutcome, Plan};
 use super::why::Why;
 use truegrind_programs::motion::{Listing, Motion, Reason};
 

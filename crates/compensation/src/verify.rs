@@ -5,12 +5,13 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::arms::Arms;
 use super::cell::Cell;
+use super::configured::{configured, monitored};
 use super::course::{Reached, Stop, courses};
 use super::deviation::{After, Deviation, PathPoint, PathReport, Status};
 use super::mountings::Mountings;
 use super::payload::Loads;
-use super::rewrite::{Arms, configured, monitored};
 use super::why::Why;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Carried, Estimated};

@@ -56,7 +56,7 @@ pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> 
     page.subtitle = format!("{}, {} poses in {} rows", dataset.file, found.poses, found.rows);
     page.push(verdict(found, dataset.sensor));
     page.push(Block::KeyFigures(figures(found)));
-    page.push(table(found));
+    page.push(table(found, dataset.sensor));
     page.push(iso(found, dataset.sensor));
     page
 }
@@ -120,29 +120,28 @@ fn figures(found: &Acceptance) -> Vec<KeyFigure> {
     ]
 }
 
-/// Mean, standard deviation, RMS and largest error of both arms.
-pub fn table(found: &Acceptance) -> Table {
+/// The figures of both arms; a signed mean where the sensor tells a sign.
+pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     let mut table = Table::new(
         "Errors",
         vec![
             Column::text("arm", "Arm"),
-            Column::number("mean_mm", "Mean", "mm", 4),
-            Column::number("mean_absolute_mm", "Mean |e|", "mm", 4),
-            Column::number("sd_mm", "SD", "mm", 4),
-            Column::number("rmse_mm", "RMS", "mm", 4),
-            Column::number("max_mm", "Largest", "mm", 4),
-            Column::count("rows", "Rows"),
+            Column::number("rmse_mm", "RMSE", "mm", 3),
+            Column::number("mean_absolute_mm", "mean |e|", "mm", 3),
+            Column::number("standard_deviation_mm", "SD", "mm", 3),
+            Column::number("max_mm", "max", "mm", 3),
+            Column::number("mean_mm", "signed mean", "mm", 3),
         ],
     );
+    let signed = sensor == Sensor::Cable;
     for (name, errors) in [("data sheet, sensor registered", &found.nominal), ("estimated", &found.model)] {
         table.push([
             name.into(),
-            errors.mean.into(),
+            errors.rmse.into(),
             errors.mean_absolute.into(),
             errors.standard_deviation.into(),
-            errors.rmse.into(),
             errors.max.into(),
-            errors.count.into(),
+            Some(errors.mean).filter(|_| signed).into(),
         ]);
     }
     table

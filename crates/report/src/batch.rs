@@ -262,7 +262,7 @@ fn read_table(rows: &[Row]) -> Table {
         let (Some(column), Some(folder)) = (place(key, &table), shared_folder(&names)) else { continue };
         for row in &mut table.rows {
             if let Cell::Text(name) = &mut row[column] {
-                *name = name.replace(folder, "");
+                *name = name.strip_prefix(folder).unwrap_or(name).to_owned();
             }
         }
         table.notes.push(format!("{what} {folder}"));
@@ -362,9 +362,9 @@ fn verdict(rows: &[Row]) -> Verdict {
     let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
     let folder = shared_folder(&names).unwrap_or_default();
     let named = |row: &Row, words: &str| {
-        let file = row.file.replace(folder, "");
+        let file = row.file.strip_prefix(folder).unwrap_or(&row.file);
         // Many errors begin with the file's name.
-        match words.strip_prefix(&file) {
+        match words.strip_prefix(file) {
             Some(rest) if rest.starts_with(':') => words.to_owned(),
             _ => format!("{file}: {words}"),
         }

@@ -11,7 +11,7 @@ mod summary;
 
 use serde_json::{Value, json};
 
-use self::side::{AFTER, BEFORE, Side, by_program, cut, has, intended, sigma_rms};
+use self::side::{AFTER, BEFORE, Side, by_program, has, intended};
 use self::words::{decimals, meaning, named, notes, words};
 use super::document::{Block, Document, KeyFigure, Verdict};
 use super::status::Status;
@@ -436,10 +436,10 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             reasons.push(format!("{} makes the path worse: up to {}", report.model, known(Some(*after))));
         }
         // Under a model that corrects no cut there is no correction to be sure of.
-        let corrects = cut(report).any(|p| !matches!(p.status, Fate::Left));
+        let corrects = report.cut().any(|p| !matches!(p.status, Fate::Left));
         if !corrects {
             reasons.push(format!("under {} every cut stays as it is", report.model));
-        } else if let (Some(sigma), Some(rms)) = (sigma_rms(report), before_rms(report))
+        } else if let (Some(sigma), Some(rms)) = (report.sigma_rms_mm(), before_rms(report))
             && sigma > rms
         {
             if status == Status::Good {
@@ -461,9 +461,9 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
             format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
         }
         [(report, before, after)]
-            if report.after == After::PredictedRemainder && sigma_rms(report).is_some() =>
+            if report.after == After::PredictedRemainder && report.sigma_rms_mm().is_some() =>
         {
-            let sigma = sigma_rms(report).unwrap_or(0.0);
+            let sigma = report.sigma_rms_mm().unwrap_or(0.0);
             format!(
                 "The largest deviation goes from {before:.3} mm to an expected {:.3} mm (1σ); held-out error of the model {}",
                 after.hypot(sigma),
@@ -475,7 +475,7 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
              model {}",
             decimals(report.after),
             meaning(report.after),
-            known(sigma_rms(report)),
+            known(report.sigma_rms_mm()),
             known(report.held_out_mm),
         ),
         [(first, ..), ..] => {
@@ -509,7 +509,7 @@ fn verdict(reports: &[&PathReport]) -> Verdict {
 /// Root mean square of the sizes of the deviations of the cut as programmed (mm).
 fn before_rms(report: &PathReport) -> Option<f64> {
     let squares: Vec<f64> =
-        cut(report).filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();
+        report.cut().filter_map(|p| p.before.map(|d| d.vector_mm.norm_squared())).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
@@ -531,9 +531,7 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             }
             // What the solver leaves says nothing of the arm: what it has to be expected to do does.
             After::PredictedRemainder => {
-                let expected =
-                    max(report, AFTER).zip(sigma_rms(report)).map(|(after, sigma)| after.hypot(sigma));
-                ("Expected after", expected, "1σ of the model, RMS over the cut".to_owned())
+                ("Expected after", report.expected_mm(), "1σ of the model, largest over the cut".to_owned())
             }
         };
         let label = if reports.len() > 1 { format!("{label}, {}", report.model) } else { label.to_owned() };
@@ -547,7 +545,9 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
             ));
         }
         if report.after == After::Achieved || !has(report, AFTER) {
-            figures.push(KeyFigure::new("Predicted 1σ", sigma_rms(report), 3, "mm").note("RMS over the cut"));
+            figures.push(
+                KeyFigure::new("Predicted 1σ", report.sigma_rms_mm(), 3, "mm").note("RMS over the cut"),
+            );
         }
         figures.push(
             KeyFigure::new("Held-out error of the model", report.held_out_mm, 3, "mm")

@@ -21,7 +21,6 @@ use super::extension::Subject;
 use super::marginal::{self, Variances};
 use crate::identification::calibration::flange_torques;
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split;
 use truegrind_arm::model::Model;
 
 /// What a group of functions moves, and by what it changes.
@@ -89,8 +88,6 @@ pub struct Functions {
     pub columns: DMatrix<f64>,
     /// Which columns belong to which group.
     pub groups: Vec<(Group, std::ops::Range<usize>)>,
-    /// Number of the pose of each observation.
-    poses: Vec<usize>,
 }
 
 impl Functions {
@@ -99,8 +96,7 @@ impl Functions {
         let dataset = &subject.observed.dataset;
         let slopes = &linear.slopes;
         let (n, per) = (linear.observations, linear.per);
-        let poses = split::pose_of_rows(dataset);
-        let mut out = Self { columns: DMatrix::zeros(n * per, 0), groups: Vec::new(), poses };
+        let mut out = Self { columns: DMatrix::zeros(n * per, 0), groups: Vec::new() };
         let courses = cosines(n);
         let frame: Vec<DVector<f64>> = columns_of(&slopes.by_frame);
         let single = |slope: &DVector<f64>| vec![slope.clone()];
@@ -291,9 +287,9 @@ impl Discrepancy {
         let columns =
             if scaled.is_empty() { DMatrix::zeros(design.rows(), 0) } else { DMatrix::from_columns(&scaled) };
         let correlation =
-            if rho == 0.0 { correlation(&left, linear.per, numbers, &functions.poses) } else { rho };
+            if rho == 0.0 { correlation(&left, linear.per, numbers, &linear.slopes.poses) } else { rho };
         let reach =
-            if rho == 0.0 && correlation != 0.0 { reach(&left, linear.per, &functions.poses) } else { 0 };
+            if rho == 0.0 && correlation != 0.0 { reach(&left, linear.per, &linear.slopes.poses) } else { 0 };
         let push_mm =
             push_mm.chunks(linear.per).map(|row| row.iter().map(|l| l * l).sum::<f64>().sqrt()).collect();
         Self { sizes, columns, in_time, carried, push_mm, evidence, noise, correlation, reach }

@@ -153,7 +153,8 @@ fn plain_statistic(information: &DMatrix<f64>, gradient: &DVector<f64>) -> (f64,
 }
 
 /// The same with the covariance of the gradient taken from the residuals that the candidate leaves: Σ over poses of the outer
-/// products, since readings of one pose are no two witnesses of what the model gets wrong there.
+/// products, since readings of one pose are no two witnesses of what the model gets wrong there. Of a design of all rows: the
+/// slopes, and so the numbers of poses, stay those of all where a design is of a part.
 fn scatter_statistic(
     design: &Design,
     columns: &DMatrix<f64>,
@@ -167,8 +168,9 @@ fn scatter_statistic(
     pure.column_iter_mut().zip(sizes).for_each(|(mut column, size)| column *= *size);
     let left = &design.residual - &pure * step;
     let poses = &design.slopes.poses;
+    debug_assert_eq!(poses.len(), design.observations, "a design of a part of the rows");
     let mut by_pose = DMatrix::zeros(k, poses.iter().max().map_or(0, |p| p + 1));
-    for (i, &pose) in poses.iter().enumerate().take(design.observations) {
+    for (i, &pose) in poses.iter().enumerate() {
         let mut g = by_pose.column_mut(pose);
         for s in i * design.per..(i + 1) * design.per {
             g.axpy(left[s], &pure.row(s).transpose(), 1.0);

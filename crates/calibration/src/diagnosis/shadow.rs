@@ -153,7 +153,12 @@ impl Shadows<'_> {
         let other: Vec<usize> = warm.filter(|&k| !first.moves_the_same(&self.causes[k])).collect();
         let theirs = self.worth.own_of(&other);
         let growth = other.iter().any(|&k| self.causes[k].is_of_the_arm());
-        let share = if first.is_of_the_arm() { GROWTH } else { f64::from(u8::from(growth)) / GROWTH };
+        let share = match (first.is_of_the_arm(), growth) {
+            (true, _) => GROWTH,
+            (false, true) => 1.0 / GROWTH,
+            // Nothing else of it is in the arm.
+            (false, false) => 0.0,
+        };
         (own < share * theirs).then(|| {
             format!("something else that follows the same warmth explains {theirs:.4} mm, this {own:.4} mm: it may be a part of that")
         })

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rerun::components::{Color, Radius};
 use rerun::{Arrows3D, LineStrips3D, Mesh3D, Points3D};
 
-use super::scene::{PathScene, Plan, expected_mm, intended, reached};
+use super::scene::{PathScene, Plan, intended, reached};
 use crate::colour::{BEFORE, FLAGGED, INTENDED, REFUSED, Rgba, TOOL, TRAVEL, WORKPIECE, after};
 use crate::legend;
 use crate::recording::{Store, VisualError};
@@ -35,7 +35,7 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
     for (k, report) in scene.reports.iter().enumerate() {
         let title =
             if scene.reports.len() > 1 { format!("after · {}", report.model) } else { "after".to_owned() };
-        let expected = expected_mm(plan, report);
+        let expected = report.expected_mm();
         let drawn = Run { name: format!("after/{}", plan.names[k]), title, colour: after(k), expected };
         run(store, plan, report, |p| p.after, &drawn, &mut labels)?;
     }

@@ -9,7 +9,7 @@ use crate::recording::VisualError;
 use crate::shape::Shape;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
-use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport};
+use truegrind_compensation::deviation::{Deviation, PathPoint, PathReport};
 use truegrind_math::se3::Pose;
 use truegrind_surfaces::Tessellation;
 
@@ -141,18 +141,6 @@ impl<'a> Plan<'a> {
             "before".to_owned()
         }
     }
-}
-
-/// The largest of what has to be expected of a path after the correction (mm): what is left and the predicted 1σ. `None` where
-/// what is left was achieved on an arm, or σ is not known.
-pub(super) fn expected_mm(plan: &Plan<'_>, report: &PathReport) -> Option<f64> {
-    if report.after == After::Achieved {
-        return None;
-    }
-    let cut = report.points.iter().filter(|p| plan.cuts(p));
-    cut.filter_map(|p| Some(p.after?.norm_mm().hypot(p.sigma_mm?)))
-        .filter(|mm| mm.is_finite())
-        .reduce(f64::max)
 }
 
 /// Where the tool shall be, in the base.

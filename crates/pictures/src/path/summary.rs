@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::scene::{PathScene, Plan, expected_mm};
+use super::scene::{PathScene, Plan};
 use crate::markdown::{cell, line, number};
 use crate::recording::{Store, VisualError};
 use truegrind_compensation::deviation::{After, Block, Deviation, PathPoint, PathReport, Status};
@@ -29,12 +29,15 @@ fn markdown(scene: &PathScene<'_>, plan: &Plan<'_>) -> String {
 /// How far off it is before and after, in one line.
 fn answer(text: &mut String, plan: &Plan<'_>) {
     let report = plan.first;
-    let cut = || report.points.iter().filter(|p| plan.cuts(p));
     let largest = |which: fn(&PathPoint) -> Option<Deviation>| {
-        cut().filter_map(|p| which(p).map(|d| d.norm_mm())).filter(|mm| mm.is_finite()).reduce(f64::max)
+        report
+            .cut()
+            .filter_map(|p| which(p).map(|d| d.norm_mm()))
+            .filter(|mm| mm.is_finite())
+            .reduce(f64::max)
     };
     let Some(before) = largest(|p| p.before) else { return };
-    let after = match (expected_mm(plan, report), largest(|p| p.after)) {
+    let after = match (report.expected_mm(), largest(|p| p.after)) {
         (Some(mm), Some(_)) => format!(", an expected **{mm:.3} mm** (1σ) after"),
         (None, Some(mm)) if report.after == After::Achieved => format!(", **{mm:.3} mm** after"),
         _ => String::new(),
@@ -83,8 +86,6 @@ fn block(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
 /// What "after" is, and how far it may be trusted.
 fn meaning(text: &mut String, scene: &PathScene<'_>) {
     for report in scene.reports {
-        let sigmas: Vec<f64> = report.points.iter().filter_map(|p| p.sigma_mm).collect();
-        let sigma = (!sigmas.is_empty()).then(|| sigmas.iter().sum::<f64>() / sigmas.len() as f64);
         let kind = match report.after {
             After::PredictedRemainder => {
                 "*after* is the **predicted remainder** (rounding, interpolation, inverse kinematics), not what the arm will do"
@@ -95,7 +96,7 @@ fn meaning(text: &mut String, scene: &PathScene<'_>) {
             text,
             "**{}**: {kind}; predicted 1σ {} mm, held-out error {} mm.\n",
             line(&report.model),
-            number(sigma),
+            number(report.sigma_rms_mm()),
             number(report.held_out_mm)
         );
     }

@@ -1,6 +1,6 @@
 //! Pictures of a path: its deviation along the way, how often each size occurs, and where on the part.
 
-use super::side::{AFTER, BEFORE, Side, cut, has, intended};
+use super::side::{AFTER, BEFORE, Side, has, intended};
 use super::words::meaning;
 use crate::document::Figure;
 use crate::plot::{
@@ -58,7 +58,7 @@ fn shown<'a>(reports: &[&'a PathReport]) -> Vec<Shown<'a>> {
 const SIGNED: &str = "deviation along the normal";
 
 fn quantity(reports: &[&PathReport]) -> &'static str {
-    let signed = reports.iter().flat_map(|report| cut(report)).all(|point| point.normal.is_some());
+    let signed = reports.iter().flat_map(|report| report.cut()).all(|point| point.normal.is_some());
     if signed { SIGNED } else { "size of the deviation" }
 }
 
@@ -218,7 +218,8 @@ fn plan(reports: &[&PathReport]) -> Option<Figure> {
 /// The two axes of the work object along which the path is longest, in their order.
 fn widest(report: &PathReport) -> Option<[usize; 2]> {
     let extent = |axis: usize| {
-        let ends = cut(report)
+        let ends = report
+            .cut()
             .map(|point| intended(point)[axis])
             .fold((f64::INFINITY, f64::NEG_INFINITY), |ends, v| (ends.0.min(v), ends.1.max(v)));
         ends.1 - ends.0

@@ -28,18 +28,6 @@ pub(super) fn intended(point: &PathPoint) -> Point3<f64> {
     point.base_from_object.inverse_transform_point(&Point3::from(point.intended.translation.vector))
 }
 
-/// The points that a summary is made of: the cut, or all where nothing cuts.
-pub(super) fn cut(report: &PathReport) -> impl Iterator<Item = &PathPoint> {
-    let any = report.points.iter().any(|point| point.cutting);
-    report.points.iter().filter(move |point| point.cutting || !any)
-}
-
 pub(super) fn has(report: &PathReport, side: Side) -> bool {
     report.points.iter().any(|point| side(point).is_some())
-}
-
-/// Root mean square of the predicted 1σ over the cut (mm); `None` where no point has one.
-pub(super) fn sigma_rms(report: &PathReport) -> Option<f64> {
-    let squares: Vec<f64> = cut(report).filter_map(|point| point.sigma_mm.map(|s| s * s)).collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }

@@ -1,6 +1,6 @@
 //! The summary block of ltlm-2024 Table 8, and the shape error after rigid registration.
 
-use super::side::{AFTER, BEFORE, Side, by_program, cut, has, sigma_rms};
+use super::side::{AFTER, BEFORE, Side, by_program, has};
 use super::words::{REMAINDER, meaning};
 use crate::table::{Cell, Column, Table};
 use truegrind_compensation::deviation::{After, Block, PathReport};
@@ -41,11 +41,11 @@ pub(super) fn block(reports: &[&PathReport], programs: bool) -> Table {
         cells.extend([all.mean, all.mean_absolute, all.standard_deviation, all.max].map(Cell::from));
         // What a program does on an actual arm before anything is corrected is no model's prediction.
         let model = (!row.before || row.report.after != After::Achieved).then_some(row.report);
-        cells.extend([model.and_then(sigma_rms).into(), model.and_then(|m| m.held_out_mm).into()]);
+        cells.extend([model.and_then(|m| m.sigma_rms_mm()).into(), model.and_then(|m| m.held_out_mm).into()]);
         table.push(cells);
     }
     let (mut with, mut without) = (0, 0);
-    for point in reports.iter().flat_map(|report| cut(report)) {
+    for point in reports.iter().flat_map(|report| report.cut()) {
         match point.normal {
             Some(_) => with += 1,
             None => without += 1,

@@ -1,0 +1,47 @@
+//! The arm as the controller believes it to be and the better one, with what all targets share of them.
+
+use super::circumstance::Circumstances;
+use super::payload::{Load, Loads};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::inverse::Inverse;
+use truegrind_arm::model::Model;
+use truegrind_programs::motion::Listing;
+
+/// The two arms and their inverses, shared by all targets.
+pub(super) struct Arms<'a> {
+    pub(super) nominal: Inverse<'a>,
+    /// The arm in the middle of every play, under the stated condition.
+    pub(super) estimated: Inverse<'a>,
+    /// The same under each condition that the program brings about.
+    pub(super) acting: Circumstances<'a>,
+    pub(super) knowledge: Option<&'a Estimated>,
+}
+
+impl<'a> Arms<'a> {
+    pub(super) fn of(estimated: &'a Estimated, condition: &Condition) -> Self {
+        let arms = Self::simulated(&estimated.nominal, &estimated.model, condition);
+        Self { knowledge: Some(estimated), ..arms }
+    }
+
+    pub(super) fn simulated(nominal: &'a Model, actual: &'a Model, condition: &Condition) -> Self {
+        let condition = Condition { approach: [0; 6], ..*condition };
+        Self {
+            nominal: Inverse::new(nominal, &Condition::default(), nominal),
+            estimated: Inverse::new(actual, &condition, nominal),
+            acting: Circumstances::new(actual, nominal, &condition),
+            knowledge: None,
+        }
+    }
+
+    /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
+    pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
+        let model = self.estimated.arm().model;
+        let Some(loads) = loads.filter(|_| model.effects.iter().any(Effect::needs_torque)) else {
+            return Vec::new();
+        };
+        let motions = listing.motions.iter().enumerate();
+        motions.map(|(index, motion)| loads.at(index, motion, listing, model)).collect()
+    }
+}

@@ -1,0 +1,112 @@
+//! What is worked out of each target, and where it is found.
+
+use super::as_it_is::Guess;
+use super::deviation::Deviation;
+use super::options::Emit;
+use super::segment::Way;
+use super::why::Why;
+use truegrind_arm::inverse::configuration::Configuration;
+use truegrind_arm::model::Joints;
+use truegrind_arm::region::Outside;
+use truegrind_math::se3::Pose;
+use truegrind_programs::motion::{Motion, MotionKind, MotionTarget, Role, TargetValue};
+
+/// Motions that one thread takes at a time.
+pub(super) const PORTION: usize = 64;
+
+/// One target worked out.
+#[derive(Debug, Clone)]
+pub(super) struct Solved {
+    pub(super) mounted: usize,
+    pub(super) meant: Pose,
+    pub(super) before: Joints,
+    pub(super) after: Joints,
+    pub(super) told: Pose,
+    pub(super) conf_before: Configuration,
+    pub(super) conf: Configuration,
+    pub(super) deviation_before: Deviation,
+    pub(super) deviation_after: Deviation,
+    pub(super) sigma_mm: f64,
+    /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
+    pub(super) shape_sigma_mm: Option<f64>,
+    /// What of either comes from joints whose side is not known (mm).
+    pub(super) in_play_mm: f64,
+    pub(super) outside: Option<Outside>,
+    pub(super) singularity: f64,
+    /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
+    pub(super) margins: [[f64; 3]; 2],
+    /// Why it must not be written.
+    pub(super) forbidden: Option<Why>,
+    /// The condition under which the arm comes there.
+    pub(super) place: usize,
+    /// Whether `before` rests on a guess.
+    pub(super) guess: Guess,
+}
+
+impl Solved {
+    /// How far the commanded position lies from the intended one (mm): what the program's numbers move by.
+    pub(super) fn shift_mm(&self) -> f64 {
+        (self.told.translation.vector - self.meant.translation.vector).norm()
+    }
+}
+
+/// The targets of all motions.
+pub(super) struct SolvedTargets {
+    /// What [`SolvedTargets::forbid`] did: portion and place in it, and what was forbidden there before.
+    pub(super) forbade: Vec<(usize, usize, Option<Why>)>,
+    /// Where the targets of each motion begin, and the end of the last.
+    pub(super) first: Vec<usize>,
+    /// The targets of so many motions each: one list of all would be copied together once more.
+    pub(super) portions: Vec<Vec<Result<Solved, Why>>>,
+    /// The conditions on the way to the end of each motion; empty where no joint has play.
+    pub(super) ways: Vec<Way>,
+    /// Motions of which the configuration is not checked and the start not known; not those that go on from there.
+    pub(super) guessed: Vec<u32>,
+}
+
+impl SolvedTargets {
+    /// Forbids that a motion is changed; of no effect where its last target was not worked out.
+    pub(super) fn forbid(&mut self, motion: usize, why: Why) {
+        let portion = motion / PORTION;
+        let end = self.first[motion + 1] - self.first[portion * PORTION];
+        if end > 0
+            && let Some(Ok(solved)) = self.portions[portion].get_mut(end - 1)
+        {
+            self.forbade.push((portion, end - 1, solved.forbidden));
+            solved.forbidden = Some(why);
+        }
+    }
+
+    /// Takes back all that [`SolvedTargets::forbid`] did: what was worked out serves another round.
+    pub(super) fn allow_again(&mut self) {
+        for (portion, place, before) in self.forbade.drain(..).rev() {
+            if let Ok(solved) = &mut self.portions[portion][place] {
+                solved.forbidden = before;
+            }
+        }
+    }
+
+    /// The targets of one motion; none where the motion must be left.
+    pub(super) fn of(&self, motion: usize) -> &[Result<Solved, Why>] {
+        let portion = motion / PORTION;
+        let begin = self.first[portion * PORTION];
+        &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
+    }
+
+    /// The conditions on the way to the end of a motion, at which the arm comes under `place`.
+    pub(super) fn way(&self, motion: usize, place: usize) -> Way {
+        self.ways.get(motion).cloned().unwrap_or(Way { first: place, later: Vec::new() })
+    }
+
+    /// At how many targets a side is not known, and how far the tool may be off for it at most (mm).
+    pub(super) fn in_play(&self) -> (usize, f64) {
+        let open = self.portions.iter().flatten().flatten().map(|s| s.in_play_mm).filter(|mm| *mm > 0.0);
+        open.fold((0, 0.0), |(count, most), mm| (count + 1, f64::max(most, mm)))
+    }
+}
+
+/// Whether a target is written as joints.
+pub(super) fn as_joints(motion: &Motion, target: &MotionTarget, emit: Emit) -> bool {
+    let may = target.role == Role::To && motion.kind != MotionKind::Circular;
+    matches!(target.value, Ok(TargetValue::Joint(_))) || (emit == Emit::Joints && may)
+}
