@@ -119,6 +119,8 @@ struct Course {
     /// What must not move: because of origins, because of increments.
     held: [[Gathered; AXES]; 2],
     motions: std::ops::Range<u32>,
+    /// Whether the axes may turn anywhere in the file: where ways meet they may come from another frame.
+    turns: bool,
 }
 
 /// The two reasons in [`Course::held`].
@@ -165,11 +167,23 @@ impl Course {
                 }
                 self.origin.iter_mut().for_each(|origin| origin.origins = true);
             }
-            Event::Start | Event::Unknown | Event::Lost(_) | Event::Motion(_) => {}
+            Event::Unknown => self.turn(),
+            Event::Start | Event::Lost(_) | Event::Motion(_) => {}
         }
     }
 
+    /// X, Y and Z may be other directions from here on.
+    fn turn(&mut self) {
+        let [x, y, z, ..] = self.place;
+        self.place[..3].fill(x.and(y).and(z));
+        let [x, y, z] = self.origin;
+        self.origin.fill(x.and(y).and(z));
+    }
+
     fn leave(&mut self) {
+        if self.turns {
+            self.turn();
+        }
         for (all, place) in self.places.iter_mut().zip(&self.place) {
             all.add(place);
         }
@@ -207,12 +221,15 @@ impl Task<'_> {
                 refused.extend(gathered.on.iter().copied().chain(all).map(|motion| (motion, reason)));
             }
         };
-        for event in &self.events {
+        for (at, event) in self.events.iter().enumerate() {
             match *event {
                 Event::Start => {
                     end(&course);
                     let next = course.motions.end;
-                    course = Course { motions: next..next, ..Course::default() };
+                    let of_file = self.events[at + 1..].iter().take_while(|event| **event != Event::Start);
+                    let mut moving = of_file.skip_while(|event| !matches!(event, Event::Motion(_)));
+                    let turns = moving.any(|event| *event == Event::Unknown);
+                    course = Course { motions: next..next, turns, ..Course::default() };
                 }
                 Event::Motion(motion) => {
                     course.motions.end = motion + 1;

@@ -53,6 +53,20 @@ fn a_turned_frame_passes_on_every_axis() {
     check(Siemens, &[(&turned, &listed), (&plain, &[None, None, path, left(NotFollowed)])]);
 }
 
+/// The same where the motion comes from a jump: what a path that stays hangs on is followed on every way to it.
+#[test]
+fn a_turned_frame_passes_on_every_axis_of_what_was_before_a_jump() {
+    let body = |turn: &str| {
+        format!(
+            "R2=5\nX10 Y5 Z1\nIF R2<>0 GOTOF M_1\nX11 Y6 Z2\nM_1:\nG1 X20 Z4\n{turn}\nY=R2\n\
+             CIP X40 Y0 I1=30 J1=10 K1=50"
+        )
+    };
+    let kept = |turn: &str| rewritten(Siemens, &body(turn)).contains("X10 Y5 Z1\n");
+    assert!(kept("AROT Z90"));
+    assert!(!kept("G4 F1"), "without a turn X and Z are stated, and Y is");
+}
+
 #[test]
 fn words_that_such_a_path_leaves_out_hold_what_they_held() {
     assert_eq!(
