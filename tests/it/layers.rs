@@ -211,15 +211,9 @@ fn modules(folder: &Path) -> BTreeMap<String, String> {
     code(folder).into_iter().map(|(file, text)| (name(&file), text)).collect()
 }
 
-/// Crates whose files still form circles: to be taken off this list, never to be added to.
-const STILL_ROUND: [&str; 1] = ["programs"];
-
 #[test]
 fn the_files_of_a_crate_form_no_circle() {
     for (name, _) in USES {
-        if STILL_ROUND.contains(&name) {
-            continue;
-        }
         let modules = modules(&root().join("crates").join(name).join("src"));
         let found = circles(&graph(&modules));
         assert!(found.is_empty(), "{name}: {found:#?}");

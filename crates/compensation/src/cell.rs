@@ -35,7 +35,6 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use super::taught::{taught_frame, taught_tcp};
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::{FARTHEST_MM, Listing, Tool, WorkObject};
 use truegrind_programs::nc::orientation::Angles;
@@ -343,7 +342,8 @@ impl Cell {
     /// # Errors
     /// [`CellError`], with key and reason.
     pub fn from_toml(text: &str) -> Result<Self, CellError> {
-        let cell = open::read(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        let (cell, open) = open::read::<Cell>(text).map_err(|e| CellError::Syntax(e.to_string()))?;
+        let cell = Cell { open, ..cell };
         if let Some(found) = cell.angles.as_ref().filter(|word| Angles::of(word).is_none()) {
             return Err(CellError::Angles { found: found.clone() });
         }

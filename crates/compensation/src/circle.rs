@@ -9,8 +9,9 @@
 use super::arms::Arms;
 use super::curve::{Curve, between};
 use super::options::{Emit, Options};
-use super::segment::{CHORD_MM, Ends, PIECE_MM, Path, STEPS, extra_of, largest};
+use super::segment::{Ends, PIECE_MM, Path, STEPS, extra_of, largest};
 use super::singular::leaps;
+use super::way::CHORD_MM;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::Motion;

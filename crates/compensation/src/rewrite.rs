@@ -444,29 +444,6 @@ fn work<'a>(
     Worked { passage: Some(passage), ..finish(outcome, status, flag, Some(change), point) }
 }
 
-/// Why a corrected target must not be written.
-pub(super) fn forbidden(solved: &Solved, arms: &Arms<'_>, options: &Options) -> Option<Why> {
-    let shift = solved.shift_mm();
-    if !(shift <= options.max_correction_mm) {
-        return Some(Why::TooFar { mm: shift });
-    }
-    let turn = solved.told.rotation.angle_to(&solved.meant.rotation);
-    if !(turn <= options.max_turn_rad) {
-        return Some(Why::TooMuchTurn { deg: turn.to_degrees() });
-    }
-    if let Some(joint) = arms.nominal.arm().model.limits.violated(&solved.after) {
-        return Some(Why::OutsideLimits { joint });
-    }
-    if solved.singularity < options.min_singularity {
-        return Some(Why::NearSingularity);
-    }
-    // Without branches cfx is 0 everywhere.
-    if solved.conf_before.cfx != solved.conf.cfx {
-        return Some(Why::OtherBranch);
-    }
-    None
-}
-
 /// A joint that would turn faster than it can at the programmed speed: the controller slows down there, or stops.
 fn too_fast(
     index: usize,

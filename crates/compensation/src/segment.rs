@@ -9,6 +9,7 @@ use super::mounting::Mounted;
 use super::options::{Emit, Options};
 use super::singular::leaps;
 use super::slack::Slack;
+use super::way::{CHORD_MM, Way};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
@@ -35,20 +36,7 @@ pub(super) struct Ends<'a> {
     pub(super) external: Option<&'a [Option<f64>; 6]>,
 }
 
-/// Under which condition the arm goes along a path: from a share of the way on, a place in the list of conditions.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Way {
-    /// From the start on.
-    pub(super) first: usize,
-    /// Where it changes, because a joint turns: share of the way, and from there on.
-    pub(super) later: Vec<(f64, usize)>,
-}
-
 impl Way {
-    pub(super) fn at(&self, s: f64) -> usize {
-        self.later.iter().rev().find(|(from, _)| *from <= s).map_or(self.first, |later| later.1)
-    }
-
     /// At which shares of the way from `start` a joint has a play to take up, or the load is another: under which
     /// condition the arm comes there, and under which it goes on.
     fn changes(&self, start: &Ends<'_>) -> Vec<Turn> {
@@ -214,10 +202,6 @@ fn pieces_of(from: &Ends<'_>, to: &Ends<'_>) -> usize {
     let length = gap(&from.meant.translation.vector, &to.meant.translation.vector);
     ((length / PIECE_MM).ceil() as usize).clamp(1, 25) * 2
 }
-
-/// Between two samples the distance from the intended path is known to this (mm): their chord leaves the distance half
-/// way by no more.
-pub(super) const CHORD_MM: f64 = 0.002;
 
 /// How often a piece is halved at most.
 const HALVINGS: u32 = 5;

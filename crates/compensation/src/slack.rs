@@ -11,7 +11,7 @@
 
 use super::circumstance::Circumstances;
 use super::course::Sides;
-use super::segment::CHORD_MM;
+use super::way::CHORD_MM;
 use truegrind_arm::model::{Joints, PreparedModel};
 use truegrind_math::se3::Pose;
 

@@ -3,7 +3,7 @@
 use super::as_it_is::Guess;
 use super::deviation::Deviation;
 use super::options::Emit;
-use super::segment::Way;
+use super::way::Way;
 use super::why::Why;
 use truegrind_arm::inverse::configuration::Configuration;
 use truegrind_arm::model::Joints;

@@ -31,6 +31,7 @@
 pub mod tree;
 pub mod shared;
 pub mod edit;
+pub mod label;
 pub mod diff;
 pub mod motion;
 pub mod rewrite;

@@ -581,7 +581,7 @@ impl fmt::Display for Misstated {
 impl Listing {
     /// How comments of an NC program call a tool or work offset.
     pub fn labels_of(&self, number: &str) -> impl Iterator<Item = &str> {
-        let here = self.labels.iter().filter(move |(other, _)| super::nc::setup::same(other, number));
+        let here = self.labels.iter().filter(move |(other, _)| super::label::same(other, number));
         here.map(|(_, label)| label.as_str())
     }
 

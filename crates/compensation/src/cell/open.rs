@@ -2,17 +2,16 @@
 //!
 //! Such a file is read, so that it can be filled in piece by piece, and nothing is corrected with it.
 
+use serde::de::DeserializeOwned;
 use toml::{Table, Value};
-
-use super::Cell;
 
 /// What stands where a person has to say something.
 pub(super) const MARK: &str = "?";
 
-/// Reads a cell file. Where nothing is open, the text itself is read, so that errors have their line.
-pub(super) fn read(text: &str) -> Result<Cell, toml::de::Error> {
+/// Reads a cell file, and says what is open in it. Where nothing is, the text itself is read, so that errors have their line.
+pub(super) fn read<T: DeserializeOwned>(text: &str) -> Result<(T, Vec<String>), toml::de::Error> {
     if !text.contains("\"?\"") && !text.contains("'?'") {
-        return toml::from_str(text);
+        return Ok((toml::from_str(text)?, Vec::new()));
     }
     let mut table: Table = text.parse()?;
     let mut open = Vec::new();
@@ -27,8 +26,7 @@ pub(super) fn read(text: &str) -> Result<Cell, toml::de::Error> {
             entries_open(kind, entry, &mut open);
         }
     }
-    let cell: Cell = table.try_into()?;
-    Ok(Cell { open, ..cell })
+    Ok((table.try_into()?, open))
 }
 
 /// Takes the open keys out of one entry; what must be there gets a value that is never used.

@@ -20,9 +20,10 @@ use truegrind_arm::estimated::{Estimated, Judgement, Provenance, StageErrors, Ve
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::link_parameters;
 use truegrind_arm::region::Region;
-use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin, taught_frame, taught_tcp};
+use truegrind_compensation::cell::{Cell, CellFrame, FrameOrigin};
 use truegrind_compensation::deviation::{After, PathReport, Status};
 use truegrind_compensation::rewrite::{Emit, Options, Plan, plan};
+use truegrind_compensation::taught::{taught_frame, taught_tcp};
 use truegrind_compensation::verify::{Acting, Judged, judge};
 use truegrind_compensation::why::Why;
 use truegrind_math::se3::Pose;

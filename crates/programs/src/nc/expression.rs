@@ -10,6 +10,9 @@ use super::token::Token;
 use crate::motion::Reason;
 use crate::rapid::number;
 
+/// A control holds no larger number in a word.
+pub(super) const LARGEST: f64 = 1e9;
+
 /// How deeply expressions may nest.
 const DEPTH: u32 = 64;
 

@@ -9,6 +9,7 @@ mod again;
 mod arcs;
 mod ends;
 mod long;
+mod now;
 mod origins;
 mod pen;
 mod slots;
@@ -17,7 +18,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::UnitQuaternion;
 
-use self::again::Now;
+use self::now::Now;
 use self::pen::{Pen, differs};
 use self::slots::{ANGLES, AXES, CENTRE, ORDER, RADIUS, SPIN, Slots, VECTOR, said, slots};
 use super::arc::{Arc, Plane};

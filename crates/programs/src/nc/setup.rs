@@ -12,6 +12,8 @@ use super::dialect::Dialect;
 use super::orientation::Angles;
 use crate::motion::{FARTHEST_MM, Frame, ToolValue};
 
+pub use crate::label::{plain, same};
+
 /// What is known beside the program. What is given here goes before what the program's comments say.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Setup {
@@ -41,30 +43,6 @@ impl Setup {
 fn find(list: &[(String, Frame)], name: &str) -> Option<Frame> {
     let name = plain(name);
     list.iter().rev().find(|(other, _)| plain(other) == name).map(|(_, frame)| *frame)
-}
-
-/// Whether two names are one: in any case, T08 is T8.
-///
-/// ```
-/// use truegrind_programs::nc::setup::same;
-///
-/// assert!(same("T08", "t8") && same("g54.1 P1", "G54.1P1"));
-/// assert!(!same("T8", "T80"));
-/// ```
-pub fn same(one: &str, other: &str) -> bool {
-    plain(one) == plain(other)
-}
-
-/// A name in upper case without blanks, and its number without leading zeros.
-pub fn plain(name: &str) -> String {
-    let name: String = name.split_whitespace().collect::<String>().to_ascii_uppercase();
-    match name.strip_prefix('T') {
-        Some(digits) if !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()) => {
-            let number = digits.trim_start_matches('0');
-            format!("T{}", if number.is_empty() { "0" } else { number })
-        }
-        _ => name,
-    }
 }
 
 /// A tool on the flange of which only the frame is known.

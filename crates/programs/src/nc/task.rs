@@ -7,6 +7,7 @@
 mod codes;
 mod doubt;
 mod flow;
+mod found;
 mod frames;
 mod heidenhain;
 mod known;
@@ -21,7 +22,7 @@ use std::sync::Arc as Shared;
 
 use super::arc::Arc;
 use super::dialect::Dialect;
-use super::expression::{Variable, literal};
+use super::expression::{LARGEST, Variable, literal};
 use super::machine::{Group, Meaning, Mode, State, Turn};
 use super::mark;
 use super::orientation::Angles;
@@ -32,6 +33,7 @@ use super::token::Token;
 use crate::motion::{
     Frame, Listing, Misstated, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
+use found::Found;
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -198,9 +200,9 @@ pub(super) struct Lister<'t, 's> {
     ever_set: HashSet<Variable>,
     state: State,
     /// What the file sets; found while it is followed.
-    found: doubt::Found,
+    found: Found,
     /// What the whole file sets, where it has been followed before.
-    whole: Option<doubt::Found>,
+    whole: Option<Found>,
     /// Groups that are set before the way can first part.
     settled: u32,
     /// Whether the way has parted: jumps, calls, labels.
@@ -322,7 +324,7 @@ impl<'t, 's> Lister<'t, 's> {
             frames: HashMap::new(),
             ever_set: HashSet::new(),
             state,
-            found: doubt::Found::default(),
+            found: Found::default(),
             whole: None,
             settled: 0,
             branched: false,
@@ -599,7 +601,7 @@ impl<'t, 's> Lister<'t, 's> {
             let feed = self.worth(&said.words[index]).0;
             // A feed has no decimals on any control.
             let feed = self.literal(&said.words[index]).ok_or(Reason::Variable).or(feed);
-            let feed = feed.and_then(|feed| match feed > 0.0 && feed < words::LARGEST {
+            let feed = feed.and_then(|feed| match feed > 0.0 && feed < LARGEST {
                 true => Ok(feed),
                 // F0 and F-5 go nowhere, and what is too large is read as something else.
                 false => Err(Reason::NumberRange),

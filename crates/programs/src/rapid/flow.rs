@@ -16,7 +16,8 @@ use super::instruction::{self, Also, INSTRUCTIONS};
 use super::modal::{States, Which, setting};
 use super::predefined;
 use super::standing::Standing;
-use super::symbol::{Unit, What, places, resumes};
+use super::symbol::change::{places, resumes};
+use super::symbol::{Unit, What};
 use super::syntax::{Syntax, arguments, parts, token_kind};
 use super::token::{Token, same_name};
 use super::value::Value;
@@ -46,6 +47,11 @@ pub(super) struct State {
 }
 
 impl State {
+    /// The program displacement: `None` as at the entry of the routine, an error where it is not known.
+    pub(super) fn displacement(&self) -> Option<Result<Frame, Reason>> {
+        self.known.get(&DISPLACEMENT).map(|value| value.frame())
+    }
+
     fn joined(self, other: State) -> State {
         if !self.reached {
             return other;

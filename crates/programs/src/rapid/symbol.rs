@@ -5,14 +5,14 @@
 //! value then says nothing about its value at a motion, or only about the components that nothing assigns.
 
 mod acts;
-mod change;
+pub(super) mod change;
 mod named;
+mod reach;
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-pub use self::change::{Change, Ends, How, Reach};
-pub(super) use self::change::{places, resumes};
+pub use self::reach::{Change, Ends, How, Reach};
 use super::instruction;
 use super::modal::States;
 use super::syntax::{Data, RapidTree, RoutineHead, Syntax, data, parts, routine_head, text_of, token_kind};

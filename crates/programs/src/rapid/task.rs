@@ -749,7 +749,7 @@ impl Visitor for Lister<'_, '_> {
         self.listing.motions.push(motion);
         self.statements.push(Statement { node, guarded: place.guarded });
         self.modal.push(state.modal);
-        self.displaced.push(matches!(frames::displacement(state), Some(Ok(_))));
+        self.displaced.push(matches!(state.displacement(), Some(Ok(_))));
         self.units.push(self.unit);
         Some(self.listing.motions.len() as u32 - 1)
     }

@@ -6,8 +6,8 @@ use super::super::expression::Worth;
 use super::super::machine::{Group, Length, Mode, OF_TOOL, State, Turn};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
-use super::doubt::key;
-use super::names::{HARMLESS, KEYWORDS, is_cycle};
+use super::found::key;
+use super::names::{HARMLESS, KEYWORDS, code_name, is_cycle};
 use super::{Event, Lister, Said};
 use crate::motion::Reason;
 
@@ -731,13 +731,5 @@ impl Lister<'_, '_> {
         }
         self.state.previous = None;
         self.events.push(Event::Lost(lost));
-    }
-}
-
-/// A code as a program writes it: G54, G43.4.
-pub(super) fn code_name(code: u32) -> String {
-    match (code / 10, code % 10) {
-        (whole, 0) => format!("G{whole}"),
-        (whole, tenth) => format!("G{whole}.{tenth}"),
     }
 }

@@ -5,55 +5,10 @@ use super::super::expression::{Worth, literal};
 use super::super::machine::{GROUPS, Group, Mode};
 use super::super::syntax::Belongs;
 use super::super::token::Token;
+use super::found::key;
+use super::names::code_name;
 use super::{Event, Lister, Said};
 use crate::motion::Reason;
-
-/// What a file sets, group by group.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Found {
-    /// The one thing that a group is set to.
-    value: [Option<u64>; GROUPS as usize],
-    /// Groups that are set to more than one thing, one bit each.
-    several: u32,
-    /// Whether work offsets and tools are set.
-    pub(super) assigns: (bool, bool),
-    /// Whether origins are set (G92).
-    pub(super) presets: bool,
-    /// How often the way has parted.
-    pub(super) forgotten: u32,
-}
-
-impl Found {
-    fn add(&mut self, group: Group, value: u64) {
-        match self.value[group as usize] {
-            Some(old) if old != value => self.several |= 1 << group as u32,
-            _ => self.value[group as usize] = Some(value),
-        }
-    }
-
-    /// The one thing that a group is set to so far.
-    fn settle(&mut self, group: Group, value: u64) {
-        self.value[group as usize] = Some(value);
-        self.several &= !(1 << group as u32);
-    }
-
-    /// Every group may be set to anything.
-    pub(super) fn add_all(&mut self) {
-        self.several = (1 << GROUPS) - 1;
-    }
-
-    /// A group that is set to what the text does not tell.
-    fn add_any(&mut self, group: Group) {
-        self.several |= 1 << group as u32;
-    }
-}
-
-/// A number for a name, to tell names apart.
-pub(super) fn key(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
-}
 
 impl Lister<'_, '_> {
     /// A group is set to something.
@@ -245,7 +200,7 @@ impl Lister<'_, '_> {
             return Some((word.clone(), *reason));
         }
         match said.g.iter().find(|&&code| !super::known::is_g(code, self.dialect, self.says(said))) {
-            Some(code) => Some((super::codes::code_name(*code), Reason::UnknownWord)),
+            Some(code) => Some((code_name(*code), Reason::UnknownWord)),
             None => self.m_not_known(said),
         }
     }

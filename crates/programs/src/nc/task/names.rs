@@ -290,3 +290,11 @@ pub(super) enum Address {
 pub(super) fn is_cycle(name: &[u8]) -> bool {
     ["CYCLE", "POCKET", "HOLES", "SLOT", "LONGHOLE"].iter().any(|kind| name.starts_with(kind.as_bytes()))
 }
+
+/// A code as a program writes it: G54, G43.4.
+pub(super) fn code_name(code: u32) -> String {
+    match (code / 10, code % 10) {
+        (whole, 0) => format!("G{whole}"),
+        (whole, tenth) => format!("G{whole}.{tenth}"),
+    }
+}

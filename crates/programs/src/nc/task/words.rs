@@ -1,7 +1,7 @@
 //! The words of a block, gathered by what they say, and what their values are worth.
 
 use super::super::dialect::Dialect;
-use super::super::expression::{Reader, Variable, Worth, literal};
+use super::super::expression::{LARGEST, Reader, Variable, Worth, literal};
 use super::super::machine::Group;
 use super::super::parser::word;
 use super::super::syntax::{Belongs, Syntax, Word};
@@ -9,9 +9,6 @@ use super::super::token::Token;
 use super::{Lister, Said, code, is_axis, is_axis_name};
 use crate::motion::Reason;
 use crate::tree::Node;
-
-/// A control holds no larger number in a word.
-pub(super) const LARGEST: f64 = 1e9;
 
 /// A value that a control can hold.
 fn held(value: Worth) -> Worth {

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::named::{Named, Names};
+use super::reach::{Change, Ends, How, REACH, Reach};
 use super::{Symbol, Symbols, Unit, What};
 use crate::motion::Reason;
 use crate::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
@@ -21,75 +22,6 @@ use crate::rapid::predefined::{self, Effect};
 use crate::rapid::syntax::{Argument, RapidTree, Syntax, arguments, parts, token_kind};
 use crate::rapid::token::{Token, folded, same_name};
 use crate::tree::Child;
-
-/// How a statement changes data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum How {
-    /// As a whole, or in a way that the text does not tell.
-    Whole,
-    /// One component: the node of the place that is assigned.
-    Part(u32),
-    /// It is given to a routine that is declared in none of the files, or called by a computed name.
-    HandedOver,
-    /// From here on at any time: the controller keeps it and writes it when something happens.
-    Later,
-}
-
-/// A change of data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Change {
-    /// The data.
-    pub symbol: u32,
-    /// How.
-    pub how: How,
-}
-
-/// What a call of a routine may bring about.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Reach {
-    /// Data declared outside the routine that it may change, in order.
-    pub changes: Vec<u32>,
-    /// Whether it calls what is not known here, which may change everything that is declared outside routines.
-    pub anything: bool,
-    /// Whether it may move the robot.
-    pub moves: bool,
-    /// Whether it waits, so that another task may write what tasks share.
-    pub waits: bool,
-    /// Whether it may grip something else (GripLoad).
-    pub grips: bool,
-    /// Whether it does more than answer: it changes what others see, moves, writes, waits, reads devices, raises.
-    pub acts: bool,
-    /// Whether it counts a displacement from where the robot stands (PDispOn without \ExeP).
-    pub places: bool,
-    /// The switches that statements in it, or in what it calls, set: at some time, not at its end alone.
-    pub sets: States,
-}
-
-impl Reach {
-    /// In order, each once; and anything where it is too much.
-    fn settle(&mut self) {
-        self.changes.sort_unstable();
-        self.changes.dedup();
-        if self.changes.len() > REACH {
-            self.anything = true;
-        }
-        if self.anything {
-            self.changes.clear();
-        }
-    }
-}
-
-/// How a unit leaves the switches that act in execution order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ends {
-    /// As they were at its entry.
-    AsItBegins,
-    /// As its statements set them.
-    Set {
-        /// Whether anything calls it.
-        called: bool,
-    },
-}
 
 /// What is gone through once for each unit.
 #[derive(Default)]
@@ -148,9 +80,6 @@ const SIMPLE: [&[u8]; 8] = [b"num", b"dnum", b"bool", b"string", b"byte", b"intn
 
 /// Nodes that one thread goes through at a time.
 const PORTION: u32 = 1 << 16;
-
-/// A routine that changes more data outside than this may as well change anything.
-const REACH: usize = 1024;
 
 impl Symbols {
     /// Finds what the program changes.
@@ -783,7 +712,7 @@ impl Symbols {
 }
 
 /// Whether a call counts a displacement from where the robot stands: PDispOn without the point to which it has gone.
-pub(in crate::rapid) fn places(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> bool {
+pub(crate) fn places(tree: &RapidTree<'_>, call: u32, name: &[u8]) -> bool {
     let executed = |argument: Argument| argument.name.is_some_and(|name| same_name(tree.text(name), b"ExeP"));
     same_name(name, b"PDispOn") && !arguments(tree, call).any(executed)
 }
@@ -821,7 +750,7 @@ fn named<'s>(tree: &RapidTree<'s>, call: u32) -> Option<&'s [u8]> {
 }
 
 /// Whether a clause is an error handler that goes back to the statements.
-pub(in crate::rapid) fn resumes(tree: &RapidTree<'_>, clause: u32) -> bool {
+pub(crate) fn resumes(tree: &RapidTree<'_>, clause: u32) -> bool {
     let end = clause + tree.nodes[clause as usize].size;
     tree.nodes[clause as usize].kind == Syntax::ErrorClause && (clause..end).any(|node| goes_back(tree, node))
 }

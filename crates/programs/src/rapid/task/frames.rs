@@ -1,6 +1,6 @@
 //! Speed, zone, tool and work object of a motion: each distinct one once in the listing.
 
-use super::super::flow::{DISPLACEMENT, State};
+use super::super::flow::State;
 use super::Lister;
 use crate::motion::{Frame, Place, Reason, Speed, Tool, WorkObject, Zone};
 use crate::rapid::evaluate::{Context, Known};
@@ -112,7 +112,8 @@ impl<'s> Lister<'_, 's> {
 
     /// The work object of a motion, with the displacement in it that the text tells.
     pub(super) fn work_object(&mut self, unit: Unit, state: &State, value: Option<Child>) -> u32 {
-        let displacement = displacement(state).and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
+        let displacement =
+            state.displacement().and_then(Result::ok).filter(|frame| *frame != Frame::IDENTITY);
         let text: &'s [u8] = match value {
             Some(value) => text_of(&self.trees[unit.file as usize], value),
             None => b"wobj0",
@@ -143,11 +144,6 @@ impl<'s> Lister<'_, 's> {
         }
         index
     }
-}
-
-/// The program displacement before a statement: `None` as at the entry of the routine, an error where it is not known.
-pub(super) fn displacement(state: &State) -> Option<Result<Frame, Reason>> {
-    state.known.get(&DISPLACEMENT).map(|value| value.frame())
 }
 
 /// The index of an equal item among the last, else of the new one: thousands of different inline speeds must not cost

@@ -16,16 +16,16 @@ const AROUND: [Syntax; 4] = [Syntax::File, Syntax::Module, Syntax::Proc, Syntax:
 const FAR: usize = 1 << 16;
 
 /// Statements of the body of a routine.
-pub(super) struct Ahead {
+pub(crate) struct Ahead {
     /// Their first token.
-    pub(super) from: u32,
+    pub(crate) from: u32,
     nodes: Vec<Node<Syntax>>,
     at: u32,
     last: u32,
 }
 
 /// Where to cut a file into so many parts: tokens that begin a statement, if they stand in a body.
-pub(super) fn cuts(tree: &Tree<'_, Token, Syntax>, parts: usize) -> Vec<u32> {
+pub(crate) fn cuts(tree: &Tree<'_, Token, Syntax>, parts: usize) -> Vec<u32> {
     let kinds = tree.kinds();
     let begin = |part: usize| {
         let from = part * kinds.len() / parts;
@@ -42,7 +42,7 @@ pub(super) fn cuts(tree: &Tree<'_, Token, Syntax>, parts: usize) -> Vec<u32> {
 
 impl Ahead {
     /// Reads from one token to the first statement that begins at or after another.
-    pub(super) fn read(tree: &Tree<'_, Token, Syntax>, from: u32, until: u32) -> Self {
+    pub(crate) fn read(tree: &Tree<'_, Token, Syntax>, from: u32, until: u32) -> Self {
         let mut parser = Parser::new(tree);
         (parser.at, parser.last) = (from, from);
         // One node stands for all blocks around, which are not ours.
@@ -70,7 +70,7 @@ impl Ahead {
 
 impl Parser<'_, '_> {
     /// Takes over what was read ahead, where it begins here.
-    pub(super) fn take(&mut self, ahead: &Ahead) {
+    pub(crate) fn take(&mut self, ahead: &Ahead) {
         let here = self.at == ahead.from
             && self.blocks.len() == AROUND.len()
             && self.blocks.iter().zip(AROUND).all(|(block, around)| {
