@@ -103,7 +103,7 @@ fn fixed_point(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<FixedPoin
 /// use truegrind_arm::inverse::Inverse;
 /// use truegrind_arm::model::Joints;
 /// use truegrind_arm::robots;
-/// use truegrind_compensation::cell::taught_tcp;
+/// use truegrind_compensation::taught::taught_tcp;
 /// use truegrind_math::se3::Pose;
 ///
 /// // A tip of 95 mm that touches one point with the flange turned four ways.
@@ -135,7 +135,7 @@ pub fn taught_tcp(arm: &PreparedModel<'_>, teaching: &[Joints]) -> Option<Vector
 ///
 /// ```
 /// use nalgebra::Point3;
-/// use truegrind_compensation::cell::taught_frame;
+/// use truegrind_compensation::taught::taught_frame;
 ///
 /// // Two points on x, one on y: the origin is where the third one's foot lies.
 /// let points = [Point3::new(400.0, 0.0, 100.0), Point3::new(500.0, 0.0, 100.0), Point3::new(420.0, 70.0, 100.0)];
