@@ -113,14 +113,6 @@ pub fn summary(found: &Diagnosed) -> Document {
         None if diagnosis.findings.is_empty() => (Status::Good, found_there),
         None => (Status::Warning, found_there),
     };
-    page.push(Verdict::new(
-        status,
-        format!(
-            "{headline}: held-out error {:.3} mm, geometry alone {:.3}, data sheet {:.3}",
-            fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
-        ),
-        causes,
-    ));
     let mut figures = super::identification::promise(found.benefit.as_ref());
     figures.extend([
         KeyFigure::new("Held-out RMSE", fits.extended.cv_rmse_mm, 3, "mm")
@@ -135,6 +127,14 @@ pub fn summary(found: &Diagnosed) -> Document {
         )),
     ]);
     page.push(figures);
+    page.push(Verdict::new(
+        status,
+        format!(
+            "{headline}: held-out error {:.3} mm, geometry alone {:.3}, data sheet {:.3}",
+            fits.extended.cv_rmse_mm, fits.geometric.cv_rmse_mm, fits.nominal.cv_rmse_mm
+        ),
+        causes,
+    ));
     if !diagnosis.findings.is_empty() {
         page.push(finding_table(diagnosis));
     }
@@ -310,11 +310,18 @@ fn place(finding: &Finding) -> String {
     }
 }
 
-/// Numbers in a sentence, not too many.
+/// Numbers in a sentence, runs as `7 to 16`, and not too many.
 fn listed(numbers: &[usize]) -> String {
-    let shown: Vec<String> = numbers.iter().take(20).map(usize::to_string).collect();
-    let rest = numbers.len().saturating_sub(20);
-    if rest > 0 { format!("{} and {rest} more", shown.join(", ")) } else { shown.join(", ") }
+    let runs: Vec<String> = numbers
+        .chunk_by(|one, next| one + 1 == *next)
+        .flat_map(|run| match run {
+            [first, _, .., last] => vec![format!("{first} to {last}")],
+            few => few.iter().map(usize::to_string).collect(),
+        })
+        .collect();
+    let rest = runs.len().saturating_sub(20);
+    let shown = runs[..runs.len() - rest].join(", ");
+    if rest > 0 { format!("{shown} and {rest} more") } else { shown }
 }
 
 fn sentence(text: &str) -> String {
@@ -503,4 +510,17 @@ fn caption(picture: &Picture) -> String {
         sentence(&picture.y.0),
         picture.x.0
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::listed;
+
+    #[test]
+    fn rows_that_follow_each_other_are_a_run() {
+        assert_eq!(listed(&[]), "");
+        assert_eq!(listed(&[1, 2, 7, 8, 9, 12]), "1, 2, 7 to 9, 12");
+        let odd: Vec<usize> = (0..25).map(|n| 2 * n).collect();
+        assert!(listed(&odd).ends_with("36, 38 and 5 more"));
+    }
 }

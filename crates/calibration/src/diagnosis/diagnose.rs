@@ -549,7 +549,7 @@ fn judge(
 ) -> Verdict {
     let mut hearing = Hearing::default();
     if fitted.termination().is_converged() {
-        hearing.tell(format!("the fit {}", fitted.termination()));
+        hearing.tell("the fit converged");
     } else {
         hearing.fail(format!("the fit did not converge: {}", fitted.termination()));
     }

@@ -537,7 +537,7 @@ fn judge(case: &Case<'_>, options: &Options) -> Verdict {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
-            hearing.tell(format!("on {rows} the fit {}", fitted.termination()));
+            hearing.tell(format!("on {rows} the fit converged"));
         } else if filtered {
             hearing.tell(format!("on {rows} the filter took in every reading; it claims no minimum"));
         } else {

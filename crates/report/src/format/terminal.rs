@@ -6,7 +6,7 @@
 use super::visible;
 use crate::document::{Block, Document};
 use crate::status::Status;
-use crate::table::{Alignment, Table};
+use crate::table::{Alignment, ColumnKind, Table};
 
 /// Columns of words are made as narrow as this before a table is cut into blocks.
 const NARROWEST_TEXT: usize = 12;
@@ -16,8 +16,8 @@ const NARROWEST_SENTENCE: usize = 24;
 const GAP: usize = 2;
 
 /// The table as lines of at most `width` characters. Where it is wider, folders that all paths of a column share are left
-/// out, then cells of words go on in further lines; where that does not suffice, the table continues below with its first
-/// column repeated. Nothing is cut off.
+/// out, then cells of words go on in further lines; where that does not suffice, the table continues below with the first
+/// columns repeated, as many as tell the rows apart. Nothing is cut off.
 pub fn table(table: &Table, width: usize) -> String {
     let mut text = String::new();
     if !table.title.is_empty() {
@@ -36,8 +36,8 @@ pub fn table(table: &Table, width: usize) -> String {
         widths = widest(&lines);
     }
     shrink(table, &mut widths, width);
-    for block in blocks(&widths, width) {
-        if !text.is_empty() && block.first() == Some(&0) && block.get(1).is_some_and(|&second| second > 1) {
+    for (number, block) in blocks(&widths, telling(table, &lines[1..]), width).iter().enumerate() {
+        if !text.is_empty() && number > 0 {
             text.push('\n');
         }
         for (index, line) in lines.iter().enumerate() {
@@ -195,18 +195,33 @@ fn leave_out_folders(rows: &mut [Vec<String>], column: usize) {
     }
 }
 
-/// Columns of each block; the first column leads every block. A block has at least one column beside it, even where
-/// that is too wide.
-fn blocks(widths: &[usize], width: usize) -> Vec<Vec<usize>> {
+/// How many columns of words at the left tell the rows apart; one where all of them do not.
+fn telling(table: &Table, rows: &[Vec<String>]) -> usize {
+    let words = table.columns.iter().take_while(|column| column.kind == ColumnKind::Text).count();
+    let tells = |count: &usize| {
+        let mut seen = std::collections::HashSet::new();
+        rows.iter().all(|row| seen.insert(&row[..*count]))
+    };
+    (1..=words).find(tells).unwrap_or(1)
+}
+
+/// Columns of each block; the first columns lead every block, as far as there is room for another beside them. A block has at
+/// least one column beside the first, even where that is too wide.
+fn blocks(widths: &[usize], leading: usize, width: usize) -> Vec<Vec<usize>> {
     if widths.is_empty() {
         return Vec::new();
     }
-    let mut blocks = vec![vec![0]];
-    for column in 1..widths.len() {
+    let room = |count: &usize| {
+        let others = widths[*count..].iter().max().copied().unwrap_or(0);
+        total(widths[..*count].iter().copied().chain([others])) <= width
+    };
+    let leading = (1..=leading.min(widths.len())).rev().find(room).unwrap_or(1);
+    let mut blocks: Vec<Vec<usize>> = vec![(0..leading).collect()];
+    for column in leading..widths.len() {
         let last = blocks.len() - 1;
         let wide = total(blocks[last].iter().chain(&[column]).map(|&c| widths[c])) > width;
-        if wide && blocks[last].len() > 1 {
-            blocks.push(vec![0, column]);
+        if wide && blocks[last].len() > leading {
+            blocks.push((0..leading).chain([column]).collect());
         } else {
             blocks[last].push(column);
         }

@@ -383,3 +383,25 @@ fn bytes_that_are_no_text_are_spelled_out() {
     assert_eq!(visible::line("a\r\nb\tc\rd\x08"), "a b c d\\x08");
     assert_eq!(visible::text("a\rb\r\n"), "a\\x0db\r\n");
 }
+
+/// The class: a table that is too wide for the terminal, in whose continuation the rows could not be told apart.
+#[test]
+fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
+    let columns = vec![
+        Column::text("effect", "effect"),
+        Column::text("where", "where"),
+        Column::number("worth_mm", "worth", "mm", 3),
+        Column::number("without_mm", "held out without", "mm", 4),
+    ];
+    let mut table = Table::new("Findings", columns);
+    for joint in 1..=2 {
+        table.push(["gear".into(), format!("joint {joint}").into(), 0.1.into(), 0.05.into()]);
+    }
+    let text = terminal::table(&table, 40);
+    let below = text.split("\n\n").nth(1).unwrap();
+    assert!(below.contains("gear    joint 1") && below.contains("gear    joint 2"), "{text}");
+    // Where one column tells them apart, it stands alone.
+    table.rows[1][0] = "play".into();
+    let text = terminal::table(&table, 40);
+    assert!(!text.split("\n\n").nth(1).unwrap().contains("joint"), "{text}");
+}
