@@ -32,8 +32,9 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// where a play is taken up; a load that is another by a computed call; a circle point that is passed with the tool turned
 /// otherwise than it is told there; an arc that stays and whose ends come to lie apart, or that
 /// passes a singularity from a corrected start; a configuration that may not be checked; a part that is
-/// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame.
-const ONCE_WRONG: [(Dialect, u64); 36] = [
+/// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame;
+/// a turn about the tool that a block states which is left.
+const ONCE_WRONG: [(Dialect, u64); 37] = [
     (Dialect::Fanuc, 1_001_909),
     (Dialect::Fanuc, 1_001_375),
     (Dialect::Fanuc, 1_018_769),
@@ -46,6 +47,7 @@ const ONCE_WRONG: [(Dialect, u64); 36] = [
     (Dialect::Siemens, 1_017_853),
     (Dialect::Siemens, 1_000_218),
     (Dialect::Siemens, 40_002_739),
+    (Dialect::Siemens, 60_004_757),
     (Dialect::Rapid, 93),
     (Dialect::Rapid, 293),
     (Dialect::Rapid, 573),

@@ -68,6 +68,10 @@ impl Lister<'_, '_> {
         let written = self.written_as(said, None);
         self.push(motion, written);
         self.state.previous = None;
+        if said.spin.is_some() {
+            // It holds beyond what makes the orientation unknown.
+            self.state.spin = Err(Reason::OrientationUnknown);
+        }
     }
 
     /// A path of its own kind that is listed and left.

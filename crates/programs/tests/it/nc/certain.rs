@@ -375,6 +375,18 @@ fn what_is_left_goes_where_it_always_went() {
     assert_eq!(Reason::BeforeLeftArc.text(), "an arc that stays as it is starts where this ends");
 }
 
+/// The class: a word that holds on, in a block that is left before its words are taken. What it set is not known after it.
+#[test]
+fn the_turn_about_the_tool_that_a_left_block_states_holds_on() {
+    let head = "TRAORI\nG0 X1 Y2 Z3 A3=0 B3=0.3 C3=0.95 THETA=10 F600\n/G1 Y5\n";
+    let tail = "G1 X9 Y9 Z9 A3=0.1 B3=0 C3=0.99";
+    let last = |between: &str| *reasons(Siemens, &format!("{head}{between}{tail}")).last().unwrap();
+    // Whether G0 or G1 holds is not known there: the block is left.
+    assert_eq!(last("THETA=5\n"), Some(OrientationUnknown));
+    assert_eq!(last("THETA=5\nG1 THETA=5\n"), None);
+    assert_eq!(last(""), None);
+}
+
 #[test]
 fn a_cycle_whose_line_breaks_off_is_no_panic() {
     for line in [
