@@ -116,6 +116,16 @@ fn meshes_are_named_with_the_frames_that_they_move_with() {
     let off = place(1, &turned) - Vector3::new(50.0, 20.0, 560.0);
     assert!(off.norm() < 1e-9, "{off}");
     assert!(read(GRIPPER, "gripper.urdf", &Choice::default()).visuals.is_empty());
+    // Many arms are shown by meshes of another kind, and stop at simpler ones that are STL.
+    let other = text.replace("link_3.stl\"", "link_3.dae\"");
+    let collision = visual("simple/link_3.STL").replace("visual>", "collision>");
+    let both = other.replace("<link name=\"link_3\">", &format!("<link name=\"link_3\">{collision}"));
+    assert_eq!(read(&both, "gripper.urdf", &Choice::default()).visuals[1].file, "simple/link_3.STL");
+    assert_eq!(
+        read(&other, "gripper.urdf", &Choice::default()).visuals[1].file,
+        "link_3.dae",
+        "to be told of"
+    );
 }
 
 /// Masses stand where the links are, what is fixed to a link with it.

@@ -237,7 +237,22 @@ fn body(node: &Node<'_, '_>, file: &str) -> Result<Option<Body>, RobotError> {
     Ok((mass_kg > 0.0).then(|| Body { mass_kg, centre_mm: centre.into() }))
 }
 
-/// The mesh of a `<visual>`; boxes, cylinders and balls are left to us.
+/// The meshes of one link that show it: those of `<visual>`, or, where none of them is STL and those of `<collision>` are, these.
+fn shown_by(link: &Node<'_, '_>, file: &str) -> Result<Vec<Drawn>, RobotError> {
+    let of = |tag: &str| -> Result<Vec<Drawn>, RobotError> {
+        let parts = link.children().filter(|inner| inner.has_tag_name(tag));
+        parts.filter_map(|part| drawn(&part, file).transpose()).collect()
+    };
+    let is_stl = |mesh: &Drawn| mesh.file.to_ascii_lowercase().ends_with(".stl");
+    let visual = of("visual")?;
+    if visual.is_empty() || visual.iter().any(is_stl) {
+        return Ok(visual);
+    }
+    let collision = of("collision")?;
+    Ok(if collision.iter().any(is_stl) { collision } else { visual })
+}
+
+/// The mesh of a `<visual>` or `<collision>`; boxes, cylinders and balls are left to us.
 fn drawn(visual: &Node<'_, '_>, file: &str) -> Result<Option<Drawn>, RobotError> {
     let mesh = child(visual, "geometry").and_then(|geometry| child(&geometry, "mesh"));
     let Some(name) = mesh.and_then(|mesh| mesh.attribute("filename")) else { return Ok(None) };
@@ -264,9 +279,7 @@ impl<'a> Tree<'a> {
                     if let Some(body) = body(&node, file)? {
                         tree.masses.insert(name, body);
                     }
-                    for visual in node.children().filter(|inner| inner.has_tag_name("visual")) {
-                        tree.visuals.extend(drawn(&visual, file)?.map(|drawn| (name, drawn)));
-                    }
+                    tree.visuals.extend(shown_by(&node, file)?.into_iter().map(|drawn| (name, drawn)));
                     tree.meshes += node.descendants().filter(|inner| inner.has_tag_name("mesh")).count();
                 }
                 // A transmission has joints of its own, which are none.
