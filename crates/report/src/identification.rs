@@ -18,6 +18,7 @@ use super::status::Status;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
 use truegrind_calibration::identification::benefit::Benefit;
 use truegrind_calibration::identification::identify::Identification;
+use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_calibration::measurement::dataset::Dataset;
 
 pub use tables::{
@@ -248,7 +249,7 @@ pub(super) fn promise(benefit: Option<&Benefit>) -> Vec<KeyFigure> {
         KeyFigure::new("Programs before", benefit.nominal_mm, 3, "mm")
             .note("expected RMS inside the measured region, apart from where base and flange are placed"),
         KeyFigure::new("Programs after", benefit.estimated_mm, 3, "mm")
-            .note(format!("expected RMS; better with a probability of {:.1} %", 100.0 * benefit.chance)),
+            .note(format!("expected RMS; better with a probability of {}", percent_of(benefit.chance))),
     ]
 }
 

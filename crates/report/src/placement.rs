@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::table::{Column, Table};
+use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::placement::{ObjectPlacement, Placement};
 use truegrind_compensation::rewrite::{MotionOutcome, Plan};
@@ -130,16 +131,11 @@ pub fn expected_mm(plan: &Plan) -> Option<f64> {
 
 /// The chance that what is written gets worse, in words; `None` where nothing is known of it.
 pub fn chance(plan: &Plan) -> Option<String> {
-    let percent = 100.0 * plan.chance_of_worse?;
+    let all = percent_of(plan.chance_of_worse?);
     let largest = plan.cuts.iter().filter(|cut| !cut.left).map(|cut| cut.chance).fold(0.0, f64::max);
-    let of = |percent: f64| match percent {
-        p if p < 0.1 => "under 0.1 %".to_owned(),
-        p => format!("{p:.1} %"),
-    };
     Some(format!(
-        "the probability that the corrected cuts are farther off than the cuts as they were is {}, of any one of them {}",
-        of(percent),
-        match of(100.0 * largest) {
+        "the probability that the corrected cuts are farther off than the cuts as they were is {all}, of any one of them {}",
+        match percent_of(largest) {
             small if small.starts_with("under") => small,
             other => format!("at most {other}"),
         }

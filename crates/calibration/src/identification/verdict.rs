@@ -155,17 +155,29 @@ fn spoils(scale: &ScaleError) -> bool {
         && scale.estimated_mm > SPOILT * scale.nominal_mm
 }
 
+/// A probability as people read it: no 0 % and no 100 %, which nothing measured can be.
+///
+/// ```
+/// use truegrind_calibration::identification::verdict::percent_of;
+///
+/// assert_eq!(percent_of(0.1234), "12.3 %");
+/// assert_eq!(percent_of(1.0), "over 99.9 %");
+/// assert_eq!(percent_of(1e-9), "under 0.1 %");
+/// ```
+pub fn percent_of(probability: f64) -> String {
+    match 100.0 * probability {
+        p if p > 99.9 => "over 99.9 %".to_owned(),
+        p if p < 0.1 => "under 0.1 %".to_owned(),
+        p => format!("{p:.1} %"),
+    }
+}
+
 /// What a model promises.
 fn promise(found: &Benefit) -> String {
-    let chance = 100.0 * found.chance;
-    let chance = match chance {
-        c if c > 99.9 => "over 99.9".to_owned(),
-        c if c < 0.1 => "under 0.1".to_owned(),
-        c => format!("{c:.1}"),
-    };
+    let chance = percent_of(found.chance);
     format!(
         "inside the measured region, apart from where base and flange are placed, the data sheet's arm is expected to be \
-         {:.3} mm RMS off and the estimated one {:.3} mm: it helps programs with a probability of {chance} % (at least {:.0} % \
+         {:.3} mm RMS off and the estimated one {:.3} mm: it helps programs with a probability of {chance} (at least {:.0} % \
          is asked for)",
         found.nominal_mm,
         found.estimated_mm,

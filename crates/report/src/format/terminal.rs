@@ -120,11 +120,7 @@ fn push_block(text: &mut String, block: &Block, width: usize) {
                 if let Some(status) = figure.status {
                     line.push_str(&format!("  {}", badge(status)));
                 }
-                if !figure.note.is_empty() {
-                    line.push_str(&format!("  {}", visible::line(&figure.note)));
-                }
-                text.push_str(line.trim_end());
-                text.push('\n');
+                beside(text, &line, &visible::line(&figure.note), width);
             }
         }
         Block::Table(block) => text.push_str(&table(block, width)),
@@ -285,6 +281,19 @@ fn fit(cell: &str, width: usize, alignment: Alignment) -> String {
     match alignment {
         Alignment::Left => format!("{cell}{blank}"),
         Alignment::Right => format!("{blank}{cell}"),
+    }
+}
+
+/// A line and a note beside it, which goes on below itself where the terminal ends.
+fn beside(text: &mut String, line: &str, note: &str, width: usize) {
+    let indent = length(line) + GAP;
+    let room = width.saturating_sub(indent).max(NARROWEST_SENTENCE);
+    let mut notes = wrapped(note, room, "");
+    notes.truncate(notes.trim_end().len());
+    for (index, note) in notes.split('\n').enumerate() {
+        let lead = if index == 0 { line.to_owned() } else { " ".repeat(length(line)) };
+        text.push_str(format!("{lead}{}{note}", " ".repeat(GAP)).trim_end());
+        text.push('\n');
     }
 }
 

@@ -405,3 +405,17 @@ fn a_table_that_continues_below_repeats_what_tells_its_rows_apart() {
     let text = terminal::table(&table, 40);
     assert!(!text.split("\n\n").nth(1).unwrap().contains("joint"), "{text}");
 }
+
+#[test]
+fn the_note_of_a_key_figure_stays_within_the_terminal() {
+    let mut document = Document::new("Page");
+    document.push(vec![
+        KeyFigure::new("Programs before", 0.66, 3, "mm").note("expected RMS inside the measured region"),
+        KeyFigure::new("After", 0.05, 3, "mm"),
+    ]);
+    let text = terminal::document(&document, 48);
+    assert!(text.lines().all(|line| line.chars().count() <= 52), "{text}");
+    assert!(text.contains("0.660 mm  expected RMS inside the\n"), "{text}");
+    assert!(text.contains("\n                           measured region\n"), "{text}");
+    assert!(text.ends_with("After            0.050 mm\n"), "{text}");
+}
