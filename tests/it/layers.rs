@@ -223,6 +223,19 @@ fn the_files_of_a_crate_form_no_circle() {
     assert!(found.is_empty(), "the command line: {found:#?}");
 }
 
+/// The class: a test that nobody runs. Libraries are built for tests once (`test = false`), so a test beside their code is not.
+#[test]
+fn no_test_stands_where_it_never_runs() {
+    for (name, _) in USES {
+        let dead: Vec<String> = code(&root().join("crates").join(name).join("src"))
+            .into_iter()
+            .filter(|(_, text)| text.contains("cfg(test)") || text.contains("#[test]"))
+            .map(|(file, _)| file)
+            .collect();
+        assert!(dead.is_empty(), "{name}: to be moved to its tests/it or its documentation: {dead:?}");
+    }
+}
+
 #[test]
 fn a_circle_is_found_through_groups_and_climbing_paths() {
     let of = |files: &[(&str, &str)]| {

@@ -148,6 +148,50 @@ impl Edits {
         parts.flat_map(|part| part.entries.iter().map(|entry| (entry.range(), entry.text(&part.text))))
     }
 
+    /// The lines of a source that the edits make longer, and longer than `most` bytes; the edits are sorted.
+    ///
+    /// ```
+    /// use truegrind_programs::edit::Edits;
+    ///
+    /// let source = b"X1 Y2\nX1 Y2 Z3\nX1 Y2\n";
+    /// let mut edits = Edits::new();
+    /// // A block that is put in is a line of its own.
+    /// edits.insert(0, b"G1 X1 Y2 Z3 A0 B0 C0\n");
+    /// edits.replace(1..2, b"1.5");
+    /// edits.replace(10..11, b"2.5");
+    /// edits.insert(14, b" A1");
+    /// edits.replace(19..20, b"7");
+    /// assert_eq!(edits.grown_lines(source, 12), [6..15]);
+    /// assert_eq!(edits.grown_lines(source, 14), []);
+    /// assert_eq!(edits.grown_lines(source, 5), [0..6, 6..15]);
+    /// ```
+    pub fn grown_lines(&self, source: &[u8], most: usize) -> Vec<Range<usize>> {
+        let mut out = Vec::new();
+        let mut line = 0..0;
+        // The bytes that new text puts in after the last line end that it brings along, less those it takes away.
+        let mut more = 0isize;
+        let mut close = |line: &Range<usize>, more: isize| {
+            let length = line.len() as isize + more;
+            if more > 0 && length > most as isize {
+                out.push(line.clone());
+            }
+        };
+        for (range, text) in self.iter() {
+            if range.start >= line.end {
+                close(&line, more);
+                let begin =
+                    source[..range.start].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+                let end = source[range.start..].iter().position(|byte| *byte == b'\n');
+                (line, more) = (begin..end.map_or(source.len(), |at| range.start + at + 1), 0);
+            }
+            // Blocks that are put in are lines of their own.
+            let own = text.iter().rposition(|byte| *byte == b'\n').map_or(text, |at| &text[at + 1..]);
+            more += own.len() as isize - range.len() as isize;
+        }
+        close(&line, more);
+        out
+    }
+
     /// Sorts the edits by place and checks that no two overlap. An insertion at the first byte of a replacement goes
     /// before it.
     pub fn sort(&mut self) -> Result<(), EditError> {

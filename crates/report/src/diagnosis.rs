@@ -2,7 +2,7 @@
 //! held-out rows, what to do, and what could not be told.
 
 use super::document::{Block, Document, KeyFigure, Provenance, Source, Verdict};
-use super::number::Precision;
+use super::number::{Precision, listed};
 use super::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, Span};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -310,20 +310,6 @@ fn place(finding: &Finding) -> String {
     }
 }
 
-/// Numbers in a sentence, runs as `7 to 16`, and not too many.
-fn listed(numbers: &[usize]) -> String {
-    let runs: Vec<String> = numbers
-        .chunk_by(|one, next| one + 1 == *next)
-        .flat_map(|run| match run {
-            [first, _, .., last] => vec![format!("{first} to {last}")],
-            few => few.iter().map(usize::to_string).collect(),
-        })
-        .collect();
-    let rest = runs.len().saturating_sub(20);
-    let shown = runs[..runs.len() - rest].join(", ");
-    if rest > 0 { format!("{shown} and {rest} more") } else { shown }
-}
-
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
@@ -510,17 +496,4 @@ fn caption(picture: &Picture) -> String {
         sentence(&picture.y.0),
         picture.x.0
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::listed;
-
-    #[test]
-    fn rows_that_follow_each_other_are_a_run() {
-        assert_eq!(listed(&[]), "");
-        assert_eq!(listed(&[1, 2, 7, 8, 9, 12]), "1, 2, 7 to 9, 12");
-        let odd: Vec<usize> = (0..25).map(|n| 2 * n).collect();
-        assert!(listed(&odd).ends_with("36, 38 and 5 more"));
-    }
 }

@@ -108,3 +108,25 @@ fn exponent_of(size: f64, digits: usize) -> i32 {
     let text = format!("{size:.*e}", digits - 1);
     text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0)
 }
+
+/// Numbers in a sentence, runs as `7 to 16`, and not too many.
+///
+/// ```
+/// use truegrind_report::number::listed;
+///
+/// assert_eq!(listed(&[1, 2, 7, 8, 9, 12]), "1, 2, 7 to 9, 12");
+/// let odd: Vec<usize> = (0..25).map(|n| 2 * n).collect();
+/// assert!(listed(&odd).ends_with("36, 38 and 5 more"));
+/// ```
+pub fn listed(numbers: &[usize]) -> String {
+    let runs: Vec<String> = numbers
+        .chunk_by(|one, next| one + 1 == *next)
+        .flat_map(|run| match run {
+            [first, _, .., last] => vec![format!("{first} to {last}")],
+            few => few.iter().map(usize::to_string).collect(),
+        })
+        .collect();
+    let rest = runs.len().saturating_sub(20);
+    let shown = runs[..runs.len() - rest].join(", ");
+    if rest > 0 { format!("{shown} and {rest} more") } else { shown }
+}

@@ -472,10 +472,16 @@ fn changes_are_carried_along_chains_of_calls_in_any_order() {
 
 #[test]
 fn predefined_names_stand_in_order() {
-    use truegrind_programs::rapid::predefined::{Effect, READERS, WRITERS, effect};
-    assert!(READERS.windows(2).all(|two| two[0] < two[1]));
-    assert!(WRITERS.windows(2).all(|two| two[0].0 < two[1].0));
-    assert!(READERS.iter().all(|name| effect(name.to_uppercase().as_bytes()) == Some(Effect::Reads)));
+    use truegrind_programs::rapid::predefined::{Effect, all, effect};
+    // Every line of the list is understood.
+    let list = include_str!("../../src/rapid/predefined.txt");
+    assert_eq!(list.lines().filter(|line| !line.starts_with('#')).count(), all().len());
+    assert!(all().windows(2).all(|two| two[0].name < two[1].name));
+    assert!(all().iter().all(|one| effect(one.name.to_uppercase().as_bytes()) == Some(&one.effect)));
+    let Some(Effect::Writes(written)) = effect(b"WaitAI") else { panic!("WaitAI writes") };
+    assert_eq!((&*written.optional, written.later), (&["valueattimeout", "timeflag"][..], false));
+    let Some(Effect::Writes(written)) = effect(b"IVarValue") else { panic!("IVarValue writes") };
+    assert_eq!((&*written.required, written.later), (&[2][..], true));
     assert!(matches!(effect(b"TPReadFK"), Some(Effect::Writes(_))));
     for name in ["MoveL", "myOwn", "", "a_name_that_is_longer_than_any_that_a_controller_takes"] {
         assert_eq!(effect(name.as_bytes()), None, "{name}");

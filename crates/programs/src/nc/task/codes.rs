@@ -7,7 +7,7 @@ use super::super::machine::{Group, Length, Mode, OF_TOOL, State, Turn};
 use super::super::syntax::{Belongs, Word};
 use super::super::token::Token;
 use super::found::key;
-use super::names::{HARMLESS, KEYWORDS, code_name, is_cycle};
+use super::names::{code_name, is_cycle, is_harmless_call, is_keyword};
 use super::{Event, Lister, Said};
 use crate::motion::Reason;
 
@@ -92,14 +92,14 @@ impl Lister<'_, '_> {
                     self.frames_assigned();
                 }
                 _ => match word.belongs {
-                    Belongs::Arguments { .. } if HARMLESS.iter().any(|known| word.is(known)) => {}
+                    Belongs::Arguments { .. } if is_harmless_call(&name) => {}
                     Belongs::Arguments { .. } if is_cycle(&name) => {
                         let text = String::from_utf8_lossy(&name).into_owned();
                         self.left(said, &text, Reason::Cycle);
                         self.lose_position();
                         done = true;
                     }
-                    _ if KEYWORDS.iter().any(|known| word.is(known)) => {}
+                    _ if is_keyword(&name) => {}
                     Belongs::Nothing | Belongs::Arguments { .. } if self.is_call(said, index) => {
                         let text = String::from_utf8_lossy(word.name).into_owned();
                         self.subprogram(said, &text);

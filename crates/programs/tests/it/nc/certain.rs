@@ -462,3 +462,23 @@ fn a_word_that_may_be_an_increment_hands_on_where_it_begins() {
     let stays = |reason| matches!(reason, BeforeLeftPath | BeforeIncrement);
     assert!(matches!(rewritten.outcomes[0], Outcome::Refused(reason) if stays(reason)), "{rewritten:?}");
 }
+
+#[test]
+fn names_that_move_nothing_are_listed_with_where_they_stand() {
+    let lines = include_str!("../../../src/nc/siemens.txt").lines().filter(|line| !line.starts_with('#'));
+    let listed: Vec<(&str, &str)> = lines.map(|line| line.split_once(' ').unwrap()).collect();
+    assert!(listed.windows(2).all(|two| two[0].0 < two[1].0));
+    for (name, places) in listed {
+        let known = |place: &str| ["alone", "call", "value"].contains(&place.trim());
+        assert!(places.split(',').all(known), "{name}: {places}");
+    }
+    let certain = |block: &str| {
+        reasons(Siemens, &format!("{block}\nG1 X9 Y9 Z9 A=180 B=0 C=0")).iter().all(Option::is_none)
+    };
+    for block in ["STOPRE", "MSG(\"x\")", "X5 ADIS=2", "BRISK"] {
+        assert!(certain(block), "{block}");
+    }
+    for block in ["MYPART", "MYPART(1)", "X5 MYPART=2"] {
+        assert!(!certain(block), "{block}");
+    }
+}
