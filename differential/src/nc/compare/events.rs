@@ -145,7 +145,8 @@ impl Judge<'_> {
         self.tally.corrected += 1;
         self.most = self.most.max(difference(&wanted, &given).0);
         let (mm, mut rad) = difference(&real, &wanted);
-        if self.pair.dialect == Dialect::Heidenhain && old.angles == [None; 3] {
+        let axis_alone = self.pair.dialect == Dialect::Heidenhain && old.angles == [None; 3];
+        if axis_alone {
             // TX TY TZ tell the axis of the tool and no turn about it.
             let axis = nalgebra::Vector3::z();
             rad = (real.rotation * axis).angle(&(wanted.rotation * axis));
@@ -157,7 +158,7 @@ impl Judge<'_> {
             self.tally.stated += 1;
         }
         if !right(mm, rad) {
-            let ways = self.arm.every_way(&wanted, &given, &tool);
+            let ways = self.arm.every_way(&wanted, &given, &tool, axis_alone);
             if ways.iter().any(|&(mm, rad)| right(mm, rad)) {
                 self.tally.corrected -= 1;
                 self.tally.open += 1;

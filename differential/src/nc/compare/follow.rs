@@ -1,6 +1,6 @@
 //! What the arm does along a run: the controller's joints, where the links are, and where the tip really is.
 
-use nalgebra::{Translation3, Vector3};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -150,13 +150,19 @@ impl<'c> Follower<'c> {
 
     /// How far the tip would really be from where it shall for a told pose (mm, rad) in each of the ways in which the arm can
     /// stand at the pose that was meant, with the links on the flanks that suit it best. A program says no configuration:
-    /// which of them the arm stands in is not told where it begins or goes on from what is not followed.
-    pub fn every_way(&self, meant: &Pose, told: &Pose, tool: &Pose) -> Vec<(f64, f64)> {
+    /// which of them the arm stands in is not told where it begins or goes on from what is not followed. Where only the axis of the
+    /// tool is told (`axis_alone`), how it is turned about that does not count.
+    pub fn every_way(&self, meant: &Pose, told: &Pose, tool: &Pose, axis_alone: bool) -> Vec<(f64, f64)> {
         let back = tool.inverse();
         let all = self.case.arm.nominal_inverse(&(meant * back), None);
         let near = all.iter().filter_map(|joints| self.solve(&(told * back), joints));
         let at = Circumstance::default();
-        near.map(|q| meant_links(&self.case.arm, &q, &at, &(meant * back), tool)).collect()
+        let as_turned = |q: &[f64; 6]| {
+            let turn = meant.rotation.inverse() * (self.case.arm.actual_forward(q, &at) * tool).rotation;
+            let about = if axis_alone { 2.0 * turn.k.atan2(turn.w) } else { 0.0 };
+            meant * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about)
+        };
+        near.map(|q| meant_links(&self.case.arm, &q, &at, &(as_turned(&q) * back), tool)).collect()
     }
 
     /// Where the tip would really be for a told pose, with the links before their motors as they are.
