@@ -3,6 +3,7 @@
 //! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
 //! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor`. Other columns are kept as text.
+//! Tables of RoboDK and DELMIA are told by their content (see the notes of the dataset).
 //! CSV may be separated by comma, semicolon or tab; with semicolon or tab a decimal comma is understood. Of a
 //! workbook the first sheet that has the columns is read, or the one named.
 
@@ -14,6 +15,7 @@ pub mod template;
 mod columns;
 mod error;
 mod options;
+mod profile;
 mod rows;
 mod rounding;
 
@@ -105,8 +107,21 @@ pub fn rows(
 }
 
 fn from_table(file: &str, table: &Table, options: &Options) -> Result<Dataset, ImportError> {
-    let columns = Columns::find(file, table)?;
-    rows::dataset(file, table, &columns, options, std::iter::empty())
+    match Columns::find(file, table) {
+        Ok(columns) => rows::dataset(file, table, &columns, options, std::iter::empty()),
+        Err(error) => from_other(file, table, options).unwrap_or(Err(error)),
+    }
+}
+
+/// A table of another program; `None` where it is none that is known.
+fn from_other(file: &str, table: &Table, options: &Options) -> Option<Result<Dataset, ImportError>> {
+    let read = |(table, notes): (Table, Vec<String>)| {
+        let columns = Columns::find(file, &table)?;
+        let mut dataset = rows::dataset(file, &table, &columns, options, std::iter::empty())?;
+        dataset.notes.splice(0..0, notes);
+        Ok(dataset)
+    };
+    profile::known(file, table).map(|found| found.and_then(read))
 }
 
 /// A text table: as many lines as it takes to find the header, and the rest one by one.
@@ -118,8 +133,15 @@ fn from_text(file: &str, text: &csv::Text<'_>, options: &Options) -> Result<Data
     {
         table.rows.push(line?);
     }
-    let columns = Columns::find(file, &table)?;
-    rows::dataset(file, &table, &columns, options, lines)
+    match Columns::find(file, &table) {
+        Ok(columns) => rows::dataset(file, &table, &columns, options, lines),
+        Err(error) => {
+            for line in lines {
+                table.rows.push(line?);
+            }
+            from_other(file, &table, options).unwrap_or(Err(error))
+        }
+    }
 }
 
 fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Dataset, ImportError> {
@@ -133,6 +155,9 @@ fn from_workbook(file: &str, tables: &[Table], options: &Options) -> Result<Data
     }
     let mut usable = tables.iter().filter(|t| Columns::find(file, t).is_ok());
     let Some(table) = usable.next() else {
+        if let Some(found) = tables.iter().find_map(|table| from_other(file, table, options)) {
+            return found;
+        }
         // Nothing fits: complain about the first sheet that holds anything.
         let table = tables.iter().find(|t| !t.rows.is_empty()).or(tables.first());
         return match table {

@@ -2,6 +2,7 @@
 
 mod import;
 mod plausibility;
+mod profile;
 mod registration;
 mod simulation;
 mod split;
