@@ -33,8 +33,13 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// otherwise than it is told there; an arc that stays and whose ends come to lie apart, or that
 /// passes a singularity from a corrected start; a configuration that may not be checked; a part that is
 /// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame;
-/// a turn about the tool that a block states which is left.
-const ONCE_WRONG: [(Dialect, u64); 37] = [
+/// a turn about the tool that a block states which is left;
+/// a work offset that a called program has set.
+const ONCE_WRONG: [(Dialect, u64); 41] = [
+    (Dialect::Fanuc, 60_001_877),
+    (Dialect::Fanuc, 60_009_435),
+    (Dialect::Fanuc, 60_015_894),
+    (Dialect::Fanuc, 60_017_435),
     (Dialect::Fanuc, 1_001_909),
     (Dialect::Fanuc, 1_001_375),
     (Dialect::Fanuc, 1_018_769),

@@ -158,11 +158,11 @@ impl Assigned {
         self.all |= other.all;
     }
 
-    /// What holds where the way may have come from anywhere in the file.
-    fn forget(&mut self, any: bool) {
-        // Each of them stays among those that are lost.
-        self.by_name = Map::new();
-        self.all |= any;
+    /// What holds where the way may have come from anywhere in the file: all that has been set, unless any is set `elsewhere` too.
+    fn forget(&mut self, elsewhere: bool) {
+        if elsewhere {
+            self.lose_all();
+        }
     }
 }
 

@@ -131,7 +131,7 @@ impl Fanuc<'_> {
                     self.preset[axis] = zero.map(|(zero, at)| zero + at - place);
                 }
             }
-            self.recount_after_preset(places);
+            self.unturned(|this| this.recount_after_preset(places));
             return true;
         }
         if block.has(921) {
@@ -142,7 +142,7 @@ impl Fanuc<'_> {
                     (self.preset[axis], self.local[axis]) = (Some(0.0), 0.0);
                 }
             }
-            self.recount();
+            self.unturned(Self::recount);
             return true;
         }
         if block.has(520) {
@@ -151,7 +151,7 @@ impl Fanuc<'_> {
                     self.local[axis] = *place;
                 }
             }
-            self.recount();
+            self.unturned(Self::recount);
             return true;
         }
         if block.has(100) {
@@ -176,6 +176,13 @@ impl Fanuc<'_> {
     }
 
     /// After G92 the named axes stand where it says, even where nothing else is known.
+    /// A shift, known or not, does not turn: how the tool is turned is told as before.
+    fn unturned(&mut self, shift: impl FnOnce(&mut Self)) {
+        let turn = self.machine.turn;
+        shift(self);
+        self.machine.turn = turn;
+    }
+
     fn recount_after_preset(&mut self, places: [Option<f64>; 3]) {
         self.recount();
         for (axis, place) in places.iter().enumerate() {

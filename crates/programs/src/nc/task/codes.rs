@@ -192,7 +192,7 @@ impl Lister<'_, '_> {
         }
         let name = self.state.tool_name(self.dialect);
         self.state.tools.set(&name, None);
-        self.found.assigns.1 = true;
+        self.found.assigns.1 |= self.anywhere_else();
         self.tool_index.clear();
         self.lose_position();
     }
@@ -200,7 +200,7 @@ impl Lister<'_, '_> {
     /// Every work offset is or may be changed to what the text does not tell.
     pub(super) fn frames_assigned(&mut self) {
         self.state.frames.lose_all();
-        self.found.assigns.0 = true;
+        self.found.assigns.0 |= self.anywhere_else();
         self.frame_index = None;
         self.lose_all();
     }
@@ -208,7 +208,7 @@ impl Lister<'_, '_> {
     /// Every tool is or may be changed.
     pub(super) fn tools_assigned(&mut self) {
         self.state.tools.lose_all();
-        self.found.assigns.1 = true;
+        self.found.assigns.1 |= self.anywhere_else();
         self.tool_index.clear();
         self.lose_position();
     }

@@ -79,11 +79,19 @@ impl Lister<'_, '_> {
             }
         }
         self.state.forget(constant, assigns);
+        // What was found for a name before says nothing of what it stands for now.
+        self.frame_index = None;
+        self.tool_index.clear();
         // Elsewhere an origin may have been set, or a tool made ready.
         self.state.preset |= self.whole.as_ref().is_none_or(|whole| whole.presets);
         self.state.next_tool =
             (self.changes_tools || self.dialect == Dialect::LinuxCnc).then(|| "T?".to_owned());
         self.events.push(Event::Join);
+    }
+
+    /// Whether what a block sets is not set once and for all: the way has parted before it, or may pass it by.
+    pub(super) fn anywhere_else(&self) -> bool {
+        self.branched || self.skipping || self.actions
     }
 
     /// The way parts: it may go on elsewhere in the file.

@@ -9,7 +9,7 @@ pub(super) struct Found {
     pub(super) value: [Option<u64>; GROUPS as usize],
     /// Groups that are set to more than one thing, one bit each.
     pub(super) several: u32,
-    /// Whether work offsets and tools are set.
+    /// Whether work offsets and tools are set after ways have parted, or where they may.
     pub(super) assigns: (bool, bool),
     /// Whether origins are set (G92).
     pub(super) presets: bool,

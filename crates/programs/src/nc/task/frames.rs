@@ -174,7 +174,7 @@ impl Lister<'_, '_> {
                 frame
             });
             self.state.tools.set(&tool, frame);
-            self.found.assigns.1 = true;
+            self.found.assigns.1 |= self.anywhere_else();
             self.tool_index.clear();
             if open {
                 self.lose_position();
@@ -207,7 +207,7 @@ impl Lister<'_, '_> {
     /// The program gives a work offset a value, or one that is not known.
     pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
         self.state.frames.set(name, frame);
-        self.found.assigns.0 = true;
+        self.found.assigns.0 |= self.anywhere_else();
         self.frame_index = None;
     }
 

@@ -387,6 +387,30 @@ fn the_turn_about_the_tool_that_a_left_block_states_holds_on() {
     assert_eq!(last(""), None);
 }
 
+/// The class: a work offset or a tool that a called program sets anew, under the name that held before the call.
+#[test]
+fn what_a_called_program_assigns_is_not_known_after_the_call() {
+    let all = "G1 X1. Y1. Z1. A180. B0. C0. F600.";
+    let after = |early: &str, set: &str| {
+        let begin = "G90 G21 G17 G40 G94\nT1 M6\nG54\nG43.4 H1";
+        let main = format!("O0001\n{HEAD}{begin}\n{early}\n{all}\nX5.\nM98 P100\n{all}\nM30\n");
+        let source = format!("{main}O0100\nG1 X3. Y3. Z3. A180. B0. C0. F600.\n{set}\nM99\n");
+        let setup = Setup { dialect: Some(Fanuc), ..Setup::default() };
+        let task = Task::read(&[("x", source.as_bytes())], &setup);
+        let call =
+            task.listing.motions.iter().position(|motion| motion.reason() == Some(Subprogram)).unwrap();
+        task.listing.motions[call + 1].reason()
+    };
+    assert_eq!(after("", "G4 X1."), None);
+    for set in ["G10 L2 P1 X5. Y0. Z0.", "G10 L2 P1 X[#5221+5.]", "#5221=5."] {
+        assert_eq!(after("", set), Some(WorkObjectAssigned), "{set}");
+    }
+    assert_ne!(after("", "G10 L11 P1 R50."), None, "the length of the tool");
+    // What is set before ways part, and nowhere else, holds wherever they meet.
+    assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G4 X1."), None);
+    assert_eq!(after("G10 L2 P1 X500. Y0. Z200.", "G10 L2 P1 X500. Y0. Z200."), Some(WorkObjectAssigned));
+}
+
 #[test]
 fn a_cycle_whose_line_breaks_off_is_no_panic() {
     for line in [
