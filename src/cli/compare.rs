@@ -115,38 +115,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--rows: experiment {name} draws no rows");
     }
     let work = Work::start(format!("experiment {}", experiment.name));
-    let results = on_threads(arguments.common.threads, || -> anyhow::Result<Results> {
-        let rows = || measured.as_ref().ok_or_else(|| anyhow!("no measurements"));
-        let options = |from: &Measured| Options {
-            rows: arguments.rows,
-            seed,
-            simulated: arguments.data.is_none(),
-            sensor_sigma_mm: from.sensor_sigma_mm,
-        };
-        Ok(match kind {
-            Kind::Methods(methods) => {
-                let from = rows()?;
-                let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
-                let study = protocol::run(&experiment, methods, data, robot, nominal, &options(from))?;
-                Results::Methods(Box::new(study))
-            }
-            Kind::Grinding(settings) => {
-                let from = rows()?;
-                let actual = from.actual.as_ref().map_or(Actual::Estimated, Actual::Simulated);
-                let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
-                let name = &experiment.name;
-                let result = grinding::run(settings, name, data, robot, nominal, actual, &options(from))?;
-                Results::Grinding(Box::new(result))
-            }
-            Kind::Uniformity(settings) => Results::Uniformity(uniformity::run(settings, seed)),
-            Kind::SignedRank(tables) => Results::SignedRank(signed_rank::run(tables)),
-            Kind::Degradation(settings) => {
-                let recipe = experiment.recipe.as_deref().unwrap_or_default();
-                let result = degradation::run(settings, &experiment.name, recipe, seed, nominal)?;
-                Results::Degradation(Box::new(result))
-            }
-        })
-    })??;
+    let results =
+        on_threads(arguments.common.threads, || results(arguments, &experiment, kind, measured.as_ref()))??;
     drop(work);
     let summary = view::summary(&experiment, &results);
     arguments.outputs.print(&summary)?;
@@ -178,6 +148,46 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     batch.write()?;
     Ok(Ending::Done)
+}
+
+/// Runs an experiment on what was measured, where it takes rows.
+fn results(
+    arguments: &Arguments,
+    experiment: &Experiment,
+    kind: Kind<'_>,
+    measured: Option<&Measured>,
+) -> anyhow::Result<Results> {
+    let seed = arguments.common.seed;
+    let rows = || measured.ok_or_else(|| anyhow!("no measurements"));
+    let options = |from: &Measured| Options {
+        rows: arguments.rows,
+        seed,
+        simulated: arguments.data.is_none(),
+        sensor_sigma_mm: from.sensor_sigma_mm,
+    };
+    Ok(match kind {
+        Kind::Methods(methods) => {
+            let from = rows()?;
+            let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
+            let study = protocol::run(experiment, methods, data, robot, nominal, &options(from))?;
+            Results::Methods(Box::new(study))
+        }
+        Kind::Grinding(settings) => {
+            let from = rows()?;
+            let actual = from.actual.as_ref().map_or(Actual::Estimated, Actual::Simulated);
+            let (data, robot, nominal) = (&from.dataset, &from.robot, &from.nominal);
+            let name = &experiment.name;
+            let result = grinding::run(settings, name, data, robot, nominal, actual, &options(from))?;
+            Results::Grinding(Box::new(result))
+        }
+        Kind::Uniformity(settings) => Results::Uniformity(uniformity::run(settings, seed)),
+        Kind::SignedRank(tables) => Results::SignedRank(signed_rank::run(tables)),
+        Kind::Degradation(settings) => {
+            let recipe = experiment.recipe.as_deref().unwrap_or_default();
+            let result = degradation::run(settings, &experiment.name, recipe, seed, nominal)?;
+            Results::Degradation(Box::new(result))
+        }
+    })
 }
 
 fn nominal(name: &str) -> Result<Model, String> {

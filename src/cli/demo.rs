@@ -10,10 +10,12 @@ use clap::Args;
 use truegrind::Confidence;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
+use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis;
 use truegrind::calibration::identification::identify::{Identification, Options};
 use truegrind::calibration::identification::solver::SOLVERS;
 use truegrind::calibration::measurement::import;
+use truegrind::compensation::cell::Cell;
 use truegrind::compensation::compensate::compensate;
 use truegrind::compensation::deviation::{After, Deviation, PathPoint, PathReport};
 use truegrind::compensation::rewrite::Options as RewriteBounds;
@@ -27,7 +29,7 @@ use truegrind::report::document::Document;
 use truegrind::report::{
     deviation as deviation_view, diagnosis as diagnosis_view, format, identification as identification_view,
 };
-use truegrind::surfaces::sample;
+use truegrind::surfaces::{SurfaceFile, sample};
 
 use super::computation::{Common, on_threads};
 use super::ending::Ending;
@@ -56,6 +58,95 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     files::make_folder(&arguments.output)?;
     on_threads(arguments.common.threads, || whole_way(&arguments.output, arguments.common.seed))?
+}
+
+/// A program and who runs it.
+struct Job<'a> {
+    task: &'a Program<'a>,
+    program: &'a [u8],
+    cell: &'a Cell,
+    surface: &'a SurfaceFile,
+    nominal: &'a Model,
+    /// The simulated arm.
+    actual: &'a Model,
+    condition: Condition,
+}
+
+/// The program as a model corrects it, and the file of that model.
+struct Corrected {
+    program: Vec<u8>,
+    model: String,
+}
+
+impl Job<'_> {
+    /// Rewrites the program with a model and runs it on the simulated arm.
+    fn ground(&self, name: &str, estimated: &Estimated) -> anyhow::Result<(PathReport, Corrected)> {
+        let bounds = RewriteBounds { condition: self.condition, ..RewriteBounds::default() };
+        let model = estimated.to_toml()?;
+        let mark = Mark {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            model: inputs::hash(model.as_bytes()),
+            partial: false,
+        };
+        let done = compensate(self.task, estimated, self.cell, &bounds, Some(mark))?;
+        let planned = done.plan;
+        let program = done.rewritten.files[0].edits.apply(self.program)?;
+        let after = Task::read(&[("blade.mod", program.as_slice())]);
+        let judged = Judged {
+            original: self.task.listing(),
+            rewritten: Some(&after.listing),
+            cell: self.cell,
+            surface: Some(&self.surface.surface),
+            program: "blade.mod",
+            name,
+            after: After::Achieved,
+            loads: [None, None],
+        };
+        let acting =
+            Acting { nominal: self.nominal, model: self.actual, knowledge: None, condition: self.condition };
+        let mut report = judge(&judged, &acting);
+        report.held_out_mm = Some(estimated.geometry.held_out.rmse);
+        for (point, planned) in report.points.iter_mut().zip(&planned.points) {
+            (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
+            (point.status, point.reason) = (planned.status, planned.reason.clone());
+        }
+        Ok((report, Corrected { program, model }))
+    }
+
+    /// The files of the program and of how far it is off, corrected by `best`.
+    fn add_files(
+        &self,
+        batch: &mut Batch,
+        folder: &Path,
+        best: &Corrected,
+        reports: &[PathReport],
+    ) -> anyhow::Result<()> {
+        let mut page: Document = deviation_view::document(reports);
+        page.title = "truegrind demo: a blade ground by an IRB 120".to_owned();
+        let mut add = |name: &str, bytes: Vec<u8>| batch.add(folder.join(name), bytes);
+        add("blade.mod", self.program.to_vec());
+        add("blade-compensated.mod", best.program.clone());
+        add("model.toml", best.model.clone().into());
+        add("measurements.csv", DATA.to_vec());
+        add("cell.toml", toml::to_string(self.cell)?.into());
+        add("actual-arm.toml", simulate::arm_text(self.actual)?.into());
+        add("deviation.csv", format::csv::table(&deviation_view::whole_table(reports)).into());
+        add("deviation.md", format::markdown::document(&page).into());
+        add("deviation.html", format::html::document(&page).into());
+        add("deviation.json", format::json::text(&deviation_view::json(reports))?.into());
+        Ok(())
+    }
+
+    #[cfg(feature = "visual")]
+    fn recording(&self, reports: &[PathReport]) -> anyhow::Result<Vec<u8>> {
+        let arms = super::recording::Arms {
+            real: self.actual,
+            is: "simulated actual arm",
+            nominal: self.nominal,
+            robot: None,
+        };
+        super::recording::path("truegrind demo", arms, self.condition, reports, Some(self.surface))
+    }
 }
 
 fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
@@ -90,83 +181,38 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     let work = Work::start("rewriting the program, running all of them on the simulated actual arm");
     let mass = path.draft.tool.1.mass_kg;
     let condition = Condition { payload_kg: Some(mass), ..Condition::default() };
-    let mut reports: Vec<PathReport> = Vec::new();
-    let mut rewritten_program = None;
-    for (name, estimated) in arms {
-        let bounds = RewriteBounds { condition, ..RewriteBounds::default() };
-        let text = estimated.to_toml()?;
-        let mark = Mark {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            model: inputs::hash(text.as_bytes()),
-            partial: false,
-        };
-        let done = compensate(&task, estimated, &cell, &bounds, Some(mark))?;
-        let planned = done.plan;
-        let bytes = done.rewritten.files[0].edits.apply(&program)?;
-        let after = Task::read(&[("blade.mod", bytes.as_slice())]);
-        let judged = Judged {
-            original: task.listing(),
-            rewritten: Some(&after.listing),
-            cell: &cell,
-            surface: Some(&surface.surface),
-            program: "blade.mod",
-            name,
-            after: After::Achieved,
-            loads: [None, None],
-        };
-        let acting = Acting { nominal, model: &simulation.actual, knowledge: None, condition };
-        let mut report = judge(&judged, &acting);
-        report.held_out_mm = Some(estimated.geometry.held_out.rmse);
-        for (point, planned) in report.points.iter_mut().zip(&planned.points) {
-            (point.sigma_mm, point.outside) = (planned.sigma_mm, planned.outside);
-            (point.status, point.reason) = (planned.status, planned.reason.clone());
-        }
-        reports.push(report);
-        if rewritten_program.is_none() {
-            rewritten_program = Some((bytes, text));
-        }
-    }
+    let job = Job {
+        task: &task,
+        program: &program,
+        cell: &cell,
+        surface: &surface,
+        nominal,
+        actual: &simulation.actual,
+        condition,
+    };
+    let ground = arms.into_iter().map(|(name, estimated)| job.ground(name, estimated));
+    let (reports, corrected): (Vec<_>, Vec<_>) =
+        ground.collect::<anyhow::Result<Vec<_>>>()?.into_iter().unzip();
 
     drop(work);
-    let mut page: Document = deviation_view::document(&reports);
-    page.title = "truegrind demo: a blade ground by an IRB 120".to_owned();
     let mut batch = Batch::default();
-    let place = |name: &str| folder.join(name);
-    batch.add(place("blade.mod"), program.clone());
-    if let Some((bytes, model)) = rewritten_program {
-        batch.add(place("blade-compensated.mod"), bytes);
-        batch.add(place("model.toml"), model);
-    }
-    batch.add(place("measurements.csv"), DATA.to_vec());
-    batch.add(place("cell.toml"), toml::to_string(&cell)?);
-    batch.add(place("actual-arm.toml"), simulate::arm_text(&simulation.actual)?);
-    batch.add(place("deviation.csv"), format::csv::table(&deviation_view::whole_table(&reports)));
-    batch.add(place("deviation.md"), format::markdown::document(&page));
-    batch.add(place("deviation.html"), format::html::document(&page));
-    batch.add(place("deviation.json"), format::json::text(&deviation_view::json(&reports))?);
+    job.add_files(&mut batch, folder, &corrected[0], &reports)?;
     let identification = identification_view::document(&found[0], &dataset);
-    batch.add(place("identification.html"), format::html::document(&identification));
-    batch.add(place("diagnosis.html"), format::html::document(&diagnosis_view::document(&causes, &dataset)));
+    batch.add(folder.join("identification.html"), format::html::document(&identification));
+    let diagnosis = diagnosis_view::document(&causes, &dataset);
+    batch.add(folder.join("diagnosis.html"), format::html::document(&diagnosis));
     #[cfg(feature = "visual")]
-    batch.add(
-        place("demo.rrd"),
-        super::recording::path(
-            "truegrind demo",
-            super::recording::Arms {
-                real: &simulation.actual,
-                is: "simulated actual arm",
-                nominal,
-                robot: None,
-            },
-            condition,
-            &reports[..1],
-            Some(&surface),
-        )?,
-    );
+    batch.add(folder.join("demo.rrd"), job.recording(&reports[..1])?);
     batch.write()?;
 
-    let tables = [deviation_view::block_table(&reports), deviation_view::registered_table(&reports)];
-    let mut text = headline(&reports[0], &causes);
+    say(answer(folder, &reports, &causes))?;
+    Ok(Ending::Done)
+}
+
+/// What the terminal says.
+fn answer(folder: &Path, reports: &[PathReport], causes: &diagnosis::diagnose::Diagnosed) -> String {
+    let tables = [deviation_view::block_table(reports), deviation_view::registered_table(reports)];
+    let mut text = headline(&reports[0], causes);
     for table in &tables {
         text += &format::terminal::table(table, width());
         text += "\n";
@@ -186,8 +232,7 @@ fn whole_way(folder: &Path, seed: u64) -> anyhow::Result<Ending> {
     ] {
         text += &format!("  {name:<34} {what}\n");
     }
-    say(&text)?;
-    Ok(Ending::Done)
+    text
 }
 
 /// What came of it, in two lines.

@@ -210,8 +210,8 @@ fn space(arguments: &Arguments, reach_mm: f64) -> anyhow::Result<Space> {
     Ok(Space { floor_mm: Some(arguments.floor), boxes_mm, radius_mm, approach_rad })
 }
 
-fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
-    let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
+/// What can be refused by itself: numbers and counts.
+fn check_numbers(arguments: &Arguments, sigma: f64) -> anyhow::Result<()> {
     for (name, value) in [
         ("--sigma", sigma),
         ("--sigma-angle", arguments.sigma_angle),
@@ -251,6 +251,30 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
     if arguments.candidates > MOST_CANDIDATES {
         bail!("--candidates {}: expected at most {MOST_CANDIDATES}; 2000 are usual", arguments.candidates);
     }
+    Ok(())
+}
+
+/// What a diagnosis left open, for the plan to settle.
+fn questions(arguments: &Arguments) -> anyhow::Result<Vec<rival::Question>> {
+    Ok(match &arguments.diagnosis {
+        None => Vec::new(),
+        Some(path) => {
+            let found =
+                rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            if found.is_empty() {
+                tell(format_args!(
+                    "note: {}: nothing is ambiguous or untested; planned for the geometry",
+                    path.display()
+                ));
+            }
+            found
+        }
+    })
+}
+
+fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Result<Options> {
+    let sigma = arguments.sigma.unwrap_or(if sensor == Sensor::Cable { 0.05 } else { 0.03 });
+    check_numbers(arguments, sigma)?;
     let box_mm = match &arguments.box_mm {
         None => None,
         Some(text) => match numbers("--box", text)?[..] {
@@ -274,20 +298,7 @@ fn options(arguments: &Arguments, sensor: Sensor, reach_mm: f64) -> anyhow::Resu
         (_, None) => None,
     };
     let space = space(arguments, reach_mm)?;
-    let questions = match &arguments.diagnosis {
-        None => Vec::new(),
-        Some(path) => {
-            let found =
-                rival::questions(&files::read_text(path)?).map_err(|e| anyhow!("{}: {e}", path.display()))?;
-            if found.is_empty() {
-                tell(format_args!(
-                    "note: {}: nothing is ambiguous or untested; planned for the geometry",
-                    path.display()
-                ));
-            }
-            found
-        }
-    };
+    let questions = questions(arguments)?;
     let approach_rad = arguments.approach.to_radians();
     Ok(Options {
         poses: arguments.poses,

@@ -202,19 +202,47 @@ impl Why {
             Why::Uncertain { .. } => "the model is uncertain here",
         }
     }
+
+    /// The whole sentence, where it has no numbers in it and says more than [`Self::kind`].
+    fn sentence(&self) -> Option<&'static str> {
+        Some(match self {
+            Why::Same => "its numbers are right to the last decimal that is written",
+            Why::JointTarget => "joint target: states joints, not a pose (--joint-targets rewrites it too)",
+            Why::Contradicted => {
+                "what the cell file says of its tool or work object and what the program says do not agree"
+            }
+            Why::SingularWay => "on the corrected way to it the arm comes too close to a singularity",
+            Why::OpenBranch => {
+                "the controller may take another configuration, since none is stated and another lies as near: state it, or \
+                 come nearer before"
+            }
+            Why::OpenStart => {
+                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
+                 arm stands, and where it comes from the text does not tell. It is corrected for the stated one, or the one \
+                 that leads on from there: check that, or begin with a joint target"
+            }
+            Why::Bend { mm } if !mm.is_finite() => "the arm cannot follow the path to it",
+            Why::Corner { mm } if !mm.is_finite() => {
+                "the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)"
+            }
+            Why::CircleKept => {
+                "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
+                 straight pieces keep to it"
+            }
+            Why::NoCircle => "its three points make no circle, or none that keeps to the way that was meant",
+            Why::WholeCircle => "a whole circle: the path between its ends is not checked",
+            _ => return None,
+        })
+    }
 }
 
 impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(sentence) = self.sentence() {
+            return f.write_str(sentence);
+        }
         match self {
             Why::Program(reason) => reason.fmt(f),
-            Why::Same => f.write_str("its numbers are right to the last decimal that is written"),
-            Why::JointTarget => {
-                f.write_str("joint target: states joints, not a pose (--joint-targets rewrites it too)")
-            }
-            Why::Contradicted => {
-                f.write_str("what the cell file says of its tool or work object and what the program says do not agree")
-            }
             Why::MovingBase { axis } => write!(
                 f,
                 "external axis {} carries the robot's base: where that stands is not followed",
@@ -224,7 +252,6 @@ impl fmt::Display for Why {
             Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
             Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
             Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
-            Why::NearSingularity => f.write_str("too close to a singularity"),
             Why::JointJump { joint, deg, most_deg, on_the_way } => write!(
                 f,
                 "{}the correction would turn joint {} by {deg:.1}°, more than {most_deg:.1}°, which is enough away from \
@@ -232,42 +259,23 @@ impl fmt::Display for Why {
                 if *on_the_way { "on the way to it " } else { "" },
                 joint + 1
             ),
-            Why::SingularWay => f.write_str("on the corrected way to it the arm comes too close to a singularity"),
-            Why::OtherBranch => f.write_str("the corrected target lies in another configuration"),
-            Why::OpenBranch => f.write_str(
-                "the controller may take another configuration, since none is stated and another lies as near: state it, or \
-                 come nearer before",
-            ),
-            Why::OpenStart => f.write_str(
-                "its configuration is not checked (ConfL \\Off, ConfJ \\Off): the controller takes the one next to where the \
-                 arm stands, and where it comes from the text does not tell. It is corrected for the stated one, or the one \
-                 that leads on from there: check that, or begin with a joint target",
-            ),
-            Why::Bend { mm } if !mm.is_finite() => f.write_str("the arm cannot follow the path to it"),
-            Why::Corner { mm } if !mm.is_finite() => {
-                f.write_str("the arm cannot follow the rounded corner before it: round it less (zone, path tolerance)")
-            }
             Why::Bend { mm } => write!(f, "the path to it leaves the intended one by {mm:.3} mm"),
             Why::Corner { mm } => {
-                write!(f, "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)")
+                write!(
+                    f,
+                    "the rounded corner before it leaves the intended one by {mm:.3} mm: round it less (zone, path tolerance)"
+                )
             }
             Why::OpenCentre { mm } => write!(
                 f,
                 "an arc of about half a turn that states its radius: the decimals that are written leave its centre open by \
                  {mm:.3} mm; state the centre instead (I, J, K; CC)"
             ),
-            Why::CircleKept => f.write_str(
-                "the circle stays: its start is not known or not corrected, the instruction may not be split, or no \
-                 straight pieces keep to it",
+            Why::TooFast { joint, ratio } => write!(
+                f,
+                "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
+                joint + 1
             ),
-            Why::TooFast { joint, ratio } => {
-                write!(
-                    f,
-                    "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
-                    joint + 1
-                )
-            }
-            Why::NoCircle => f.write_str("its three points make no circle, or none that keeps to the way that was meant"),
             Why::BeforeCircle { line } => write!(
                 f,
                 "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
@@ -278,21 +286,16 @@ impl fmt::Display for Why {
                 "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
                  singularity"
             ),
-            Why::WholeCircle => f.write_str("a whole circle: the path between its ends is not checked"),
-            Why::JointNotMeasured { joint, by_deg } => {
-                write!(
-                    f,
-                    "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
-                    joint + 1
-                )
-            }
-            Why::PartOfCut { line, because } => {
-                write!(
-                    f,
-                    "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
-                     corrects the rest)"
-                )
-            }
+            Why::JointNotMeasured { joint, by_deg } => write!(
+                f,
+                "joint {} is {by_deg:.1}° outside the range in which the arm was measured",
+                joint + 1
+            ),
+            Why::PartOfCut { line, because } => write!(
+                f,
+                "the cut is corrected as a whole or not at all, and line {line} stays as it is: {because} (--partial \
+                 corrects the rest)"
+            ),
             Why::Step { line, mm } => write!(
                 f,
                 "line {line} of the same cut stays as it is: the step of {mm:.3} mm between the two exceeds --tolerance"
@@ -309,6 +312,7 @@ impl fmt::Display for Why {
             Why::Uncertain { sigma_mm } => {
                 write!(f, "the model is uncertain here: predicted standard deviation {sigma_mm:.3} mm")
             }
+            _ => f.write_str(self.kind()),
         }
     }
 }

@@ -18,6 +18,7 @@ pub mod vslm;
 pub mod triangular;
 pub mod rank;
 pub(crate) mod damped;
+pub(crate) mod search;
 
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use crate::experiment::{ExperimentError, Grinding, PaperPoints};
+use crate::experiment::{ExperimentError, Grinding, GrindingMethod, PaperPoints};
 use crate::protocol::{Options as CaseOptions, drawn};
 use crate::verdict::{Test, paired};
 use truegrind_arm::condition::Condition;
@@ -39,7 +39,8 @@ use truegrind_programs::nc::orientation::Angles;
 use truegrind_programs::nc::setup::Setup;
 use truegrind_programs::nc::writer;
 use truegrind_programs::reading::Program;
-use truegrind_surfaces::{SurfaceFile, sample};
+use truegrind_surfaces::SurfaceFile;
+use truegrind_surfaces::sample::{self, Sample};
 
 /// The result.
 #[derive(Debug, Clone)]
@@ -162,24 +163,10 @@ pub fn run(
     options: &CaseOptions,
 ) -> Result<GrindingResult, ExperimentError> {
     let fail = |message: String| ExperimentError::Recipe { experiment: experiment.to_owned(), message };
-    let stem = |file: &'static str| file.trim_end_matches(".toml");
-    let sample = sample::ALL.iter().find(|s| stem(s.file) == settings.surface).ok_or_else(|| {
-        let names: Vec<&str> = sample::ALL.iter().map(|s| stem(s.file)).collect();
-        fail(format!("no surface named {} ships; there are {}", settings.surface, names.join(", ")))
-    })?;
+    let sample = shipped(&settings.surface).map_err(fail)?;
     let all = dataset.rows.len();
     let seed = options.seed;
-    let measured = options.rows.or(settings.rows).unwrap_or(all);
-    if all < measured {
-        return Err(ExperimentError::TooFewRows {
-            file: dataset.file.clone(),
-            experiment: experiment.to_owned(),
-            found: all,
-            asked: measured,
-            // With all of them every case would have the same rows.
-            possible: all * 4 / 5,
-        });
-    }
+    let measured = rows_of_a_case(settings, experiment, dataset, options)?;
     let surface = sample.read().map_err(|e| fail(e.to_string()))?;
     let path = toolpath(&surface, nominal, robot).map_err(|e| fail(e.to_string()))?;
     // A tool vector and the turn about it: no convention of A, B and C is needed.
@@ -218,12 +205,9 @@ pub fn run(
         model,
         after,
     };
-    let solvers = settings
-        .method
-        .iter()
-        .map(|m| solver::by_name(&m.solver).map_err(|e| fail(e.to_string())))
-        .collect::<Result<Vec<&'static Solver>, _>>()?;
-    let cases: Vec<Vec<(GrindingCase, Option<PathReport>)>> = (0..settings.cases as u64)
+    let named = settings.method.iter().map(|m| solver::by_name(&m.solver).map_err(|e| fail(e.to_string())));
+    let solvers = named.collect::<Result<Vec<&'static Solver>, _>>()?;
+    let cases: Vec<Vec<Ground>> = (0..settings.cases as u64)
         .into_par_iter()
         .map(|k| {
             let drawn = dataset.subset(&drawn(all, measured, seed + k));
@@ -231,31 +215,8 @@ pub fn run(
             methods.map(|(method, solver)| ground(&shop, &method.id, solver, &drawn, seed + k)).collect()
         })
         .collect();
-    let mut rows: Vec<GrindingRow> = settings
-        .method
-        .iter()
-        .zip(&solvers)
-        .map(|(method, solver)| GrindingRow {
-            id: method.id.clone(),
-            solver,
-            paper: method.paper,
-            cases: Vec::new(),
-        })
-        .collect();
-    let mut reports = Vec::new();
-    for (k, case) in cases.into_iter().enumerate() {
-        for (row, (case, report)) in rows.iter_mut().zip(case) {
-            row.cases.push(case);
-            reports.extend(report.filter(|_| k == 0));
-        }
-    }
-    let reference = rows.iter().find(|r| r.id == settings.reference).and_then(GrindingRow::sizes_mm);
-    let sizes: Vec<Option<Vec<f64>>> = rows
-        .iter()
-        .map(|r| reference.as_ref().and_then(|_| r.sizes_mm()).filter(|_| r.id != settings.reference))
-        .collect();
-    let ratio = settings.held_out / (1.0 - settings.held_out);
-    let against = paired(&reference.unwrap_or_default(), &sizes, ratio);
+    let (rows, reports) = by_method(settings, &solvers, cases);
+    let against = against_reference(settings, &rows);
     Ok(GrindingResult {
         settings: settings.clone(),
         surface: surface.name.clone(),
@@ -270,6 +231,74 @@ pub fn run(
         against,
         reports,
     })
+}
+
+/// How many rows one case has.
+fn rows_of_a_case(
+    settings: &Grinding,
+    experiment: &str,
+    dataset: &Dataset,
+    options: &CaseOptions,
+) -> Result<usize, ExperimentError> {
+    let all = dataset.rows.len();
+    let asked = options.rows.or(settings.rows).unwrap_or(all);
+    if all < asked {
+        return Err(ExperimentError::TooFewRows {
+            file: dataset.file.clone(),
+            experiment: experiment.to_owned(),
+            found: all,
+            asked,
+            // With all of them every case would have the same rows.
+            possible: all * 4 / 5,
+        });
+    }
+    Ok(asked)
+}
+
+/// A surface that ships, by the name of its file.
+fn shipped(name: &str) -> Result<&'static Sample, String> {
+    let stem = |sample: &Sample| sample.file.trim_end_matches(".toml");
+    sample::ALL.iter().find(|sample| stem(sample) == name).ok_or_else(|| {
+        let names: Vec<&str> = sample::ALL.iter().map(stem).collect();
+        format!("no surface named {name} ships; there are {}", names.join(", "))
+    })
+}
+
+/// What a method comes to in one case, with its path where it has one.
+type Ground = (GrindingCase, Option<PathReport>);
+
+/// The cases, each with an entry for each method, as methods with an entry for each case; and the paths of the first case.
+fn by_method(
+    settings: &Grinding,
+    solvers: &[&'static Solver],
+    cases: Vec<Vec<Ground>>,
+) -> (Vec<GrindingRow>, Vec<PathReport>) {
+    let row = |(method, &solver): (&GrindingMethod, &&'static Solver)| GrindingRow {
+        id: method.id.clone(),
+        solver,
+        paper: method.paper,
+        cases: Vec::new(),
+    };
+    let mut rows: Vec<GrindingRow> = settings.method.iter().zip(solvers).map(row).collect();
+    let mut reports = Vec::new();
+    for (k, case) in cases.into_iter().enumerate() {
+        for (row, (case, report)) in rows.iter_mut().zip(case) {
+            row.cases.push(case);
+            reports.extend(report.filter(|_| k == 0));
+        }
+    }
+    (rows, reports)
+}
+
+/// Every method against the reference, by the mean size of the deviation in each case.
+fn against_reference(settings: &Grinding, rows: &[GrindingRow]) -> Vec<Option<Test>> {
+    let reference = rows.iter().find(|r| r.id == settings.reference).and_then(GrindingRow::sizes_mm);
+    let sizes: Vec<Option<Vec<f64>>> = rows
+        .iter()
+        .map(|r| reference.as_ref().and_then(|_| r.sizes_mm()).filter(|_| r.id != settings.reference))
+        .collect();
+    let ratio = settings.held_out / (1.0 - settings.held_out);
+    paired(&reference.unwrap_or_default(), &sizes, ratio)
 }
 
 /// What a method makes of measurements.
@@ -298,13 +327,7 @@ fn found(
 }
 
 /// Identifies, rewrites the program and runs it.
-fn ground(
-    shop: &Shop<'_>,
-    id: &str,
-    solver: &'static Solver,
-    dataset: &Dataset,
-    seed: u64,
-) -> (GrindingCase, Option<PathReport>) {
+fn ground(shop: &Shop<'_>, id: &str, solver: &'static Solver, dataset: &Dataset, seed: u64) -> Ground {
     let mut case = GrindingCase {
         after: None,
         refused: 0,

@@ -166,47 +166,12 @@ pub fn run(
         .par_iter()
         .map(|&seed| prepare(&observed, nominal, rows, protocol.held_out, seed, any_sound))
         .collect::<Result<Vec<_>, ExperimentError>>()?;
-    let cases: Vec<Case> = prepared
+    let cases = prepared.iter().zip(&seeds).map(|(case, &seed)| case.described(seed)).collect();
+    let results = methods
+        .method
         .iter()
-        .zip(&seeds)
-        .map(|(case, &seed)| {
-            let errors = errors_on(&case.test, &case.registered.model, &case.registered.frames);
-            Case {
-                seed,
-                train: case.train.dataset.rows.len(),
-                test: case.test.dataset.rows.len(),
-                registered: ErrorSummary::of(errors.iter().copied()),
-                registered_errors_mm: errors,
-            }
-        })
-        .collect();
-
-    let mut results = Vec::with_capacity(methods.method.len());
-    for method in &methods.method {
-        let solver = method.solver();
-        let treatment = treatment_of(method, methods);
-        let fail = |found: SolverError| ExperimentError::Invalid {
-            file: experiment.name.clone(),
-            key: method.id.clone(),
-            found: found.to_string(),
-            expected: "settings of that method".to_owned(),
-        };
-        let configured = solver.configured(&method.settings).map_err(fail)?;
-        let (outcomes, converged): (Vec<Outcome>, Vec<Option<Outcome>>) = prepared
-            .par_iter()
-            .zip(&seeds)
-            .map(|(case, seed)| outcome(case, method, solver, treatment, &configured.run, *seed))
-            .unzip();
-        let converged: Option<Vec<Outcome>> = converged.into_iter().collect();
-        results.push(MethodResult {
-            method: method.clone(),
-            solver,
-            treatment,
-            settings: configured.settings,
-            outcomes,
-            converged,
-        });
-    }
+        .map(|method| result_of(method, experiment, methods, &prepared, &seeds))
+        .collect::<Result<Vec<_>, _>>()?;
     let parameters = if methods.parameters {
         results.iter().filter_map(|r| parameters_of(&prepared[0], r)).collect()
     } else {
@@ -230,6 +195,53 @@ pub fn run(
         results,
         parameters,
         judgement,
+    })
+}
+
+impl Prepared {
+    /// What a study says of the case.
+    fn described(&self, seed: u64) -> Case {
+        let errors = errors_on(&self.test, &self.registered.model, &self.registered.frames);
+        Case {
+            seed,
+            train: self.train.dataset.rows.len(),
+            test: self.test.dataset.rows.len(),
+            registered: ErrorSummary::of(errors.iter().copied()),
+            registered_errors_mm: errors,
+        }
+    }
+}
+
+/// What a method comes to in all cases.
+fn result_of(
+    method: &Method,
+    experiment: &Experiment,
+    methods: &Methods,
+    prepared: &[Prepared],
+    seeds: &[u64],
+) -> Result<MethodResult, ExperimentError> {
+    let solver = method.solver();
+    let treatment = treatment_of(method, methods);
+    let fail = |found: SolverError| ExperimentError::Invalid {
+        file: experiment.name.clone(),
+        key: method.id.clone(),
+        found: found.to_string(),
+        expected: "settings of that method".to_owned(),
+    };
+    let configured = solver.configured(&method.settings).map_err(fail)?;
+    let (outcomes, converged): (Vec<Outcome>, Vec<Option<Outcome>>) = prepared
+        .par_iter()
+        .zip(seeds)
+        .map(|(case, seed)| outcome(case, method, solver, treatment, &configured.run, *seed))
+        .unzip();
+    let converged: Option<Vec<Outcome>> = converged.into_iter().collect();
+    Ok(MethodResult {
+        method: method.clone(),
+        solver,
+        treatment,
+        settings: configured.settings,
+        outcomes,
+        converged,
     })
 }
 

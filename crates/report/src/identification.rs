@@ -17,6 +17,7 @@ use super::number::Precision;
 use super::status::Status;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement};
 use truegrind_calibration::identification::benefit::Benefit;
+use truegrind_calibration::identification::identifiability::Identifiability;
 use truegrind_calibration::identification::identify::Identification;
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_calibration::measurement::dataset::Dataset;
@@ -114,32 +115,7 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         .iter()
         .map(|(row, before, after)| json!({ "row": row, "registered_mm": before, "geometry_mm": after }))
         .collect();
-    let identifiability = found.identifiability.as_ref().map(|report| {
-        let observability: serde_json::Map<String, Value> = report
-            .observability
-            .iter()
-            .enumerate()
-            .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank > 0).then_some(value))))
-            .collect();
-        let combinations: Vec<Value> = report
-            .combinations
-            .iter()
-            .map(|terms| {
-                terms.iter().map(|(p, share)| json!({ "parameter": p.to_string(), "share": share })).collect()
-            })
-            .collect();
-        json!({
-            "parameters": report.parameters,
-            "rank": report.rank,
-            "condition": report.condition,
-            "determined_condition": report.determined_condition,
-            "singular_values": report.singular_values,
-            "observability": observability,
-            "held_by_priors": report.held_by_priors,
-            "combinations": combinations,
-            "sentences": words::combinations(found, report),
-        })
-    });
+    let identifiability = found.identifiability.as_ref().map(|report| identifiability_json(found, report));
     let rounds: Vec<Vec<f64>> = found
         .geometry
         .rounds
@@ -187,6 +163,34 @@ pub fn json(found: &Identification, dataset: &Dataset) -> Value {
         "region": estimated.region,
         "condition": estimated.condition,
         "held_out": held_out,
+    })
+}
+
+/// What the measurements tell, and which combinations they do not.
+fn identifiability_json(found: &Identification, report: &Identifiability) -> Value {
+    let observability: serde_json::Map<String, Value> = report
+        .observability
+        .iter()
+        .enumerate()
+        .map(|(k, value)| (format!("o{}", k + 1), json!((report.rank > 0).then_some(value))))
+        .collect();
+    let combinations: Vec<Value> = report
+        .combinations
+        .iter()
+        .map(|terms| {
+            terms.iter().map(|(p, share)| json!({ "parameter": p.to_string(), "share": share })).collect()
+        })
+        .collect();
+    json!({
+        "parameters": report.parameters,
+        "rank": report.rank,
+        "condition": report.condition,
+        "determined_condition": report.determined_condition,
+        "singular_values": report.singular_values,
+        "observability": observability,
+        "held_by_priors": report.held_by_priors,
+        "combinations": combinations,
+        "sentences": words::combinations(found, report),
     })
 }
 

@@ -251,6 +251,15 @@ pub fn document(robot: &Robot) -> Document {
         None => page.paragraph("No masses are stated, so gravity bends this arm only through its payload."),
     }
     page.heading(2, "Published poses");
+    push_published(&mut page, robot);
+    page.heading(2, "Sources");
+    page.push(untitled(source_table(robot)));
+    page
+}
+
+/// What checks the links: a table, and the words of each pose in a list.
+fn push_published(page: &mut Document, robot: &Robot) {
+    let sheet = &robot.sheet;
     if sheet.published.is_empty() {
         page.paragraph("None is stated, so nothing checks the links.");
     } else {
@@ -264,17 +273,13 @@ pub fn document(robot: &Robot) -> Document {
         }
         page.push(table);
         page.push(Block::List(
-            robot
-                .sheet
+            sheet
                 .published
                 .iter()
                 .map(|pose| format!("{}: joints ({})°; {}", pose.what, list(&pose.joints_deg), pose.source))
                 .collect(),
         ));
     }
-    page.heading(2, "Sources");
-    page.push(untitled(source_table(robot)));
-    page
 }
 
 /// What was understood of a robot file, in a few lines: to be compared with the manual before anything is measured.

@@ -554,7 +554,6 @@ impl Reporter<'_> {
         surface: &StatedSurface,
         tool: &Tool,
     ) -> Result<PathOptions, SurfaceError> {
-        let names = if surface.kind == Kind::Parametric { ["u", "v"] } else { ["x", "y"] };
         let only_raster = |key: &str, given: bool| {
             if !given || stated.pattern == Pattern::Raster {
                 return Ok(());
@@ -569,7 +568,32 @@ impl Reporter<'_> {
         };
         only_raster("along", stated.along.is_some())?;
         only_raster("traverse", stated.traverse.is_some())?;
-        let along = match stated.along.as_deref() {
+        let default = PathOptions::default();
+        let options = PathOptions {
+            pattern: stated.pattern,
+            along: self.along(stated, surface)?,
+            traverse: stated.traverse.unwrap_or_default(),
+            spacing: self.spacing(stated, tool)?,
+            max_step_mm: stated.max_step_mm.unwrap_or(default.max_step_mm),
+            chord_mm: stated.chord_mm.unwrap_or(default.chord_mm),
+            lead_rad: stated.lead_deg.unwrap_or(0.0).to_radians(),
+            tilt_rad: stated.tilt_deg.unwrap_or(0.0).to_radians(),
+            tool_x: self.tool_x(stated)?,
+            approach_mm: stated.approach_mm.unwrap_or(default.approach_mm),
+        };
+        match options.check() {
+            Ok(()) => Ok(options),
+            Err(SurfaceError::Option { option, found, expected }) => {
+                Err(self.value(&format!("path.{option}"), found.to_string(), expected, "correct the number"))
+            }
+            Err(error) => Err(self.stated("path", error)),
+        }
+    }
+
+    /// Along which coordinate of the surface the passes run.
+    fn along(&self, stated: &StatedPath, surface: &StatedSurface) -> Result<Along, SurfaceError> {
+        let names = if surface.kind == Kind::Parametric { ["u", "v"] } else { ["x", "y"] };
+        Ok(match stated.along.as_deref() {
             None => Along::First,
             Some(name) if name == names[0] => Along::First,
             Some(name) if name == names[1] => Along::Second,
@@ -578,8 +602,12 @@ impl Reporter<'_> {
                 let remedy = "choose the coordinate along which the passes run";
                 return Err(self.value("path.along", format!("`{name}`"), expected, remedy));
             }
-        };
-        let spacing = match (stated.step_over_mm, stated.scallop_mm, tool.radius_mm) {
+        })
+    }
+
+    /// How far passes lie apart.
+    fn spacing(&self, stated: &StatedPath, tool: &Tool) -> Result<Spacing, SurfaceError> {
+        Ok(match (stated.step_over_mm, stated.scallop_mm, tool.radius_mm) {
             (Some(step), None, Some(radius)) if step > 2.0 * radius => {
                 let expected = format!("at most {} mm, twice tool.radius_mm", 2.0 * radius);
                 let remedy = "make it smaller: the passes would leave strips between them";
@@ -601,8 +629,12 @@ impl Reporter<'_> {
                 let expected = "either step_over_mm or scallop_mm";
                 return Err(self.value("path.step_over_mm", found, expected, "state one of the two"));
             }
-        };
-        let tool_x = match (stated.tool_x, stated.tool_x_direction) {
+        })
+    }
+
+    /// How the tool is turned about its axis.
+    fn tool_x(&self, stated: &StatedPath) -> Result<ToolX, SurfaceError> {
+        Ok(match (stated.tool_x, stated.tool_x_direction) {
             (Some(StatedToolX::Feed), Some(_)) => {
                 let expected = "no direction with tool_x = \"feed\"";
                 return Err(self.value(
@@ -614,27 +646,7 @@ impl Reporter<'_> {
             }
             (Some(StatedToolX::Feed), None) => ToolX::Feed,
             (_, direction) => ToolX::Fixed(Vector3::from(direction.unwrap_or([1.0, 0.0, 0.0]))),
-        };
-        let default = PathOptions::default();
-        let options = PathOptions {
-            pattern: stated.pattern,
-            along,
-            traverse: stated.traverse.unwrap_or_default(),
-            spacing,
-            max_step_mm: stated.max_step_mm.unwrap_or(default.max_step_mm),
-            chord_mm: stated.chord_mm.unwrap_or(default.chord_mm),
-            lead_rad: stated.lead_deg.unwrap_or(0.0).to_radians(),
-            tilt_rad: stated.tilt_deg.unwrap_or(0.0).to_radians(),
-            tool_x,
-            approach_mm: stated.approach_mm.unwrap_or(default.approach_mm),
-        };
-        match options.check() {
-            Ok(()) => Ok(options),
-            Err(SurfaceError::Option { option, found, expected }) => {
-                Err(self.value(&format!("path.{option}"), found.to_string(), expected, "correct the number"))
-            }
-            Err(error) => Err(self.stated("path", error)),
-        }
+        })
     }
 }
 

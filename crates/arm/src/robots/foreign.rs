@@ -204,13 +204,7 @@ fn robot(
             gravity: gravity.map(tidy).into(),
             plate_mm: (inside.rotation * -place).map(tidy).into(),
         },
-        masses: described.masses.as_ref().map(|masses| Masses {
-            mass_kg: std::array::from_fn(|i| masses[i].mass_kg),
-            centre_mm: std::array::from_fn(|i| {
-                let centre = laid.frames[i + 1].inverse() * nalgebra::Point3::from(masses[i].centre_mm);
-                centre.coords.map(tidy).into()
-            }),
-        }),
+        masses: masses(&described, &laid),
         sources: Sources {
             links: described.source.clone(),
             limits: described.limits_deg.map(|_| described.source.clone()).unwrap_or_default(),
@@ -222,6 +216,17 @@ fn robot(
     let robot = Robot::new(sheet, file)?;
     compared(&robot, &described, &laid.base, &map, file)?;
     Ok((robot, notes, visuals))
+}
+
+/// Masses of the links, with their centres in the frames of our links.
+fn masses(described: &Described, laid: &axes::Laid) -> Option<Masses> {
+    described.masses.as_ref().map(|masses| Masses {
+        mass_kg: std::array::from_fn(|i| masses[i].mass_kg),
+        centre_mm: std::array::from_fn(|i| {
+            let centre = laid.frames[i + 1].inverse() * nalgebra::Point3::from(masses[i].centre_mm);
+            centre.coords.map(tidy).into()
+        }),
+    })
 }
 
 /// What an arm is called whose file does not say it: after the file, and so that no file is meant by it.

@@ -185,31 +185,7 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
     rotations.extend(shah(base_from_flange, sensor_from_target));
     let starts = rotations
         .into_iter()
-        .filter_map(|rotation| {
-            // With the sensor's rotation known: the target's as the mean, both translations linear.
-            let target = mean_rotation(
-                base_from_flange
-                    .iter()
-                    .zip(sensor_from_target)
-                    .map(|(f, m)| f.rotation.inverse() * rotation * m.rotation),
-            )?;
-            let mut normal = Normal::new(6);
-            for (f, m) in base_from_flange.iter().zip(&measured) {
-                let residual = f.translation.vector - rotation * m;
-                let to_base = f.rotation.to_rotation_matrix();
-                for k in 0..3 {
-                    let mut row = [0.0; 6];
-                    row[k] = -1.0;
-                    for c in 0..3 {
-                        row[3 + c] = to_base[(k, c)];
-                    }
-                    normal.add(&row, residual[k]);
-                }
-            }
-            let x = normal.least_norm_step(1e-10)?;
-            let base_from_sensor = Pose::from_parts(Translation3::new(x[0], x[1], x[2]), rotation);
-            Some((base_from_sensor, Pose::from_parts(Translation3::new(x[3], x[4], x[5]), target)))
-        })
+        .filter_map(|rotation| with_rotation(base_from_flange, sensor_from_target, rotation))
         .collect();
     let rows = |state: &(Pose, Pose), normal: &mut Normal| {
         for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
@@ -260,6 +236,36 @@ pub fn poses(base_from_flange: &[Pose], sensor_from_target: &[Pose]) -> Option<P
         rmse_mm: root(square_mm),
         rmse_rad: root(square_rad),
     })
+}
+
+/// Both frames where the sensor's rotation is known: the target's as the mean, both translations linear.
+fn with_rotation(
+    base_from_flange: &[Pose],
+    sensor_from_target: &[Pose],
+    rotation: UnitQuaternion<f64>,
+) -> Option<(Pose, Pose)> {
+    let target = mean_rotation(
+        base_from_flange
+            .iter()
+            .zip(sensor_from_target)
+            .map(|(f, m)| f.rotation.inverse() * rotation * m.rotation),
+    )?;
+    let mut normal = Normal::new(6);
+    for (f, m) in base_from_flange.iter().zip(sensor_from_target) {
+        let residual = f.translation.vector - rotation * m.translation.vector;
+        let to_base = f.rotation.to_rotation_matrix();
+        for k in 0..3 {
+            let mut row = [0.0; 6];
+            row[k] = -1.0;
+            for c in 0..3 {
+                row[3 + c] = to_base[(k, c)];
+            }
+            normal.add(&row, residual[k]);
+        }
+    }
+    let x = normal.least_norm_step(1e-10)?;
+    let base_from_sensor = Pose::from_parts(Translation3::new(x[0], x[1], x[2]), rotation);
+    Some((base_from_sensor, Pose::from_parts(Translation3::new(x[3], x[4], x[5]), target)))
 }
 
 /// The sensor's rotation in the base from rotations alone (Shah 2013, eq. 22 to 28).

@@ -23,7 +23,7 @@
 //!
 //! **Checked against** least squares that has the change as one parameter more.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use truegrind_math::distribution::ln_gamma;
 
 /// Ratios within this of the largest are alternatives: e^−2 of its likelihood.
@@ -105,6 +105,99 @@ pub struct Found {
     pub nearly: Option<usize>,
 }
 
+/// The poses as they bear on each other: `j` and `r` are Jacobian and residuals with `per` rows for each.
+struct Seen {
+    per: usize,
+    j: DMatrix<f64>,
+    r: DVector<f64>,
+    /// L⁻¹Jᵀ with LLᵀ the information that all poses and the filter have together.
+    rooted: DMatrix<f64>,
+    /// What the unchanged parameters explain of the residuals.
+    towards: DVector<f64>,
+}
+
+/// Sums from the end to a pose: of a jump there (weights 1), of a drift from there (weights 1, 2, …).
+struct Sums {
+    jump: DMatrix<f64>,
+    of_jump: DMatrix<f64>,
+    of_drift: DMatrix<f64>,
+    jump_cross: DVector<f64>,
+    drift_cross: DVector<f64>,
+    jump_gradient: DVector<f64>,
+    drift_gradient: DVector<f64>,
+    drift_square: DVector<f64>,
+    /// Σ w(w + 1)/2 on the diagonal.
+    triangle: DVector<f64>,
+}
+
+impl Sums {
+    fn new(p: usize) -> Self {
+        let (square, column) = (DMatrix::zeros(p, p), DVector::zeros(p));
+        Self {
+            jump: square.clone(),
+            of_jump: square.clone(),
+            of_drift: square,
+            jump_cross: column.clone(),
+            drift_cross: column.clone(),
+            jump_gradient: column.clone(),
+            drift_gradient: column.clone(),
+            drift_square: column.clone(),
+            triangle: column,
+        }
+    }
+
+    /// Takes in the pose before those so far.
+    fn add(&mut self, seen: &Seen, since: usize) {
+        let Seen { per, j, r, rooted, towards } = seen;
+        let rows = j.rows(since * per, *per);
+        self.jump.gemm_tr(1.0, &rows, &rows, 1.0);
+        self.of_jump.gemm(1.0, &rooted.columns(since * per, *per), &rows, 1.0);
+        self.of_drift += &self.of_jump;
+        self.jump_gradient.gemv_tr(1.0, &rows, &r.rows(since * per, *per), 1.0);
+        self.drift_gradient += &self.jump_gradient;
+        self.jump_cross.gemv_tr(1.0, &rows, &towards.rows(since * per, *per), 1.0);
+        self.drift_cross += &self.jump_cross;
+        self.drift_square += self.jump.diagonal();
+        self.triangle += &self.drift_square;
+    }
+
+    /// What the members of a group would have jumped by, with the factor of the information on it and the likelihood ratio.
+    fn together(&self, group: &Group) -> Option<(DVector<f64>, Cholesky<f64, Dyn>, f64)> {
+        let at = |a: usize| group.members[a].0;
+        let d = group.members.len();
+        let left = DVector::from_fn(d, |a, _| self.jump_gradient[at(a)] - self.jump_cross[at(a)]);
+        let information = DMatrix::from_fn(d, d, |a, b| {
+            let own = if a == b { 1.0 / (group.members[a].1 * group.members[a].1) } else { 0.0 };
+            self.jump[(at(a), at(b))] - self.of_jump.column(at(a)).dot(&self.of_jump.column(at(b))) + own
+        });
+        let factor = information.cholesky()?;
+        let shifts = factor.solve(&left);
+        let ratio = left.dot(&shifts);
+        Some((shifts, factor, ratio))
+    }
+
+    /// What parameter `k` would have changed by over the last `poses`, and how much of the residuals that explains.
+    fn change(&self, k: usize, form: Form, poses: usize) -> Option<(f64, f64, f64)> {
+        let (left, square, own, far) = match form {
+            Form::Jump => (
+                self.jump_gradient[k] - self.jump_cross[k],
+                self.jump[(k, k)],
+                self.of_jump.column(k).norm_squared(),
+                1.0,
+            ),
+            Form::Drift => (
+                self.drift_gradient[k] - self.drift_cross[k],
+                2.0 * self.triangle[k] - self.drift_square[k],
+                self.of_drift.column(k).norm_squared(),
+                poses as f64,
+            ),
+        };
+        let seen = square - own;
+        // A change that the history hardly sees says nothing.
+        (seen > 1e-9 * square).then(|| (-left / seen * far, far / seen.sqrt(), left * left / seen))
+    }
+}
+
 /// Looks through all parameters, poses and forms. `residuals` and `jacobian` (column-major) have `per` rows for each pose,
 /// at the state of which `covariance` is the covariance; `groups` may move as one. `None` where that is not positive definite, or nothing is seen.
 pub fn locate(
@@ -122,67 +215,40 @@ pub fn locate(
     let mg = factor.solve(&j.tr_mul(&r));
     let rooted = factor.l_dirty().solve_lower_triangular(&j.transpose())?;
     let towards = &j * &mg;
+    let seen = Seen { per, j, r, rooted, towards };
     let mut best: Vec<[Option<Change>; 2]> = vec![[None; 2]; p];
-    // Sums from the end: of a jump (weights 1), of a drift (weights 1, 2, …), and Σ w(w + 1)/2 on the diagonal.
-    let mut jump = DMatrix::zeros(p, p);
-    let (mut of_jump, mut of_drift) = (DMatrix::zeros(p, p), DMatrix::zeros(p, p));
-    let (mut jump_cross, mut drift_cross) = (DVector::zeros(p), DVector::zeros(p));
-    let (mut jump_gradient, mut drift_gradient) = (DVector::zeros(p), DVector::zeros(p));
-    let (mut drift_square, mut triangle) = (DVector::zeros(p), DVector::zeros(p));
     let mut together: Option<Together> = None;
+    let mut sums = Sums::new(p);
     for since in (0..n).rev() {
-        let rows = j.rows(since * per, per);
-        jump.gemm_tr(1.0, &rows, &rows, 1.0);
-        of_jump.gemm(1.0, &rooted.columns(since * per, per), &rows, 1.0);
-        of_drift += &of_jump;
-        jump_gradient.gemv_tr(1.0, &rows, &r.rows(since * per, per), 1.0);
-        drift_gradient += &jump_gradient;
-        jump_cross.gemv_tr(1.0, &rows, &towards.rows(since * per, per), 1.0);
-        drift_cross += &jump_cross;
-        drift_square += jump.diagonal();
-        triangle += &drift_square;
+        sums.add(&seen, since);
         for (index, group) in groups.iter().enumerate() {
-            let at = |a: usize| group.members[a].0;
-            let d = group.members.len();
-            let left = DVector::from_fn(d, |a, _| jump_gradient[at(a)] - jump_cross[at(a)]);
-            let information = DMatrix::from_fn(d, d, |a, b| {
-                let own = if a == b { 1.0 / (group.members[a].1 * group.members[a].1) } else { 0.0 };
-                jump[(at(a), at(b))] - of_jump.column(at(a)).dot(&of_jump.column(at(b))) + own
-            });
-            let Some(factor) = information.cholesky() else { continue };
-            let shifts = factor.solve(&left);
-            let ratio = left.dot(&shifts);
+            let Some((shifts, factor, ratio)) = sums.together(group) else { continue };
             let gain = |t: &Together| surprise(groups[t.group].members.len(), t.ratio);
-            if together.as_ref().is_none_or(|t| surprise(d, ratio) > gain(t)) {
+            if together.as_ref().is_none_or(|t| surprise(group.members.len(), ratio) > gain(t)) {
                 let shifts = shifts.iter().map(|s| -s).collect();
                 together =
                     Some(Together { group: index, since, shifts, covariance: factor.inverse(), ratio });
             }
         }
-        for k in 0..p {
-            let mut weigh = |form: Form, left: f64, square: f64, own: f64| {
-                let seen = square - own;
-                // A change that the history hardly sees says nothing.
-                if !(seen > 1e-9 * square) {
-                    return;
+        for (parameter, best) in best.iter_mut().enumerate() {
+            for form in [Form::Jump, Form::Drift] {
+                // With one pose left both forms are the same.
+                if form == Form::Drift && since + 1 == n {
+                    continue;
                 }
-                let ratio = left * left / seen;
-                let place = &mut best[k][form as usize];
+                let Some((shift, sigma, ratio)) = sums.change(parameter, form, n - since) else { continue };
+                let place = &mut best[form as usize];
                 if place.is_none_or(|b| ratio > b.ratio) {
-                    let far = if form == Form::Drift { (n - since) as f64 } else { 1.0 };
-                    let (shift, sigma) = (-left / seen * far, far / seen.sqrt());
-                    *place = Some(Change { parameter: k, since, form, shift, sigma, ratio });
+                    *place = Some(Change { parameter, since, form, shift, sigma, ratio });
                 }
-            };
-            let own = of_jump.column(k).norm_squared();
-            weigh(Form::Jump, jump_gradient[k] - jump_cross[k], jump[(k, k)], own);
-            // With one pose left both forms are the same.
-            if since + 1 < n {
-                let (square, own) = (2.0 * triangle[k] - drift_square[k], of_drift.column(k).norm_squared());
-                weigh(Form::Drift, drift_gradient[k] - drift_cross[k], square, own);
             }
         }
     }
+    compared(&best, together, groups)
+}
+
+/// The best change, with what explains the history nearly as well, from the best of each parameter and form and of the groups.
+fn compared(best: &[[Option<Change>; 2]], together: Option<Together>, groups: &[Group]) -> Option<Found> {
     let better = |[a, b]: &[Option<Change>; 2]| match (a, b) {
         (Some(a), Some(b)) => Some(if b.ratio > a.ratio { *b } else { *a }),
         (a, b) => a.or(*b),

@@ -57,7 +57,6 @@ impl Tracker {
         let groups = self.groups();
         let found = self.what_moved(&groups)?;
         let ratio = found.together.as_ref().map_or(found.best.ratio, |t| t.ratio);
-        let last = self.state.history.last()?;
         // Poses that scatter more than they should are no parameter's doing, however well one of them fits a few: what moved
         // explains most of what was too much (0.7).
         let measured = |at: usize| match history[at].nis {
@@ -68,31 +67,25 @@ impl Tracker {
         let all: f64 = (history.len() - window..history.len()).map(measured).sum();
         if !(ratio >= SURE.max(0.7 * (all - (window * per) as f64))) {
             if self.set_aside_in_a_row() > SETTLE {
-                return Some(self.burst([sum, bound], ratio));
+                let alarm = self.unnamed(Course::Burst, self.set_aside_in_a_row(), [sum, bound], ratio);
+                self.state.burst_since = self.state.poses;
+                return alarm;
             }
-            let alarm = Alarm {
-                noticed_file: last.file.clone(),
-                noticed_row: last.row,
-                since_file: last.file.clone(),
-                since_row: last.row,
-                since_time_h: last.time_h,
-                parameter: String::new(),
-                unit: String::new(),
-                course: Course::Open,
-                shift: 0.0,
-                sigma: 0.0,
-                poses: 0,
-                ratio,
-                alternatives: Vec::new(),
-                window_nis: [sum, bound],
-                parts: Vec::new(),
-            };
+            let alarm = self.unnamed(Course::Open, 0, [sum, bound], ratio)?;
             // The same poses are not complained of again.
             self.state.quiet_until = self.state.poses + window;
             return Some(alarm);
         }
+        let alarm = self.named(&found, &groups, [sum, bound], ratio)?;
+        self.reopen(&found, &groups);
+        Some(alarm)
+    }
+
+    /// An alarm that names what moved.
+    fn named(&self, found: &Found, groups: &[Group], window_nis: [f64; 2], ratio: f64) -> Option<Alarm> {
+        let (history, last) = (&self.state.history, self.state.history.last()?);
         let since = found.together.as_ref().map_or(found.best.since, |t| t.since);
-        let onset = &self.state.history[since];
+        let onset = &history[since];
         let name = |k: usize| self.parameters[k].to_string();
         let best = &found.best;
         let mut alarm = Alarm {
@@ -118,22 +111,21 @@ impl Tracker {
                 .map(|c| name(c.parameter))
                 .chain(found.nearly.map(|g| format!("a move of {}", groups[g].name)))
                 .collect(),
-            window_nis: [sum, bound],
+            window_nis,
             parts: Vec::new(),
         };
         if let Some(together) = &found.together {
             self.as_a_whole(&mut alarm, &groups[together.group], together);
         }
-        self.reopen(&found, &groups);
         Some(alarm)
     }
 
-    /// Readings that are far off, one after the other, and that no change explains: one alarm for all of them.
-    fn burst(&mut self, window_nis: [f64; 2], ratio: f64) -> Alarm {
+    /// An alarm that names no parameter: readings are off that no change explains, the last `poses` of them one after the
+    /// other.
+    fn unnamed(&self, course: Course, poses: usize, window_nis: [f64; 2], ratio: f64) -> Option<Alarm> {
         let history = &self.state.history;
-        let run = self.set_aside_in_a_row().max(1);
-        let (first, last) = (&history[history.len() - run], &history[history.len() - 1]);
-        let alarm = Alarm {
+        let (first, last) = (&history[history.len() - poses.max(1)], history.last()?);
+        Some(Alarm {
             noticed_file: last.file.clone(),
             noticed_row: last.row,
             since_file: first.file.clone(),
@@ -141,17 +133,15 @@ impl Tracker {
             since_time_h: first.time_h,
             parameter: String::new(),
             unit: String::new(),
-            course: Course::Burst,
+            course,
             shift: 0.0,
             sigma: 0.0,
-            poses: run,
+            poses,
             ratio,
             alternatives: Vec::new(),
             window_nis,
             parts: Vec::new(),
-        };
-        self.state.burst_since = self.state.poses;
-        alarm
+        })
     }
 
     /// While a burst goes on nothing more is said, unless what follows agrees on a new place of target or sensor; it is over

@@ -40,6 +40,26 @@ pub fn first_poses(datasets: &[Dataset], poses: usize) -> Option<Dataset> {
     Some(out)
 }
 
+/// How uncertain the parameters are before a track begins: those of the arm as the model says.
+fn first_covariance(model: &Estimated, parameters: &[Parameter]) -> DMatrix<f64> {
+    let (arm, p) = (model.order.len(), parameters.len());
+    // The sensor was placed by a few poses under this very model: from there its frame may lie within what links of
+    // ordinary tolerance can shift it by, and the poses that placed it are taken in like all others.
+    let priors = Tolerance {
+        target_mm: 10.0,
+        target_rad: 0.02,
+        frame_mm: 20.0,
+        frame_rad: 0.04,
+        ..Tolerance::default()
+    }
+    .priors(parameters, &model.model);
+    DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
+        (true, _) => model.covariance[(i, j)] + if i == j { SMALLEST_VARIANCE } else { 0.0 },
+        (false, true) => priors[i].sigma * priors[i].sigma,
+        (false, false) => 0.0,
+    })
+}
+
 /// A model that follows its arm.
 #[derive(Debug, Clone)]
 pub struct Tracker {
@@ -104,28 +124,11 @@ impl Tracker {
         let frames = fitted.frames;
         let sensing = frame_parameters(dataset);
         let parameters: Vec<Parameter> = model.order.iter().copied().chain(sensing).collect();
-        let (arm, p) = (model.order.len(), parameters.len());
-        // The sensor was placed by a few poses under this very model: from there its frame may lie within what links of
-        // ordinary tolerance can shift it by, and the poses that placed it are taken in like all others.
-        let priors = Tolerance {
-            target_mm: 10.0,
-            target_rad: 0.02,
-            frame_mm: 20.0,
-            frame_rad: 0.04,
-            ..Tolerance::default()
-        }
-        .priors(&parameters, &model.model);
-        let covariance = DMatrix::from_fn(p, p, |i, j| match (i < arm && j < arm, i == j) {
-            (true, _) => model.covariance[(i, j)] + if i == j { SMALLEST_VARIANCE } else { 0.0 },
-            (false, true) => priors[i].sigma * priors[i].sigma,
-            (false, false) => 0.0,
-        });
-        let recursion =
-            Recursion::new(DVector::zeros(p), covariance, Memory::SquareRoot).ok_or_else(|| {
-                TrackError::State {
-                    file: model.provenance.file.clone(),
-                    why: "the model's covariance is not positive definite".to_owned(),
-                }
+        let covariance = first_covariance(model, &parameters);
+        let recursion = Recursion::new(DVector::zeros(parameters.len()), covariance, Memory::SquareRoot)
+            .ok_or_else(|| TrackError::State {
+                file: model.provenance.file.clone(),
+                why: "the model's covariance is not positive definite".to_owned(),
             })?;
         let snapshot = Snapshot::of(&recursion, 0);
         let state = State {

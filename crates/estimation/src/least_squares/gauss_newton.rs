@@ -18,9 +18,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Estimate, Iteration, Termination};
+use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
-use crate::least_squares::lm::Point;
+use crate::least_squares::search::Point;
 use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
@@ -110,10 +110,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let p = start.len();
     let printed = options.form == Form::AsPrinted;
     let mut objective = Objective::new(problem, start, options.priors);
-    let mut here =
-        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
-    let mut trace =
-        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    let (mut here, mut trace) = Point::begin(&mut objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(&objective, Termination::NotFinite, trace);
     }
@@ -122,11 +119,9 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     for _ in 0..options.max_iterations {
         let cosine = system.enter(&here.at);
         let cost = here.at.cost();
-        if !printed && cost <= options.small_cost {
-            return here.finish(&objective, Termination::SmallResidual, trace);
-        }
-        if !printed && cosine <= options.gradient_tolerance {
-            return here.finish(&objective, Termination::Gradient, trace);
+        let end = here.end(options.small_cost, cosine, Some(options.gradient_tolerance));
+        if let Some(end) = end.filter(|_| !printed) {
+            return here.finish(&objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, 0.0, &here.x, &mut trial) else {
             return here.finish(&objective, Termination::Singular, trace);
@@ -153,14 +148,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             return here.finish(&objective, Termination::NotFinite, trace);
         }
         here = Point { x: trial.clone(), at };
-        trace.push(Iteration {
-            cost: here.at.cost(),
-            step_norm: length,
-            damping: None,
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(length, None, Some(cosine), &objective));
     }
     let end = if printed { Termination::DataProcessed } else { Termination::IterationLimit };
     here.finish(&objective, end, trace)

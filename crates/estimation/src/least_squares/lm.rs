@@ -39,8 +39,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Estimate, Iteration, Termination};
-use crate::least_squares::damped::{DampedSystem, Linearisation, Promise};
+use crate::estimate::{Estimate, Termination};
+use crate::least_squares::damped::{DampedSystem, Linearisation};
+use crate::least_squares::search::{DAMPING_RANGE, Damping, Point, Search, converged};
 use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
@@ -146,67 +147,6 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     }
 }
 
-/// Where a search stands.
-pub(crate) struct Point {
-    pub(crate) x: Vec<f64>,
-    pub(crate) at: Linearisation,
-}
-
-impl Point {
-    pub(crate) fn finish(
-        self,
-        objective: &Objective<'_>,
-        termination: Termination,
-        trace: Vec<Iteration>,
-    ) -> Estimate {
-        let covariance = if self.at.is_finite() { self.at.covariance() } else { None };
-        let (cost, evaluations) = (self.at.cost(), objective.evaluations);
-        Estimate { x: self.x, covariance, cost, evaluations, termination, trace }
-    }
-}
-
-/// Nielsen's rule for μ.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Damping {
-    pub(crate) mu: f64,
-    growth: f64,
-}
-
-/// Smallest and largest μ that mean anything next to a unit diagonal in double precision.
-const DAMPING_RANGE: (f64, f64) = (1e-16, 1e16);
-
-/// μ after the first refusal: less would hardly change the step that was refused.
-const FIRST_REFUSAL: f64 = 1e-3;
-
-impl Damping {
-    pub(crate) fn new(mu: f64) -> Self {
-        Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
-    }
-
-    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
-    /// its promise: otherwise one leap from a far start lands on a plateau from which nothing leads back.
-    pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
-        gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
-    }
-
-    /// `gain` is actual over predicted reduction of a step that was taken.
-    pub(crate) fn accept(&mut self, gain: f64) {
-        let factor =
-            if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
-        self.mu = (self.mu * factor).max(DAMPING_RANGE.0);
-        self.growth = 2.0;
-    }
-
-    pub(crate) fn refuse(&mut self) {
-        self.mu = (self.mu * self.growth).max(FIRST_REFUSAL).min(DAMPING_RANGE.1);
-        self.growth *= 2.0;
-    }
-
-    pub(crate) fn is_exhausted(&self) -> bool {
-        self.mu >= DAMPING_RANGE.1
-    }
-}
-
 /// A first step that promises more than this share of the cost is taken on few rows.
 const FAR: f64 = 0.1;
 
@@ -244,10 +184,7 @@ fn on_few_rows(objective: &mut Objective<'_>, start: &[f64], options: &Options) 
 
 fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let mut here =
-        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
-    let mut trace =
-        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -265,21 +202,13 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
         if at.is_finite() && at.cost() < here.at.cost() {
             here = Point { x, at };
             cosine = system.enter(&here.at);
-            trace.push(Iteration {
-                cost: here.at.cost(),
-                gradient_norm: Some(cosine),
-                evaluations: objective.evaluations,
-                ..Iteration::default()
-            });
+            trace.push(here.entry(0.0, None, Some(cosine), objective));
         }
     }
     let mut refused = 0_usize;
     for _ in 0..options.max_iterations {
-        if here.at.cost() <= options.small_cost {
-            return here.finish(objective, Termination::SmallResidual, trace);
-        }
-        if cosine <= options.gradient_tolerance {
-            return here.finish(objective, Termination::Gradient, trace);
+        if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
+            return here.finish(objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut trial) else {
             damping.refuse();
@@ -289,18 +218,14 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             }
             continue;
         };
-        if let Some(end) = converged(
-            &mut system,
-            &here,
-            &promise,
-            &Search {
-                mu: damping.mu,
-                refused,
-                cosine,
-                cost_tolerance: options.cost_tolerance,
-                step_tolerance: options.step_tolerance,
-            },
-        ) {
+        let search = Search {
+            mu: damping.mu,
+            refused,
+            cosine,
+            cost_tolerance: options.cost_tolerance,
+            step_tolerance: options.step_tolerance,
+        };
+        if let Some(end) = converged(&mut system, &here, &promise, &search) {
             return here.finish(objective, end, trace);
         }
         let cost = here.at.cost();
@@ -322,14 +247,7 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
                 accepted = true;
             }
         }
-        trace.push(Iteration {
-            cost: here.at.cost(),
-            step_norm,
-            damping: Some(damping.mu),
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(step_norm, Some(damping.mu), Some(cosine), objective));
         if accepted {
             refused = 0;
         } else {
@@ -343,51 +261,9 @@ fn gain_ratio(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
     here.finish(objective, Termination::IterationLimit, trace)
 }
 
-/// What the tests of convergence want to know of a search.
-pub(crate) struct Search {
-    pub(crate) mu: f64,
-    /// Steps refused since the last one taken.
-    pub(crate) refused: usize,
-    pub(crate) cosine: f64,
-    pub(crate) cost_tolerance: f64,
-    pub(crate) step_tolerance: f64,
-}
-
-/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the
-/// promise is asked again almost without damping. Where the undamped model promises more than the problem keeps
-/// (large residuals), a small promise after refusals counts as converged if the gradient is small too.
-pub(crate) fn converged(
-    system: &mut DampedSystem,
-    here: &Point,
-    promise: &Promise,
-    search: &Search,
-) -> Option<Termination> {
-    const LIGHT: f64 = 1e-8;
-    const SMALL_COSINE: f64 = 1e-5;
-    let enough = search.cost_tolerance * here.at.cost();
-    let tiny = search.step_tolerance * (system.scaled_norm(&here.x) + search.step_tolerance);
-    if promise.reduction > enough && promise.step_norm > tiny {
-        return None;
-    }
-    if search.mu <= LIGHT {
-        return Some(if promise.reduction <= enough { Termination::Cost } else { Termination::Step });
-    }
-    let mut unused = vec![0.0; here.x.len()];
-    match system.step(&here.at, LIGHT, &here.x, &mut unused) {
-        Some(light) if light.reduction <= enough => Some(Termination::Cost),
-        Some(light) if light.step_norm <= tiny => Some(Termination::Step),
-        _ if search.refused > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
-        _ if search.refused > 0 => Some(Termination::Stalled),
-        _ => None,
-    }
-}
-
 fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let mut here =
-        Point { x: start.to_vec(), at: Linearisation::at(objective, start, options.factorisation) };
-    let mut trace =
-        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -395,8 +271,8 @@ fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options
     let mut trial = vec![0.0; p];
     for _ in 0..options.max_iterations {
         let cosine = system.enter(&here.at);
-        if here.at.cost() <= options.small_cost {
-            return here.finish(objective, Termination::SmallResidual, trace);
+        if let Some(end) = here.end(options.small_cost, cosine, None) {
+            return here.finish(objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, options.mu, &here.x, &mut trial) else {
             return here.finish(objective, Termination::Singular, trace);
@@ -408,14 +284,7 @@ fn fixed_damping(objective: &mut Objective<'_>, start: &[f64], options: &Options
         let (before, after) = (here.at.cost(), at.cost());
         let size = system.scaled_norm(&here.x);
         here = Point { x: trial.clone(), at };
-        trace.push(Iteration {
-            cost: after,
-            step_norm: promise.step_norm,
-            damping: Some(options.mu),
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(promise.step_norm, Some(options.mu), Some(cosine), objective));
         if (before - after).abs() <= options.cost_tolerance * before {
             return here.finish(objective, Termination::Cost, trace);
         }

@@ -28,9 +28,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::chaos::map::{Map, Sequence};
-use crate::estimate::{Estimate, Iteration, Termination};
+use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
-use crate::least_squares::lm::{Damping, Point, Search, converged};
+use crate::least_squares::search::{Damping, Point, Search, converged};
 use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::Problem;
@@ -135,10 +135,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     let p = start.len();
     let printed = options.form == Form::AsPrinted;
     let mut objective = Objective::new(problem, start, options.priors);
-    let mut here =
-        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
-    let mut trace =
-        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    let (mut here, mut trace) = Point::begin(&mut objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(&objective, Termination::NotFinite, trace);
     }
@@ -150,11 +147,9 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     for _ in 0..options.max_iterations {
         let cost = here.at.cost();
         let cosine = system.enter(&here.at);
-        if cost <= options.small_cost {
-            return here.finish(&objective, Termination::SmallResidual, trace);
-        }
-        if !printed && cosine <= options.gradient_tolerance {
-            return here.finish(&objective, Termination::Gradient, trace);
+        let tolerance = (!printed).then_some(options.gradient_tolerance);
+        if let Some(end) = here.end(options.small_cost, cosine, tolerance) {
+            return here.finish(&objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, damping.mu, &here.x, &mut x1) else {
             if printed || damping.is_exhausted() {
@@ -176,14 +171,13 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         }
         let at1 = Linearisation::at(&mut objective, &x1, options.factorisation);
         let gain = (cost - at1.cost()) / promise.reduction;
-        let usable = at1.is_finite() && (printed || damping.is_acceptable(gain));
-        if !usable {
+        if !(at1.is_finite() && (printed || damping.is_acceptable(gain))) {
             if printed {
                 return here.finish(&objective, Termination::NotFinite, trace);
             }
             damping.refuse();
             refused += 1;
-            trace.push(entry(cost, 0.0, damping.mu, cosine, &objective));
+            trace.push(here.entry(0.0, Some(damping.mu), Some(cosine), &objective));
             if damping.is_exhausted() {
                 return here.finish(&objective, Termination::Stalled, trace);
             }
@@ -202,8 +196,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         // The cost of x₁ came with its derivatives; where x₁ stays the best they are used again.
         here = match best {
             Some((x, candidate_cost)) if candidate_cost < at1.cost() => {
-                let at = Linearisation::at(&mut objective, &x, options.factorisation);
-                Point { x, at }
+                Point { at: Linearisation::at(&mut objective, &x, options.factorisation), x }
             }
             _ => Point { x: x1.clone(), at: at1 },
         };
@@ -211,17 +204,12 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
             return here.finish(&objective, Termination::NotFinite, trace);
         }
         let moved = before.iter().zip(&here.x).map(|(a, b)| b - a).collect::<Vec<_>>();
-        trace.push(entry(here.at.cost(), system.scaled_norm(&moved), damping.mu, cosine, &objective));
+        trace.push(here.entry(system.scaled_norm(&moved), Some(damping.mu), Some(cosine), &objective));
         if printed && (cost - here.at.cost()).abs() <= options.cost_tolerance * cost {
             return here.finish(&objective, Termination::Cost, trace);
         }
     }
     here.finish(&objective, Termination::IterationLimit, trace)
-}
-
-fn entry(cost: f64, step_norm: f64, mu: f64, cosine: f64, objective: &Objective<'_>) -> Iteration {
-    let evaluations = objective.evaluations;
-    Iteration { cost, row_cost: None, step_norm, damping: Some(mu), gradient_norm: Some(cosine), evaluations }
 }
 
 /// Equations 16 to 18 without x₁, whose cost is known: the best finite candidate.

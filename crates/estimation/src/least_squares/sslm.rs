@@ -19,9 +19,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Estimate, Iteration, Termination};
+use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
-use crate::least_squares::lm::Point;
+use crate::least_squares::search::Point;
 use crate::least_squares::{Factorisation, Form, vslm};
 use crate::objective::Objective;
 use crate::problem::Problem;
@@ -141,10 +141,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     }
     let p = start.len();
     let mut objective = Objective::new(problem, start, options.priors);
-    let mut here =
-        Point { x: start.to_vec(), at: Linearisation::at(&mut objective, start, options.factorisation) };
-    let mut trace =
-        vec![Iteration { cost: here.at.cost(), evaluations: objective.evaluations, ..Iteration::default() }];
+    let (mut here, mut trace) = Point::begin(&mut objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(&objective, Termination::NotFinite, trace);
     }
@@ -153,11 +150,8 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     for _ in 0..options.max_iterations {
         let cosine = system.enter(&here.at);
         let cost = here.at.cost();
-        if cost <= options.small_cost {
-            return here.finish(&objective, Termination::SmallResidual, trace);
-        }
-        if cosine <= options.gradient_tolerance {
-            return here.finish(&objective, Termination::Gradient, trace);
+        if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
+            return here.finish(&objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, options.damping, &here.x, &mut full) else {
             return here.finish(&objective, Termination::Singular, trace);
@@ -197,14 +191,7 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
         };
         here.at = at;
         std::mem::swap(&mut here.x, &mut trial);
-        trace.push(Iteration {
-            cost: here.at.cost(),
-            step_norm: delta * promise.step_norm,
-            damping: Some(delta),
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(delta * promise.step_norm, Some(delta), Some(cosine), &objective));
     }
     here.finish(&objective, Termination::IterationLimit, trace)
 }

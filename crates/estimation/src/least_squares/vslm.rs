@@ -26,9 +26,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Estimate, Iteration, Termination};
+use crate::estimate::{Estimate, Termination};
 use crate::least_squares::damped::{DampedSystem, Linearisation};
-use crate::least_squares::lm::{Damping, Point, Search, converged};
+use crate::least_squares::search::{Damping, Point, Search, converged};
 use crate::least_squares::{Factorisation, Form};
 use crate::objective::Objective;
 use crate::problem::{Problem, observations};
@@ -155,15 +155,9 @@ pub fn solve(problem: &dyn Problem, start: &[f64], options: &Options) -> Estimat
     }
 }
 
-fn begin(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> (Point, Vec<Iteration>) {
-    let at = Linearisation::at(objective, start, options.factorisation);
-    let first = Iteration { cost: at.cost(), evaluations: objective.evaluations, ..Iteration::default() };
-    (Point { x: start.to_vec(), at }, vec![first])
-}
-
 fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let (mut here, mut trace) = begin(objective, start, options);
+    let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -190,14 +184,7 @@ fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
             return here.finish(objective, Termination::NotFinite, trace);
         }
         here = Point { x, at };
-        trace.push(Iteration {
-            cost: here.at.cost(),
-            step_norm: moved.sqrt(),
-            damping: Some(delta),
-            row_cost: None,
-            gradient_norm: None,
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(moved.sqrt(), Some(delta), None, objective));
         if (before - here.at.cost()).abs() <= options.cost_tolerance * before {
             // The step size has died out, which says nothing about a minimum.
             return here.finish(objective, Termination::Stalled, trace);
@@ -207,7 +194,7 @@ fn per_sample(objective: &mut Objective<'_>, start: &[f64], options: &Options) -
 }
 
 fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
-    let (mut here, mut trace) = begin(objective, start, options);
+    let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -216,8 +203,8 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
     let mut delta = options.step_size;
     for _ in 0..options.max_iterations {
         let cosine = system.enter(&here.at);
-        if here.at.cost() <= options.small_cost {
-            return here.finish(objective, Termination::SmallResidual, trace);
+        if let Some(end) = here.end(options.small_cost, cosine, None) {
+            return here.finish(objective, end, trace);
         }
         let Some(promise) = system.step(&here.at, options.lambda, &here.x, &mut trial) else {
             return here.finish(objective, Termination::Singular, trace);
@@ -235,14 +222,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
         }
         let (before, after) = (here.at.cost(), at.cost());
         here = Point { x, at };
-        trace.push(Iteration {
-            cost: after,
-            step_norm: delta * promise.step_norm,
-            damping: Some(delta),
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        trace.push(here.entry(delta * promise.step_norm, Some(delta), Some(cosine), objective));
         delta *= options.decay_factor;
         if (before - after).abs() <= options.cost_tolerance * before {
             return here.finish(objective, Termination::Cost, trace);
@@ -253,7 +233,7 @@ fn per_iteration(objective: &mut Objective<'_>, start: &[f64], options: &Options
 
 fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Estimate {
     let p = start.len();
-    let (mut here, mut trace) = begin(objective, start, options);
+    let (mut here, mut trace) = Point::begin(objective, start, options.factorisation);
     if !here.at.is_finite() {
         return here.finish(objective, Termination::NotFinite, trace);
     }
@@ -265,11 +245,8 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
     let mut refused = 0;
     for _ in 0..options.max_iterations {
         let cost = here.at.cost();
-        if cost <= options.small_cost {
-            return here.finish(objective, Termination::SmallResidual, trace);
-        }
-        if cosine <= options.gradient_tolerance {
-            return here.finish(objective, Termination::Gradient, trace);
+        if let Some(end) = here.end(options.small_cost, cosine, Some(options.gradient_tolerance)) {
+            return here.finish(objective, end, trace);
         }
         let promise = system.step(&here.at, damping.mu, &here.x, &mut trial);
         if promise.is_none() && damping.is_exhausted() {
@@ -302,14 +279,8 @@ fn sound(objective: &mut Objective<'_>, start: &[f64], options: &Options) -> Est
             std::mem::swap(&mut here.x, &mut trial);
             cosine = system.enter(&here.at);
         }
-        trace.push(Iteration {
-            cost: here.at.cost(),
-            step_norm: if taken { delta * promise.step_norm } else { 0.0 },
-            damping: Some(delta),
-            row_cost: None,
-            gradient_norm: Some(cosine),
-            evaluations: objective.evaluations,
-        });
+        let step_norm = if taken { delta * promise.step_norm } else { 0.0 };
+        trace.push(here.entry(step_norm, Some(delta), Some(cosine), objective));
         if taken {
             refused = 0;
             delta = (delta / options.decay_factor).min(1.0);

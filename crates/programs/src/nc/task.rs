@@ -5,6 +5,7 @@
 //! may be skipped leaves known only what it does not change.
 
 mod codes;
+mod commands;
 mod doubt;
 mod flow;
 mod found;
@@ -14,7 +15,10 @@ mod known;
 mod m_words;
 mod motion;
 mod names;
+mod once;
+mod shift;
 mod survey;
+mod tools;
 mod words;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};

@@ -225,41 +225,7 @@ impl Writer {
             word(&mut words, mode);
             self.mode = mode;
         }
-        let rotation = target.pose().rotation;
-        let [x, y, z] = target.position_mm;
-        let p = self.options.position_decimals;
-        let values: Vec<(&'static str, f64, u8)> = match self.dialect {
-            Dialect::Fanuc => {
-                let angles = self.angles.angles(&rotation, self.near);
-                self.near = angles;
-                let d = self.options.joint_decimals;
-                let [a, b, c] = angles;
-                vec![("X", x, p), ("Y", y, p), ("Z", z, p), ("A", a, d), ("B", b, d), ("C", c, d)]
-            }
-            _ => {
-                let (vector, spin) = vector_and_spin(&rotation, self.near[2]);
-                self.near[2] = spin;
-                let d = self.options.quaternion_decimals;
-                let [a, b, c] = vector;
-                vec![
-                    ("X", x, p),
-                    ("Y", y, p),
-                    ("Z", z, p),
-                    ("A3=", a, d),
-                    ("B3=", b, d),
-                    ("C3=", c, d),
-                    ("THETA=", spin, self.options.joint_decimals),
-                ]
-            }
-        };
-        let texts: Vec<(&'static str, Vec<u8>)> = values
-            .iter()
-            .map(|&(name, value, decimals)| {
-                let mut text = Vec::new();
-                number::write(&mut text, value, decimals);
-                (name, text)
-            })
-            .collect();
+        let texts = self.target_words(target);
         // The three components of a vector are said together: one that is left out is 0.
         let vector_moves = texts.iter().any(|(name, text)| is_vector(name) && !self.holds(name, text));
         let before = words.len();
@@ -294,6 +260,45 @@ impl Writer {
         let text = String::from_utf8_lossy(&words).into_owned();
         self.block(&text);
         self.wait(step.wait_s);
+    }
+
+    /// The words that say where to go, with their values.
+    fn target_words(&mut self, target: &Frame) -> Vec<(&'static str, Vec<u8>)> {
+        let rotation = target.pose().rotation;
+        let [x, y, z] = target.position_mm;
+        let p = self.options.position_decimals;
+        let values: Vec<(&'static str, f64, u8)> = match self.dialect {
+            Dialect::Fanuc => {
+                let angles = self.angles.angles(&rotation, self.near);
+                self.near = angles;
+                let d = self.options.joint_decimals;
+                let [a, b, c] = angles;
+                vec![("X", x, p), ("Y", y, p), ("Z", z, p), ("A", a, d), ("B", b, d), ("C", c, d)]
+            }
+            _ => {
+                let (vector, spin) = vector_and_spin(&rotation, self.near[2]);
+                self.near[2] = spin;
+                let d = self.options.quaternion_decimals;
+                let [a, b, c] = vector;
+                vec![
+                    ("X", x, p),
+                    ("Y", y, p),
+                    ("Z", z, p),
+                    ("A3=", a, d),
+                    ("B3=", b, d),
+                    ("C3=", c, d),
+                    ("THETA=", spin, self.options.joint_decimals),
+                ]
+            }
+        };
+        values
+            .into_iter()
+            .map(|(name, value, decimals)| {
+                let mut text = Vec::new();
+                number::write(&mut text, value, decimals);
+                (name, text)
+            })
+            .collect()
     }
 
     /// Time at rest: milliseconds for Fanuc, seconds for Siemens.

@@ -222,31 +222,7 @@ impl Walk<'_, '_, '_> {
                 let guarded = Surroundings { guarded: true, ..conditional };
                 self.block(node, state, guarded).joined(before)
             }
-            Syntax::For | Syntax::While => {
-                let mut entry = state;
-                entry.modal = entry.modal.or(self.settings(node));
-                entry.previous = None;
-                let outside = std::mem::take(&mut entry.standing);
-                entry.standing = outside.in_loop();
-                let displaces = self.displaces(node);
-                let forget = |walk: &mut Self, state: &mut State| {
-                    walk.forget_changed(node, state);
-                    if kind == Syntax::While {
-                        // It may wait for another task.
-                        walk.forget_shared(state);
-                    }
-                    if displaces {
-                        state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
-                    }
-                };
-                forget(self, &mut entry);
-                let inside = Surroundings { in_loop: true, guarded: false, ..place };
-                let mut after = self.block(node, entry.clone(), inside).joined(entry);
-                forget(self, &mut after);
-                after.previous = None;
-                after.standing = after.standing.behind_loop(&outside);
-                after
-            }
+            Syntax::For | Syntax::While => self.repeated(node, kind, state, place),
             Syntax::ErrorClause | Syntax::UndoClause | Syntax::BackwardClause => {
                 let entry = self.anywhere();
                 let end = self.block(node, entry, conditional);
@@ -286,6 +262,32 @@ impl Walk<'_, '_, '_> {
                 state
             }
         }
+    }
+
+    /// A loop: what holds in it and behind it holds on every way round.
+    fn repeated(&mut self, node: u32, kind: Syntax, mut entry: State, place: Surroundings) -> State {
+        entry.modal = entry.modal.or(self.settings(node));
+        entry.previous = None;
+        let outside = std::mem::take(&mut entry.standing);
+        entry.standing = outside.in_loop();
+        let displaces = self.displaces(node);
+        let forget = |walk: &mut Self, state: &mut State| {
+            walk.forget_changed(node, state);
+            if kind == Syntax::While {
+                // It may wait for another task.
+                walk.forget_shared(state);
+            }
+            if displaces {
+                state.known.insert(DISPLACEMENT, Value::Unknown(Reason::Displacement));
+            }
+        };
+        forget(self, &mut entry);
+        let inside = Surroundings { in_loop: true, guarded: false, ..place };
+        let mut after = self.block(node, entry.clone(), inside).joined(entry);
+        forget(self, &mut after);
+        after.previous = None;
+        after.standing = after.standing.behind_loop(&outside);
+        after
     }
 
     fn branches(&mut self, node: u32, mut state: State, place: Surroundings, otherwise: Token) -> State {
@@ -466,42 +468,12 @@ impl Walk<'_, '_, '_> {
         }
         let own = symbols.routine(self.unit.scope, name).is_some();
         if let Some(sets) = (!late && !own).then(|| setting(tree, node, name)).flatten() {
-            state.modal = state.modal.then(sets);
-            if places(tree, node, name) {
-                self.visitor.placed_from(&state.standing);
-            }
-            // One that also moves.
-            state.previous = motion.or(state.previous);
-            if motion.is_some() {
-                self.gone(motion, &mut state.standing);
-            }
-            if !sets.leaves(Which::Displacement) {
-                let value = self.displaced(node, &state, name);
-                state.known.insert(DISPLACEMENT, value);
-            }
-            if predefined::displaces(name).is_some() {
-                state.previous = None;
-                self.gone(motion, &mut state.standing);
-            }
+            self.set_by_call(node, name, sets, motion, &mut state);
             return state;
         }
         let called = if late { &[] } else { symbols.called(self.unit.scope, name) };
         if late || called.is_empty() && predefined::calls_by_name(name) {
-            if self.counts {
-                self.visitor.placed_from(&state.standing);
-            }
-            if self.resumes {
-                // It may be called once more after an error in it.
-                self.may_set(symbols.late_sets_of(self.unit), &mut state);
-            }
-            self.visitor.called_late(state.modal);
-            if symbols.late_of(self.unit).is_empty() {
-                self.visitor.called_outside(state.modal);
-            }
-            self.may_set(symbols.late_sets_of(self.unit), &mut state);
-            self.forget_outside(&mut state);
-            state.previous = None;
-            state.standing = self.elsewhere();
+            self.call_late(&mut state);
             return state;
         }
         match called {
@@ -530,6 +502,48 @@ impl Walk<'_, '_, '_> {
         }
         state.previous = None;
         state
+    }
+
+    /// A call of what sets switches (ConfL, PDispOn): these hold from here on.
+    fn set_by_call(&mut self, node: u32, name: &[u8], sets: States, motion: Option<u32>, state: &mut State) {
+        let tree = &self.evaluator.trees[self.unit.file as usize];
+        state.modal = state.modal.then(sets);
+        if places(tree, node, name) {
+            self.visitor.placed_from(&state.standing);
+        }
+        // One that also moves.
+        state.previous = motion.or(state.previous);
+        if motion.is_some() {
+            self.gone(motion, &mut state.standing);
+        }
+        if !sets.leaves(Which::Displacement) {
+            let value = self.displaced(node, state, name);
+            state.known.insert(DISPLACEMENT, value);
+        }
+        if predefined::displaces(name).is_some() {
+            state.previous = None;
+            self.gone(motion, &mut state.standing);
+        }
+    }
+
+    /// A call of a routine whose name is worked out while the program runs.
+    fn call_late(&mut self, state: &mut State) {
+        let symbols = self.evaluator.symbols;
+        if self.counts {
+            self.visitor.placed_from(&state.standing);
+        }
+        if self.resumes {
+            // It may be called once more after an error in it.
+            self.may_set(symbols.late_sets_of(self.unit), state);
+        }
+        self.visitor.called_late(state.modal);
+        if symbols.late_of(self.unit).is_empty() {
+            self.visitor.called_outside(state.modal);
+        }
+        self.may_set(symbols.late_sets_of(self.unit), state);
+        self.forget_outside(state);
+        state.previous = None;
+        state.standing = self.elsewhere();
     }
 
     /// A call of a routine of the program: of one of these, where modules declare several of the name.

@@ -541,12 +541,7 @@ impl<'a, 's> Lister<'a, 's> {
             }
             let slot = match argument.name.map(|name| tree.text(name)) {
                 None => instruction.slot(index, count),
-                Some(name) if same_name(name, b"ToPoint") || same_name(name, b"ToJointPos") => Some(Slot::To),
-                Some(name) if same_name(name, b"CirPoint") => Some(Slot::Via),
-                Some(name) if same_name(name, b"Speed") => Some(Slot::Speed),
-                Some(name) if same_name(name, b"Zone") => Some(Slot::Zone),
-                Some(name) if same_name(name, b"Tool") => Some(Slot::Tool),
-                Some(_) => None,
+                Some(name) => named_slot(name),
             };
             index += 1;
             let Some(value) = argument.value else { continue };
@@ -589,9 +584,27 @@ impl<'a, 's> Lister<'a, 's> {
         if has_tool {
             motion.work_object = Some(self.work_object(unit, state, work_object));
         }
-        motion.left = if instruction.kind == MotionKind::External {
+        let complete = to && via && count >= instruction.least();
+        motion.left = self.left_because(&motion, instruction, &options, complete);
+        // Whatever is written in place of an expression that acts, or instead of the circle point, would act no more.
+        // A target that is not known stays for that reason.
+        let known = motion.targets.iter().all(|target| target.value.is_ok());
+        motion.left = motion.left.or((self.acting && known).then_some(Reason::SideEffect));
+        motion
+    }
+
+    /// Why a motion instruction is left as it is: for what it does itself, its frames or its speed. `complete` is whether it
+    /// has all arguments.
+    fn left_because(
+        &self,
+        motion: &Motion,
+        instruction: &Instruction,
+        options: &Options,
+        complete: bool,
+    ) -> Option<Reason> {
+        let own = if instruction.kind == MotionKind::External {
             Some(Reason::ExternalOnly)
-        } else if !to || !via || count < instruction.least() {
+        } else if !complete {
             Some(Reason::MissingArgument)
         } else if instruction.sensor_guided || options.corrected {
             Some(Reason::SensorGuided)
@@ -600,17 +613,10 @@ impl<'a, 's> Lister<'a, 's> {
         } else if instruction.kind == MotionKind::AbsoluteJoint {
             None
         } else {
-            self.listing.left_by_frames(&motion)
+            self.listing.left_by_frames(motion)
         };
-        let speed = self.listing.speed(&motion).map(|speed| &speed.value);
-        if speed == Some(&Err(Reason::NumberRange)) {
-            motion.left = motion.left.or(Some(Reason::NumberRange));
-        }
-        // Whatever is written in place of an expression that acts, or instead of the circle point, would act no more.
-        // A target that is not known stays for that reason.
-        let known = motion.targets.iter().all(|target| target.value.is_ok());
-        motion.left = motion.left.or((self.acting && known).then_some(Reason::SideEffect));
-        motion
+        let speed = self.listing.speed(motion).map(|speed| &speed.value);
+        own.or((speed == Some(&Err(Reason::NumberRange))).then_some(Reason::NumberRange))
     }
 
     /// Whether an argument calls a function of the program, or one that does more than compute: it would be asked once more
@@ -819,6 +825,19 @@ impl Visitor for Lister<'_, '_> {
             self.called(CallSite { routine: self.mains[at], modal });
         }
     }
+}
+
+/// The slot of an argument that is given by its name.
+fn named_slot(name: &[u8]) -> Option<Slot> {
+    const NAMES: [(&[u8], Slot); 6] = [
+        (b"ToPoint", Slot::To),
+        (b"ToJointPos", Slot::To),
+        (b"CirPoint", Slot::Via),
+        (b"Speed", Slot::Speed),
+        (b"Zone", Slot::Zone),
+        (b"Tool", Slot::Tool),
+    ];
+    NAMES.iter().find(|(known, _)| same_name(name, known)).map(|&(_, slot)| slot)
 }
 
 /// The optional arguments that decide whether a motion may be changed.

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::canvas::{DrawingError, PIXEL};
-use super::frame::{Entry, Frame, Glyph, picture};
+use super::frame::{Entry, Frame, Glyph, Inside, picture};
 use super::ink::Ink;
 use super::letters;
 use super::pen::{LABEL, Paint, Pen, THIN};
@@ -53,33 +53,17 @@ impl Bars {
     }
 
     fn draw(&self, pen: Pen<'_>) -> Result<(), DrawingError> {
-        let ink = |index: usize| {
-            self.groups[index].ink.unwrap_or(Ink::nth(index + usize::from(self.groups.len() == 1)))
-        };
-        let values = self.groups.iter().flat_map(|group| {
-            (0..group.values.len()).flat_map(|index| {
-                let value = group.value(index);
-                let spread = group.deviation(index).unwrap_or(0.0);
-                // A number over a bar needs room.
-                let room = match (self.labels, value) {
-                    (Some(_), Some(value)) if self.y.log => Some((value + spread) * 1.5),
-                    (Some(_), Some(value)) => Some((value + spread.copysign(value)) * 1.06),
-                    _ => None,
-                };
-                [value, value.map(|value| value - spread), value.map(|value| value + spread), room]
-            })
-        });
         let legend = self.groups.iter().enumerate().filter(|(_, group)| !group.name.is_empty());
         let frame = Frame {
             title: &self.title,
             x: Scale::named(&shortened(&self.names)),
-            y: Scale::of(&self.y, values.flatten(), Ends::Zero, 6),
+            y: Scale::of(&self.y, self.extent(), Ends::Zero, 6),
             x_text: String::new(),
             y_text: self.y.text(),
             legend: legend
                 .map(|(index, group)| Entry {
                     name: group.name.clone(),
-                    ink: ink(index),
+                    ink: self.ink(index),
                     glyph: Glyph::Area { alpha: 1.0, outlined: false },
                 })
                 .collect(),
@@ -94,60 +78,12 @@ impl Bars {
         }
         let slot = f64::from(inside.x.end - inside.x.start) / self.names.len().max(1) as f64;
         let breadth = (slot * 0.78 / self.groups.len().max(1) as f64).min(f64::from(90 * PIXEL));
-        for (index, group) in self.groups.iter().enumerate() {
+        for index in 0..self.groups.len() {
             let offset = (index as f64 - (self.groups.len() as f64 - 1.0) / 2.0) * breadth;
             for place in 0..self.names.len() {
                 let Some(center) = inside.across(place as f64) else { continue };
                 let middle = center + offset.round() as i32;
-                let half = (breadth * 0.46).round() as i32;
-                let base = inside.base();
-                let Some((value, top)) =
-                    group.value(place).and_then(|value| Some((value, inside.down(value)?)))
-                else {
-                    pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom)?;
-                    continue;
-                };
-                let top = top.clamp(inside.y.start, inside.y.end);
-                pen.sheet.open_group(&format!(
-                    "{} {} {} {}",
-                    self.names[place],
-                    group.name,
-                    Precision::Significant(4).format(value),
-                    self.y.unit
-                ));
-                pen.rectangle(
-                    [(middle - half, top.min(base)), (middle + half, top.max(base))],
-                    Paint(ink(index).rgb(), 1.0),
-                )?;
-                let mut above = top.min(base);
-                if let Some(spread) = group.deviation(place) {
-                    let ends = [value - spread, value + spread].map(|end| {
-                        inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end)
-                    });
-                    let cap = half / 3;
-                    for path in [
-                        vec![(middle, ends[0]), (middle, ends[1])],
-                        vec![(middle - cap, ends[0]), (middle + cap, ends[0])],
-                        vec![(middle - cap, ends[1]), (middle + cap, ends[1])],
-                    ] {
-                        pen.line(path, Paint::text(0.85), THIN + 2, "")?;
-                    }
-                    above = above.min(ends[1]);
-                }
-                if let Some(precision) = self.labels {
-                    let label = precision.format(value);
-                    let size = LABEL * 0.9;
-                    // Numbers wider than their bars would run into each other.
-                    if letters::width(&label, size) <= breadth * 1.05 {
-                        let (at, side) = if value < 0.0 {
-                            (top.max(base) + 2 * PIXEL, VPos::Top)
-                        } else {
-                            (above - 2 * PIXEL, VPos::Bottom)
-                        };
-                        pen.text(&label, (middle, at), size, HPos::Center, side)?;
-                    }
-                }
-                pen.sheet.close_group();
+                self.draw_bar(pen, &inside, (index, place), middle, breadth)?;
             }
         }
         // The line at zero lies over the feet of the bars.
@@ -158,6 +94,92 @@ impl Bars {
             "",
         )
     }
+
+    fn ink(&self, group: usize) -> Ink {
+        self.groups[group].ink.unwrap_or(Ink::nth(group + usize::from(self.groups.len() == 1)))
+    }
+
+    /// All that the vertical axis has to hold.
+    fn extent(&self) -> impl Iterator<Item = f64> {
+        let values = self.groups.iter().flat_map(|group| {
+            (0..group.values.len()).flat_map(|index| {
+                let value = group.value(index);
+                let spread = group.deviation(index).unwrap_or(0.0);
+                // A number over a bar needs room.
+                let room = match (self.labels, value) {
+                    (Some(_), Some(value)) if self.y.log => Some((value + spread) * 1.5),
+                    (Some(_), Some(value)) => Some((value + spread.copysign(value)) * 1.06),
+                    _ => None,
+                };
+                [value, value.map(|value| value - spread), value.map(|value| value + spread), room]
+            })
+        });
+        values.flatten()
+    }
+
+    /// The bar of a group at a place, about `middle`, with its whisker and its number; `breadth` is the room that it has.
+    fn draw_bar(
+        &self,
+        pen: Pen<'_>,
+        inside: &Inside,
+        (index, place): (usize, usize),
+        middle: i32,
+        breadth: f64,
+    ) -> Result<(), DrawingError> {
+        let group = &self.groups[index];
+        let half = (breadth * 0.46).round() as i32;
+        let base = inside.base();
+        let Some((value, top)) = group.value(place).and_then(|value| Some((value, inside.down(value)?)))
+        else {
+            return pen.text(MISSING, (middle, base - 3 * PIXEL), LABEL, HPos::Center, VPos::Bottom);
+        };
+        let top = top.clamp(inside.y.start, inside.y.end);
+        pen.sheet.open_group(&format!(
+            "{} {} {} {}",
+            self.names[place],
+            group.name,
+            Precision::Significant(4).format(value),
+            self.y.unit
+        ));
+        pen.rectangle(
+            [(middle - half, top.min(base)), (middle + half, top.max(base))],
+            Paint(self.ink(index).rgb(), 1.0),
+        )?;
+        let mut above = top.min(base);
+        if let Some(spread) = group.deviation(place) {
+            let ends = [value - spread, value + spread]
+                .map(|end| inside.down(end).unwrap_or(inside.y.end).clamp(inside.y.start, inside.y.end));
+            draw_whisker(pen, middle, ends, half / 3)?;
+            above = above.min(ends[1]);
+        }
+        if let Some(precision) = self.labels {
+            let label = precision.format(value);
+            let size = LABEL * 0.9;
+            // Numbers wider than their bars would run into each other.
+            if letters::width(&label, size) <= breadth * 1.05 {
+                let (at, side) = if value < 0.0 {
+                    (top.max(base) + 2 * PIXEL, VPos::Top)
+                } else {
+                    (above - 2 * PIXEL, VPos::Bottom)
+                };
+                pen.text(&label, (middle, at), size, HPos::Center, side)?;
+            }
+        }
+        pen.sheet.close_group();
+        Ok(())
+    }
+}
+
+/// A spread, from its lower to its upper end, each with a cap.
+fn draw_whisker(pen: Pen<'_>, middle: i32, ends: [i32; 2], cap: i32) -> Result<(), DrawingError> {
+    for path in [
+        vec![(middle, ends[0]), (middle, ends[1])],
+        vec![(middle - cap, ends[0]), (middle + cap, ends[0])],
+        vec![(middle - cap, ends[1]), (middle + cap, ends[1])],
+    ] {
+        pen.line(path, Paint::text(0.85), THIN + 2, "")?;
+    }
+    Ok(())
 }
 
 impl BarGroup {

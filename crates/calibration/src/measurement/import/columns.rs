@@ -59,21 +59,7 @@ impl Columns {
         let found: Vec<String> = named.iter().map(|(n, _)| n.clone()).collect();
         let letter = joint_letter(&found);
         let is_known = |name: &str| is_known(name, letter);
-        let mut by_name = BTreeMap::new();
-        for (name, index) in &named {
-            let doubled = by_name.insert(name.as_str(), *index).is_some();
-            if doubled && is_known(name) {
-                return Err(ImportError::DuplicateColumn {
-                    place: Place { column: Some(name.as_str().into()), ..place },
-                });
-            }
-        }
-        for name in by_name.keys() {
-            if let Some(joint) = joint_number(name, letter).filter(|j| *j > 6) {
-                let place = Place { column: Some((*name).into()), ..place };
-                return Err(ImportError::TooManyJoints { place, joint });
-            }
-        }
+        let by_name = by_name(&named, letter, &place)?;
         let get = |name: &str| by_name.get(name).copied();
         let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_known(n)).collect();
 
@@ -129,6 +115,30 @@ impl Columns {
             notes,
         })
     }
+}
+
+/// The columns by their names. No column that is used stands there twice, and no joint is beyond the sixth.
+fn by_name<'a>(
+    named: &'a [(String, usize)],
+    letter: char,
+    place: &Place,
+) -> Result<BTreeMap<&'a str, usize>, ImportError> {
+    let mut by_name = BTreeMap::new();
+    for (name, index) in named {
+        let doubled = by_name.insert(name.as_str(), *index).is_some();
+        if doubled && is_known(name, letter) {
+            return Err(ImportError::DuplicateColumn {
+                place: Place { column: Some(name.as_str().into()), ..place.clone() },
+            });
+        }
+    }
+    for name in by_name.keys() {
+        if let Some(joint) = joint_number(name, letter).filter(|j| *j > 6) {
+            let place = Place { column: Some((*name).into()), ..place.clone() };
+            return Err(ImportError::TooManyJoints { place, joint });
+        }
+    }
+    Ok(by_name)
 }
 
 /// Whether no further row could become the header.

@@ -82,12 +82,8 @@ pub(super) fn dataset(
     let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()));
     let angle_step_rad = rounding::step(degrees).map(f64::to_radians);
     let readouts = rows.iter().filter_map(|r| r.readout_mm).flat_map(|v| [v.x, v.y, v.z]);
-    let readings = rows.iter().flat_map(|r| {
-        let count = if columns.sensor == Sensor::Cable { 1 } else { 3 };
-        let at: [f64; 3] = coordinates(&r.reading).into();
-        at.into_iter().take(count)
-    });
-    let steps = [rounding::step(readouts), rounding::step(readings)];
+    let readout_step_mm = rounding::step(readouts);
+    let reading_step_mm = reading_step(&rows, columns.sensor);
     Ok(Dataset {
         file: file.into(),
         sheet: table.sheet.clone(),
@@ -97,9 +93,18 @@ pub(super) fn dataset(
         other_columns: columns.other.iter().map(|(name, _)| name.clone()).collect(),
         notes,
         angle_step_rad,
-        readout_step_mm: steps[0],
-        reading_step_mm: steps[1],
+        readout_step_mm,
+        reading_step_mm,
     })
+}
+
+/// The step to which readings are rounded (mm), where they are.
+fn reading_step(rows: &[Row], sensor: Sensor) -> Option<f64> {
+    let count = if sensor == Sensor::Cable { 1 } else { 3 };
+    rounding::step(rows.iter().flat_map(|r| {
+        let at: [f64; 3] = coordinates(&r.reading).into();
+        at.into_iter().take(count)
+    }))
 }
 
 /// No joint angle is larger: ten turns.
@@ -179,21 +184,7 @@ impl Reader<'_> {
             let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
             *q = angle.to_radians();
         }
-        let values: Vec<f64> = columns
-            .reading
-            .iter()
-            .map(|&c| self.bounded(line, c, LARGEST_MM, LENGTH))
-            .collect::<Result<_, _>>()?;
-        let reading = match (columns.sensor, values.as_slice()) {
-            (Sensor::Cable, [length]) => Reading::Cable(*length),
-            (_, [x, y, z]) => Reading::Position(Vector3::new(*x, *y, *z)),
-            (_, [x, y, z, w, i, j, k]) => {
-                let rotation = self.quaternion(line, columns, Quaternion::new(*w, *i, *j, *k))?;
-                Reading::Pose(Pose::from_parts(Translation3::new(*x, *y, *z), rotation))
-            }
-            // The columns were chosen for the sensor: one, three or seven.
-            _ => return Err(ImportError::Empty { place: self.place() }),
-        };
+        let reading = self.reading(line, columns)?;
         let readout_mm = match columns.readout {
             Some(c) if c.iter().any(|&i| !line.cells.get(i).is_none_or(Cell::is_empty)) => {
                 Some(Vector3::new(
@@ -204,18 +195,7 @@ impl Reader<'_> {
             }
             _ => None,
         };
-        let mut approach = [0i8; 6];
-        for (side, column) in approach.iter_mut().zip(columns.approach) {
-            *side = match self.optional(line, column)? {
-                Some(-1.0) => -1,
-                Some(1.0) => 1,
-                None | Some(0.0) => 0,
-                Some(_) => {
-                    let remedy = "the sign says from which side the joint came, 0 where that is not known";
-                    return Err(self.wrong(line, column.unwrap_or_default(), "-1, 0 or 1", remedy));
-                }
-            };
-        }
+        let approach = self.approach(line, columns)?;
         let payload_kg = self.optional(line, columns.payload)?;
         if payload_kg.is_some_and(|kg| !(0.0..=LARGEST_KG).contains(&kg)) {
             let remedy = "state what hangs on the flange, or leave the cell empty";
@@ -259,6 +239,42 @@ impl Reader<'_> {
             session: columns.session.map(text).filter(|s| !s.is_empty()),
             other: columns.other[..kept].iter().map(|(_, i)| text(*i)).collect(),
         })
+    }
+
+    /// What the sensor read.
+    fn reading(&self, line: &Line, columns: &Columns) -> Result<Reading, ImportError> {
+        let values: Vec<f64> = columns
+            .reading
+            .iter()
+            .map(|&c| self.bounded(line, c, LARGEST_MM, LENGTH))
+            .collect::<Result<_, _>>()?;
+        Ok(match (columns.sensor, values.as_slice()) {
+            (Sensor::Cable, [length]) => Reading::Cable(*length),
+            (_, [x, y, z]) => Reading::Position(Vector3::new(*x, *y, *z)),
+            (_, [x, y, z, w, i, j, k]) => {
+                let rotation = self.quaternion(line, columns, Quaternion::new(*w, *i, *j, *k))?;
+                Reading::Pose(Pose::from_parts(Translation3::new(*x, *y, *z), rotation))
+            }
+            // The columns were chosen for the sensor: one, three or seven.
+            _ => return Err(ImportError::Empty { place: self.place() }),
+        })
+    }
+
+    /// From which side each joint came.
+    fn approach(&self, line: &Line, columns: &Columns) -> Result<[i8; 6], ImportError> {
+        let mut approach = [0i8; 6];
+        for (side, column) in approach.iter_mut().zip(columns.approach) {
+            *side = match self.optional(line, column)? {
+                Some(-1.0) => -1,
+                Some(1.0) => 1,
+                None | Some(0.0) => 0,
+                Some(_) => {
+                    let remedy = "the sign says from which side the joint came, 0 where that is not known";
+                    return Err(self.wrong(line, column.unwrap_or_default(), "-1, 0 or 1", remedy));
+                }
+            };
+        }
+        Ok(approach)
     }
 
     fn quaternion(

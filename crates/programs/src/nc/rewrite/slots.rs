@@ -51,6 +51,48 @@ impl<'s> Slots<'s> {
         order[RADIUS] = self.radius;
         order
     }
+
+    /// The place of a word that says where to go; after CR (`radius_block`) an R is a radius.
+    fn slot(
+        &mut self,
+        tree: &NcTree<'_>,
+        dialect: Dialect,
+        written: &Written,
+        word: &Word<'_>,
+        name: &[u8],
+        radius_block: bool,
+    ) -> Option<&mut Option<Word<'s>>> {
+        let heidenhain = dialect == Dialect::Heidenhain;
+        let at = |letter: u8, first: u8| usize::from(letter - first);
+        Some(match *name {
+            [letter @ b'X'..=b'Z'] => &mut self.axes[at(letter, b'X')],
+            [b'I', letter @ b'X'..=b'Z'] if heidenhain => &mut self.axes[at(letter, b'X')],
+            [b'C'] if heidenhain && word.belongs == Belongs::Nothing => return None,
+            [letter @ b'A'..=b'C'] if written.turn == Turn::Angles => &mut self.angles[at(letter, b'A')],
+            [b'I', letter @ b'A'..=b'C'] if heidenhain => &mut self.angles[at(letter, b'A')],
+            [letter @ b'A'..=b'C', b'2'] if written.turn == Turn::Rpy => &mut self.angles[at(letter, b'A')],
+            [letter @ b'A'..=b'C', b'3'] => &mut self.vector[at(letter, b'A')],
+            [b'T', letter @ b'X'..=b'Z'] if heidenhain => &mut self.vector[at(letter, b'X')],
+            [letter @ b'I'..=b'K'] if written.vector_words && written.arc.is_none() => {
+                &mut self.vector[at(letter, b'I')]
+            }
+            [letter @ b'I'..=b'K'] => &mut self.centre[at(letter, b'I')],
+            [b'T', b'H', b'E', b'T', b'A'] => &mut self.spin,
+            [b'R'] if heidenhain => match word.belongs {
+                // R0: no correction by the radius.
+                Belongs::Literal { sign: None, .. }
+                    if !radius_block || number_of(tree, word) == Some(0.0) =>
+                {
+                    return None;
+                }
+                Belongs::Nothing => return None,
+                _ => &mut self.radius,
+            },
+            [b'R'] => &mut self.radius,
+            [b'C', b'R'] if dialect == Dialect::Siemens => &mut self.radius,
+            _ => return None,
+        })
+    }
 }
 
 /// The words of a block by what they are.
@@ -77,49 +119,13 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
         }
         comma = &*name == b",";
         after_m |= &*name == b"M" && !matches!(number_of(tree, &word), Some(91.0 | 92.0));
-        let at = |letter: u8, first: u8| usize::from(letter - first);
-        let mut says_where = true;
+        if let Some(slot) = slots.slot(tree, dialect, written, &word, &name, radius_block) {
+            *slot = Some(word);
+            place = Some((word.end, word.first));
+            continue;
+        }
         match &*name {
-            [letter @ b'X'..=b'Z'] => slots.axes[at(*letter, b'X')] = Some(word),
-            [b'I', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
-                slots.axes[at(*letter, b'X')] = Some(word);
-            }
-            [b'C'] if dialect == Dialect::Heidenhain && word.belongs == Belongs::Nothing => {
-                says_where = false
-            }
-            [letter @ b'A'..=b'C'] if written.turn == Turn::Angles => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [b'I', letter @ b'A'..=b'C'] if dialect == Dialect::Heidenhain => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [letter @ b'A'..=b'C', b'2'] if written.turn == Turn::Rpy => {
-                slots.angles[at(*letter, b'A')] = Some(word);
-            }
-            [letter @ b'A'..=b'C', b'3'] => slots.vector[at(*letter, b'A')] = Some(word),
-            [b'T', letter @ b'X'..=b'Z'] if dialect == Dialect::Heidenhain => {
-                slots.vector[at(*letter, b'X')] = Some(word);
-            }
-            [letter @ b'I'..=b'K'] if written.vector_words && written.arc.is_none() => {
-                slots.vector[at(*letter, b'I')] = Some(word);
-            }
-            [letter @ b'I'..=b'K'] => slots.centre[at(*letter, b'I')] = Some(word),
-            b"THETA" => slots.spin = Some(word),
-            b"R" if dialect != Dialect::Heidenhain => slots.radius = Some(word),
-            b"R" => match word.belongs {
-                Belongs::Literal { sign: None, .. }
-                    if !radius_block || number_of(tree, &word) == Some(0.0) =>
-                {
-                    says_where = false;
-                }
-                Belongs::Nothing => says_where = false,
-                _ => slots.radius = Some(word),
-            },
-            b"CR" if dialect == Dialect::Siemens => slots.radius = Some(word),
-            b"F" => {
-                slots.feed = Some(word);
-                says_where = false;
-            }
+            b"F" => slots.feed = Some(word),
             b"G" | b"N" | b"L" | b"LN" => {
                 fallback = (word.end, word.first);
                 if let Belongs::Literal { sign: None, number } = word.belongs
@@ -131,12 +137,8 @@ pub(super) fn slots<'s>(tree: &NcTree<'s>, dialect: Dialect, written: &Written) 
                         _ => {}
                     }
                 }
-                says_where = false;
             }
-            _ => says_where = false,
-        }
-        if says_where {
-            place = Some((word.end, word.first));
+            _ => {}
         }
     }
     (slots.end, slots.last) = place.unwrap_or(fallback);

@@ -206,27 +206,7 @@ impl Lister<'_, '_> {
         let Some(first) = said.words.iter().find(|word| word.address() != Some(b'N')) else { return false };
         let name = first.name.to_ascii_uppercase();
         if self.dialect == Dialect::LinuxCnc && first.address() == Some(b'O') {
-            let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
-            match &*keyword {
-                b"CALL" => self.subprogram(said, "O call"),
-                b"IF" => self.parts(),
-                b"SUB" => {
-                    let passed = self.state.clone();
-                    self.forget();
-                    self.passed = Some(passed);
-                }
-                // The way goes past a subprogram; what stands in it holds only where it is called.
-                b"ENDSUB" if self.passed.is_some() => {
-                    if let Some(state) = self.passed.take() {
-                        self.state = state;
-                    }
-                    self.ended = false;
-                    self.frame_index = None;
-                    self.tool_index.clear();
-                    self.events.push(Event::Join);
-                }
-                _ => self.forget(),
-            }
+            self.o_word(said);
             return true;
         }
         match (&*name, first.address()) {
@@ -289,6 +269,31 @@ impl Lister<'_, '_> {
             }
             (b"DEF" | b"EXTERN" | b"DEFINE", _) => true,
             _ => false,
+        }
+    }
+
+    /// LinuxCNC: `O100 sub`, `O100 if […]`.
+    fn o_word(&mut self, said: &Said<'_>) {
+        let keyword = said.words.get(1).map(|word| word.name.to_ascii_uppercase()).unwrap_or_default();
+        match &*keyword {
+            b"CALL" => self.subprogram(said, "O call"),
+            b"IF" => self.parts(),
+            b"SUB" => {
+                let passed = self.state.clone();
+                self.forget();
+                self.passed = Some(passed);
+            }
+            // The way goes past a subprogram; what stands in it holds only where it is called.
+            b"ENDSUB" if self.passed.is_some() => {
+                if let Some(state) = self.passed.take() {
+                    self.state = state;
+                }
+                self.ended = false;
+                self.frame_index = None;
+                self.tool_index.clear();
+                self.events.push(Event::Join);
+            }
+            _ => self.forget(),
         }
     }
 

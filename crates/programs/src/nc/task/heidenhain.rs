@@ -99,62 +99,10 @@ impl<'s> Lister<'_, 's> {
             text.split(|byte| byte.is_ascii_whitespace()).filter(|part| !part.is_empty()).collect();
         let second = words.get(1).copied().unwrap_or_default();
         match name {
-            b"TOOL" if second == b"CALL" => {
-                self.tool_call(&text);
-            }
-            // A length that the program states.
-            b"TOOL" if second == b"DEF" && words.iter().skip(3).any(|word| word.starts_with(b"L")) => {
-                self.tools_assigned();
-            }
-            b"TOOL" if second == b"DEF" => {}
-            b"CYCL" if second == b"CALL" => {
-                self.cycle_call(said, "CYCL CALL");
-            }
-            b"CYCL" => {
-                let number: Vec<u8> = words
-                    .get(2)
-                    .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
-                    .unwrap_or_default();
-                self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
-            }
-            b"PLANE" => {
-                // TURN moves the rotary axes to the plane, MOVE the others as well.
-                let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
-                if moves {
-                    self.left(said, "PLANE", Reason::Cycle);
-                }
-                self.turn(Group::Swivel, second != b"RESET");
-                if moves {
-                    self.lose_all();
-                }
-            }
-            b"FUNCTION" if second == b"TCPM" => {
-                self.tip(true, false);
-            }
-            b"FUNCTION" if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
-            // What a mill does anyway; the name of a kinematic may follow, which is not known.
-            b"FUNCTION" if words[1..] == [b"MODE", b"MILL"] => {}
-            b"FUNCTION" if matches!(second, b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
-            b"TRANS" if second == b"DATUM" => {
-                match words.get(2).copied() {
-                    Some(b"RESET") => {
-                        self.datum_is([Some(0.0); 3]);
-                        self.turn(Group::Rotary, false);
-                    }
-                    Some(b"AXIS") => self.datum_shift(&words[3..]),
-                    _ => self.datum_is([None; 3]),
-                }
-                self.lose_position();
-            }
-            b"TRANS" => {
-                let on = words.get(2) != Some(&&b"RESET"[..]);
-                match second {
-                    b"MIRROR" => self.turn(Group::Mirror, on),
-                    b"ROTATION" => self.turn(Group::Rotation, on),
-                    b"SCALE" => self.turn(Group::Scale, on),
-                    _ => self.deny(said, "TRANS", Reason::UnknownWord),
-                }
-            }
+            b"TOOL" if self.tool_block(&text, &words) => {}
+            b"PLANE" | b"FUNCTION" | b"TRANS" if self.transformation_block(said, name, &words) => {}
+            b"CYCL" => self.cycle_block(said, first, &words),
+            b"FN" | b"Q" | b"QL" | b"QR" => self.function_block(said, first, &text, &words),
             b"LBL" if second != b"0" => {
                 self.forget();
                 self.state.mode = Mode::Lost(Reason::UnknownFlow);
@@ -163,46 +111,9 @@ impl<'s> Lister<'_, 's> {
             b"CALL" | b"SEL" if second == b"LBL" || second == b"PGM" || name == b"CALL" => {
                 self.subprogram(said, "CALL");
             }
-            b"RND" | b"CHF" => {
-                // They round or cut the corner that their neighbours make; the next block counts from the corner.
-                let previous = self.state.previous;
-                let text = String::from_utf8_lossy(name).into_owned();
-                self.left_path(said, &text, Needs::Nothing);
-                self.state.previous = previous;
-            }
-            b"APPR" | b"DEP" | b"CP" | b"LP" | b"CTP" | b"FL" | b"FC" | b"FLT" | b"FCT" | b"FPOL"
-            | b"SPL" => {
-                let text = String::from_utf8_lossy(name).into_owned();
-                let needs = match name {
-                    b"FPOL" => Needs::Nothing,
-                    b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
-                    _ => Needs::Tangent,
-                };
-                self.left_path(said, &text, needs);
-                self.lose_position();
-            }
             b"TCH" => {
                 self.left(said, "TCH PROBE", Reason::Probe);
                 self.lose_position();
-            }
-            b"FN" | b"Q" | b"QL" | b"QR" => {
-                // FN 25 sets a datum, FN 17 any data of the control.
-                match number_of_function(&text) {
-                    Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
-                    Some(25) => {
-                        self.held_here(super::EVERYWHERE);
-                        return self.frames_assigned();
-                    }
-                    Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
-                        self.events.push(super::Event::Held { axes: super::EVERYWHERE, read: true });
-                    }
-                    _ => {}
-                }
-                // FN 9 to FN 12 jump: what is set from here on may be passed over.
-                if words.contains(&&b"GOTO"[..]) {
-                    self.parts();
-                }
-                self.parameter(first);
             }
             b"BEGIN" | b"END" => {
                 if words.contains(&&b"INCH"[..]) {
@@ -214,11 +125,114 @@ impl<'s> Lister<'_, 's> {
             | b"PATTERN" | b"POS" => {}
             // The rest of a cycle's definition in lines of its own.
             _ if !first.name.first().is_some_and(u8::is_ascii_alphabetic) => {}
-            _ => {
-                let text = String::from_utf8_lossy(name).into_owned();
-                self.deny(said, &text, Reason::UnknownWord);
-            }
+            _ if self.path_block(said, name) => {}
+            _ => self.deny(said, &String::from_utf8_lossy(name), Reason::UnknownWord),
         }
+    }
+
+    /// `TOOL CALL` and `TOOL DEF`. Whether the block is one of these.
+    fn tool_block(&mut self, text: &[u8], words: &[&[u8]]) -> bool {
+        match words.get(1).copied() {
+            Some(b"CALL") => self.tool_call(text),
+            // A length that the program states.
+            Some(b"DEF") if words.iter().skip(3).any(|word| word.starts_with(b"L")) => self.tools_assigned(),
+            Some(b"DEF") => {}
+            _ => return false,
+        }
+        true
+    }
+
+    /// `CYCL CALL` and `CYCL DEF`.
+    fn cycle_block(&mut self, said: &Said<'_>, first: &Word<'_>, words: &[&[u8]]) {
+        if words.get(1) == Some(&&b"CALL"[..]) {
+            return self.cycle_call(said, "CYCL CALL");
+        }
+        let number: Vec<u8> = words
+            .get(2)
+            .map(|word| word.iter().copied().take_while(u8::is_ascii_digit).collect())
+            .unwrap_or_default();
+        self.cycle_definition(said, first, &number, words.get(2..).unwrap_or_default());
+    }
+
+    /// `PLANE`, `FUNCTION TCPM`, `TRANS`: frames, and functions that none of them hangs on. Whether the block is one of these.
+    fn transformation_block(&mut self, said: &Said<'_>, name: &[u8], words: &[&[u8]]) -> bool {
+        let second = words.get(1).copied().unwrap_or_default();
+        let third = words.get(2).copied();
+        let on = third != Some(b"RESET");
+        match (name, second) {
+            (b"PLANE", _) => {
+                // TURN moves the rotary axes to the plane, MOVE the others as well.
+                let moves = words.iter().any(|word| matches!(*word, b"TURN" | b"MOVE"));
+                if moves {
+                    self.left(said, "PLANE", Reason::Cycle);
+                }
+                self.turn(Group::Swivel, second != b"RESET");
+                if moves {
+                    self.lose_all();
+                }
+            }
+            (b"FUNCTION", b"TCPM") => self.tip(true, false),
+            (b"FUNCTION", _) if words.contains(&&b"TCPM"[..]) => self.tip(false, false),
+            // What a mill does anyway; the name of a kinematic may follow, which is not known.
+            (b"FUNCTION", b"MODE") => return words[2..] == [b"MILL"],
+            (b"FUNCTION", b"FEED" | b"S-PULSE" | b"DWELL" | b"FILE" | b"COUNT") => {}
+            (b"TRANS", b"DATUM") => {
+                match third {
+                    Some(b"RESET") => {
+                        self.datum_is([Some(0.0); 3]);
+                        self.turn(Group::Rotary, false);
+                    }
+                    Some(b"AXIS") => self.datum_shift(&words[3..]),
+                    _ => self.datum_is([None; 3]),
+                }
+                self.lose_position();
+            }
+            (b"TRANS", b"MIRROR") => self.turn(Group::Mirror, on),
+            (b"TRANS", b"ROTATION") => self.turn(Group::Rotation, on),
+            (b"TRANS", b"SCALE") => self.turn(Group::Scale, on),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Blocks whose path is not followed. Whether the block is one of these.
+    fn path_block(&mut self, said: &Said<'_>, name: &[u8]) -> bool {
+        let needs = match name {
+            b"RND" | b"CHF" | b"FPOL" => Needs::Nothing,
+            b"CP" | b"LP" | b"FC" | b"FL" | b"SPL" => Needs::Start,
+            b"APPR" | b"DEP" | b"CTP" | b"FLT" | b"FCT" => Needs::Tangent,
+            _ => return false,
+        };
+        let previous = self.state.previous;
+        self.left_path(said, &String::from_utf8_lossy(name), needs);
+        if matches!(name, b"RND" | b"CHF") {
+            // They round or cut the corner that their neighbours make; the next block counts from the corner.
+            self.state.previous = previous;
+        } else {
+            self.lose_position();
+        }
+        true
+    }
+
+    /// `FN 0: Q1 = +5`, `Q1 = +5`.
+    fn function_block(&mut self, said: &Said<'_>, first: &Word<'_>, text: &[u8], words: &[&[u8]]) {
+        // FN 25 sets a datum, FN 17 any data of the control.
+        match number_of_function(text) {
+            Some(17) => return self.deny(said, "FN 17", Reason::UnknownWord),
+            Some(25) => {
+                self.held_here(super::EVERYWHERE);
+                return self.frames_assigned();
+            }
+            Some(18) if text.windows(3).any(|id| id == b"270" || id == b"240") => {
+                self.events.push(super::Event::Held { axes: super::EVERYWHERE, read: true });
+            }
+            _ => {}
+        }
+        // FN 9 to FN 12 jump: what is set from here on may be passed over.
+        if words.contains(&&b"GOTO"[..]) {
+            self.parts();
+        }
+        self.parameter(first);
     }
 
     /// `TOOL CALL 1 Z S1000 DL+0.5`, `TOOL CALL "MILL" Z`, `TOOL CALL Z S500`.

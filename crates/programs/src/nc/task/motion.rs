@@ -187,15 +187,14 @@ impl Lister<'_, '_> {
         } else {
             self.state.mode
         };
-        let vector_words = self.state.vector_words && matches!(mode, Mode::Rapid | Mode::Linear);
-        let has_centre = said.centre.iter().any(Option::is_some) && !vector_words;
-        let circular = matches!(mode, Mode::Circular(_));
+        let straight = matches!(mode, Mode::Rapid | Mode::Linear);
+        let vector_words = self.state.vector_words && straight;
+        let has_centre = said.centre.iter().any(Option::is_some);
+        let bends = has_centre && !vector_words || said.radius.is_some();
         // R, I and K of a straight block round or cut its corner, on controls that take them.
-        let cut = self.dialect.paren_comments()
-            && matches!(mode, Mode::Rapid | Mode::Linear)
-            && (has_centre || said.radius.is_some());
-        let vector_moves = vector_words && said.centre.iter().any(Option::is_some);
-        if !said.moves() && !(circular && (has_centre || said.radius.is_some())) && !vector_moves {
+        let cut = self.dialect.paren_comments() && straight && bends;
+        let circular = matches!(mode, Mode::Circular(_));
+        if !said.moves() && !(circular && bends) && !(vector_words && has_centre) {
             self.without_axes(said);
             return;
         }
@@ -221,24 +220,7 @@ impl Lister<'_, '_> {
         self.state.turn = turn.0;
         (self.state.abc, self.state.rpy, self.state.vector, self.state.spin) = turn.1;
         let rotation = self.state.rotation(self.angles);
-        let value = match said.lengthens {
-            true => Err(Reason::RadiusCompensation),
-            false => target(to, rotation),
-        };
-        let origin = self.origin(said, &value);
-        let argument = self.argument(said);
-        // The way round.
-        let mut arc = None;
-        if let Mode::Circular(positive) = mode {
-            let found = self.arc(said, from, to, positive);
-            let via = middle(found, [from, to], [old_rotation, rotation]);
-            let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
-            motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
-            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
-        }
-        if kind != MotionKind::Unknown {
-            motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
-        }
+        let arc = self.targets(said, mode, [from, to], [old_rotation, rotation], &mut motion);
         motion.speed = (mode != Mode::Rapid).then(|| self.speed()).flatten();
         motion.zone = self.zone();
         motion.tool = Some(self.tool());
@@ -247,36 +229,18 @@ impl Lister<'_, '_> {
         if cut && motion.left.is_none() {
             motion.left = Some(Reason::NotFollowed);
         }
-        // The words of this block that change what numbers mean come after a block that is put in before it.
-        let alike = self.meaning == self.state.meaning();
         motion.timed = !self.state.feed_per_minute && kind != MotionKind::Joint;
-        let splits = alike
-            && !begins_something(said)
-            && !heidenhain
-            && !said.skippable
-            && !motion.timed
-            && before.start.iter().all(Option::is_some);
-        let insertable = splits && kind == MotionKind::Linear && !said.others;
-        motion.insertable = insertable;
+        let splits = !motion.timed && self.splits(said, &before);
+        motion.insertable = splits && kind == MotionKind::Linear && !said.others;
         motion.straightens = splits && arc.is_some() && !said.opaque;
         motion.axis = arc.map(|(arc, positive, _)| arc.plane.axis(positive));
         motion.by_radius = arc.is_some() && said.radius.is_some();
-        let after = self.written_as(said, None);
-        let start_angles = if (before.turn == Turn::Rpy) == (after.turn == Turn::Rpy) {
-            before.start_angles
-        } else {
-            [None; 3]
-        };
+        let after = self.written_as(said, arc);
         let written = Written {
-            arc,
-            insertable,
+            insertable: motion.insertable,
             restates: self.restates(said, &motion),
             needs: self.needs_of(said, mode),
-            start_angles,
-            turn: after.turn,
-            angles: after.angles,
-            vector: after.vector,
-            ..before
+            ..before.until(&after)
         };
         let index = self.push(motion, written);
         self.state.previous = Some(index);
@@ -287,6 +251,44 @@ impl Lister<'_, '_> {
             self.state.lose_orientation();
             self.events.push(Event::Lost(super::ORIENTATION));
         }
+    }
+
+    /// The targets of a motion, and its arc with whether it turns positively and whether its centre is absolute.
+    fn targets(
+        &self,
+        said: &Said<'_>,
+        mode: Mode,
+        [from, to]: [[Worth; 3]; 2],
+        rotations: [Rotation; 2],
+        motion: &mut Motion,
+    ) -> Option<(Arc, bool, bool)> {
+        let value = match said.lengthens {
+            true => Err(Reason::RadiusCompensation),
+            false => target(to, rotations[1]),
+        };
+        let origin = self.origin(said, &value);
+        let argument = self.argument(said);
+        let mut arc = None;
+        if let Mode::Circular(positive) = mode {
+            let found = self.arc(said, from, to, positive);
+            let via = middle(found, [from, to], rotations);
+            let via_origin = if via.is_ok() { Origin::Computed } else { Origin::Unknown };
+            motion.targets.push(MotionTarget { role: Role::Via, value: via, origin: via_origin, argument });
+            arc = found.ok().map(|arc| (arc, positive, self.state.centre_absolute));
+        }
+        if motion.kind != MotionKind::Unknown {
+            motion.targets.push(MotionTarget { role: Role::To, value, origin, argument });
+        }
+        arc
+    }
+
+    /// Whether a block may stand before this one: the words of this block that change what numbers mean would come after it.
+    fn splits(&self, said: &Said<'_>, before: &Written) -> bool {
+        self.meaning == self.state.meaning()
+            && !begins_something(said)
+            && self.dialect != Dialect::Heidenhain
+            && !said.skippable
+            && before.start.iter().all(Option::is_some)
     }
 
     /// What is not where the words of the block say.
@@ -567,6 +569,21 @@ impl Lister<'_, '_> {
             self.listing.zones.push(zone);
             self.listing.zones.len() - 1
         }) as u32)
+    }
+}
+
+impl Written {
+    /// From where the tool stands before a block to how it is turned after it.
+    fn until(self, after: &Written) -> Written {
+        let same_angles = (self.turn == Turn::Rpy) == (after.turn == Turn::Rpy);
+        Written {
+            arc: after.arc,
+            start_angles: if same_angles { self.start_angles } else { [None; 3] },
+            turn: after.turn,
+            angles: after.angles,
+            vector: after.vector,
+            ..self
+        }
     }
 }
 

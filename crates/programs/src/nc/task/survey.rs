@@ -3,136 +3,125 @@
 use super::super::dialect::Dialect;
 use super::super::expression::{Variable, literal, numbered};
 use super::super::parser::word;
-use super::super::syntax::{Belongs, Syntax};
+use super::super::syntax::{Belongs, Syntax, Word};
 use super::super::token::Token;
 use super::{Lister, code};
 
 impl Lister<'_, '_> {
     /// What the whole file sets, and where its jumps go.
     pub(super) fn survey(&mut self) {
-        let mut jump = false;
-        // `%NAME G71 *`: DIN/ISO of Heidenhain, `$NAME.MIN%`: Okuma, whose G words have meanings of their own.
-        let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
-        self.foreign = self.dialect.paren_comments()
-            && tape.is_some_and(|token| {
-                let text = self.tree.text(token).to_ascii_uppercase();
-                text[0] == b'$'
-                    || text.split(u8::is_ascii_whitespace).any(|word| matches!(word, b"G70" | b"G71"))
-            });
-        let tape_says = |text: &[u8]| {
-            let text = text.to_ascii_uppercase();
-            text.windows(4).any(|part| part == b"_SPF")
-        };
-        self.called &= self.dialect == Dialect::Siemens;
-        self.called |=
-            self.dialect == Dialect::Siemens && tape.is_some_and(|token| tape_says(self.tree.text(token)));
-        let mut block = Block::default();
-        let (mut programs, mut back) = (0, false);
-        let mut subs = Subs::default();
+        self.survey_tape();
+        let mut survey = Survey::default();
         for node in 0..self.tree.nodes.len() as u32 {
-            let kind = self.tree.nodes[node as usize].kind;
-            if matches!(kind, Syntax::Block | Syntax::Skippable) {
-                self.survey_block(&block);
-                subs.add(&block);
-                back |= block.back && block.p.is_none();
-                block = Block { skippable: kind == Syntax::Skippable, ..Block::default() };
-            }
-            if self.tree.nodes[node as usize].kind != Syntax::Word {
-                continue;
-            }
-            let said = word(self.tree, node);
-            let number = match said.belongs {
-                Belongs::Literal { sign: None, number } => literal(self.tree.text(number)),
-                _ => None,
-            };
-            let address = said.address();
-            block.does |= matches!(
-                address,
-                Some(
-                    b'G' | b'X' | b'Y' | b'Z' | b'A' | b'B' | b'C' | b'U' | b'V' | b'W' | b'T' | b'F' | b'S'
-                )
-            );
-            block.sub |= said.is("SUB");
-            block.endsub |= said.is("ENDSUB");
-            block.does |= said.is("CALL");
-            if matches!(address, Some(b'O' | b':')) {
-                block.program = Some(match number {
-                    Some(number) if self.dialect != Dialect::LinuxCnc => numbered(b"O", number),
-                    _ => self.tree.source()[self.tree.range(said.first, said.end)].to_ascii_uppercase(),
-                });
-            }
-            block.returns |= said.is("RET");
-            if jump {
-                // GOTO N100: the block number stands in a word of its own.
-                jump = false;
-                match (address, number) {
-                    (Some(b'N'), Some(number)) => {
-                        self.targets.insert(number as u64);
-                        continue;
-                    }
-                    // A label; anything else is computed.
-                    (None, _)
-                        if said
-                            .name
-                            .first()
-                            .is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
-                    _ => self.anywhere = true,
+            match self.tree.nodes[node as usize].kind {
+                kind @ (Syntax::Block | Syntax::Skippable) => {
+                    self.survey_block(&mut survey);
+                    survey.block.skippable = kind == Syntax::Skippable;
                 }
-            }
-            match (address, number) {
-                (Some(b'G'), Some(number)) => block.cycle |= matches!(code(number), 700..=730),
-                (Some(b'M'), Some(number)) => {
-                    self.changes_tools |= number == 6.0;
-                    block.ends |= number == 2.0 || number == 30.0;
-                    block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
-                    block.back |= number == 99.0;
-                    // Haas: to a block of the same program. Fanuc and Mitsubishi begin a subprogram at a block, which may be here.
-                    block.jumps |= matches!(number as u32, 46 | 96 | 97);
-                    block.calls |= matches!(number as u32, 98 | 198);
-                }
-                (Some(b'P'), Some(number)) => block.p = Some(number as u64),
-                (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
-                (Some(b'H'), Some(number)) => block.h = Some(number as u64),
-                (Some(b'P'), None) => block.computed.0 |= said.belongs != Belongs::Nothing,
-                (Some(b'Q' | b'H'), None) => block.computed.1 |= said.belongs != Belongs::Nothing,
-                (Some(b'O'), Some(_)) => programs += 1,
-                // What the caller hands over has names too.
-                (None, _) if said.is("PROC") => {
-                    block.declares = true;
-                    self.called |= self.dialect == Dialect::Siemens && !subs.outside;
-                }
-                (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
-                    for at in said.first..said.end {
-                        if self.tree.kind(at) == Some(Token::Name) {
-                            self.declare(&mut block, self.tree.text(at));
-                        }
-                    }
-                }
-                (None, _) if said.is("DEF") || block.declares => {
-                    block.declares = true;
-                    self.declare(&mut block, said.name);
-                }
-                (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
-                    match number {
-                        Some(number) => {
-                            self.targets.insert(number as u64);
-                        }
-                        None if said.belongs == Belongs::Nothing && said.index.is_none() => jump = true,
-                        None => self.anywhere = true,
-                    }
-                }
+                Syntax::Word => self.survey_word(&mut survey, &word(self.tree, node)),
                 _ => {}
             }
         }
-        self.survey_block(&block);
-        subs.add(&block);
-        back |= block.back && block.p.is_none();
-        self.repeats = back && programs <= 1;
+        self.survey_block(&mut survey);
+        self.repeats = survey.back && survey.programs <= 1;
+        let subs = survey.subs;
         self.called |= match self.dialect {
             Dialect::Heidenhain => false,
             Dialect::LinuxCnc => subs.returns == Some(true) || subs.has && !subs.outside,
             _ => subs.returns == Some(true),
         };
+    }
+
+    /// What the first line says: `%NAME G71 *` is DIN/ISO of Heidenhain, `$NAME.MIN%` Okuma, whose G words have meanings of their
+    /// own; `%_N_NAME_SPF` is a subprogram of Siemens.
+    fn survey_tape(&mut self) {
+        let tape = (0..self.tree.len() as u32).find(|&token| self.tree.kind(token) == Some(Token::Tape));
+        let text = tape.map(|token| self.tree.text(token).to_ascii_uppercase()).unwrap_or_default();
+        let mut words = text.split(u8::is_ascii_whitespace);
+        self.foreign = self.dialect.paren_comments()
+            && (text.first() == Some(&b'$') || words.any(|word| matches!(word, b"G70" | b"G71")));
+        self.called |= text.windows(4).any(|part| part == b"_SPF");
+        self.called &= self.dialect == Dialect::Siemens;
+    }
+
+    fn survey_word(&mut self, survey: &mut Survey, said: &Word<'_>) {
+        let Survey { block, subs, jump, programs, .. } = survey;
+        let number = match said.belongs {
+            Belongs::Literal { sign: None, number } => literal(self.tree.text(number)),
+            _ => None,
+        };
+        let address = said.address();
+        let moves_or_sets =
+            address.is_some_and(|letter| b"GXYZABCUVWTFS".contains(&letter)) || said.is("CALL");
+        block.does |= moves_or_sets;
+        block.sub |= said.is("SUB");
+        block.endsub |= said.is("ENDSUB");
+        block.returns |= said.is("RET");
+        if matches!(address, Some(b'O' | b':')) {
+            block.program = Some(match number {
+                Some(number) if self.dialect != Dialect::LinuxCnc => numbered(b"O", number),
+                _ => self.tree.source()[self.tree.range(said.first, said.end)].to_ascii_uppercase(),
+            });
+        }
+        if std::mem::take(jump) {
+            // GOTO N100: the block number stands in a word of its own.
+            match (address, number) {
+                (Some(b'N'), Some(number)) => {
+                    self.targets.insert(number as u64);
+                    return;
+                }
+                // A label; anything else is computed.
+                (None, _)
+                    if said.name.first().is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_') => {}
+                _ => self.anywhere = true,
+            }
+        }
+        match (address, number) {
+            (Some(b'M'), Some(number)) => self.survey_m_word(block, number),
+            (Some(b'G'), Some(number)) => block.cycle |= matches!(code(number), 700..=730),
+            (Some(b'P'), Some(number)) => block.p = Some(number as u64),
+            (Some(b'Q'), Some(number)) => block.q = Some(number as u64),
+            (Some(b'H'), Some(number)) => block.h = Some(number as u64),
+            (Some(b'P'), None) => block.computed.0 |= said.belongs != Belongs::Nothing,
+            (Some(b'Q' | b'H'), None) => block.computed.1 |= said.belongs != Belongs::Nothing,
+            (Some(b'O'), Some(_)) => *programs += 1,
+            // What the caller hands over has names too.
+            (None, _) if said.is("PROC") => {
+                block.declares = true;
+                self.called |= self.dialect == Dialect::Siemens && !subs.outside;
+            }
+            (None, _) if block.declares && matches!(said.belongs, Belongs::Arguments { .. }) => {
+                for at in said.first..said.end {
+                    if self.tree.kind(at) == Some(Token::Name) {
+                        self.declare(block, self.tree.text(at));
+                    }
+                }
+            }
+            (None, _) if said.is("DEF") || block.declares => {
+                block.declares = true;
+                self.declare(block, said.name);
+            }
+            (None, number) if said.name.len() >= 4 && said.name[..4].eq_ignore_ascii_case(b"GOTO") => {
+                match number {
+                    Some(number) => {
+                        self.targets.insert(number as u64);
+                    }
+                    None if said.belongs == Belongs::Nothing && said.index.is_none() => *jump = true,
+                    None => self.anywhere = true,
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn survey_m_word(&mut self, block: &mut Block, number: f64) {
+        self.changes_tools |= number == 6.0;
+        block.ends |= number == 2.0 || number == 30.0;
+        block.returns |= number == 17.0 && self.dialect == Dialect::Siemens;
+        block.back |= number == 99.0;
+        // Haas: to a block of the same program. Fanuc and Mitsubishi begin a subprogram at a block, which may be here.
+        block.jumps |= matches!(number as u32, 46 | 96 | 97);
+        block.calls |= matches!(number as u32, 98 | 198);
     }
 
     /// A name of a declaration: a type, or what is of that type.
@@ -149,12 +138,16 @@ impl Lister<'_, '_> {
         self.declared.insert(name);
     }
 
-    fn survey_block(&mut self, block: &Block) {
+    /// A block is read: what it says together.
+    fn survey_block(&mut self, survey: &mut Survey) {
+        let block = std::mem::take(&mut survey.block);
+        survey.subs.add(&block);
+        survey.back |= block.back && block.p.is_none();
         if self.dialect == Dialect::Heidenhain {
             return;
         }
         if block.sub || self.dialect != Dialect::LinuxCnc {
-            self.programs.extend(block.program.clone());
+            self.programs.extend(block.program);
         }
         if block.back || block.jumps {
             self.targets.extend(block.p);
@@ -174,6 +167,20 @@ impl Lister<'_, '_> {
     pub(super) fn repeats(&self) -> bool {
         self.dialect != Dialect::Heidenhain && self.repeats
     }
+}
+
+/// What has been read so far.
+#[derive(Default)]
+struct Survey {
+    /// The block that is being read.
+    block: Block,
+    subs: Subs,
+    /// GOTO has been read, and not yet where to.
+    jump: bool,
+    /// How many programs begin (O and a number).
+    programs: usize,
+    /// Whether M99 stands in it without a block to go to.
+    back: bool,
 }
 
 /// What a block says that the survey looks at.

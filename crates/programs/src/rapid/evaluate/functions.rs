@@ -67,68 +67,105 @@ fn euler_zyx(q: [f64; 4], axis: usize) -> Result<f64, Reason> {
     Ok(radians.to_degrees())
 }
 
+/// An offset: that it is unknown is another reason than an unknown base; a name that another file declares is named as such.
+fn offset(value: &Value) -> Result<f64, Reason> {
+    value.number().map_err(|reason| match reason {
+        Reason::Undeclared | Reason::Ambiguous => reason,
+        _ => Reason::RunTimeOffset,
+    })
+}
+
+/// `Offs(target, x, y, z)`: moved along the axes of the object frame.
+fn offs(required: &[Value]) -> Result<Value, Reason> {
+    let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
+    let shift = [offset(x)?, offset(y)?, offset(z)?];
+    edited(target, |frame| {
+        for (position, shift) in frame.position_mm.iter_mut().zip(shift) {
+            *position += shift;
+        }
+    })
+}
+
+/// `RelTool(target, x, y, z \Rx \Ry \Rz)`: moved along the axes of the tool, and turned about them.
+fn rel_tool(required: &[Value], options: &Options) -> Result<Value, Reason> {
+    let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
+    let shift = Vector3::new(offset(x)?, offset(y)?, offset(z)?);
+    let mut angles = [0.0; 3];
+    for (angle, option) in angles.iter_mut().zip(&options.turns) {
+        if let Some(value) = option {
+            *angle = offset(value)?;
+        }
+    }
+    let [rx, ry, rz] = angles.map(f64::to_radians);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), rx)
+        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), ry)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rz);
+    edited(target, |frame| {
+        let moved = frame.pose() * Pose::from_parts(Translation3::from(shift), turn);
+        let quaternion = frame.quaternion;
+        *frame = Frame::from_pose(&moved);
+        if angles == [0.0; 3] {
+            frame.quaternion = quaternion;
+        }
+    })
+}
+
+/// `MirPos(target, plane \WObj \MirY)`.
+fn mir_pos(required: &[Value], options: &Options) -> Result<Value, Reason> {
+    let [target, plane] = required else { return Err(Reason::MissingArgument) };
+    let plane = plane.work_object()?;
+    let object = match &options.work_object {
+        Some(value) => value.work_object()?,
+        None => built_in(b"wobj0").ok_or(Reason::WrongShape)?.work_object()?,
+    };
+    if !plane.fixed || !object.fixed {
+        return Err(Reason::MovingWorkObject);
+    }
+    let plane = plane.user_frame.pose() * plane.object_frame.pose();
+    let object = object.user_frame.pose() * object.object_frame.pose();
+    edited(target, |frame| {
+        *frame = Frame::from_pose(&mirrored(&frame.pose(), &plane, &object, options.mirrors_y));
+    })
+}
+
+/// `DefFrame(p1, p2, p3 \Origin)`: a frame through three points.
+fn def_frame(required: &[Value], options: &Options) -> Result<Value, Reason> {
+    let [origin, x, xy] = required else { return Err(Reason::MissingArgument) };
+    let point = |value: &Value| -> Result<Vector3<f64>, Reason> {
+        match value.target(false)? {
+            TargetValue::Cartesian(target) => Ok(Vector3::from(target.position_mm)),
+            TargetValue::Joint(_) => Err(Reason::WrongShape),
+        }
+    };
+    let (origin, x, xy) = (point(origin)?, point(x)?, point(xy)?);
+    let normal = (x - origin).cross(&(xy - origin));
+    if normal.norm() < 1e-9 {
+        return Err(Reason::WrongShape);
+    }
+    let (e1, e3) = ((x - origin).normalize(), normal.normalize());
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[e1, e3.cross(&e1), e3]));
+    // Where the origin is: in the first point, in the second, or where the third then lies on the y axis.
+    let origin = match options.origin.as_ref().map_or(Ok(1.0), Value::number)?.round() {
+        1.0 => origin,
+        2.0 => x,
+        3.0 => origin + e1 * e1.dot(&(xy - origin)),
+        _ => return Err(Reason::WrongShape),
+    };
+    let pose = Pose::from_parts(origin.into(), rotation_from_matrix(rotation.matrix()));
+    Ok(Value::from_frame(&Frame::from_pose(&pose)))
+}
+
 /// A predefined function of values.
 pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result<Value, Reason> {
     let number = |index: usize| required.get(index).ok_or(Reason::MissingArgument)?.number();
-    // An unknown offset is another reason than an unknown base; a name that another file declares is named as such.
-    let offset = |value: &Value| {
-        value.number().map_err(|reason| match reason {
-            Reason::Undeclared | Reason::Ambiguous => reason,
-            _ => Reason::RunTimeOffset,
-        })
-    };
     let one = |function: fn(f64) -> f64| Ok(Value::Number(function(number(0)?)));
     let vector = |index: usize| -> Result<Vector3<f64>, Reason> {
         Ok(Vector3::from(required.get(index).ok_or(Reason::MissingArgument)?.numbers::<3>()?))
     };
     match name {
-        b"offs" => {
-            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
-            let shift = [offset(x)?, offset(y)?, offset(z)?];
-            edited(target, |frame| {
-                for (position, shift) in frame.position_mm.iter_mut().zip(shift) {
-                    *position += shift;
-                }
-            })
-        }
-        b"reltool" => {
-            let [target, x, y, z] = required else { return Err(Reason::MissingArgument) };
-            let shift = Vector3::new(offset(x)?, offset(y)?, offset(z)?);
-            let mut angles = [0.0; 3];
-            for (angle, option) in angles.iter_mut().zip(&options.turns) {
-                if let Some(value) = option {
-                    *angle = offset(value)?;
-                }
-            }
-            let [rx, ry, rz] = angles.map(f64::to_radians);
-            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), rx)
-                * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), ry)
-                * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rz);
-            edited(target, |frame| {
-                let moved = frame.pose() * Pose::from_parts(Translation3::from(shift), turn);
-                let quaternion = frame.quaternion;
-                *frame = Frame::from_pose(&moved);
-                if angles == [0.0; 3] {
-                    frame.quaternion = quaternion;
-                }
-            })
-        }
-        b"mirpos" => {
-            let [target, plane] = required else { return Err(Reason::MissingArgument) };
-            let plane = plane.work_object()?;
-            let object = match &options.work_object {
-                Some(value) => value.work_object()?,
-                None => built_in(b"wobj0").ok_or(Reason::WrongShape)?.work_object()?,
-            };
-            if !plane.fixed || !object.fixed {
-                return Err(Reason::MovingWorkObject);
-            }
-            let plane = plane.user_frame.pose() * plane.object_frame.pose();
-            let object = object.user_frame.pose() * object.object_frame.pose();
-            edited(target, |frame| {
-                *frame = Frame::from_pose(&mirrored(&frame.pose(), &plane, &object, options.mirrors_y));
-            })
-        }
+        b"offs" => offs(required),
+        b"reltool" => rel_tool(required, options),
+        b"mirpos" => mir_pos(required, options),
         b"posemult" => {
             let [a, b] = required else { return Err(Reason::MissingArgument) };
             Ok(Value::from_frame(&Frame::from_pose(&(a.frame()?.pose() * b.frame()?.pose()))))
@@ -154,31 +191,7 @@ pub(super) fn call(name: &[u8], required: &[Value], options: &Options) -> Result
             }
             Ok(Value::from_numbers(&q.map(|q| q / length)))
         }
-        b"defframe" => {
-            let [origin, x, xy] = required else { return Err(Reason::MissingArgument) };
-            let point = |value: &Value| -> Result<Vector3<f64>, Reason> {
-                match value.target(false)? {
-                    TargetValue::Cartesian(target) => Ok(Vector3::from(target.position_mm)),
-                    TargetValue::Joint(_) => Err(Reason::WrongShape),
-                }
-            };
-            let (origin, x, xy) = (point(origin)?, point(x)?, point(xy)?);
-            let normal = (x - origin).cross(&(xy - origin));
-            if normal.norm() < 1e-9 {
-                return Err(Reason::WrongShape);
-            }
-            let (e1, e3) = ((x - origin).normalize(), normal.normalize());
-            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[e1, e3.cross(&e1), e3]));
-            // Where the origin is: in the first point, in the second, or where the third then lies on the y axis.
-            let origin = match options.origin.as_ref().map_or(Ok(1.0), Value::number)?.round() {
-                1.0 => origin,
-                2.0 => x,
-                3.0 => origin + e1 * e1.dot(&(xy - origin)),
-                _ => return Err(Reason::WrongShape),
-            };
-            let pose = Pose::from_parts(origin.into(), rotation_from_matrix(rotation.matrix()));
-            Ok(Value::from_frame(&Frame::from_pose(&pose)))
-        }
+        b"defframe" => def_frame(required, options),
         b"abs" => one(f64::abs),
         b"sqrt" => one(f64::sqrt),
         b"exp" => one(f64::exp),

@@ -59,33 +59,7 @@ impl Rewriter<'_, '_> {
             Between::Plain | Between::Nothing => None,
         };
         let Some(name) = same else {
-            let name: &[u8] = match extra.kind {
-                MotionKind::Joint => b"MoveJ",
-                MotionKind::AbsoluteJoint => b"MoveAbsJ",
-                _ => b"MoveL",
-            };
-            out.extend_from_slice(name);
-            out.push(b' ');
-            out.extend_from_slice(&target);
-            out.push(b',');
-            for (index, part) in [&parts.speed, &parts.zone, &parts.tool].into_iter().enumerate() {
-                if index == 1 {
-                    out.extend_from_slice(self.options.extra_zone.as_bytes());
-                    out.push(b',');
-                } else if let Some(span) = part {
-                    out.extend_from_slice(&source[span.range()]);
-                    if index == 0 {
-                        for option in &parts.speed_options {
-                            out.extend_from_slice(&source[option.range()]);
-                        }
-                        out.push(b',');
-                    }
-                }
-            }
-            for option in &parts.tool_options {
-                out.extend_from_slice(&source[option.range()]);
-            }
-            out.push(b';');
+            self.plain(out, extra.kind, &target, source, parts);
             return;
         };
         // The same instruction, with another target and a fly-by zone.
@@ -111,6 +85,29 @@ impl Rewriter<'_, '_> {
         if let Ok(copy) = edits.apply(statement) {
             out.extend_from_slice(&copy);
         }
+    }
+
+    /// A motion without process: speed, tool and work object are those of the motion, the zone is a fly-by.
+    fn plain(&self, out: &mut Vec<u8>, kind: MotionKind, target: &[u8], source: &[u8], parts: &Parts) {
+        out.extend_from_slice(match kind {
+            MotionKind::Joint => b"MoveJ ",
+            MotionKind::AbsoluteJoint => b"MoveAbsJ ",
+            _ => b"MoveL ",
+        });
+        out.extend_from_slice(target);
+        out.push(b',');
+        if let Some(speed) = &parts.speed {
+            for part in [speed].into_iter().chain(&parts.speed_options) {
+                out.extend_from_slice(&source[part.range()]);
+            }
+            out.push(b',');
+        }
+        out.extend_from_slice(self.options.extra_zone.as_bytes());
+        out.push(b',');
+        for part in parts.tool.iter().chain(&parts.tool_options) {
+            out.extend_from_slice(&source[part.range()]);
+        }
+        out.push(b';');
     }
 }
 

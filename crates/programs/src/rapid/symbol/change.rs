@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::named::{Named, Names};
 use super::reach::{Change, Ends, How, REACH, Reach};
-use super::{Symbol, Symbols, Unit, What};
+use super::{RoutineScope, Symbol, Symbols, Unit, What};
 use crate::motion::Reason;
 use crate::rapid::instruction::{self, Also, INSTRUCTIONS, Instruction, Slot};
 use crate::rapid::modal::{States, setting};
@@ -635,39 +635,15 @@ impl Symbols {
         let root = |argument: &Argument| self.root(tree, scope, argument.value?);
         let called = self.called(scope, name);
         for routine in called.iter().map(|&routine| &self.routines[routine as usize]) {
-            let mut required =
-                (0..).zip(&routine.head.parameters).filter(|(_, parameter)| !parameter.optional);
-            for argument in arguments(tree, node) {
-                let at: Option<usize> = match argument.name {
-                    None => required.next().map(|(at, _)| at),
-                    Some(name) => self.parameter(routine.scope, tree.text(name)).and_then(|name| {
-                        routine.head.parameters.iter().position(|parameter| parameter.name == name)
-                    }),
-                };
-                match at.and_then(|at| routine.written[at]) {
-                    Some(Reason::HandedOver) => give(root(&argument), How::HandedOver),
-                    Some(_) => give(root(&argument), How::Whole),
-                    None => {}
-                }
-            }
+            self.changed_by_routine(tree, scope, node, routine, give);
         }
         if !called.is_empty() {
             return;
         }
         if let Some(known) = known {
-            let count = arguments(tree, node).filter(|argument| !argument.optional).count();
-            let required = arguments(tree, node).filter(|argument| !argument.optional).enumerate();
-            for (_, argument) in required.filter(|&(index, _)| known.slot(index, count) == Some(Slot::Output))
-            {
-                give(root(&argument), How::Whole);
-            }
-            for argument in arguments(tree, node).filter(|argument| argument.optional) {
-                let returned = |name: u32| tree.text(name).get(..3).is_some_and(|n| same_name(n, b"Ret"));
-                if known.also == Also::Returns && argument.name.is_some_and(returned) {
-                    give(root(&argument), How::Whole);
-                }
-            }
-            return;
+            return changed_by_instruction(tree, node, known, &mut |argument| {
+                give(root(argument), How::Whole)
+            });
         }
         match predefined::effect(name) {
             Some(Effect::Reads) => {
@@ -704,10 +680,56 @@ impl Symbols {
         }
     }
 
+    /// What a routine of the program changes of the data that it is given.
+    fn changed_by_routine(
+        &self,
+        tree: &RapidTree<'_>,
+        scope: u32,
+        node: u32,
+        routine: &RoutineScope,
+        give: &mut dyn FnMut(Option<u32>, How),
+    ) {
+        let root = |argument: &Argument| self.root(tree, scope, argument.value?);
+        let mut required = (0..).zip(&routine.head.parameters).filter(|(_, parameter)| !parameter.optional);
+        for argument in arguments(tree, node) {
+            let at: Option<usize> = match argument.name {
+                None => required.next().map(|(at, _)| at),
+                Some(name) => self.parameter(routine.scope, tree.text(name)).and_then(|name| {
+                    routine.head.parameters.iter().position(|parameter| parameter.name == name)
+                }),
+            };
+            match at.and_then(|at| routine.written[at]) {
+                Some(Reason::HandedOver) => give(root(&argument), How::HandedOver),
+                Some(_) => give(root(&argument), How::Whole),
+                None => {}
+            }
+        }
+    }
+
     /// The token of a parameter of a routine, by its name.
     fn parameter(&self, scope: u32, name: &[u8]) -> Option<u32> {
         let symbol = self.scopes[scope as usize].names.get(&folded(name))?;
         Some(self.symbols[*symbol as usize].name)
+    }
+}
+
+/// The arguments that a motion instruction of the table writes to.
+fn changed_by_instruction(
+    tree: &RapidTree<'_>,
+    node: u32,
+    known: &Instruction,
+    give: &mut dyn FnMut(&Argument),
+) {
+    let count = arguments(tree, node).filter(|argument| !argument.optional).count();
+    let required = arguments(tree, node).filter(|argument| !argument.optional).enumerate();
+    for (_, argument) in required.filter(|&(index, _)| known.slot(index, count) == Some(Slot::Output)) {
+        give(&argument);
+    }
+    for argument in arguments(tree, node).filter(|argument| argument.optional) {
+        let returned = |name: u32| tree.text(name).get(..3).is_some_and(|n| same_name(n, b"Ret"));
+        if known.also == Also::Returns && argument.name.is_some_and(returned) {
+            give(&argument);
+        }
     }
 }
 

@@ -1,0 +1,138 @@
+//! What the Levenberg–Marquardt methods share: where a search stands, how it is damped, when it ends.
+
+use crate::estimate::{Estimate, Iteration, Termination};
+use crate::least_squares::Factorisation;
+use crate::least_squares::damped::{DampedSystem, Linearisation, Promise};
+use crate::objective::Objective;
+
+/// Where a search stands.
+pub(crate) struct Point {
+    pub(crate) x: Vec<f64>,
+    pub(crate) at: Linearisation,
+}
+
+impl Point {
+    /// The start, linearised, and what is told of it.
+    pub(crate) fn begin(
+        objective: &mut Objective<'_>,
+        start: &[f64],
+        factorisation: Factorisation,
+    ) -> (Self, Vec<Iteration>) {
+        let at = Linearisation::at(objective, start, factorisation);
+        let first = Iteration { cost: at.cost(), evaluations: objective.evaluations, ..Iteration::default() };
+        (Self { x: start.to_vec(), at }, vec![first])
+    }
+
+    /// What is told of an iteration that ends here.
+    pub(crate) fn entry(
+        &self,
+        step_norm: f64,
+        damping: Option<f64>,
+        cosine: Option<f64>,
+        objective: &Objective<'_>,
+    ) -> Iteration {
+        let (cost, evaluations) = (self.at.cost(), objective.evaluations);
+        Iteration { cost, row_cost: None, step_norm, damping, gradient_norm: cosine, evaluations }
+    }
+
+    /// The tests that need no step: the cost itself, and the largest cosine between residuals and a column of J, where a
+    /// tolerance is stated for it.
+    pub(crate) fn end(&self, small_cost: f64, cosine: f64, tolerance: Option<f64>) -> Option<Termination> {
+        if self.at.cost() <= small_cost {
+            return Some(Termination::SmallResidual);
+        }
+        tolerance.is_some_and(|tolerance| cosine <= tolerance).then_some(Termination::Gradient)
+    }
+
+    pub(crate) fn finish(
+        self,
+        objective: &Objective<'_>,
+        termination: Termination,
+        trace: Vec<Iteration>,
+    ) -> Estimate {
+        let covariance = if self.at.is_finite() { self.at.covariance() } else { None };
+        let (cost, evaluations) = (self.at.cost(), objective.evaluations);
+        Estimate { x: self.x, covariance, cost, evaluations, termination, trace }
+    }
+}
+
+/// Nielsen's rule for μ.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Damping {
+    pub(crate) mu: f64,
+    growth: f64,
+}
+
+/// Smallest and largest μ that mean anything next to a unit diagonal in double precision.
+pub(crate) const DAMPING_RANGE: (f64, f64) = (1e-16, 1e16);
+
+/// μ after the first refusal: less would hardly change the step that was refused.
+const FIRST_REFUSAL: f64 = 1e-3;
+
+impl Damping {
+    pub(crate) fn new(mu: f64) -> Self {
+        Self { mu: mu.clamp(DAMPING_RANGE.0, DAMPING_RANGE.1), growth: 2.0 }
+    }
+
+    /// Whether a step with this gain ratio may be taken. A step with hardly any damping must keep a quarter of
+    /// its promise: otherwise one leap from a far start lands on a plateau from which nothing leads back.
+    pub(crate) fn is_acceptable(&self, gain: f64) -> bool {
+        gain > if self.mu < FIRST_REFUSAL { 0.25 } else { 1e-4 }
+    }
+
+    /// `gain` is actual over predicted reduction of a step that was taken.
+    pub(crate) fn accept(&mut self, gain: f64) {
+        let factor =
+            if (gain - 1.0).abs() < 0.1 { 0.1 } else { (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0) };
+        self.mu = (self.mu * factor).max(DAMPING_RANGE.0);
+        self.growth = 2.0;
+    }
+
+    pub(crate) fn refuse(&mut self) {
+        self.mu = (self.mu * self.growth).max(FIRST_REFUSAL).min(DAMPING_RANGE.1);
+        self.growth *= 2.0;
+    }
+
+    pub(crate) fn is_exhausted(&self) -> bool {
+        self.mu >= DAMPING_RANGE.1
+    }
+}
+
+/// What the tests of convergence want to know of a search.
+pub(crate) struct Search {
+    pub(crate) mu: f64,
+    /// Steps refused since the last one taken.
+    pub(crate) refused: usize,
+    pub(crate) cosine: f64,
+    pub(crate) cost_tolerance: f64,
+    pub(crate) step_tolerance: f64,
+}
+
+/// The tests that need a step: cost and step size. A small promise under heavy damping proves nothing, so the
+/// promise is asked again almost without damping. Where the undamped model promises more than the problem keeps
+/// (large residuals), a small promise after refusals counts as converged if the gradient is small too.
+pub(crate) fn converged(
+    system: &mut DampedSystem,
+    here: &Point,
+    promise: &Promise,
+    search: &Search,
+) -> Option<Termination> {
+    const LIGHT: f64 = 1e-8;
+    const SMALL_COSINE: f64 = 1e-5;
+    let enough = search.cost_tolerance * here.at.cost();
+    let tiny = search.step_tolerance * (system.scaled_norm(&here.x) + search.step_tolerance);
+    if promise.reduction > enough && promise.step_norm > tiny {
+        return None;
+    }
+    if search.mu <= LIGHT {
+        return Some(if promise.reduction <= enough { Termination::Cost } else { Termination::Step });
+    }
+    let mut unused = vec![0.0; here.x.len()];
+    match system.step(&here.at, LIGHT, &here.x, &mut unused) {
+        Some(light) if light.reduction <= enough => Some(Termination::Cost),
+        Some(light) if light.step_norm <= tiny => Some(Termination::Step),
+        _ if search.refused > 0 && search.cosine <= SMALL_COSINE => Some(Termination::Cost),
+        _ if search.refused > 0 => Some(Termination::Stalled),
+        _ => None,
+    }
+}
