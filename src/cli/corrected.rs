@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use truegrind::compensation::cell::Used;
 use truegrind::report::batch::{self, Ended, Row};
-use truegrind::report::kept;
+use truegrind::report::kept::{Packed, unpacked};
 
 use super::ending::Ending;
 use super::files::Batch;
@@ -36,9 +36,21 @@ pub(super) struct Done {
     pub(super) used: Option<Used>,
 }
 
-/// What is kept of a program.
-#[derive(Serialize, Deserialize)]
-struct Record {
+/// What is kept of a program, as it is written.
+#[derive(Serialize)]
+struct Writing<'a> {
+    row: &'a Row,
+    diff: String,
+    notes: &'a [String],
+    clean: bool,
+    changed: bool,
+    undeclared: usize,
+    json: Vec<Packed<'a>>,
+}
+
+/// The same, as it is read.
+#[derive(Deserialize)]
+struct Reading {
     row: Row,
     diff: String,
     notes: Vec<String>,
@@ -57,22 +69,22 @@ impl Kept for Done {
         self.row.ended == Ended::Failed
     }
 
-    fn record(&self) -> anyhow::Result<Value> {
-        Ok(serde_json::to_value(Record {
-            row: self.row.clone(),
+    fn record(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string(&Writing {
+            row: &self.row,
             // A character for each byte: programs may be in any character set.
             diff: self.diff.iter().copied().map(char::from).collect(),
-            notes: self.notes.clone(),
+            notes: &self.notes,
             clean: self.clean,
             changed: self.changed,
             undeclared: self.undeclared,
-            json: kept::packed(Value::Array(self.json.clone())),
+            json: self.json.iter().map(Packed).collect(),
         })?)
     }
 
     fn from_record(record: Value) -> Option<Self> {
-        let record: Record = serde_json::from_value(record).ok()?;
-        let Value::Array(json) = kept::unpacked(record.json) else { return None };
+        let record: Reading = serde_json::from_value(record).ok()?;
+        let Value::Array(json) = unpacked(record.json) else { return None };
         Some(Self {
             row: record.row,
             written: Vec::new(),

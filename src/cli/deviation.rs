@@ -129,6 +129,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         work: |job: &Job, programs: Programs| {
             Ok((shop.judged(job, &programs, surface.as_ref())?, Vec::new()))
         },
+        lighten: |_: &mut Found| (),
     };
     let mut found: Vec<Found> =
         on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
@@ -189,9 +190,9 @@ impl Kept for Found {
         self.failed.is_some()
     }
 
-    fn record(&self) -> anyhow::Result<Value> {
+    fn record(&self) -> anyhow::Result<String> {
         let reports: Vec<Value> = self.reports.iter().map(view::kept).collect();
-        Ok(json!({ "name": self.name, "reports": reports, "failed": self.failed }))
+        Ok(json!({ "name": self.name, "reports": reports, "failed": self.failed }).to_string())
     }
 
     fn from_record(record: Value) -> Option<Self> {

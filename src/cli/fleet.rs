@@ -74,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             read.iter().map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
         },
         work: |job: &Job, read: Vec<(PathBuf, Vec<u8>)>| one(arguments, &options, job, &read),
+        lighten: |_: &mut Found| (),
     };
     let found: Vec<Found> = on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
     drop(work);
@@ -146,8 +147,9 @@ impl Kept for Found {
         self.row.failed
     }
 
-    fn record(&self) -> anyhow::Result<Value> {
-        Ok(json!({ "row": serde_json::to_value(&self.row)?, "notes": self.notes, "clean": self.clean }))
+    fn record(&self) -> anyhow::Result<String> {
+        Ok(json!({ "row": serde_json::to_value(&self.row)?, "notes": self.notes, "clean": self.clean })
+            .to_string())
     }
 
     fn from_record(mut record: Value) -> Option<Self> {

@@ -1,11 +1,12 @@
 //! Runs that several jobs share, on one machine or many, and that go on where they were stopped: `--shard`, `--resume`.
 //!
 //! Jobs know nothing of each other but a folder. In it `run.json` lists all units, `done/KEY.json` is the record of one that is
-//! done, and `begun/KEY` says how often one was begun and not ended. Two jobs that do the same unit at the same time both come to
+//! done, and `begun/` holds what was begun and did not end. Two jobs that do the same unit at the same time both come to
 //! the same bytes, and whoever is last puts them over the same.
 //!
-//! A unit may take its whole process with it (memory, stack). The next job that resumes finds it begun, leaves it to the end and does
-//! it alone, so that it takes nobody else along, and after [`MOST_BEGUN`] times lists it as failed.
+//! A unit may take its whole process with it (memory, stack). The next job of the same units finds that one before it did not end,
+//! and from then on notes each unit that it begins. One that is begun and not ended is left to the end and done alone, so that it
+//! takes nobody else along, and after [`MOST_BEGUN`] times it is listed as failed. Jobs that nobody kills note nothing.
 
 use std::path::{Path, PathBuf};
 
@@ -80,7 +81,7 @@ pub(super) trait Kept: Sized + Send {
     /// Whether it is one of those.
     fn is_failed(&self) -> bool;
     /// As JSON, every bit.
-    fn record(&self) -> anyhow::Result<Value>;
+    fn record(&self) -> anyhow::Result<String>;
     /// From JSON; `None` where it is none of this verb.
     fn from_record(record: Value) -> Option<Self>;
 }
@@ -89,26 +90,29 @@ pub(super) trait Kept: Sized + Send {
 pub(super) type Written = Vec<(PathBuf, String)>;
 
 /// How a verb reads and does a unit.
-pub(super) struct Doing<R, C, W> {
+pub(super) struct Doing<R, C, W, L> {
     /// Reads its files.
     pub(super) read: R,
     /// Their names and contents; see [`key::of_unit`].
     pub(super) content: C,
     /// Does it, and writes its outputs.
     pub(super) work: W,
+    /// Lets go of it what only the record needs: a job may be of a million units.
+    pub(super) lighten: L,
 }
 
 /// Does all units, each by itself: what one brings to light does not take the others with it.
-pub(super) fn each<I, T, R, C, W>(
+pub(super) fn each<I, T, R, C, W, L>(
     store: Option<&Store>,
     jobs: &[Job],
-    doing: &Doing<R, C, W>,
+    doing: &Doing<R, C, W, L>,
 ) -> anyhow::Result<Vec<T>>
 where
     T: Kept,
     R: Fn(&Job) -> anyhow::Result<I> + Sync,
     C: Fn(&I) -> Vec<(String, String)> + Sync,
     W: Fn(&Job, I) -> anyhow::Result<(T, Written)> + Sync,
+    L: Fn(&mut T) + Sync,
 {
     let Some(store) = store else {
         let one = |job: &Job| isolated(|| (doing.work)(job, (doing.read)(job)?));
@@ -117,14 +121,17 @@ where
             jobs.par_iter().map(|job| one(job).map_or_else(|error| failed(job, error), |(done, _)| done));
         return Ok(each.collect());
     };
+    let here = Here::enter(store, jobs)?;
     let first =
-        jobs.par_iter().map(|job| store.done_or_do(job, doing, false)).collect::<anyhow::Result<Vec<_>>>()?;
+        jobs.par_iter().map(|job| here.done_or_do(job, doing, false)).collect::<anyhow::Result<Vec<_>>>()?;
     // What was begun before and not ended may have killed its process: alone, after all others.
     let each = first.into_iter().zip(jobs).map(|(done, job)| match done {
         Some(done) => Ok(done),
-        None => store.done_or_do(job, doing, true)?.ok_or_else(|| anyhow!("{}: left out", job.name())),
+        None => here.done_or_do(job, doing, true)?.ok_or_else(|| anyhow!("{}: left out", job.name())),
     });
-    each.collect()
+    let done = each.collect::<anyhow::Result<Vec<_>>>()?;
+    own::gone(&here.note);
+    Ok(done)
 }
 
 /// What the jobs of one run keep.
@@ -229,7 +236,11 @@ impl Store {
 
     /// The outputs of a unit that are not as they were written.
     pub(super) fn changed(&self, done: &Done) -> Vec<PathBuf> {
-        let places = done.outputs.iter().map(|output| (self.work.join(&output.file), &output.sha256));
+        let place = |output: &Output| match output.below {
+            true => self.work.join(&output.file),
+            false => PathBuf::from(&output.file),
+        };
+        let places = done.outputs.iter().map(|output| (place(output), &output.sha256));
         let other = places.filter(|(place, hash)| {
             let bytes = files::read_own(place);
             !bytes.is_ok_and(|bytes| key::sha256(&bytes) == **hash)
@@ -237,11 +248,57 @@ impl Store {
         other.map(|(place, _)| place).collect()
     }
 
+    fn keep<T: Kept>(
+        &self,
+        key: &str,
+        job: &Job,
+        kept: &T,
+        ended: Ended,
+        written: Written,
+    ) -> anyhow::Result<()> {
+        let output = |(path, sha256): (PathBuf, String)| {
+            let below = path.strip_prefix(&self.work).ok();
+            let file = below.unwrap_or(&path).display().to_string();
+            Output { file, below: below.is_some(), sha256 }
+        };
+        let done = Done {
+            schema: SCHEMA.to_owned(),
+            key: key.to_owned(),
+            unit: job.name(),
+            ended,
+            outputs: written.into_iter().map(output).collect(),
+            record: Value::Null,
+        };
+        let text = done.to_text(&kept.record()?);
+        let text = text.with_context(|| format!("{}: the record cannot be made", job.name()))?;
+        own::put(&self.record_place(key), text.as_bytes())
+    }
+}
+
+/// One job among those of a run.
+struct Here<'s> {
+    store: &'s Store,
+    /// Says that a job of these units was begun and did not end.
+    note: PathBuf,
+    /// Whether one was, before this one: then each unit is noted.
+    careful: bool,
+}
+
+impl<'s> Here<'s> {
+    fn enter(store: &'s Store, jobs: &[Job]) -> anyhow::Result<Self> {
+        let start = key::Fields::new("truegrind.job/1").text(&store.run);
+        let name = jobs.iter().fold(start, |fields, job| fields.text(&job.name())).hex();
+        let note = store.work.join("begun").join(format!("job-{name}"));
+        let careful = store.resume && own::there(&note)?.is_some();
+        own::note(&note, "")?;
+        Ok(Self { store, note, careful })
+    }
+
     /// A unit that is done, or does it. `None` where it was begun before and not ended, unless it is done `alone` now.
-    fn done_or_do<I, T, R, C, W>(
+    fn done_or_do<I, T, R, C, W, L>(
         &self,
         job: &Job,
-        doing: &Doing<R, C, W>,
+        doing: &Doing<R, C, W, L>,
         alone: bool,
     ) -> anyhow::Result<Option<T>>
     where
@@ -249,20 +306,24 @@ impl Store {
         R: Fn(&Job) -> anyhow::Result<I>,
         C: Fn(&I) -> Vec<(String, String)>,
         W: Fn(&Job, I) -> anyhow::Result<(T, Written)>,
+        L: Fn(&mut T),
     {
         let read = isolated(|| (doing.read)(job));
         let content = read.as_ref().ok().map(&doing.content);
-        let key = self.key(job, content.as_deref());
-        let begun = self.work.join("begun").join(&key);
+        let key = self.store.key(job, content.as_deref());
+        let begun = self.store.work.join("begun").join(&key);
         let mut times = 0;
-        if self.resume {
-            if let Some(done) = self.record(&key)?
-                && done.ended == Ended::Done
-                && self.changed(&done).is_empty()
-                && let Some(kept) = T::from_record(done.record)
+        if self.store.resume {
+            if let Some(done) = self.store.record(&key)?
+                && done.ended != Ended::Failed
+                && self.store.changed(&done).is_empty()
+                && let Some(mut kept) = T::from_record(done.record)
             {
+                (doing.lighten)(&mut kept);
                 return Ok(Some(kept));
             }
+        }
+        if self.careful {
             // One that cannot be read was being noted.
             let noted =
                 own::there(&begun)?.map(|bytes| String::from_utf8_lossy(&bytes).trim().parse().unwrap_or(1));
@@ -277,40 +338,22 @@ impl Store {
                  truegrind, then please report it (--resume leaves it; without --resume it is tried again)"
             );
             let kept = T::failed(job, &why);
-            self.keep(&key, job, &kept, Ended::Killed, Vec::new())?;
+            self.store.keep(&key, job, &kept, Ended::Killed, Vec::new())?;
+            own::gone(&begun);
             return Ok(Some(kept));
         }
-        own::note(&begun, &(times + 1).to_string())?;
+        if self.careful {
+            own::note(&begun, &(times + 1).to_string())?;
+        }
         let done = isolated(|| (doing.work)(job, read?));
-        let (kept, written) =
+        let (mut kept, written) =
             done.unwrap_or_else(|error| (T::failed(job, &format!("{error:#}")), Vec::new()));
         let ended = if kept.is_failed() { Ended::Failed } else { Ended::Done };
-        self.keep(&key, job, &kept, ended, written)?;
-        own::gone(&begun);
+        self.store.keep(&key, job, &kept, ended, written)?;
+        if self.careful {
+            own::gone(&begun);
+        }
+        (doing.lighten)(&mut kept);
         Ok(Some(kept))
-    }
-
-    fn keep<T: Kept>(
-        &self,
-        key: &str,
-        job: &Job,
-        kept: &T,
-        ended: Ended,
-        written: Written,
-    ) -> anyhow::Result<()> {
-        let output = |(path, sha256): (PathBuf, String)| {
-            let file = path.strip_prefix(&self.work).unwrap_or(&path);
-            Output { file: file.display().to_string(), sha256 }
-        };
-        let done = Done {
-            schema: SCHEMA.to_owned(),
-            key: key.to_owned(),
-            unit: job.name(),
-            ended,
-            outputs: written.into_iter().map(output).collect(),
-            record: kept.record()?,
-        };
-        let text = done.to_text().with_context(|| format!("{}: the record cannot be made", job.name()))?;
-        own::put(&self.record_place(key), text.as_bytes())
     }
 }

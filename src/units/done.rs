@@ -12,8 +12,10 @@ pub const SCHEMA: &str = "truegrind.done/1";
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Output {
-    /// Where: below the folder of what is done where it lies there, else as it was named.
+    /// Where.
     pub file: String,
+    /// Whether that is below the folder of what is done, which may have moved since; else it is as it was named.
+    pub below: bool,
     /// SHA-256 of its bytes.
     pub sha256: String,
 }
@@ -48,12 +50,16 @@ pub struct Done {
 }
 
 impl Done {
-    /// As a file.
+    /// As a file; `record`: JSON, in place of that of `self`, which a job of many need not build first.
     ///
     /// # Errors
     /// None that a record could bring about; what the writer says.
-    pub fn to_text(&self) -> Result<String, serde_json::Error> {
-        Ok(serde_json::to_string(self)? + "\n")
+    pub fn to_text(&self, record: &str) -> Result<String, serde_json::Error> {
+        let Self { schema, key, unit, ended, outputs, record: _ } = self;
+        let [schema, key, unit] = [schema, key, unit].map(serde_json::to_string);
+        let (ended, outputs) = (serde_json::to_string(ended)?, serde_json::to_string(outputs)?);
+        let head = format!("\"schema\":{},\"key\":{},\"unit\":{}", schema?, key?, unit?);
+        Ok(format!("{{{head},\"ended\":{ended},\"outputs\":{outputs},\"record\":{record}}}\n"))
     }
 
     /// From the bytes of a file; `None` where it is not the whole record of the unit with this key.

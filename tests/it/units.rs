@@ -81,10 +81,10 @@ fn lists_and_records_come_back_and_a_torn_record_counts_for_nothing() {
         key: "k".to_owned(),
         unit: "a.mod".to_owned(),
         ended: Ended::Done,
-        outputs: vec![Output { file: "a.mod".to_owned(), sha256: sha256(b"") }],
+        outputs: vec![Output { file: "a.mod".to_owned(), below: true, sha256: sha256(b"") }],
         record: serde_json::json!([1, "two"]),
     };
-    let text = done.to_text().unwrap();
+    let text = done.to_text(&done.record.to_string()).unwrap();
     assert_eq!(Done::from_bytes(text.as_bytes(), "k"), Some(done));
     assert_eq!(Done::from_bytes(text.as_bytes(), "another"), None);
     for length in 0..text.len() - 1 {

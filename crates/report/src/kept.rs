@@ -51,19 +51,23 @@ const NUMBER: char = '#';
 /// See [`NUMBER`].
 const TEXT: char = '\'';
 
-/// The value with each number that is no whole one as text.
-pub fn packed(value: Value) -> Value {
-    match value {
-        Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
-            Some(value) => Value::String(format!("{NUMBER}{}", exact(value))),
-            None => Value::Number(number),
-        },
-        Value::String(text) if text.starts_with([NUMBER, TEXT]) => Value::String(format!("{TEXT}{text}")),
-        Value::Array(list) => Value::Array(list.into_iter().map(packed).collect()),
-        Value::Object(all) => {
-            Value::Object(all.into_iter().map(|(key, value)| (key, packed(value))).collect())
+/// A value that is written with each number that is no whole one as text.
+pub struct Packed<'a>(pub &'a Value);
+
+impl Serialize for Packed<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Value::Number(number) if number.is_f64() => {
+                let value = number.as_f64().unwrap_or(f64::NAN);
+                serializer.collect_str(&format_args!("{NUMBER}{}", exact(value)))
+            }
+            Value::String(text) if text.starts_with([NUMBER, TEXT]) => {
+                serializer.collect_str(&format_args!("{TEXT}{text}"))
+            }
+            Value::Array(list) => serializer.collect_seq(list.iter().map(Packed)),
+            Value::Object(all) => serializer.collect_map(all.iter().map(|(key, value)| (key, Packed(value)))),
+            other => other.serialize(serializer),
         }
-        other => other,
     }
 }
 

@@ -164,7 +164,15 @@ fn without_case(key: &Key) -> Option<(Identity, String)> {
 impl Ledger {
     /// What was written and may be the same file.
     fn written_like(&self, place: &Place) -> impl Iterator<Item = (&Key, &Path)> {
+        // Another job may have put its own file over ours: the number of ours then goes to any other.
+        let is_still = |key: &Key, named: &Path| match key {
+            Key::There(identity) => {
+                fs::metadata(named).is_ok_and(|meta| Identity::of(named, &meta) == *identity)
+            }
+            _ => true,
+        };
         let same = place.key.as_ref().and_then(|key| self.written.get_key_value(key));
+        let same = same.filter(|(key, named)| is_still(key, named));
         let alike = place.key.as_ref().and_then(without_case).and_then(|alike| self.alike.get(&alike));
         let alike = alike.into_iter().flatten().filter_map(|key| self.written.get_key_value(key));
         same.into_iter().chain(alike).map(|(key, named)| (key, named.as_path()))

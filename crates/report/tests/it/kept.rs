@@ -9,7 +9,7 @@ use truegrind_math::se3::Pose;
 use truegrind_programs::motion::MotionKind;
 use truegrind_report::batch::{Ended, Row};
 use truegrind_report::deviation::{from_kept, kept};
-use truegrind_report::kept::{packed, unpacked};
+use truegrind_report::kept::{Packed, unpacked};
 
 /// Any finite number, with all its bits.
 fn number() -> impl Strategy<Value = f64> {
@@ -121,7 +121,7 @@ proptest! {
         let back: Row = serde_json::from_str(&serde_json::to_string(&row).unwrap()).unwrap();
         prop_assert_eq!(format!("{row:?}"), format!("{back:?}"));
         let contract = json!({ "a": [value, text, null, true, 12, -3, u64::MAX], "b": { "c": value } });
-        let kept = serde_json::to_string(&packed(contract.clone())).unwrap();
+        let kept = serde_json::to_string(&Packed(&contract)).unwrap();
         let back = unpacked(serde_json::from_str(&kept).unwrap());
         prop_assert_eq!(contract.to_string(), back.to_string());
     }
