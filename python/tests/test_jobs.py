@@ -203,7 +203,7 @@ def test_a_power_study_counts_what_was_named(plant, client):
     recipe = (DATA / "irb120-cable.toml").read_text(encoding="utf-8").replace("count = 300", "count = 80")
     Path("few.toml").write_text(recipe, encoding="utf-8")
     rows = power_study("few.toml", range(2), client=client, work="study")
-    assert rows and all(row["runs"] + row["failed"] == 2 for row in rows)
+    assert rows and all((row["runs"], row["failed"]) == (2, 0) for row in rows)
     assert len(list(Path("study").glob("*.json"))) == 2
     kept = {path: path.stat().st_ino for path in Path("study").glob("*.json")}
     assert power_study({"few.toml": "few.toml"}, range(2), client=client, work="study") == rows
@@ -211,6 +211,7 @@ def test_a_power_study_counts_what_was_named(plant, client):
     # One with causes and one without, as the table has them.
     finding = {"effect": "backlash", "joints": [4], "confidence": "identified", "worth_mm": 0.1}
     runs = [{"recipe": "r", "seed": s, "failed": None, "findings": [finding] if s else []} for s in range(4)]
+    assert _power.table([{"recipe": "r", "seed": 9, "failed": "why", "findings": []}])[0]["failed"] == 1
     named, nothing = _power.table([*runs, {"recipe": "r", "seed": 9, "failed": "why", "findings": []}])
     assert (named["named"], named["identified"], named["runs"], named["failed"]) == (3, 3, 4, 1)
     assert nothing["effect"] is None and nothing["named"] == 1
