@@ -19,17 +19,21 @@ mod simulate;
 mod identify;
 mod stated;
 mod diagnose;
+mod fleet;
 mod plan;
 mod compare;
 mod track;
 mod path;
 mod programs;
+mod shares;
 mod naming;
 mod belonging;
 mod cell;
 mod manual;
+mod corrected;
 mod compensate;
 mod deviation;
+mod gather;
 mod export;
 mod accept;
 mod measurement;
@@ -79,6 +83,8 @@ enum Verb {
     Compensate(compensate::Arguments),
     /// How far programs are off under a model; nothing is rewritten.
     Deviation(deviation::Arguments),
+    /// Put together what the jobs of a shared run made (--shard), byte for byte as one run writes it.
+    Gather(gather::Arguments),
     /// Whether an estimated arm holds a tolerance at poses that it was not fitted to: a page for the file of the cell.
     Accept(accept::Arguments),
     /// The links of an estimated arm in the formats of others: URDF, tables of link parameters, the kinematics of UR drivers.
@@ -126,6 +132,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Measurement(arguments) => measurement::run(&arguments),
         Verb::Identify(arguments) => identify::run(&arguments),
+        Verb::Diagnose(arguments) if fleet::is_asked(&arguments) => fleet::run(&arguments),
         Verb::Diagnose(arguments) => diagnose::run(&arguments),
         Verb::Plan(arguments) => plan::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
@@ -134,6 +141,7 @@ fn dispatch(verb: Verb) -> anyhow::Result<Ending> {
         Verb::Cell(arguments) => cell::run(&arguments),
         Verb::Compensate(arguments) => compensate::run(&arguments),
         Verb::Deviation(arguments) => deviation::run(&arguments),
+        Verb::Gather(arguments) => gather::run(&arguments),
         Verb::Accept(arguments) => accept::run(&arguments),
         Verb::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "visual")]

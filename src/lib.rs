@@ -38,6 +38,9 @@
 //! names below do not reach is in the crates, which stand here by their names: [`arm`], [`programs`], [`surfaces`],
 //! [`estimation`], [`calibration`], [`compensation`], [`planning`], [`report`], [`papers`], [`math`].
 
+// Many inputs over several machines.
+pub mod units;
+
 // The arm.
 pub use truegrind_arm::arm_file::{ArmFile, LinkFile};
 pub use truegrind_arm::batch::{JointColumns, PoseColumns};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use clap::{Args, ValueEnum};
 use nalgebra::Point3;
-use rayon::prelude::*;
+use serde_json::Value;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
@@ -27,22 +27,24 @@ use truegrind::programs::motion::{Listing, Mark, Reason};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::reading::{Language, Program};
 use truegrind::programs::rewrite::RewriteOptions;
-use truegrind::report::batch::{self, Ended, Row};
+use truegrind::report::batch::{Ended, Row};
 use truegrind::report::compensation::{self as view, ProgramFile};
 use truegrind::report::status::Status as Judged;
 use truegrind::surfaces::SurfaceFile;
+use truegrind::units::key::sha256;
 
 use super::belonging;
 use super::computation::{Common, on_threads};
-use super::defect::isolated;
+use super::corrected::{Done, Judging, Reports};
 use super::ending::Ending;
-use super::files::{self, Batch};
+use super::files::{self, Batch, witness};
 use super::inputs;
 use super::inputs::NamedModel;
 use super::naming;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
+use super::shares::{Asked, Doing, Shares, Store, Written, each};
 use super::terminal::{say, tell, tell_lines};
 
 /// What is written.
@@ -174,7 +176,7 @@ pub(super) fn agreed(
 const LARGEST_PAYLOAD_KG: f64 = 3000.0;
 
 /// Arguments of `compensate`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     after_help = "NC programs (G-code, Heidenhain) leave to the control where tool and work offset lie and what A, B and C mean. \
     `truegrind cell PROGRAM… -o cell.toml` writes the file that says it, to be filled in; docs/nc.md has one complete example \
@@ -246,6 +248,19 @@ pub(super) struct Arguments {
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
+    #[command(flatten)]
+    shares: Shares,
+}
+
+impl Arguments {
+    /// Every option that has a part in what is written, in words. What has none is taken out by name, so that one that comes anew
+    /// counts until somebody says that it does not.
+    fn that_count(&self) -> String {
+        let common = Common { threads: None, ..self.common.clone() };
+        let diff = self.diff.as_ref().map(|_| PathBuf::new());
+        let (outputs, shares) = (Outputs::default(), Shares::default());
+        format!("{:?}", Self { programs: Vec::new(), common, diff, outputs, shares, ..self.clone() })
+    }
 }
 
 /// What all programs of a run share.
@@ -262,14 +277,8 @@ struct Shop<'a> {
 }
 
 impl Shop<'_> {
-    /// How a run ended that refused and flagged nothing (`clean`) or something, and rewrote something or nothing.
-    fn ending(&self, clean: bool, changed: bool) -> Ending {
-        let as_asked = match self.corrector {
-            None => true,
-            Some(_) if self.arguments.check => !changed,
-            Some(_) => changed,
-        };
-        if clean && as_asked { Ending::Done } else { Ending::Flagged }
+    fn judging(&self) -> Judging {
+        Judging { nominal: self.corrector.is_none(), check: self.arguments.check }
     }
 }
 
@@ -281,32 +290,15 @@ struct Corrector<'a> {
     arm: &'a Estimated,
 }
 
-/// A program, rewritten.
-struct Done {
-    row: Row,
-    /// Files to write, with their bytes.
-    written: Vec<(PathBuf, Vec<u8>)>,
-    diff: Vec<u8>,
-    /// What to say on stderr.
-    notes: Vec<String>,
-    /// Whether everything that it holds was rewritten, without refusal, flag or doubt.
-    clean: bool,
-    /// Whether any byte changes.
-    changed: bool,
-    /// Motions that are left because what they use is declared in none of the files.
-    undeclared: usize,
-    /// Entries of the contract.
-    json: Vec<serde_json::Value>,
-    /// What it uses of the cell file; absent where it was not looked at.
-    used: Option<Used>,
-}
-
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let dry = arguments.dry_run || arguments.check;
     if !dry && arguments.output.is_none() {
         bail!("-o OUT is missing: a file for one program, a folder for several (or --dry-run)");
     }
-    let jobs = programs::jobs(&arguments.programs, arguments.grouping)?;
+    let mut jobs = match arguments.shares.listed()? {
+        Some(jobs) => jobs,
+        None => programs::jobs(&arguments.programs, arguments.grouping)?,
+    };
     refuse_one_place_for_two(&jobs)?;
     let mut checked: Vec<&Path> = arguments.outputs.files();
     checked.extend(arguments.diff.as_deref());
@@ -315,6 +307,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if !dry {
         refuse_report_over_program(&jobs, arguments.output.as_deref(), &checked)?;
     }
+    if arguments.shares.on() && arguments.output.as_deref() == Some(Path::new("-")) {
+        bail!("-o -: the standard output takes one program, a shared run is of several: name a folder");
+    }
+    witness::begin();
     for (value, name) in
         [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")]
     {
@@ -366,8 +362,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         ..Options::default()
     };
     let setup = programs::setup(&cell, arguments.robot.as_deref().or(Some(robot.as_str())));
-    let ends = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
+    let alone = matches!(jobs.as_slice(), [job] if job.under.is_none() || job.paths.len() > 1);
+    let ends = alone && !arguments.shares.on();
     let shop = Shop { arguments, corrector, cell, surface, setup, options, ends };
+    let shared = witness::end();
     if corrector.is_none() {
         let text = "model nominal: nothing to correct, every byte stays\n";
         if arguments.outputs.takes_stdout() || arguments.output.as_deref() == Some(Path::new("-")) {
@@ -376,10 +374,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             say(text)?;
         }
     }
-    match jobs.as_slice() {
-        [job] if ends => one(&shop, job),
-        jobs => many(&shop, jobs),
+    if let [job] = jobs.as_slice()
+        && ends
+    {
+        return one(&shop, job);
     }
+    let store = if arguments.shares.on() {
+        let asked = Asked {
+            verb: "compensate",
+            options: arguments.that_count(),
+            shared,
+            context: shop.judging().to_value(),
+            output: arguments.output.as_deref().filter(|_| !dry),
+        };
+        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else { return Ok(Ending::Done) };
+        Some(store)
+    } else {
+        None
+    };
+    many(&shop, &jobs, store.as_ref())
 }
 
 /// One program: its own report.
@@ -453,40 +466,37 @@ fn one(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Ending> {
     if let Some(summary) = &summary {
         outputs.print_beside(summary, arguments.output.as_deref() == Some(Path::new("-")))?;
     }
-    Ok(shop.ending(done.clean, done.changed))
+    Ok(shop.judging().ending(done.clean, done.changed))
 }
 
 /// Many programs: in parallel, each written on its own, going on past a bad one; one table for all.
-fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
+fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<Ending> {
     let arguments = shop.arguments;
     #[cfg(feature = "visual")]
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd shows one program: name one");
     }
-    let (with_json, with_diff) = (arguments.outputs.json.is_some(), arguments.diff.is_some());
     let work = Work::start(format!("rewriting {} programs", jobs.len()));
-    let done: Vec<Done> = on_threads(arguments.common.threads, || {
-        jobs.par_iter()
-            .map(|job| {
-                let done = isolated(|| file_to_file(shop, job));
-                let mut done = done.unwrap_or_else(|error| failed(job, &format!("{error:#}")));
-                if !with_json {
-                    done.json = Vec::new();
-                }
-                if !with_diff {
-                    done.diff = Vec::new();
-                }
-                done
-            })
-            .collect()
-    })?;
+    let doing = Doing {
+        read: |job: &Job| Programs::read(&job.paths),
+        content: Programs::content,
+        work: |job: &Job, programs: Programs| file_to_file(shop, job, &programs),
+        lighten: |done: &mut Done| {
+            if arguments.outputs.json.is_none() {
+                done.json = Vec::new();
+            }
+        },
+    };
+    let done: Vec<Done> = on_threads(arguments.common.threads, || each(store, jobs, &doing))??;
     drop(work);
     for done in &done {
         for note in &done.notes {
             tell(format_args!("note: {}: {note}", done.row.file));
         }
     }
-    say_unused(done.iter().map(|done| &done.used), &shop.cell, shop.surface.as_ref());
+    if store.is_none() {
+        say_unused(done.iter().map(|done| &done.used), &shop.cell, shop.surface.as_ref());
+    }
     let undeclared: usize = done.iter().map(|done| done.undeclared).sum();
     let module = |path: &PathBuf| Language::by_name(&files::name(path)) == Some(Language::Rapid);
     let alone = |job: &Job| job.under.is_some() && job.paths.len() == 1 && job.paths.iter().any(module);
@@ -496,69 +506,38 @@ fn many(shop: &Shop<'_>, jobs: &[Job]) -> anyhow::Result<Ending> {
              modules of a folder run together, --together reads them as one task"
         ));
     }
-    let clean = done.iter().all(|done| done.clean);
-    let changed = done.iter().any(|done| done.changed);
-    let (mut rows, mut programs, mut diff) = (Vec::new(), Vec::new(), Vec::new());
-    for done in done {
-        rows.push(done.row);
-        programs.extend(done.json);
-        diff.extend_from_slice(&done.diff);
-    }
-    arguments.outputs.print(&batch::summary(&rows))?;
-    let mut batch = Batch::sparing(jobs.iter().flat_map(|job| &job.paths));
-    arguments.outputs.add_made(
-        &mut batch,
-        || batch::document(&rows),
-        || batch::table(&rows),
-        || batch::json(&rows, programs),
-    )?;
-    if let Some(path) = &arguments.diff {
-        batch.add(path, diff);
-    }
-    batch.write()?;
-    if rows.iter().all(|row| row.ended == Ended::Failed) {
-        bail!("none of {} programs could be done", rows.len());
-    }
-    Ok(shop.ending(clean, changed))
+    let inputs = jobs.iter().flat_map(|job| &job.paths);
+    let shown =
+        Reports { outputs: &arguments.outputs, diff: arguments.diff.as_deref(), judging: shop.judging() };
+    shown.write(done, Batch::sparing(inputs), store.is_some())
 }
 
-fn failed(job: &Job, error: &str) -> Done {
-    Done {
-        row: Row::without(job.name(), Ended::Failed, Some(error.to_owned())),
-        written: Vec::new(),
-        diff: Vec::new(),
-        notes: Vec::new(),
-        clean: false,
-        changed: false,
-        undeclared: 0,
-        json: Vec::new(),
-        used: None,
-    }
-}
-
-/// One program of many: read, rewritten and written.
-fn file_to_file(shop: &Shop<'_>, job: &Job) -> anyhow::Result<Done> {
-    let programs = Programs::read(&job.paths)?;
-    let targets = outputs_of(shop.arguments, job, &programs, true)?;
+/// One program of many: rewritten and written.
+fn file_to_file(shop: &Shop<'_>, job: &Job, programs: &Programs) -> anyhow::Result<(Done, Written)> {
+    let targets = outputs_of(shop.arguments, job, programs, true)?;
+    let with_json = shop.arguments.outputs.json.is_some() || shop.arguments.shares.on();
     let mut entries = Vec::new();
     let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
-        if shop.arguments.outputs.json.is_some()
-            && let serde_json::Value::Object(mut all) = view::json(planned, program.listing(), files)
-            && let Some(serde_json::Value::Array(list)) = all.remove("programs")
+        if with_json
+            && let Value::Object(mut all) = view::json(planned, program.listing(), files)
+            && let Some(Value::Array(list)) = all.remove("programs")
         {
             entries = list;
         }
         Ok(())
     };
-    let mut done = rewritten(shop, &programs, &targets, || (), &mut report)?;
+    let mut done = rewritten(shop, programs, &targets, || (), &mut report)?;
     done.json = entries;
     if job.under.is_some() && job.paths.len() > 1 {
         done.row.file = job.name();
     }
     let mut batch = Batch::sparing(programs.files.iter().map(|(path, _)| path));
-    add_made(&mut batch, std::mem::take(&mut done.written), true)?;
+    let made = std::mem::take(&mut done.written);
+    let hash = |(path, bytes): &(PathBuf, Vec<u8>)| (path.clone(), sha256(bytes));
+    let written = if shop.arguments.shares.on() { made.iter().map(hash).collect() } else { Vec::new() };
+    add_made(&mut batch, made, true)?;
     batch.write()?;
-    Ok(done)
+    Ok((done, written))
 }
 
 /// Adds the programs that were rewritten; `folders`: theirs are made where they are not there yet.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use rayon::prelude::*;
+use serde_json::{Value, json};
 use truegrind::arm::arm_file::ArmFile;
 use truegrind::arm::condition::Condition;
 use truegrind::arm::estimated::Estimated;
@@ -19,17 +19,17 @@ use truegrind::surfaces::SurfaceFile;
 use super::belonging;
 use super::compensate::{CellArguments, agreed, say_unused};
 use super::computation::{Common, on_threads};
-use super::defect::isolated;
 use super::ending::Ending;
-use super::files::{self, Batch};
+use super::files::{self, Batch, witness};
 use super::inputs;
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
+use super::shares::{Asked, Doing, Kept, Shares, Store, each};
 use super::terminal::tell;
 
 /// Arguments of `deviation`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Arguments {
     /// RAPID modules of one task, .pgf lists of such, NC files, or folders of them.
     #[arg(required = true)]
@@ -54,6 +54,17 @@ pub(super) struct Arguments {
     common: Common,
     #[command(flatten)]
     outputs: Outputs,
+    #[command(flatten)]
+    shares: Shares,
+}
+
+impl Arguments {
+    /// Every option that has a part in what is written, in words; as those of `compensate`.
+    fn that_count(&self) -> String {
+        let common = Common { threads: None, ..self.common.clone() };
+        let (outputs, shares) = (Outputs::default(), Shares::default());
+        format!("{:?}", Self { programs: Vec::new(), common, outputs, shares, ..self.clone() })
+    }
 }
 
 /// An arm on which programs are run.
@@ -68,20 +79,28 @@ struct Runner {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    let jobs = programs::jobs(&arguments.programs, arguments.grouping)?;
-    let several = jobs.len() > 1;
+    let mut jobs = match arguments.shares.listed()? {
+        Some(jobs) => jobs,
+        None => programs::jobs(&arguments.programs, arguments.grouping)?,
+    };
+    let several = jobs.len() > 1 || arguments.shares.on();
     if several && !arguments.intended.is_empty() {
         bail!("--intended states what one program meant: name one program, not {}", jobs.len());
     }
     let originals =
         if arguments.intended.is_empty() { None } else { Some(Programs::read(&arguments.intended)?) };
-    let all: Vec<&std::path::Path> = jobs
+    let all: Vec<PathBuf> = jobs
         .iter()
         .flat_map(|job| &job.paths)
         .chain(originals.iter().flat_map(|o| o.files.iter().map(|(path, _)| path)))
-        .map(PathBuf::as_path)
+        .cloned()
         .collect();
-    Batch::check(&all, &arguments.outputs.files())?;
+    let inputs: Vec<&std::path::Path> = all.iter().map(PathBuf::as_path).collect();
+    Batch::check(&inputs, &arguments.outputs.files())?;
+    if arguments.shares.on() && arguments.outputs.rrd.is_some() {
+        bail!("--rrd shows the programs of one job: leave the options of several jobs out");
+    }
+    witness::begin();
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;
@@ -95,52 +114,145 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         condition,
         arguments: &arguments.cell,
     };
-    let found: Vec<anyhow::Result<(Vec<PathReport>, Used)>> = on_threads(arguments.common.threads, || {
-        jobs.par_iter().map(|job| isolated(|| shop.reports(job, surface.as_ref()))).collect()
-    })?;
-    let (mut reports, mut used, mut failed) = (Vec::new(), Vec::new(), 0);
-    for (found, job) in found.into_iter().zip(&jobs) {
-        match found {
-            Ok((found, uses)) => {
-                reports.extend(found);
-                used.push(Some(uses));
-            }
-            // A bad one among many is listed, and the others go on.
-            Err(error) if several => {
-                failed += 1;
-                used.push(None);
-                tell(format_args!("failed: {}: {error:#}", job.name()));
-            }
-            Err(error) => return Err(error),
+    let shared = witness::end();
+    let store = if arguments.shares.on() {
+        let options = arguments.that_count();
+        let asked = Asked { verb: "deviation", options, shared, context: Value::Null, output: None };
+        let Some(store) = Store::open(&arguments.shares, &asked, &mut jobs)? else { return Ok(Ending::Done) };
+        Some(store)
+    } else {
+        None
+    };
+    let doing = Doing {
+        read: |job: &Job| Programs::read(&job.paths),
+        content: Programs::content,
+        work: |job: &Job, programs: Programs| {
+            Ok((shop.judged(job, &programs, surface.as_ref())?, Vec::new()))
+        },
+        lighten: |_: &mut Found| (),
+    };
+    let mut found: Vec<Found> =
+        on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
+    if let ([one], false) = (found.as_mut_slice(), several)
+        && let Some(error) = one.failed.take()
+    {
+        bail!("{error}");
+    }
+    if store.is_none() {
+        say_unused(found.iter().map(|found| &found.used), &cell, surface.as_ref());
+    }
+    let shown = Reports { outputs: &arguments.outputs, is_part: store.is_some() };
+    shown.write(found, Batch::sparing(&all), |batch, name, reports| {
+        #[cfg(feature = "visual")]
+        if let Some(path) = &arguments.outputs.rrd {
+            let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
+            let arms = super::recording::Arms {
+                real: &first.model,
+                is,
+                nominal: &first.nominal,
+                robot: arguments.robot.as_deref(),
+            };
+            let bytes = super::recording::path(name, arms, condition, reports, surface.as_ref())?;
+            batch.add(path, bytes);
         }
+        #[cfg(not(feature = "visual"))]
+        let _ = (batch, name, reports);
+        Ok(())
+    })
+}
+
+/// How a report calls what it is of.
+fn name_of(programs: usize, reports: &[PathReport]) -> String {
+    match reports {
+        [first, ..] if programs == 1 => first.program.clone(),
+        _ => format!("{programs} programs"),
     }
-    say_unused(&used, &cell, surface.as_ref());
-    if reports.is_empty() {
-        bail!("none of {} programs has a motion whose target is known from the text", jobs.len());
+}
+
+/// What was found of one program.
+struct Found {
+    /// The program, for messages.
+    name: String,
+    /// One per arm.
+    reports: Vec<PathReport>,
+    /// What it uses of the cell file; absent where it was not looked at.
+    used: Option<Used>,
+    /// Why it could not be judged.
+    failed: Option<String>,
+}
+
+impl Kept for Found {
+    fn failed(job: &Job, why: &str) -> Self {
+        Self { name: job.name(), reports: Vec::new(), used: None, failed: Some(why.to_owned()) }
     }
-    let name = if several { format!("{} programs", jobs.len()) } else { reports[0].program.clone() };
-    arguments.outputs.print(&view::summary(&name, &reports))?;
-    let mut batch = Batch::sparing(&all);
-    arguments.outputs.add_made(
-        &mut batch,
-        || view::document(&reports),
-        || view::whole_table(&reports),
-        || view::json(&reports),
-    )?;
-    #[cfg(feature = "visual")]
-    if let Some(path) = &arguments.outputs.rrd {
-        let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
-        let arms = super::recording::Arms {
-            real: &first.model,
-            is,
-            nominal: &first.nominal,
-            robot: arguments.robot.as_deref(),
-        };
-        let bytes = super::recording::path(&name, arms, condition, &reports, surface.as_ref())?;
-        batch.add(path, bytes);
+
+    fn is_failed(&self) -> bool {
+        self.failed.is_some()
     }
-    batch.write()?;
-    Ok(if failed > 0 { Ending::Flagged } else { Ending::Done })
+
+    fn record(&self) -> anyhow::Result<String> {
+        let reports: Vec<Value> = self.reports.iter().map(view::kept).collect();
+        Ok(json!({ "name": self.name, "reports": reports, "failed": self.failed }).to_string())
+    }
+
+    fn from_record(record: Value) -> Option<Self> {
+        Some(Self {
+            name: record["name"].as_str()?.to_owned(),
+            reports: record["reports"].as_array()?.iter().map(view::from_kept).collect::<Option<_>>()?,
+            used: None,
+            failed: record["failed"].as_str().map(str::to_owned),
+        })
+    }
+}
+
+/// Where the reports go.
+struct Reports<'a> {
+    outputs: &'a Outputs,
+    /// Of a run that goes on elsewhere, which no number of bad programs ends.
+    is_part: bool,
+}
+
+impl Reports<'_> {
+    /// Prints and writes them; `further` adds what else is made of them.
+    fn write(
+        &self,
+        found: Vec<Found>,
+        mut batch: Batch,
+        further: impl FnOnce(&mut Batch, &str, &[PathReport]) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Ending> {
+        let (programs, mut failed, mut reports) = (found.len(), 0, Vec::new());
+        for found in found {
+            // A bad one among many is listed, and the others go on.
+            if let Some(error) = found.failed {
+                failed += 1;
+                tell(format_args!("failed: {}: {error}", found.name));
+            }
+            reports.extend(found.reports);
+        }
+        if reports.is_empty() && !self.is_part {
+            bail!("none of {programs} programs has a motion whose target is known from the text");
+        }
+        let name = name_of(programs, &reports);
+        self.outputs.print(&view::summary(&name, &reports))?;
+        self.outputs.add_made(
+            &mut batch,
+            || view::document(&reports),
+            || view::whole_table(&reports),
+            || view::json(&reports),
+        )?;
+        further(&mut batch, &name, &reports)?;
+        batch.write()?;
+        Ok(if failed > 0 { Ending::Flagged } else { Ending::Done })
+    }
+}
+
+/// The reports of a shared run, from what was kept of each program.
+pub(super) fn gathered(records: Vec<Value>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
+    let found: Option<Vec<Found>> = records.into_iter().map(Found::from_record).collect();
+    let found = found.ok_or_else(|| {
+        anyhow!("a record is none of `deviation`: was the folder of another run put there?")
+    })?;
+    Reports { outputs, is_part: false }.write(found, batch, |_, _, _| Ok(()))
 }
 
 /// What all programs of a run are judged by.
@@ -155,8 +267,7 @@ struct Shop<'a> {
 
 impl Shop<'_> {
     /// The reports of one program, one per arm.
-    fn reports(&self, job: &Job, surface: Option<&SurfaceFile>) -> anyhow::Result<(Vec<PathReport>, Used)> {
-        let programs = Programs::read(&job.paths)?;
+    fn judged(&self, job: &Job, programs: &Programs, surface: Option<&SurfaceFile>) -> anyhow::Result<Found> {
         let task = programs.task(self.setup);
         let original = self.originals.map(|original| original.task(self.setup));
         for runner in self.runners {
@@ -165,7 +276,7 @@ impl Shop<'_> {
             }
             if let Some(robot) = &runner.robot {
                 belonging::cell_is_of(self.cell, robot, &runner.nominal)?;
-                belonging::made_for(&programs, robot, &runner.nominal)?;
+                belonging::made_for(programs, robot, &runner.nominal)?;
             }
         }
         let name = match &job.under {
@@ -208,7 +319,7 @@ impl Shop<'_> {
         if let Some(original) = &original {
             used.join(&Used::by(original.listing(), self.cell));
         }
-        Ok((reports, used))
+        Ok(Found { name: job.name(), reports, used: Some(used), failed: None })
     }
 }
 

@@ -25,14 +25,25 @@ pub(super) use place::is_stdout;
 
 mod in_place;
 mod ledger;
+pub(super) mod own;
 mod pending;
 mod place;
+pub(super) mod witness;
 
 /// The bytes of a file: an input, which no output may overwrite from here on.
 pub(super) fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     let (file, meta) = opened(path)?;
     ledger::note_read(path, &meta)?;
-    whole(file, &meta, path)
+    let bytes = whole(file, &meta, path)?;
+    witness::note(&bytes);
+    Ok(bytes)
+}
+
+/// All that comes on the standard input.
+pub(super) fn read_stdin() -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().read_to_end(&mut bytes).context("the standard input cannot be read")?;
+    Ok(bytes)
 }
 
 /// The bytes of a file that is this program's own and will be written again, such as the state of a track.

@@ -192,6 +192,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     write_model(&found.estimated, arguments.output.as_deref(), arguments.allow_doubtful, batch)
 }
 
+/// Why a model is not written, where its verdict does not allow it.
+pub(super) fn why_not_written(estimated: &Estimated, allow_doubtful: bool) -> Option<String> {
+    let why = match estimated.verdict.status {
+        Judgement::Fail => "the fit failed",
+        Judgement::Doubtful if !allow_doubtful => {
+            "the model is doubtful (--allow-doubtful writes it all the same)"
+        }
+        _ => return None,
+    };
+    Some(format!("was not written, because {why}: {}", estimated.verdict.reasons.join("; ")))
+}
+
 /// Writes what was made, and the model where its verdict allows it.
 pub(super) fn write_model(
     estimated: &Estimated,
@@ -200,18 +212,10 @@ pub(super) fn write_model(
     mut batch: Batch,
 ) -> anyhow::Result<Ending> {
     let status = estimated.verdict.status;
-    let reasons = || estimated.verdict.reasons.join("; ");
     if let Some(path) = output {
-        let why = match status {
-            Judgement::Fail => Some("the fit failed"),
-            Judgement::Doubtful if !allow_doubtful => {
-                Some("the model is doubtful (--allow-doubtful writes it all the same)")
-            }
-            _ => None,
-        };
-        if let Some(why) = why {
+        if let Some(why) = why_not_written(estimated, allow_doubtful) {
             batch.write()?;
-            bail!("{} was not written, because {why}: {}", path.display(), reasons());
+            bail!("{} {why}", path.display());
         }
         batch.add(path, estimated.to_toml()?);
     }
@@ -250,11 +254,15 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
 
 /// Reads robot and measurements, and checks that their units fit each other.
 pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
+    read_bytes(arguments, &files::read(&arguments.data)?)
+}
+
+/// The same of measurements whose bytes are there.
+pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(&arguments.robot)?;
-    let bytes = files::read(&arguments.data)?;
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
-    let dataset = import::read(&files::name(&arguments.data), &bytes, &options)?;
+    let dataset = import::read(&files::name(&arguments.data), bytes, &options)?;
     let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
     let dataset =

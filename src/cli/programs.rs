@@ -10,6 +10,8 @@ use truegrind::compensation::cell::Cell;
 use truegrind::programs::nc::setup::Setup;
 use truegrind::programs::rapid::task_list;
 use truegrind::programs::reading::{Language, Program};
+use truegrind::units::key::sha256;
+use truegrind::units::run::Unit;
 
 use super::terminal::tell;
 use super::{files, inputs};
@@ -19,6 +21,8 @@ use super::{files, inputs};
 pub(super) struct Programs {
     /// Files, in the order of the listing.
     pub(super) files: Vec<(PathBuf, Vec<u8>)>,
+    /// Task lists that named some of them.
+    lists: Vec<(PathBuf, Vec<u8>)>,
 }
 
 /// Which modules are read as one task.
@@ -50,6 +54,37 @@ impl Job {
         match &self.under {
             Some(under) if self.paths.len() > 1 => under.display().to_string(),
             _ => self.paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "),
+        }
+    }
+
+    /// Its name below the folder that was given, with `/` between folders: the same on every machine that is given the same folder,
+    /// wherever it lies there.
+    pub(super) fn name_below(&self) -> String {
+        let below = |path: &Path| {
+            let path = self.under.as_ref().and_then(|under| path.strip_prefix(under).ok()).unwrap_or(path);
+            let parts = path.components().map(|part| part.as_os_str().to_string_lossy().into_owned());
+            parts.collect::<Vec<_>>().join("/")
+        };
+        self.paths.iter().map(|path| below(path)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// As a list of units holds it.
+    pub(super) fn unit(&self) -> anyhow::Result<Unit> {
+        let text = |path: &PathBuf| match path.to_str() {
+            Some(text) => Ok(text.to_owned()),
+            None => bail!("{}: not UTF-8; a shared run needs names that can be listed", path.display()),
+        };
+        Ok(Unit {
+            under: self.under.as_ref().map(text).transpose()?,
+            paths: self.paths.iter().map(text).collect::<anyhow::Result<_>>()?,
+        })
+    }
+
+    /// From a list of units.
+    pub(super) fn of_unit(unit: &Unit) -> Self {
+        Self {
+            under: unit.under.as_ref().map(PathBuf::from),
+            paths: unit.paths.iter().map(PathBuf::from).collect(),
         }
     }
 
@@ -194,9 +229,8 @@ pub(super) fn jobs(
     Ok(jobs)
 }
 
-/// Every program below a folder, in the order of names. What a task list names is not taken again on its own; `as_one`:
-/// all RAPID modules are one task, and lists say nothing new.
-fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
+/// Every file below a folder that is wanted, in the order of names.
+pub(super) fn found_below(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_path_buf()];
     while let Some(next) = open.pop() {
@@ -209,7 +243,7 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
             // Links to folders are not followed: they could lead round in a circle.
             if kind.is_dir() {
                 open.push(path);
-            } else if path.is_file() && Language::by_name(&files::name(&path)).is_some() {
+            } else if is_wanted(&path) && path.is_file() {
                 found.push(path);
             } else if kind.is_symlink() && path.is_dir() {
                 tell(format_args!(
@@ -220,6 +254,13 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
         }
     }
     found.sort();
+    Ok(found)
+}
+
+/// Every program below a folder, in the order of names. What a task list names is not taken again on its own; `as_one`:
+/// all RAPID modules are one task, and lists say nothing new.
+fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result<()> {
+    let mut found = found_below(folder, |path| Language::by_name(&files::name(path)).is_some())?;
     let under = Some(folder.to_path_buf());
     if as_one {
         let (modules, others): (Vec<_>, Vec<_>) = found
@@ -247,7 +288,7 @@ fn in_folder(folder: &Path, as_one: bool, jobs: &mut Vec<Job>) -> anyhow::Result
 impl Programs {
     /// Reads the files of one task; a `.pgf` stands for the modules that it lists.
     pub(super) fn read(paths: &[PathBuf]) -> anyhow::Result<Self> {
-        let mut files = Vec::new();
+        let (mut files, mut lists) = (Vec::new(), Vec::new());
         for path in paths {
             let bytes = files::read(path)?;
             if is_list(path) {
@@ -257,6 +298,7 @@ impl Programs {
                         files::read(&place).with_context(|| format!("named in {}", path.display()))?;
                     files.push((place, module));
                 }
+                lists.push((path.clone(), bytes));
             } else {
                 files.push((path.clone(), bytes));
             }
@@ -264,7 +306,13 @@ impl Programs {
         if files.is_empty() {
             bail!("no module to read: the task list names none");
         }
-        Ok(Self { files })
+        Ok(Self { files, lists })
+    }
+
+    /// All that was read, by name and SHA-256: what decides, beside model, cell and options, what comes of it.
+    pub(super) fn content(&self) -> Vec<(String, String)> {
+        let all = self.lists.iter().chain(&self.files);
+        all.map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
     }
 
     /// The task.

@@ -18,6 +18,7 @@ mod nc;
 mod pictures;
 mod robots;
 mod same;
+mod shares;
 mod text;
 
 const CABLE: &str = include_str!("../data/irb120-cable.csv");

@@ -6,5 +6,6 @@
 mod command;
 mod programs;
 mod layers;
+mod units;
 mod keys;
 mod keys_of_runs;

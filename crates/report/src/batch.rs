@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::document::{Document, KeyFigure, Verdict};
+use super::kept;
 use super::placement;
 use super::status::Status;
 use super::table::{Cell, Column, Table};
@@ -15,7 +17,8 @@ use truegrind_compensation::why::Why;
 use truegrind_programs::motion::Listing;
 
 /// What became of one program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Ended {
     /// Rewritten (or would be, in a dry run).
     Changed,
@@ -39,8 +42,8 @@ impl Ended {
     }
 }
 
-/// One program of a run.
-#[derive(Debug, Clone, PartialEq)]
+/// One program of a run. As JSON it is what is kept of it: every number comes back with every bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Its files.
     pub file: String,
@@ -53,10 +56,13 @@ pub struct Row {
     /// Regions that could not be read.
     pub opaque: usize,
     /// Largest deviation before (mm).
+    #[serde(with = "kept::optional")]
     pub before_mm: Option<f64>,
     /// Largest predicted remainder of the rewritten motions (mm).
+    #[serde(with = "kept::optional")]
     pub after_mm: Option<f64>,
     /// How far off the rewritten motions have to be expected: remainder and predicted 1σ, the largest (mm).
+    #[serde(with = "kept::optional")]
     pub expected_mm: Option<f64>,
     /// Why it failed, or what to know about it.
     pub note: Option<String>,

@@ -4,6 +4,7 @@
 //! kinematics); it is labelled so everywhere and stands beside the predicted 1σ and the model's held-out error, which say
 //! how far the real arm will be off. Only a simulated actual arm or a measurement is called *achieved*.
 
+mod kept;
 mod side;
 mod words;
 mod pictures;
@@ -21,6 +22,7 @@ use super::table::{Cell, Column, Table};
 use truegrind_arm::region::Outside;
 use truegrind_compensation::deviation::{After, Deviation, PathPoint, PathReport, Status as Fate};
 
+pub use kept::{from_kept, kept};
 pub use summary::{block_table, registered_table};
 
 /// Rows of a point table on a page; the whole table belongs in the CSV file.

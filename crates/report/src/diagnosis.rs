@@ -297,7 +297,7 @@ fn word(confidence: Confidence) -> &'static str {
     }
 }
 
-fn place(finding: &Finding) -> String {
+pub(super) fn place(finding: &Finding) -> String {
     if let Some([from, to]) = finding.rows {
         return format!("rows {from} to {to}");
     }

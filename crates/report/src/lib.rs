@@ -10,6 +10,7 @@
 //! What is absent is printed as `–`, never as 0.
 
 pub mod number;
+pub mod kept;
 pub mod status;
 pub mod table;
 pub mod plot;
@@ -18,6 +19,7 @@ pub mod repeated;
 pub mod format;
 pub mod identification;
 pub mod diagnosis;
+pub mod fleet;
 pub mod study;
 pub mod tracking;
 pub mod deviation;

@@ -21,11 +21,18 @@ struct Ledger {
     promised: BTreeMap<Identity, PathBuf>,
     /// Outputs that are written, or just being written.
     written: BTreeMap<Key, PathBuf>,
+    /// Those among them that were made anew, by folder and by name without regard to case: a million outputs must not be
+    /// compared each with each.
+    alike: BTreeMap<(Identity, String), Vec<Key>>,
 }
 
 fn ledger() -> MutexGuard<'static, Ledger> {
-    static LEDGER: Mutex<Ledger> =
-        Mutex::new(Ledger { read: BTreeMap::new(), promised: BTreeMap::new(), written: BTreeMap::new() });
+    static LEDGER: Mutex<Ledger> = Mutex::new(Ledger {
+        read: BTreeMap::new(),
+        promised: BTreeMap::new(),
+        written: BTreeMap::new(),
+        alike: BTreeMap::new(),
+    });
     LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -109,12 +116,15 @@ pub(super) fn take(outputs: &[&Path]) -> anyhow::Result<Vec<Place>> {
         let place = Place::of(output)?;
         ledger.spares_inputs(&place)?;
         apart(&place, places.iter().filter_map(|other| Some((other.key.as_ref()?, other.named.as_path()))))?;
-        apart(&place, ledger.written.iter().map(|(key, named)| (key, named.as_path())))?;
+        apart(&place, ledger.written_like(&place))?;
         places.push(place);
     }
     for place in &places {
         if let Some(key) = &place.key {
             ledger.written.insert(key.clone(), place.named.clone());
+            if let Some(alike) = without_case(key) {
+                ledger.alike.entry(alike).or_default().push(key.clone());
+            }
         }
     }
     Ok(places)
@@ -138,10 +148,36 @@ pub(super) fn note_put(place: &Place) {
 
 /// A new round of a run that goes on: it writes its outputs again.
 pub(crate) fn new_round() {
-    ledger().written.clear();
+    let mut ledger = ledger();
+    ledger.written.clear();
+    ledger.alike.clear();
+}
+
+/// Folder and name of a file that is to be made, without regard to case.
+fn without_case(key: &Key) -> Option<(Identity, String)> {
+    match key {
+        Key::New(folder, name) => Some((folder.clone(), name.to_string_lossy().to_lowercase())),
+        _ => None,
+    }
 }
 
 impl Ledger {
+    /// What was written and may be the same file.
+    fn written_like(&self, place: &Place) -> impl Iterator<Item = (&Key, &Path)> {
+        // Another job may have put its own file over ours: the number of ours then goes to any other.
+        let is_still = |key: &Key, named: &Path| match key {
+            Key::There(identity) => {
+                fs::metadata(named).is_ok_and(|meta| Identity::of(named, &meta) == *identity)
+            }
+            _ => true,
+        };
+        let same = place.key.as_ref().and_then(|key| self.written.get_key_value(key));
+        let same = same.filter(|(key, named)| is_still(key, named));
+        let alike = place.key.as_ref().and_then(without_case).and_then(|alike| self.alike.get(&alike));
+        let alike = alike.into_iter().flatten().filter_map(|key| self.written.get_key_value(key));
+        same.into_iter().chain(alike).map(|(key, named)| (key, named.as_path()))
+    }
+
     fn spares_inputs(&self, place: &Place) -> anyhow::Result<()> {
         match &place.key {
             Some(Key::There(identity)) => match self.read.get(identity) {

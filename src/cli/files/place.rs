@@ -126,6 +126,10 @@ impl Place {
         let real = fs::canonicalize(named)
             .ok()
             .filter(|real| fs::metadata(real).is_ok_and(|meta| Identity::of(real, &meta) == identity));
+        // Another job put its own over it in between: then it is looked at again, and never written where it stands.
+        if real.is_none() && fs::metadata(named).is_ok_and(|now| Identity::of(named, &now) != identity) {
+            return Self::of(named);
+        }
         Ok(match real {
             Some(real) => place(&real, Kind::Over(meta), Some(Key::There(identity))),
             None => place(named, Kind::Stream, Some(Key::There(identity))),

@@ -145,6 +145,11 @@ fn verbs() -> Vec<Verb> {
                 "--seed",
                 "--threads",
                 "--allow-doubtful",
+                "--shard",
+                "--resume",
+                "--work",
+                "--units",
+                "--list-units",
             ],
         },
         Verb {
@@ -284,6 +289,11 @@ fn verbs() -> Vec<Verb> {
                 "--seed",
                 "--threads",
                 "--allow-doubtful",
+                "--shard",
+                "--resume",
+                "--work",
+                "--units",
+                "--list-units",
             ],
         },
         Verb {
@@ -306,6 +316,13 @@ fn verbs() -> Vec<Verb> {
             outputs: &["--diff", "--json", "--csv", "--md", "--html"],
             needs: &["-o", "made-folder"],
             others: &[],
+        },
+        Verb {
+            base: &["gather", "shared"],
+            inputs: &["a.mod"],
+            outputs: &["--diff", "--json", "--csv", "--parquet", "--md", "--html"],
+            needs: &[],
+            others: &["--threads", "--rrd"],
         },
         Verb {
             base: &[
@@ -346,6 +363,11 @@ fn verbs() -> Vec<Verb> {
                 "--outside",
                 "--seed",
                 "--threads",
+                "--shard",
+                "--resume",
+                "--work",
+                "--units",
+                "--list-units",
             ],
         },
     ]
@@ -387,6 +409,9 @@ fn inputs() -> &'static Path {
             let (code, _, err) = truegrind(at, run);
             assert!(code < 2, "{run:?}: {err}");
         }
+        let shared = ["compensate", "a.mod", "--model", "model.toml", "-o", "shared", "--resume"];
+        let (code, _, err) = truegrind(at, &shared);
+        assert!(code < 2, "{err}");
         fs::create_dir(at.join("days")).unwrap();
         for copy in ["a2.mod", "listed.mod", "days/b.mod", "days/c.mod"] {
             fs::copy(at.join("a.mod"), at.join(copy)).unwrap();
@@ -403,20 +428,21 @@ fn inputs() -> &'static Path {
 /// A copy of the inputs that one run may try to spoil.
 fn copied() -> TempDir {
     let dir = folder();
-    for entry in fs::read_dir(inputs()).unwrap() {
+    copy_all(inputs(), dir.path());
+    dir
+}
+
+fn copy_all(from: &Path, to: &Path) {
+    for entry in fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
-        let to = dir.path().join(entry.file_name());
+        let to = to.join(entry.file_name());
         if entry.file_type().unwrap().is_dir() {
             fs::create_dir(&to).unwrap();
-            for member in fs::read_dir(entry.path()).unwrap() {
-                let member = member.unwrap();
-                fs::copy(member.path(), to.join(member.file_name())).unwrap();
-            }
+            copy_all(&entry.path(), &to);
         } else {
             fs::copy(entry.path(), to).unwrap();
         }
     }
-    dir
 }
 
 fn arguments<'a>(verb: &Verb, more: &[&'a str]) -> Vec<&'a str> {

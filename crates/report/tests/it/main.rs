@@ -6,8 +6,10 @@
 mod compensation;
 mod deviation;
 mod examples;
+mod fleet;
 mod formats;
 mod identification;
+mod kept;
 mod numbers;
 mod page;
 #[cfg(feature = "parquet")]

@@ -1,0 +1,188 @@
+"""Many programs and arms by jobs that an engine starts and repeats: what ``truegrind.dask`` and ``truegrind.ray`` have in common.
+
+Each job runs the command line on a chunk of the units (``--units``, ``--resume``), in a process of its own: what one program brings to
+light ends that process and not the worker, and the bytes are those of the command line, whatever the engine. Nothing here imports
+one.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .errors import ArgumentError, TruegrindError
+
+CHUNK = 200
+"""Units of one job: some seconds of work, so that an engine's own costs do not count."""
+
+DEATHS_WITHOUT_PROGRESS = 3
+"""As often a chunk's process may die without a unit having been begun or ended, before the engine is told."""
+
+NAMED = 3
+"""Units that a message names."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A verb with its options, as it is given to the command line; the same for every chunk."""
+
+    verb: str
+    inputs: tuple[str, ...]
+    options: tuple[str, ...]
+    work: str
+
+    def arguments(self, *more: str) -> list[str]:
+        return [program(), self.verb, *self.inputs, *self.options, "--work", self.work, *more]
+
+
+@dataclass
+class Gathered:
+    """What all jobs made together, byte for byte as one run of the command line writes it.
+
+    ``flagged``: something was refused, flagged or failed. ``summary``: what the command line prints. ``reports``: files by kind.
+    """
+
+    flagged: bool
+    summary: str
+    notes: str
+    reports: dict[str, Path] = field(default_factory=dict)
+
+    def rows(self) -> list[dict[str, str]]:
+        """The table, a dictionary for each program or arm; ``pandas.read_csv(found.reports["csv"])`` makes a data frame of it."""
+        with self.reports["csv"].open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+
+
+def program() -> str:
+    """The command line on this machine: named by TRUEGRIND, else found on PATH.
+
+    :raises FileNotFoundError: it is not there.
+    """
+    found = os.environ.get("TRUEGRIND") or shutil.which("truegrind")
+    if found is None:
+        raise FileNotFoundError(
+            "truegrind: the command line is not on this machine's PATH; jobs run it: install it (cargo install), or name it by the "
+            "environment variable TRUEGRIND on every worker"
+        )
+    return found
+
+
+def options(given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Keywords as options: ``max_risk=0.2`` is ``--max-risk=0.2``, ``partial=True`` is ``--partial``; ``None`` and ``False`` are left
+    out."""
+    out: list[str] = []
+    for name, value in given.items():
+        option = "--" + name.replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            out.append(option)
+            continue
+        several = isinstance(value, Sequence) and not isinstance(value, str)
+        out.extend(f"{option}={_text(one)}" for one in (value if several else [value]))
+    return tuple(out)
+
+
+def _text(value: object) -> str:
+    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
+
+
+def inputs(given: object) -> tuple[str, ...]:
+    """A path or several."""
+    if isinstance(given, (str, os.PathLike)):
+        return (os.fspath(given),)
+    return tuple(os.fspath(path) for path in given)  # type: ignore[union-attr]
+
+
+def listed(command: Command) -> list[dict[str, Any]]:
+    """All units, in the order of one run; they are noted in the folder of the run, whence ``gather`` knows them.
+
+    :raises TruegrindError: what the command line refuses.
+    """
+    _checked(subprocess.run(command.arguments("--list-units"), capture_output=True))
+    return json.loads((Path(command.work) / "run.json").read_text(encoding="utf-8"))["units"]
+
+
+def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[list[dict[str, Any]]]:
+    """The units, so many at a time."""
+    if size < 1:
+        raise ArgumentError(f"chunk: {size}, expected at least 1", found=str(size), expected="at least 1")
+    for start in range(0, len(units), size):
+        yield list(units[start : start + size])
+
+
+def do(command: Command, units: Sequence[dict[str, Any]]) -> int:
+    """One job: does what of a chunk is not done yet. A process that dies is started again; the command line itself lists a unit that
+    kills it every time.
+
+    :returns: how many units the chunk has.
+    :raises TruegrindError: what the command line refuses.
+    """
+    given = json.dumps(list(units)).encode()
+    idle = 0
+    while True:
+        before = _state(command)
+        done = subprocess.run(
+            command.arguments("--units", "-", "--resume", "--threads", "1"), input=given, capture_output=True
+        )
+        if done.returncode >= 0:
+            _checked(done)
+            return len(units)
+        idle = idle + 1 if _state(command) == before else 0
+        if idle >= DEATHS_WITHOUT_PROGRESS:
+            names = ", ".join(", ".join(unit["paths"]) for unit in units[:NAMED])
+            raise TruegrindError(
+                f"the process was killed {idle} times (signal {-done.returncode}) before it began anything, of {len(units)} units "
+                f"({names} …): too little memory on this worker?"
+            )
+
+
+def _state(command: Command) -> list[tuple[str, int]]:
+    """What was begun and not ended, with how often: changes with every unit that takes its process along."""
+    out = []
+    for entry in os.scandir(Path(command.work) / "begun"):
+        try:
+            out.append((entry.name, entry.stat().st_mtime_ns))
+        except FileNotFoundError:
+            continue
+    return sorted(out)
+
+
+def gathered(command: Command, reports: Mapping[str, Any]) -> Gathered:
+    """Tables and pages of all jobs.
+
+    :raises TruegrindError: something is missing; the message lists it.
+    """
+    files = {kind: Path(os.fspath(path)) for kind, path in reports.items() if path is not None}
+    files.setdefault("csv", Path(command.work) / "table.csv")
+    given = [f"--{kind}={path}" for kind, path in files.items()]
+    done = _checked(subprocess.run([program(), "gather", command.work, *given], capture_output=True))
+    return Gathered(done.returncode == 1, done.stdout.decode(), done.stderr.decode(errors="replace"), files)
+
+
+def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedProcess[bytes]:
+    if done.returncode not in (0, 1):
+        text = done.stderr.decode(errors="replace").strip()
+        raise TruegrindError(text.removeprefix("error: ") or f"the command line ended with {done.returncode}")
+    return done
+
+
+def compensating(
+    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any]
+) -> Command:
+    """The command that corrects programs."""
+    chosen = options({"model": model, "output": output, **given})
+    return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
+
+
+def diagnosing(data: object, robot: object, output: object, work: object | None, given: Mapping[str, Any]) -> Command:
+    """The command that diagnoses arms."""
+    chosen = options({"robot": robot, "output": output, **given})
+    return Command("diagnose", inputs(data), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]

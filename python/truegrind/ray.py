@@ -1,0 +1,26 @@
+"""Many programs and arms on Ray Core, as :mod:`truegrind.dask` has them on Dask; needs ``ray`` and the command line on every node."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ray
+
+from . import _jobs
+from ._jobs import CHUNK, Gathered
+
+
+def _run(command: _jobs.Command, reports: dict[str, Any], chunk: int) -> Gathered:
+    do = ray.remote(num_cpus=1, max_retries=5)(_jobs.do)
+    ray.get([do.remote(command, units) for units in _jobs.chunks(_jobs.listed(command), chunk)])
+    return _jobs.gathered(command, reports)
+
+
+def compensate_folder(programs, model, output, *, reports=None, chunk=CHUNK, work=None, **options) -> Gathered:
+    """See :func:`truegrind.dask.compensate_folder`; ``reports={"html": "page.html"}``."""
+    return _run(_jobs.compensating(programs, model, output, work, options), reports or {}, chunk)
+
+
+def diagnose_many(data, robot, output, *, reports=None, chunk=1, work=None, **options) -> Gathered:
+    """See :func:`truegrind.dask.diagnose_many`."""
+    return _run(_jobs.diagnosing(data, robot, output, work, options), reports or {}, chunk)
