@@ -194,7 +194,7 @@ impl Lister<'_, '_> {
         // R, I and K of a straight block round or cut its corner, on controls that take them.
         let cut = self.dialect.paren_comments() && straight && bends;
         let circular = matches!(mode, Mode::Circular(_));
-        if !said.moves() && !(circular && bends) && !(vector_words && has_centre) {
+        if !(said.moves() || circular && bends || vector_words && has_centre) {
             self.without_axes(said);
             return;
         }
