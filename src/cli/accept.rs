@@ -38,6 +38,9 @@ pub(super) struct Arguments {
     /// The robot, where the model is of one that is not in the catalogue: its file.
     #[arg(long)]
     robot: Option<String>,
+    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
+    #[arg(long, value_name = "POINTS.txt")]
+    points: Option<PathBuf>,
     /// Sheet of a workbook; the first with the columns otherwise.
     #[arg(long)]
     sheet: Option<String>,
@@ -56,7 +59,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.outputs.rrd.is_some() {
         bail!("--rrd: an acceptance has no recording; `truegrind identify DATA --rrd` draws the same rows");
     }
-    let given: [&Path; 2] = [&arguments.data, &arguments.model];
+    let mut given: Vec<&Path> = vec![&arguments.data, &arguments.model];
+    given.extend(arguments.points.as_deref());
     Batch::check(&given, &arguments.outputs.files())?;
     let serials = arguments.serial.iter().map(|text| serial(text)).collect::<anyhow::Result<Vec<_>>>()?;
     let named = inputs::model(&arguments.model.to_string_lossy())?;
@@ -69,6 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     inputs::nominal(&named, arguments.robot.as_deref())?;
     let robot = arguments.robot.clone().unwrap_or_else(|| arm.robot.clone());
     let data = DataArguments {
+        points: arguments.points.clone(),
         sheet: arguments.sheet.clone(),
         allow_odd_units: arguments.allow_odd_units,
         ..DataArguments::of(arguments.data.clone(), robot)

@@ -218,6 +218,7 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
     let (robot, dataset) = identify::read(&DataArguments {
         data: data.clone(),
         robot,
+        points: None,
         sheet: arguments.sheet.clone(),
         angles: arguments.angles,
         allow_odd_units: arguments.allow_odd_units,

@@ -75,7 +75,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
-    let mut given: Vec<&std::path::Path> = vec![&arguments.data.data];
+    let mut given: Vec<&std::path::Path> = arguments.data.files();
     given.extend(arguments.also.iter().map(PathBuf::as_path));
     Batch::check(&given, &targets)?;
     let options = options(arguments)?;
@@ -85,7 +85,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let others = arguments
         .also
         .iter()
-        .map(|data| Ok(read(&DataArguments { data: data.clone(), sheet: None, ..arguments.data.clone() })?.1))
+        .map(|data| {
+            Ok(read(&DataArguments {
+                data: data.clone(),
+                points: None,
+                sheet: None,
+                ..arguments.data.clone()
+            })?
+            .1)
+        })
         .collect::<anyhow::Result<Vec<Dataset>>>()?;
     let found = watching(arguments.common.threads, &work, || {
         of_rows(arguments, &options, &name, &robot.model, &dataset, &others)

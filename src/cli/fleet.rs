@@ -43,6 +43,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         None => jobs(arguments)?,
     };
     refuse_one_place_for_two(&jobs)?;
+    if arguments.data.points.is_some() {
+        bail!("--points belong to one log of joints, and these are several arms: diagnose each by itself");
+    }
     if !arguments.also.is_empty() {
         bail!("--also is another series of one arm, and these are several: diagnose that arm by itself");
     }

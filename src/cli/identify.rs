@@ -58,6 +58,9 @@ pub(super) struct DataArguments {
     /// Robot: a name of `truegrind robots`, or a TOML file.
     #[arg(long)]
     pub(super) robot: String,
+    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
+    #[arg(long, value_name = "POINTS.txt")]
+    pub(super) points: Option<PathBuf>,
     /// Sheet of a workbook; the first with the columns otherwise.
     #[arg(long)]
     pub(super) sheet: Option<String>,
@@ -72,7 +75,12 @@ pub(super) struct DataArguments {
 impl DataArguments {
     /// A file as it is, of a robot.
     pub(super) fn of(data: PathBuf, robot: String) -> Self {
-        Self { data, robot, sheet: None, angles: None, allow_odd_units: false }
+        Self { data, robot, points: None, sheet: None, angles: None, allow_odd_units: false }
+    }
+
+    /// The files that are read.
+    pub(super) fn files(&self) -> Vec<&Path> {
+        std::iter::once(&self.data).chain(&self.points).map(PathBuf::as_path).collect()
     }
 }
 
@@ -144,7 +152,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.output.as_deref());
-    Batch::check(&[&arguments.data.data], &targets)?;
+    Batch::check(&arguments.data.files(), &targets)?;
     if !(0.0..=0.9).contains(&arguments.held_out) || arguments.held_out == 0.0 {
         bail!("--held-out {}: expected a share above 0, up to 0.9", arguments.held_out);
     }
@@ -166,7 +174,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         tell(format_args!("note: {note}"));
     }
     arguments.outputs.print(&view::summary(&found))?;
-    let mut batch = Batch::sparing([&arguments.data.data]);
+    let mut batch = Batch::sparing(arguments.data.files());
     arguments.outputs.add_made(
         &mut batch,
         || view::document(&found, &dataset),
@@ -262,7 +270,13 @@ pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Res
     let robot = inputs::robot(&arguments.robot)?;
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
-    let dataset = import::read(&files::name(&arguments.data), bytes, &options)?;
+    let name = files::name(&arguments.data);
+    let dataset = match &arguments.points {
+        None => import::read(&name, bytes, &options)?,
+        Some(points) => {
+            import::joined((&name, bytes), (&files::name(points), &files::read(points)?), &options)?
+        }
+    };
     let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
     let dataset =

@@ -80,6 +80,7 @@ fn verbs() -> Vec<Verb> {
                 "--sensor-uncertainty",
                 "--serial",
                 "--robot",
+                "--points",
                 "--sheet",
                 "--allow-odd-units",
                 "--sensor-frame",
@@ -98,6 +99,7 @@ fn verbs() -> Vec<Verb> {
             needs: &[],
             others: &[
                 "--robot",
+                "--points",
                 "--sheet",
                 "--angles",
                 "--allow-odd-units",
@@ -126,6 +128,7 @@ fn verbs() -> Vec<Verb> {
             needs: &[],
             others: &[
                 "--robot",
+                "--points",
                 "--sheet",
                 "--angles",
                 "--allow-odd-units",

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::{CABLE, folder, truegrind};
 
+const TRACKER: &str = include_str!("../../data/irb120-tracker.csv");
 const ROUNDED: &str = include_str!("../../data/irb120-rounded.csv");
 
 /// A stated limit decides, and the verdict names it, whichever way the arm was found; one that is no length is refused.
@@ -47,4 +48,48 @@ fn columns_are_taken_as_they_are_where_that_is_asked_for() {
             assert!(model.contains(sharpened), "{verb} {more:?}");
         }
     }
+}
+
+/// The same rows, the points in a file of the tracker's software in another order: the same model, but for what says where it came from.
+#[test]
+fn points_of_the_tracker_are_joined_with_a_log_of_joints_by_name() {
+    let dir = folder();
+    let at = dir.path();
+    let rows: Vec<Vec<&str>> = TRACKER.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let mut log = "name,q1,q2,q3,q4,q5,q6\nextra,0,0,0,0,90,0\n".to_owned();
+    let mut points = vec!["// Units: Millimeters".to_owned()];
+    let mut alone = "q1,q2,q3,q4,q5,q6,measured_x,measured_y,measured_z\n".to_owned();
+    for (k, row) in rows.iter().enumerate() {
+        log += &format!("A::Arm::p{k},{}\n", row[..6].join(","));
+        points.insert(1, format!("A Arm p{k} {} 0.012 11/23/2026 10:15:30", row[6..9].join(" ")));
+        alone += &format!("{}\n", row[..9].join(","));
+    }
+    fs::write(at.join("log.csv"), &log).unwrap();
+    fs::write(at.join("points.txt"), points.join("\n")).unwrap();
+    fs::write(at.join("alone.csv"), &alone).unwrap();
+    let run = |data: &str, more: &[&str]| {
+        let begin = ["identify", data, "--robot", "abb-irb-120", "--json", "o.json"];
+        let (code, out, err) = truegrind(at, &[&begin[..], more].concat());
+        assert!(code < 2, "{err}");
+        let json: Value = serde_json::from_str(&fs::read_to_string(at.join("o.json")).unwrap()).unwrap();
+        (json["parameters"].clone(), out)
+    };
+    let (joined, _) = run("log.csv", &["--points", "points.txt"]);
+    assert!(joined.as_array().is_some_and(|all| all.len() > 20));
+    assert_eq!(joined, run("alone.csv", &[]).0);
+    let refused = |points: &str, expected: &[&str]| {
+        fs::write(at.join("points.txt"), points).unwrap();
+        let begin = ["identify", "log.csv", "--robot", "abb-irb-120", "--points", "points.txt"];
+        let (code, _, err) = truegrind(at, &begin);
+        assert!(code == 2 && expected.iter().all(|part| err.contains(part)), "{err}");
+    };
+    refused("p1, 1.5, 2.5, 3.5\np1, 1.5, 2.5, 3.5\n", &["points.txt, row 2", "`p1` stands twice"]);
+    refused("r1 1.5 2.5 3.5\n", &["none of its names", "`r1`", "`extra`"]);
+    refused("// Units: Inches\np1 1.5 2.5 3.5\n", &["row 1", "millimetres"]);
+    refused("1 2 3 4\n5 6\n", &["row 1", "x, y, z"]);
+    let protected =
+        ["identify", "log.csv", "--robot", "abb-irb-120", "--points", "points.txt", "-o", "points.txt"];
+    let (code, _, err) = truegrind(at, &protected);
+    assert!(code == 2 && err.contains("points.txt"), "{err}");
+    assert_eq!(fs::read_to_string(at.join("points.txt")).unwrap(), "1 2 3 4\n5 6\n");
 }

@@ -15,6 +15,7 @@ pub mod template;
 mod columns;
 mod error;
 mod options;
+mod points;
 mod profile;
 mod rows;
 mod rounding;
@@ -26,6 +27,7 @@ use sha2::{Digest, Sha256};
 
 use self::cell::{Cell, Line, Table};
 use self::columns::Columns;
+use self::points::Points;
 use super::dataset::Dataset;
 
 /// Reads a measurement file. `file` is the name that messages and reports print; the format is told by the bytes.
@@ -57,6 +59,56 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
     };
     dataset.sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
     Ok(dataset)
+}
+
+/// Reads a log of joints whose points a tracker's software has exported into a file of their own, and joins the two by the column
+/// `name` of the log. Both are given by the name that messages print, and bytes.
+///
+/// ```
+/// use truegrind_calibration::measurement::dataset::Reading;
+/// use truegrind_calibration::measurement::import::{Options, joined};
+///
+/// let log = b"name,q1,q2,q3,q4,q5,q6\np1,10,20,30,40,50,60\np2,11,21,31,41,51,61\n";
+/// let points = b"// Frame: World\nMain p2 812.5 -40.25 903.125\nMain p1 800.5 -41.0 900.25\n";
+/// let rows = joined(("joints.csv", log), ("tracker.txt", points), &Options::default())?;
+/// assert_eq!(rows.rows[0].reading, Reading::Position([800.5, -41.0, 900.25].into()));
+/// # Ok::<(), truegrind_calibration::measurement::import::ImportError>(())
+/// ```
+///
+/// # Errors
+/// [`ImportError`]: as of [`read`], and where lines of the export are not alike, a point stands twice, the log has no names, or none of
+/// them is that of a point.
+pub fn joined(log: (&str, &[u8]), points: (&str, &[u8]), options: &Options) -> Result<Dataset, ImportError> {
+    let measured = Points::read(points.0, points.1)?;
+    let table = match xlsx::is_workbook(log.1) {
+        true => sheet_of(log.0, xlsx::tables(log.0, log.1)?, options)?,
+        false => {
+            let text = csv::Text::of(log.0, log.1)?;
+            let rows = text.lines(log.0).collect::<Result<_, _>>()?;
+            Table { rows, ..text.empty() }
+        }
+    };
+    let (table, notes) = measured.joined(log.0, table)?;
+    let columns = Columns::find(log.0, &table)?;
+    let mut dataset = rows::dataset(log.0, &table, &columns, options, std::iter::empty())?;
+    dataset.notes.splice(0..0, notes);
+    let digest = Sha256::new().chain_update(log.1).chain_update(points.1).finalize();
+    dataset.sha256 = digest.iter().map(|b| format!("{b:02x}")).collect();
+    Ok(dataset)
+}
+
+/// The sheet that is asked for, or the first that holds anything.
+fn sheet_of(file: &str, tables: Vec<Table>, options: &Options) -> Result<Table, ImportError> {
+    let name = |table: &Table| table.sheet.clone().unwrap_or_default();
+    let sheets: Vec<String> = tables.iter().map(name).collect();
+    let wanted = |table: &Table| match &options.sheet {
+        Some(sheet) => table.sheet.as_ref() == Some(sheet),
+        None => !table.rows.is_empty(),
+    };
+    tables.into_iter().find(wanted).ok_or_else(|| match &options.sheet {
+        Some(sheet) => ImportError::UnknownSheet { file: file.into(), sheet: sheet.clone(), sheets },
+        None => ImportError::Empty { place: Place::file(file) },
+    })
 }
 
 /// Rows that stand in no file, as arrays and data frames of a program do, under the same names and checks as the columns of a

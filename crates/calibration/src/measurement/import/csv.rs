@@ -80,7 +80,7 @@ impl LineCounter<'_> {
 }
 
 /// Text of a file in whatever encoding spreadsheets export.
-fn text(bytes: &[u8]) -> Cow<'_, str> {
+pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| from([c[0], c[1]])).collect();
         Cow::Owned(String::from_utf16_lossy(&units))

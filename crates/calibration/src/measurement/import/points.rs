@@ -1,0 +1,157 @@
+//! Points that the tracker's software exports, joined with a log of the joints by name.
+//!
+//! SpatialAnalyzer, "Export ASCII Points" (user's manual): lines of a name, x, y, z and more, separated by blanks, tabs or commas; the
+//! name is that of the target alone, or of its group and collection before it; lines that begin with `//` are comments.
+
+use std::collections::BTreeMap;
+
+use super::cell::{Cell, Table};
+use super::csv;
+use super::error::{ImportError, Place};
+
+/// Columns of a log of joints that name the point, in this order of preference.
+const NAMES: [&str; 4] = ["name", "point", "target", "tag"];
+
+/// Fields that may stand before x: collection, group, target.
+const MOST_NAMES: usize = 3;
+
+/// Measured points by the name of their target.
+#[derive(Debug)]
+pub(super) struct Points {
+    by_name: BTreeMap<String, [f64; 3]>,
+}
+
+fn broken(place: Place, message: String) -> ImportError {
+    ImportError::Format { place, message }
+}
+
+impl Points {
+    /// Reads an export.
+    pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Self, ImportError> {
+        let text = csv::text(bytes);
+        let place = |row: Option<usize>| Place { row, ..Place::file(file) };
+        let mut lines: Vec<(usize, Vec<&str>)> = Vec::new();
+        for (index, line) in text.lines().map(str::trim).enumerate() {
+            if let Some(comment) = line.strip_prefix("//") {
+                let comment = comment.to_ascii_lowercase();
+                if let Some(unit) = ["inch", "meters", "feet"].iter().find(|unit| {
+                    comment.contains("unit") && comment.contains(**unit) && !comment.contains("millimeter")
+                }) {
+                    let message = format!("found `{unit}` in a comment on units; expected millimetres");
+                    return Err(broken(place(Some(index + 1)), message));
+                }
+                continue;
+            }
+            if !line.is_empty() {
+                lines.push((index + 1, fields(line)));
+            }
+        }
+        let names = layout(&lines).ok_or_else(|| {
+            let message = "no line has a name and x, y, z; expected points as SpatialAnalyzer exports them (target, x, y, z, with group \
+                           and collection before it or not), the same in every line";
+            broken(place(lines.first().map(|(row, _)| *row)), message.to_owned())
+        })?;
+        let mut by_name = BTreeMap::new();
+        for (row, fields) in &lines {
+            let number = |at: usize| fields.get(names + at).and_then(|text| csv::number(text, false));
+            let (Some(x), Some(y), Some(z)) = (number(0), number(1), number(2)) else {
+                let message = format!(
+                    "found `{}`; expected {names} names and x, y, z as in the lines above",
+                    fields.join(" ")
+                );
+                return Err(broken(place(Some(*row)), message));
+            };
+            let name = target(fields[names - 1]).to_owned();
+            if by_name.insert(name.clone(), [x, y, z]).is_some() {
+                let message = format!(
+                    "point `{name}` stands twice; expected each name once: export one group, or rename the repeats"
+                );
+                return Err(broken(place(Some(*row)), message));
+            }
+        }
+        Ok(Self { by_name })
+    }
+
+    /// The log with the measured points as columns of ours, and what was left out.
+    pub(super) fn joined(&self, file: &str, mut log: Table) -> Result<(Table, Vec<String>), ImportError> {
+        let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
+        let header = log.rows.iter().position(|line| named(line).is_some());
+        let Some((header, column)) = header.and_then(|at| Some((at, named(&log.rows[at])?))) else {
+            let message =
+                "has no column that names the measured points; expected `name` beside q1 to q6".to_owned();
+            return Err(broken(place, message));
+        };
+        let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
+        let mut used = 0_usize;
+        let mut without = Vec::new();
+        for (index, line) in log.rows.iter_mut().enumerate().skip(header) {
+            line.cells.resize(width, Cell::Empty);
+            if index == header {
+                let names = ["measured_x", "measured_y", "measured_z"];
+                line.cells.extend(names.map(|name| Cell::Text(name.to_owned())));
+                continue;
+            }
+            let name = line.cells[column].to_string();
+            match self.by_name.get(target(name.trim())) {
+                Some(point) => {
+                    used += 1;
+                    line.cells.extend(point.map(|value| Cell::Number { value, as_text: false }));
+                }
+                None => {
+                    without.push(name);
+                    line.cells.clear();
+                }
+            }
+        }
+        if used == 0 {
+            let some = |names: &mut dyn Iterator<Item = &String>| {
+                names.take(3).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+            };
+            let message = format!(
+                "none of its names is that of a measured point: the log has {}, the points are {}",
+                some(&mut without.iter()),
+                some(&mut self.by_name.keys())
+            );
+            return Err(broken(place, message));
+        }
+        log.rows.retain(|line| !line.cells.is_empty());
+        let mut notes =
+            vec![format!("{used} rows joined by name with {} measured points", self.by_name.len())];
+        if !without.is_empty() {
+            let shown = without.iter().take(5).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            notes.push(format!("{} rows without a measured point are left out: {shown}", without.len()));
+        }
+        Ok((log, notes))
+    }
+}
+
+/// The fields of a line: between commas where there are some, else between blanks.
+fn fields(line: &str) -> Vec<&str> {
+    match line.contains(',') {
+        true => line.split(',').map(str::trim).collect(),
+        false => line.split_whitespace().collect(),
+    }
+}
+
+/// How many names stand before x, y and z in every line. Names may be numbers: a coordinate has a point or an exponent.
+fn layout(lines: &[(usize, Vec<&str>)]) -> Option<usize> {
+    let is_coordinate = |text: &&str| csv::number(text, false).is_some() && text.contains(['.', 'e', 'E']);
+    (1..=MOST_NAMES).find(|&names| {
+        !lines.is_empty()
+            && lines.iter().all(|(_, fields)| {
+                fields.len() >= names + 3
+                    && fields[names..names + 3].iter().all(is_coordinate)
+                    && !fields[..names].iter().any(is_coordinate)
+            })
+    })
+}
+
+/// The target of a full name: `A::Main::p1`.
+fn target(name: &str) -> &str {
+    name.rsplit("::").next().unwrap_or(name).trim_matches('"')
+}
+
+fn named(line: &super::cell::Line) -> Option<usize> {
+    let is = |wanted: &str| line.cells.iter().position(|cell| cell.to_string().eq_ignore_ascii_case(wanted));
+    NAMES.iter().find_map(|name| is(name))
+}
