@@ -313,15 +313,14 @@ impl<'s> Here<'s> {
         let key = self.store.key(job, content.as_deref());
         let begun = self.store.work.join("begun").join(&key);
         let mut times = 0;
-        if self.store.resume {
-            if let Some(done) = self.store.record(&key)?
-                && done.ended != Ended::Failed
-                && self.store.changed(&done).is_empty()
-                && let Some(mut kept) = T::from_record(done.record)
-            {
-                (doing.lighten)(&mut kept);
-                return Ok(Some(kept));
-            }
+        if self.store.resume
+            && let Some(done) = self.store.record(&key)?
+            && done.ended != Ended::Failed
+            && self.store.changed(&done).is_empty()
+            && let Some(mut kept) = T::from_record(done.record)
+        {
+            (doing.lighten)(&mut kept);
+            return Ok(Some(kept));
         }
         if self.careful {
             // One that cannot be read was being noted.
