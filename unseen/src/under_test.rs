@@ -68,6 +68,8 @@ pub struct Reply {
     pub held_out_blocks_mm: f64,
     /// Held-out error of geometry alone, random folds (mm).
     pub geometry_held_out_mm: f64,
+    /// Held-out error of geometry alone, contiguous blocks (mm).
+    pub geometry_held_out_blocks_mm: f64,
     /// What becomes of the model.
     pub written: Written,
     /// Wall time of import and diagnosis (s).
@@ -126,6 +128,7 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         held_out_mm: error("extended", "cv_rmse_mm")?,
         held_out_blocks_mm: error("extended", "cv_blocks_rmse_mm")?,
         geometry_held_out_mm: error("geometric", "cv_rmse_mm")?,
+        geometry_held_out_blocks_mm: error("geometric", "cv_blocks_rmse_mm")?,
         written,
         seconds,
         sheet: robot.model,
@@ -161,6 +164,15 @@ fn findings(json: &Value) -> Result<Vec<Finding>, String> {
 }
 
 impl Reply {
+    /// The whole diagnosis and the model file.
+    ///
+    /// # Errors
+    /// What the command line would say.
+    pub fn json(&self) -> Result<String, String> {
+        let told = serde_json::to_string_pretty(&self.found.diagnosis).map_err(|error| error.to_string())?;
+        Ok(told + "\n" + &self.found.estimated.to_toml().map_err(|error| error.to_string())?)
+    }
+
     /// The flange as an arm has it, at a visit (mm).
     pub fn flange(&self, which: Which, visit: &Visit) -> Pose {
         let model = match which {
