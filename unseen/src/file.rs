@@ -22,6 +22,11 @@ fn is_reading(name: &str) -> bool {
     name == "L" || name.starts_with("measured")
 }
 
+/// Names of columns that hold angles.
+fn is_joint(name: &str) -> bool {
+    name.strip_prefix('q').is_some_and(|number| number.parse::<u8>().is_ok())
+}
+
 /// Half of the eighth decimal.
 const HALF: f64 = 0.5e-8;
 
@@ -45,14 +50,18 @@ impl Table {
     }
 
     /// The changed rows; `None` where the change needs repeats and there are none. A file of fewer decimals cannot be rounded at the
-    /// eighth: its numbers are moved by as much as that would do.
+    /// eighth: its angles and readings are moved by as much as that would do.
     pub fn changed(&self, change: Change, rng: &mut impl Rng) -> Option<Self> {
         let mut out = self.clone();
         match change {
             Change::Rounded => {
-                for cell in out.lines.iter_mut().flatten() {
-                    if let Ok(number) = cell.parse::<f64>() {
-                        *cell = format!("{:.10}", number + rng.random_range(-HALF..HALF));
+                for line in &mut out.lines {
+                    let cells =
+                        self.names.iter().zip(line).filter(|(name, _)| is_joint(name) || is_reading(name));
+                    for (_, cell) in cells {
+                        if let Ok(number) = cell.parse::<f64>() {
+                            *cell = format!("{:.10}", number + rng.random_range(-HALF..HALF));
+                        }
                     }
                 }
             }
@@ -78,9 +87,7 @@ impl Table {
 
     /// Rows that follow each other at one pose.
     fn repeats(&self) -> Vec<Vec<usize>> {
-        let joints: Vec<usize> = (0..self.names.len())
-            .filter(|&c| self.names[c].strip_prefix('q').is_some_and(|n| n.parse::<u8>().is_ok()))
-            .collect();
+        let joints: Vec<usize> = (0..self.names.len()).filter(|&c| is_joint(&self.names[c])).collect();
         let pose = |i: usize| joints.iter().map(|&c| self.lines[i].get(c).cloned()).collect::<Vec<_>>();
         let mut out: Vec<Vec<usize>> = Vec::new();
         for i in 0..self.lines.len() {
