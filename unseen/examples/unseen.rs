@@ -1,23 +1,27 @@
 //! `cargo run --release -p truegrind-unseen --example unseen -- [RUNS] [KIND…] [--seed S] [--from N] [--rows MOST]
-//! [--design NAME] [--workers W] [--stability | --draw] [--quiet] [--list]`
+//! [--design NAME] [--workers W] [--stability | --draw | --rows-of] [--file CSV --robot NAME] [--quiet] [--list]`
 //!
 //! RUNS runs in all, the kinds in turn; all kinds where none is named. Each worker diagnoses on one thread; with `--workers 1`
 //! one run after another has all threads, so that its time is a user's. The same marks for any number of workers. `--draw` shows what
-//! is drawn and diagnoses nothing.
+//! is drawn and diagnoses nothing, `--rows-of` prints the rows of the first run as a file. With `--file` the rows are those of a
+//! measurement (`--json` prints the whole diagnosis); with `--stability` too, RUNS times changed by nothing that matters.
 
 use std::process::ExitCode;
 
 use truegrind_unseen::case::{Case, Limits};
 use truegrind_unseen::designs::Design;
-use truegrind_unseen::report::{Plan, line, stability_line, stability_table, table};
+use truegrind_unseen::file::Table;
+use truegrind_unseen::report::{Plan, line, listed, stability_line, stability_table, table, trials_table};
+use truegrind_unseen::table::text;
 use truegrind_unseen::truth::Kind;
+use truegrind_unseen::under_test::diagnosed;
 use truegrind_unseen::worth::Measure;
 
 /// Options that take a value.
-const VALUED: [&str; 5] = ["--seed", "--from", "--rows", "--design", "--workers"];
+const VALUED: [&str; 7] = ["--seed", "--from", "--rows", "--design", "--workers", "--file", "--robot"];
 
 /// Options that do not.
-const PLAIN: [&str; 4] = ["--stability", "--draw", "--quiet", "--list"];
+const PLAIN: [&str; 6] = ["--stability", "--draw", "--rows-of", "--json", "--quiet", "--list"];
 
 fn main() -> ExitCode {
     match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
@@ -37,7 +41,14 @@ fn run(arguments: &[String]) -> Result<(), String> {
     }
     let plan = plan(arguments)?;
     let quiet = has("--quiet");
-    if has("--draw") {
+    let value = |name: &str| arguments.iter().skip_while(|a| *a != name).nth(1);
+    if let (Some(file), Some(robot)) = (value("--file"), value("--robot")) {
+        return of_file(file, robot, has("--stability").then_some((plan.runs, plan.seed)), has("--json"));
+    }
+    if has("--rows-of") {
+        let case = plan.case(plan.first);
+        print!("{}", text(case.sensor.kind, &case.lines(), None));
+    } else if has("--draw") {
         plan.over(drawn, |index, text| println!("{index:>4} {text}"));
     } else if has("--stability") {
         let all = plan.stabilities(|index, run| {
@@ -54,6 +65,36 @@ fn run(arguments: &[String]) -> Result<(), String> {
         });
         println!("\n{}", table(&plan, &all));
     }
+    Ok(())
+}
+
+/// A file that somebody measured: what is said of it, or how that stands changes that do not matter.
+fn of_file(file: &str, robot: &str, trials: Option<(usize, u64)>, json: bool) -> Result<(), String> {
+    let rows = std::fs::read_to_string(file).map_err(|why| format!("{file}: {why}"))?;
+    let table = Table::read(&rows);
+    if let Some(trials) = trials {
+        let told = truegrind_unseen::file::trials(&table, robot, trials, |run, change, same, found| {
+            let other = if same { "same".to_owned() } else { listed(found) };
+            println!("{run:>4} {}: {other}", change.name());
+        })?;
+        println!("{}", trials_table(&told));
+        return Ok(());
+    }
+    let reply = diagnosed(&rows, robot)?;
+    if json {
+        println!("{}", reply.json()?);
+    }
+    println!(
+        "{} rows, {:.1} s, held out: geometry {:.4} mm (blocks {:.4}), with causes {:.4} (blocks {:.4}); {} findings: {}",
+        table.rows(),
+        reply.seconds,
+        reply.geometry_held_out_mm,
+        reply.geometry_held_out_blocks_mm,
+        reply.held_out_mm,
+        reply.held_out_blocks_mm,
+        reply.findings.len(),
+        listed(&reply.findings)
+    );
     Ok(())
 }
 
@@ -88,6 +129,9 @@ fn plan(arguments: &[String]) -> Result<Plan, String> {
     while let Some(argument) = rest.next() {
         if VALUED.contains(&argument.as_str()) {
             let value = rest.next().ok_or_else(|| format!("{argument}: expected a value"))?;
+            if ["--file", "--robot"].contains(&argument.as_str()) {
+                continue;
+            }
             let number =
                 || value.parse::<u64>().map_err(|_| format!("{argument} {value}: expected a number"));
             match argument.as_str() {

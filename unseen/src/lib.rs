@@ -9,13 +9,15 @@
 //!
 //! Kinematics, statics, sensors and effects are written for this crate alone; only [`under_test`] names truegrind. The rows of
 //! the simulator's table: [`arms`] and [`designs`] say what is measured, [`sensors`] by what, [`hidden`] what is wrong,
-//! [`worth`] how much of it geometry could never explain, [`case`] puts them together. [`score`] judges one run, [`report`] all.
+//! [`worth`] how much of it geometry could never explain, [`case`] puts them together. [`score`] judges one run, [`report`] all;
+//! [`file`](mod@file) asks of a file that somebody measured whether its findings stand.
 //! Lengths are in mm, angles in rad, times in h.
 
 pub mod arms;
 pub mod case;
 pub mod designs;
 pub mod draw;
+pub mod file;
 pub mod hidden;
 pub mod report;
 pub mod score;

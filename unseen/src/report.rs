@@ -6,11 +6,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::case::{Case, Limits};
+use crate::file::Trials;
 use crate::score::{Marks, Outcome, WORSE, outcome};
 use crate::stability::{Change, Stability, stability};
 use crate::statistics::{quantile, wilson};
 use crate::truth::{Family, Kind, Mark, Meaning};
-use crate::under_test::Written;
+use crate::under_test::{Finding, Written};
 
 /// What is run.
 #[derive(Debug, Clone, PartialEq)]
@@ -338,20 +339,27 @@ pub fn stability_table(plan: &Plan, all: &[Stability]) -> String {
     out
 }
 
+/// Findings in one line: names, joints and rows, with a question mark where there is a doubt.
+pub fn listed(findings: &[Finding]) -> String {
+    let name = |f: &Finding| {
+        let at = f.joints.as_ref().map(|j| format!("{j:?}")).unwrap_or_default();
+        let rows = f.rows.map(|r| format!("{r:?}")).unwrap_or_default();
+        format!("{}{}{at}{rows}", f.effect, if f.identified { "" } else { "?" })
+    };
+    findings.iter().map(name).collect::<Vec<_>>().join(" ")
+}
+
+/// What becomes of a file's findings under changes.
+pub fn trials_table(trials: &Trials) -> String {
+    let mut out = format!("as it is: {}\n", listed(&trials.plain));
+    for (change, (count, others)) in &trials.changed {
+        let _ = writeln!(out, "  {:<32}{}", change.name(), bounded(count - others.len(), *count));
+    }
+    out
+}
+
 /// One line on the stability of one run.
 pub fn stability_line(index: usize, run: &Stability) -> String {
-    let names = |findings: &[crate::under_test::Finding]| {
-        let name = |f: &crate::under_test::Finding| {
-            let at = f.joints.as_ref().map(|j| format!("{j:?}"));
-            format!(
-                "{}{}{}",
-                f.effect,
-                at.unwrap_or_default(),
-                f.rows.map(|r| format!("{r:?}")).unwrap_or_default()
-            )
-        };
-        findings.iter().map(name).collect::<Vec<_>>().join(" ")
-    };
     let s = &run.setting;
     let mut out = format!(
         "{index:>4} {:<14} {:<12} {:<7} {:>4} rows",
@@ -371,8 +379,8 @@ pub fn stability_line(index: usize, run: &Stability) -> String {
                 out,
                 "\n       {}\n         as it is: {}\n         changed:  {}",
                 change.name(),
-                names(&run.plain),
-                names(findings)
+                listed(&run.plain),
+                listed(findings)
             );
         }
     }

@@ -7,7 +7,7 @@ use crate::draw::Purpose;
 use crate::score::{Setting, setting};
 use crate::table::{Line, text};
 use crate::truth::{Kind, Meaning, meanings};
-use crate::under_test::{Finding, diagnosed};
+use crate::under_test::{Finding, Reply, diagnosed};
 
 /// A change that should change nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,9 +78,13 @@ pub struct Stability {
 }
 
 fn identified(file: &str, robot: &str) -> Result<Vec<Finding>, String> {
-    let all = diagnosed(file, robot)?.findings;
-    let named = |f: &Finding| f.identified && meanings(&f.effect, &f.parameters) != [Meaning::SomethingElse];
-    Ok(all.into_iter().filter(named).collect())
+    Ok(named(&diagnosed(file, robot)?))
+}
+
+/// Causes told without a doubt; that something is left without a name is none.
+pub fn named(reply: &Reply) -> Vec<Finding> {
+    let named = |f: &&Finding| f.identified && meanings(&f.effect, &f.parameters) != [Meaning::SomethingElse];
+    reply.findings.iter().filter(named).cloned().collect()
 }
 
 /// Diagnoses a case as it is and after each change.

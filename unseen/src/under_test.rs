@@ -68,6 +68,8 @@ pub struct Reply {
     pub held_out_blocks_mm: f64,
     /// Held-out error of geometry alone, random folds (mm).
     pub geometry_held_out_mm: f64,
+    /// Held-out error of geometry alone, contiguous blocks (mm).
+    pub geometry_held_out_blocks_mm: f64,
     /// What becomes of the model.
     pub written: Written,
     /// Wall time of import and diagnosis (s).
@@ -78,10 +80,28 @@ pub struct Reply {
     convention: AngleConvention,
 }
 
-fn dataset(text: &str, convention: AngleConvention, nominal: &Model) -> Result<Dataset, String> {
+fn read(text: &str) -> Result<Dataset, String> {
     let rows = import::read("unseen.csv", text.as_bytes(), &import::Options::default());
-    let rows = rows.map_err(|error| error.to_string())?;
-    convention.apply(&rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
+    rows.map_err(|error| error.to_string())
+}
+
+fn dataset(rows: &Dataset, convention: AngleConvention, nominal: &Model) -> Result<Dataset, String> {
+    convention.apply(rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
+}
+
+/// The rows, where the sensor does not contradict the convention of their angles.
+fn read_as(
+    text: &str,
+    convention: AngleConvention,
+    nominal: &Model,
+) -> Result<(Dataset, AngleConvention), String> {
+    let rows = read(text)?;
+    for suspicion in plausibility(&rows, nominal, convention) {
+        if suspicion.evidence == Evidence::Sensor {
+            return Err(suspicion.to_string());
+        }
+    }
+    Ok((dataset(&rows, convention, nominal)?, convention))
 }
 
 /// `truegrind diagnose unseen.csv --robot NAME -o MODEL.toml --json`. A panic is one run without an answer, not the end of all.
@@ -96,13 +116,11 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
     let start = Instant::now();
     let robot = robots::load(robot).map_err(|error| error.to_string())?;
     let dh = robot.sheet.joints.angles == robots::sheet::Angles::Dh;
-    let convention = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
-    let rows = dataset(text, convention, &robot.model)?;
-    for suspicion in plausibility(&rows, &robot.model, convention) {
-        if suspicion.evidence == Evidence::Sensor {
-            return Err(suspicion.to_string());
-        }
-    }
+    let told = if dh { AngleConvention::Dh } else { AngleConvention::Logged };
+    let other = if dh { AngleConvention::Logged } else { AngleConvention::Dh };
+    // What a user is told to do where the sensor contradicts the convention: read the file the other way.
+    let (rows, convention) = read_as(text, told, &robot.model)
+        .or_else(|why| read_as(text, other, &robot.model).map_err(|_| why))?;
     let options = Options::default();
     let frames = starting_frames(&rows, &robot.model, &options.tolerance, true);
     let frames = frames.map_err(|error| error.to_string())?;
@@ -126,6 +144,7 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         held_out_mm: error("extended", "cv_rmse_mm")?,
         held_out_blocks_mm: error("extended", "cv_blocks_rmse_mm")?,
         geometry_held_out_mm: error("geometric", "cv_rmse_mm")?,
+        geometry_held_out_blocks_mm: error("geometric", "cv_blocks_rmse_mm")?,
         written,
         seconds,
         sheet: robot.model,
@@ -161,6 +180,15 @@ fn findings(json: &Value) -> Result<Vec<Finding>, String> {
 }
 
 impl Reply {
+    /// The whole diagnosis and the model file.
+    ///
+    /// # Errors
+    /// What the command line would say.
+    pub fn json(&self) -> Result<String, String> {
+        let told = serde_json::to_string_pretty(&self.found.diagnosis).map_err(|error| error.to_string())?;
+        Ok(told + "\n" + &self.found.estimated.to_toml().map_err(|error| error.to_string())?)
+    }
+
     /// The flange as an arm has it, at a visit (mm).
     pub fn flange(&self, which: Which, visit: &Visit) -> Pose {
         let model = match which {
@@ -183,7 +211,7 @@ impl Reply {
     /// # Errors
     /// What the import would say.
     pub fn fresh_mm(&self, text: &str, visits: &[Visit]) -> Result<[f64; 2], String> {
-        let mut rows = dataset(text, self.convention, &self.sheet)?;
+        let mut rows = dataset(&read(text)?, self.convention, &self.sheet)?;
         // A fresh row stands in the measurement where its time does.
         for (row, visit) in rows.rows.iter_mut().zip(visits) {
             row.number = visit.row;

@@ -3,5 +3,6 @@
 mod arms;
 mod cases;
 mod effects;
+mod files;
 mod judging;
 mod runs;

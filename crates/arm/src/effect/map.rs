@@ -88,6 +88,13 @@ impl JointMap {
         (first, weights, slopes)
     }
 
+    /// The knots that reach to the angle `u` (rad).
+    pub fn reached(&self, u: f64) -> [usize; 4] {
+        let count = self.knots_rad.len().max(1);
+        let (first, ..) = self.near(u);
+        std::array::from_fn(|k| (first + k) % count)
+    }
+
     fn sum(&self, first: usize, weights: &[f64; 4]) -> f64 {
         let count = self.knots_rad.len();
         if count == 0 {

@@ -141,7 +141,7 @@ impl<'a> CandidateScores<'a> {
                 })
             })
             .collect();
-        let (spoken, mapped) = lines::candidates(self.subject, design);
+        let (spoken, mapped) = lines::candidates(self.subject, &self.catalogue.turns, design);
         let open: Vec<Arc<Candidate>> = found.into_iter().chain(spoken).map(Arc::new).collect();
         let fine: Vec<&Entry> = mapped
             .into_par_iter()

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::catalogue::{Candidate, arm_candidates, fine_maps, measurement_candidates};
 use super::design::Design;
 use super::extension::Subject;
+use super::lines::Turns;
 use super::score::{Score, log_p};
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
@@ -28,6 +29,8 @@ pub struct Catalogue {
     pub shifts: Vec<Candidate>,
     /// Kinds of candidates (name and joints).
     pub families: f64,
+    /// Where the joints stood, for lines.
+    pub turns: Turns,
 }
 
 impl Catalogue {
@@ -57,7 +60,8 @@ impl Catalogue {
         stories.dedup();
         let families = stories.len() as f64;
         let fine = fine_maps(subject);
-        Self { listed: listed.into_iter().map(Arc::new).collect(), fine, shifts, families }
+        let listed = listed.into_iter().map(Arc::new).collect();
+        Self { listed, fine, shifts, families, turns: Turns::of(subject) }
     }
 
     /// The corrected p-value's logarithm, against `design`.

@@ -357,14 +357,17 @@ impl<'a> Half<'a> {
         let all: Vec<usize> = (0..own.len()).collect();
         let selected = self.selected(own, pool, &self.confirming.places(&all));
         let whole = self.linear.whole();
+        let columns: Vec<DMatrix<f64>> = own.iter().map(|tried| self.columns(&tried.columns)).collect();
+        let projected = whole.design.project_all(&columns);
         own.iter()
+            .zip(&projected)
             .enumerate()
-            .map(|(k, tried)| {
+            .map(|(k, (tried, projected))| {
                 let dropped: Vec<usize> = out.iter().copied().filter(|o| *o != k).chain([k]).collect();
                 let design = whole.without(&self.confirming.places(&dropped));
-                let columns = self.columns(&tried.columns);
                 let accepted = &self.confirming.accepted[k];
-                let score = score_columns(&design, &columns, &tried.candidate.cause.sizes(), accepted.tried);
+                let projected = design.project_on(projected);
+                let score = score_projected(&projected, &tried.candidate.cause.sizes(), accepted.tried);
                 let before = &accepted.own.estimate;
                 let lambda = |v: &DVector<f64>| (v.transpose() * &score.information * v)[0].max(0.0);
                 if lambda(before) < TELLING {

@@ -8,7 +8,7 @@
 //!
 //! Source: the score test with nuisance parameters, Rao 1948; the projection is that of Frisch and Waugh.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -69,8 +69,8 @@ pub struct Design {
 pub struct Reduction {
     /// U, orthonormal, p × d.
     directions: DMatrix<f64>,
-    /// (Q U)ᵀ, d × n.
-    pub removed: DMatrix<f64>,
+    /// (Q U)ᵀ, d × n, once somebody asked for it.
+    removed: OnceLock<DMatrix<f64>>,
     /// How far the residual moved along each.
     moved: DVector<f64>,
 }
@@ -82,8 +82,8 @@ pub struct Linear {
     pub(super) per: usize,
     /// Jᵀ, p × n.
     pub(super) rows: DMatrix<f64>,
-    /// JᵀJ + Λ.
-    pub(super) normal: DMatrix<f64>,
+    /// JᵀJ + Λ, once somebody asked for it.
+    normal: OnceLock<DMatrix<f64>>,
     /// r, n.
     pub(super) residual: DVector<f64>,
     /// Jᵀr + Λx.
@@ -125,10 +125,8 @@ impl Linear {
         let rows = fit.task.rows();
         let (residual, transposed) = linearised(&fit.task, &fit.x);
         let precision: Vec<f64> = fit.priors.iter().map(|prior| prior.sigma.powi(-2)).collect();
-        let mut normal = outer(&transposed);
         let mut gradient = &transposed * &residual;
         for (k, precision) in precision.iter().enumerate() {
-            normal[(k, k)] += precision;
             gradient[k] += precision * fit.x[k];
         }
         // Slopes by what candidates are made of, at the estimate.
@@ -192,7 +190,7 @@ impl Linear {
             observations,
             per,
             rows: transposed,
-            normal,
+            normal: OnceLock::new(),
             residual,
             gradient,
             x: fit.x.clone(),
@@ -212,12 +210,11 @@ impl Linear {
     /// The same with random functions free too: `columns`, n × m, whose coefficients have variance 1.
     pub(super) fn beside(&self, columns: &DMatrix<f64>) -> Self {
         let (p, m) = (self.rows.nrows(), columns.ncols());
-        let mut rows = self.rows.clone().insert_rows(p, m, 0.0);
+        let mut rows = DMatrix::zeros(p + m, self.rows.ncols());
+        rows.rows_mut(0, p).copy_from(&self.rows);
         rows.rows_mut(p, m).tr_copy_from(columns);
-        let mut wider = self.clone();
-        wider.x.extend(vec![0.0; m]);
-        wider.precision.extend(vec![1.0; m]);
-        wider.with_rows(rows, self.residual.clone())
+        let extended = |own: &[f64], value: f64| [own, vec![value; m].as_slice()].concat();
+        self.with(rows, self.residual.clone(), extended(&self.x, 0.0), extended(&self.precision, 1.0))
     }
 
     /// The same where neighbouring rows are correlated by `rho` and the noise is `noise` times what it was taken for;
@@ -226,6 +223,9 @@ impl Linear {
         if rho == 0.0 && noise == 1.0 {
             return self.clone();
         }
+        if rho == 0.0 {
+            return self.with_rows(&self.rows / noise, &self.residual / noise);
+        }
         let whitened = |columns: &DMatrix<f64>| filter(columns, rho, numbers, self.per) / noise;
         let residual =
             whitened(&DMatrix::from_columns(std::slice::from_ref(&self.residual))).column(0).into_owned();
@@ -233,30 +233,44 @@ impl Linear {
     }
 
     fn with_rows(&self, rows: DMatrix<f64>, residual: DVector<f64>) -> Self {
-        let mut normal = outer(&rows);
+        self.with(rows, residual, self.x.clone(), self.precision.clone())
+    }
+
+    fn with(&self, rows: DMatrix<f64>, residual: DVector<f64>, x: Vec<f64>, precision: Vec<f64>) -> Self {
         let mut gradient = &rows * &residual;
-        for (k, precision) in self.precision.iter().enumerate() {
-            normal[(k, k)] += precision;
-            gradient[k] += precision * self.x[k];
+        for (k, precision) in precision.iter().enumerate() {
+            gradient[k] += precision * x[k];
         }
         Self {
             observations: rows.ncols() / self.per.max(1),
             per: self.per,
             rows,
-            normal,
+            normal: OnceLock::new(),
             residual,
             gradient,
-            x: self.x.clone(),
-            precision: self.precision.clone(),
+            x,
+            precision,
             slopes: Arc::clone(&self.slopes),
         }
+    }
+
+    /// JᵀJ + Λ.
+    pub(super) fn normal(&self) -> &DMatrix<f64> {
+        self.normal.get_or_init(|| {
+            let mut normal = outer(&self.rows);
+            for (k, precision) in self.precision.iter().enumerate() {
+                normal[(k, k)] += precision;
+            }
+            normal
+        })
     }
 
     /// How many parameters the rows determine, those at `dropped` left out: each counts by the share that its prior does not.
     pub(super) fn spent(&self, dropped: &[usize]) -> f64 {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
-        let lower = lower_factor(DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]));
+        let normal = self.normal();
+        let lower = lower_factor(DMatrix::from_fn(p, p, |a, b| normal[(kept[a], kept[b])]));
         let inverse = solved(&lower, DMatrix::identity(p, p));
         let variances = inverse.column_iter().map(|c| c.norm_squared());
         kept.iter().zip(variances).map(|(&k, v)| (1.0 - v * self.precision[k]).clamp(0.0, 1.0)).sum()
@@ -275,7 +289,7 @@ impl Linear {
 
     /// The design of the whole fit, from which those of smaller models follow at little cost.
     pub fn whole(&self) -> FullDesign {
-        let lower = lower_factor(self.normal.clone());
+        let lower = lower_factor(self.normal().clone());
         let basis = solved(&lower, self.rows.clone());
         let x = DVector::from_column_slice(&self.x);
         let half = lower
@@ -301,7 +315,8 @@ impl Linear {
         let kept: Vec<usize> = (0..self.x.len()).filter(|k| !dropped.contains(k)).collect();
         let p = kept.len();
         let mut residual = self.without(dropped);
-        let normal = DMatrix::from_fn(p, p, |a, b| self.normal[(kept[a], kept[b])]);
+        let all = self.normal();
+        let normal = DMatrix::from_fn(p, p, |a, b| all[(kept[a], kept[b])]);
         let lower = lower_factor(normal);
         let part = self.rows.select_rows(&kept);
         let mut gradient = &part * &residual;
@@ -350,9 +365,8 @@ impl FullDesign {
         let directions = solved(&m, z.transpose()).transpose();
         let taken = DVector::from_iterator(d, dropped.iter().map(|&k| self.x[k]));
         let moved = m.solve_lower_triangular(&taken).unwrap_or_else(|| DVector::zeros(d));
-        let removed = product_of_transposed(&directions, &self.design.basis);
-        out.residual.gemv_tr(-1.0, &removed, &moved, 1.0);
-        out.reduction = Some(Reduction { directions, removed, moved });
+        out.residual.gemv_tr(-1.0, &*self.design.basis, &(&directions * &moved), 1.0);
+        out.reduction = Some(Reduction { directions, removed: OnceLock::new(), moved });
         out
     }
 }
@@ -453,21 +467,27 @@ impl Design {
 
     /// What is left of columns when everything free has been fitted to them, n × k.
     pub fn pure(&self, columns: &DMatrix<f64>, projected: &Projected) -> DMatrix<f64> {
+        let mut shared = projected.shared.clone();
+        if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
+            shared -= product(&reduction.directions, back);
+        }
+        if columns.ncols() >= MANY {
+            return columns - product_of_transposed(&self.basis, &shared);
+        }
         let mut out = columns.clone();
-        for a in 0..columns.ncols() {
+        for (mut column, shared) in out.column_iter_mut().zip(shared.column_iter()) {
             // Row by row: a product of matrices would pack the whole basis for a few columns.
-            let shared = projected.shared.column(a);
-            for (place, q) in out.column_mut(a).iter_mut().zip(self.basis.column_iter()) {
+            for (place, q) in column.iter_mut().zip(self.basis.column_iter()) {
                 *place -= q.dot(&shared);
-            }
-            if let (Some(reduction), Some(back)) = (&self.reduction, &projected.given_back) {
-                let back = back.column(a);
-                for (place, q) in out.column_mut(a).iter_mut().zip(reduction.removed.column_iter()) {
-                    *place += q.dot(&back);
-                }
             }
         }
         out
+    }
+
+    /// Of a design that is a part of a whole one, the basis along the directions that are free no more, d × n.
+    pub(super) fn removed(&self) -> Option<&DMatrix<f64>> {
+        let reduction = self.reduction.as_ref()?;
+        Some(reduction.removed.get_or_init(|| product_of_transposed(&reduction.directions, &self.basis)))
     }
 
     /// Scalar rows.
@@ -475,6 +495,9 @@ impl Design {
         self.residual.len()
     }
 }
+
+/// Columns from which a product of matrices is worth packing the basis.
+const MANY: usize = 8;
 
 /// Whitened residuals of a task at `x` and its Jacobian transposed, p × n; what is no number counts as 0.
 fn linearised(task: &Calibration, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {

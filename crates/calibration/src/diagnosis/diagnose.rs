@@ -145,7 +145,7 @@ pub fn diagnose(
         Some(thin) => {
             tell("fitting all rows");
             notes.push(format!(
-                "causes were looked for in {} of the {} rows, evenly spread; the fits and their errors are of all rows",
+                "causes were looked for in {} of the {} rows, drawn at random; the fits and their errors are of all rows",
                 thin.dataset.rows.len(),
                 dataset.rows.len()
             ));
@@ -254,10 +254,11 @@ pub fn diagnose(
     let held =
         FoldErrors::of(&linear, &split::purged(&searched.observed.dataset, 5, reach, options.selection.seed));
     let aside: Vec<usize> = if thinned.is_some() { Vec::new() } else { set_aside.clone() };
+    let told = extended.clone().whole(&subject);
     let context = Context {
         subject: &searched,
         found: &found,
-        extended: &extended,
+        extended: &told,
         whole: &whole,
         held: &held,
         set_aside: &aside,
@@ -300,7 +301,12 @@ pub fn diagnose(
         rest.finding(),
     ];
     let without_causes = of_the_record.into_iter().flatten();
-    stories.extend(without_causes.map(|finding| Story { finding, picture: None, causes: Vec::new() }));
+    stories.extend(without_causes.map(|finding| Story {
+        finding,
+        picture: None,
+        causes: Vec::new(),
+        doubted: Vec::new(),
+    }));
     stories::rank(&mut stories);
     let noise = remaining::noise_model(&subject, &extended, &set_aside);
     let names: Vec<String> = found.causes.iter().map(|c| c.name().to_owned()).collect();
@@ -374,7 +380,7 @@ pub fn diagnose(
     Ok(Diagnosed {
         diagnosis,
         geometric,
-        extended,
+        extended: told,
         estimated,
         benefit,
         prepared,
@@ -420,7 +426,7 @@ fn smooth_correction(subject: &Subject<'_>, extended: &Extended) -> Extended {
 /// Scalar rows in which causes are looked for, at most.
 const SEARCHED: usize = 9_000;
 
-/// Evenly spread rows of a very long data set; `None` for one that is searched whole.
+/// Rows of a very long data set, drawn by their angles; `None` for one that is searched whole.
 fn thinned(observed: &crate::identification::fit::Observed) -> Option<crate::identification::fit::Observed> {
     let dataset = &observed.dataset;
     let per = match dataset.sensor {
@@ -428,9 +434,13 @@ fn thinned(observed: &crate::identification::fit::Observed) -> Option<crate::ide
         Sensor::Position => 3,
         Sensor::Pose => 6,
     };
-    let stride = (dataset.rows.len() * per).div_ceil(SEARCHED);
-    (stride > 1).then(|| {
-        let rows: Vec<usize> = (0..dataset.rows.len()).step_by(stride).collect();
+    let most = SEARCHED / per;
+    (dataset.rows.len() > most).then(|| {
+        // Not every so many rows: one row less would then be another choice of all that follow it.
+        let all = (0..dataset.rows.len()).map(|i| vec![i]).collect();
+        let mut rows = split::drawn(dataset, all, 0).concat();
+        rows.truncate(most);
+        rows.sort_unstable();
         observed.subset(&rows)
     })
 }

@@ -15,6 +15,8 @@ use crate::identification::fit::{Fitted, Observed, frame_parameters};
 use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::Sensor;
+use nalgebra::DMatrix;
+use truegrind_arm::effect::Effect;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::{Parameter, link_parameters};
 use truegrind_estimation::estimate::{Estimate, Evaluations, Termination};
@@ -80,14 +82,37 @@ const BEND: f64 = 2.0;
 /// by the priors, which must not be lost beside weights without bound.
 const FINEST: (f64, f64) = (1e-3, 1e-6);
 
+/// What a search leaves unsolved of a fit, in χ²/2 for each scalar row: what is linear about the fit takes it up, and merits are
+/// compared in units of χ².
+const SEARCHED: f64 = 1e-5;
+
+/// Scalar rows times squared parameters from which a last word need not be so long.
+const MUCH_WORK: f64 = 1e8;
+
+/// What is then left of the cost.
+const FINE_ENOUGH: f64 = 1e-8;
+
 /// At most this many rounds of solver and weights.
 const ROUNDS: usize = 8;
 
-/// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have.
+/// Which knots of a map a row of the data set reaches; all for another effect.
+fn reached(subject: &Subject<'_>, effect: &Effect) -> Vec<bool> {
+    let Effect::GearMap(map) = effect else { return vec![true; effect.parameters().len()] };
+    let mut out = vec![false; map.knots_rad.len()];
+    for row in subject.observed.dataset.rows.iter() {
+        let knots = map.reached((subject.nominal.joint_map * row.joints)[map.joint]);
+        knots.into_iter().for_each(|k| out[k] = true);
+    }
+    out
+}
+
+/// The start of a fit: nominal arm and frames with the causes at size 0, what is free, and the sizes that the causes have. With
+/// `seen` a knot that no row reaches is not free: it is where its prior holds it, and changes nothing about the others.
 fn start(
     subject: &Subject<'_>,
     causes: &[Cause],
     freedom: Freedom,
+    seen: bool,
 ) -> (Model, Frames, Vec<(Parameter, Option<f64>)>) {
     let (mut model, mut frames) = (subject.nominal.clone(), subject.frames.clone());
     let links = if freedom == Freedom::All { link_parameters(&model) } else { Vec::new() };
@@ -100,10 +125,12 @@ fn start(
                 let mut effect = effect.clone();
                 let index = model.effects.len();
                 let values = effect.parameters();
+                let free = if seen { reached(subject, &effect) } else { vec![true; values.len()] };
                 links.extend(
                     values
                         .iter()
                         .enumerate()
+                        .filter(|(parameter, _)| free[*parameter])
                         .map(|(parameter, p)| (Parameter::Effect { index, parameter }, Some(p.value))),
                 );
                 (0..values.len()).for_each(|k| effect.set(k, 0.0));
@@ -167,7 +194,7 @@ pub(super) fn warm_fit(
 ) -> Extended {
     let observed = subject.observed;
     let dataset = &observed.dataset;
-    let (start_model, start_frames, free) = start(subject, causes, freedom);
+    let (start_model, start_frames, free) = start(subject, causes, freedom, true);
     let mut x: Vec<f64> = free.iter().map(|p| starting(p, near)).collect();
     let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
     let priors = subject.tolerance.priors_within(&parameters, &start_model, &start_frames);
@@ -264,7 +291,8 @@ pub(super) fn warm_fit(
                 })
                 .collect();
             let task = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
-            let estimate = if nearby && newton::descend(&task, &mut x) {
+            let descended = nearby && newton::descend_to(&task, &mut x, SEARCHED);
+            let estimate = if descended {
                 Estimate {
                     covariance: None,
                     cost: task.row_cost(&x) + prior_cost(&priors, &x),
@@ -273,6 +301,10 @@ pub(super) fn warm_fit(
                     trace: Vec::new(),
                     x,
                 }
+            } else if nearby {
+                // A promise is held against the cost, half the rows: the same as above.
+                let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
+                Estimate { covariance: None, ..lm::solve(&task, &x, &loose) }
             } else {
                 lm::solve(&task, &x, &lm::Options::default())
             };
@@ -339,10 +371,39 @@ impl Extended {
         if self.estimate.covariance.is_some() {
             return self;
         }
-        let estimate = lm::solve(&self.task, &self.x, &lm::Options::default());
+        let p = self.parameters.len() as f64;
+        let much = self.task.rows() as f64 * p * p > MUCH_WORK;
+        let tolerance = if much { FINE_ENOUGH } else { lm::Options::default().cost_tolerance };
+        let options = lm::Options { cost_tolerance: tolerance, ..lm::Options::default() };
+        let estimate = lm::solve(&self.task, &self.x, &options);
         let (model, frames) = self.task.apply(&estimate.x);
         let causes = filled(&self.causes, &model, &frames);
         Self { causes, x: estimate.x.clone(), model, frames, estimate, ..self }
+    }
+
+    /// The same fit with all parameters of its causes, those that no row reaches with what their priors say of them.
+    pub(super) fn whole(self, subject: &Subject<'_>) -> Self {
+        let (model, frames, free) = start(subject, &self.causes, Freedom::All, false);
+        let parameters: Vec<Parameter> = free.into_iter().map(|p| p.0).collect();
+        if parameters.len() == self.parameters.len() {
+            return self;
+        }
+        let places: Vec<Option<usize>> =
+            parameters.iter().map(|p| self.parameters.iter().position(|q| q == p)).collect();
+        let priors = subject.tolerance.priors_within(&parameters, &model, &frames);
+        let x: Vec<f64> = places.iter().map(|k| k.map_or(0.0, |k| self.x[k])).collect();
+        let covariance = self.estimate.covariance.as_ref().map(|own| {
+            DMatrix::from_fn(places.len(), places.len(), |a, b| match (places[a], places[b]) {
+                (Some(i), Some(j)) => own[(i, j)],
+                (None, None) if a == b => priors[a].sigma.powi(2),
+                _ => 0.0,
+            })
+        });
+        let weights = with_robust_weights(&self.weights, &self.robust_weight);
+        let dataset = &subject.observed.dataset;
+        let task = Calibration::new(dataset, &model, &frames, &parameters, &priors, &weights);
+        let estimate = Estimate { x: x.clone(), covariance, ..self.estimate };
+        Self { parameters, priors, task, x, estimate, ..self }
     }
 
     /// Places in x of the parameters of cause `index`.

@@ -5,9 +5,6 @@
 //! Source: complementary pairs of halves, Shah and Samworth 2013; halves on two sides of a variable, Peters et al. 2016.
 
 use nalgebra::{DMatrix, DVector};
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 
 use super::algebra::eigen;
 use crate::measurement::dataset::Dataset;
@@ -29,8 +26,11 @@ pub fn halves(dataset: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let n = dataset.rows.len();
     let path = is_path(dataset);
     for pair in 0..HALVES as u64 / 2 - 1 {
-        let sides =
-            if path { alternate(&poses, n, pair as usize) } else { random(&poses, seed.wrapping_add(pair)) };
+        let sides = if path {
+            alternate(&poses, n, pair as usize)
+        } else {
+            random(dataset, &poses, seed.wrapping_add(pair))
+        };
         out.extend(both(&poses, &sides));
     }
     out.extend(both(&poses, &sides_of_joint_space(dataset, &poses)));
@@ -60,14 +60,11 @@ fn both(poses: &[Vec<usize>], first: &[bool]) -> [Vec<usize>; 2] {
     })
 }
 
-fn random(poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut order: Vec<usize> = (0..poses.len()).collect();
-    for i in (1..order.len()).rev() {
-        order.swap(i, rng.random_range(0..=i));
-    }
+/// Half of the poses, drawn from the poses themselves: another row changes nothing about the others.
+fn random(dataset: &Dataset, poses: &[Vec<usize>], seed: u64) -> Vec<bool> {
     let mut side = vec![false; poses.len()];
-    order.iter().take(poses.len() / 2).for_each(|&p| side[p] = true);
+    let drawn = split::drawn(dataset, (0..poses.len()).map(|p| vec![poses[p][0], p]).collect(), seed);
+    drawn.iter().take(poses.len() / 2).for_each(|pose| side[pose[1]] = true);
     side
 }
 

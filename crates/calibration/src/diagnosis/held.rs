@@ -78,12 +78,13 @@ impl<'a> FoldErrors<'a> {
         let gradient = if dropped.is_empty() {
             linear.gradient.clone()
         } else {
-            let whole = &linear.rows * &residual;
+            let pulled = &linear.rows * &residual;
             DVector::from_iterator(
                 kept.len(),
-                kept.iter().map(|&k| whole[k] + linear.precision[k] * linear.x[k]),
+                kept.iter().map(|&k| pulled[k] + linear.precision[k] * linear.x[k]),
             )
         };
+        let whole = linear.normal();
         let solved = self
             .folds
             .par_iter()
@@ -93,7 +94,7 @@ impl<'a> FoldErrors<'a> {
                 let mut normal = DMatrix::zeros(p, p);
                 for (b, &to) in kept.iter().enumerate() {
                     for (a, &from) in kept.iter().enumerate().skip(b) {
-                        normal[(a, b)] = linear.normal[(from, to)] - fold.square[(from, to)];
+                        normal[(a, b)] = whole[(from, to)] - fold.square[(from, to)];
                     }
                     normal[(b, b)] *= 1.0 + 1e-12;
                 }

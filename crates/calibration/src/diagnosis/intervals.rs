@@ -205,8 +205,7 @@ impl<'a> Sums<'a> {
                 gradient[(i + 1) * k + a] = gradient[i * k + a] + g;
             }
         }
-        let given_back =
-            design.reduction.as_ref().map(|r| sums_at(&strip.cuts, &strip.scaled, &r.removed, per));
+        let given_back = design.removed().map(|removed| sums_at(&strip.cuts, &strip.scaled, removed, per));
         let products = match &given_back {
             Some(back) => Cow::Owned(&strip.products - gram(back)),
             None => Cow::Borrowed(&strip.products),
@@ -257,7 +256,7 @@ impl<'a> Sums<'a> {
             return g * g / (s + 1.0) - (1.0 + s).ln();
         }
         // S + I = L Lᵀ and L y = g on the stack: the gain is yᵀy.
-        let (mut l, mut y, mut log_det) = ([0.0; MOST * MOST], [0.0; MOST], 0.0);
+        let (mut l, mut y, mut det) = ([0.0; MOST * MOST], [0.0; MOST], 1.0);
         for a in 0..k {
             for b in 0..=a {
                 let mut sum = square(a, b) + f64::from(u8::from(a == b));
@@ -268,7 +267,7 @@ impl<'a> Sums<'a> {
                     if !(sum > 0.0) {
                         return f64::NEG_INFINITY;
                     }
-                    log_det += sum.ln();
+                    det *= sum;
                     l[a * MOST + a] = sum.sqrt();
                 } else {
                     l[a * MOST + b] = sum / l[b * MOST + b];
@@ -280,7 +279,7 @@ impl<'a> Sums<'a> {
             }
             y[a] = sum / l[a * MOST + a];
         }
-        dot(&y, &y) - log_det
+        dot(&y, &y) - det.ln()
     }
 
     /// Prefix sums at any observation, kept in `known`.
@@ -297,8 +296,8 @@ impl<'a> Sums<'a> {
             let (shared, back) = sum.split_at_mut(self.strip.k * self.strip.shared.nrows());
             for row in at..i {
                 add_products(&self.strip.scaled, &self.design.basis, self.design.per, row, shared);
-                if let Some(reduction) = &self.design.reduction {
-                    add_products(&self.strip.scaled, &reduction.removed, self.design.per, row, back);
+                if let Some(removed) = self.design.removed() {
+                    add_products(&self.strip.scaled, removed, self.design.per, row, back);
                 }
             }
             known.insert(i, sum);

@@ -7,7 +7,7 @@
 //! **Shapes.** x, m and g have p entries, N is p × p; priors are the task's own.
 //!
 //! **Stops.** Where a step promises less than 10⁻⁷ for each scalar row, in units of χ²/2, or where the fall from the step before
-//! to this one, to a twentieth at most, says so of the next. Not at all where no length lowers the cost, or after eight
+//! to this one, to a twentieth at most, says so of all that would follow. Not at all where no length lowers the cost, or after eight
 //! steps: the caller then goes on with Levenberg and Marquardt.
 //!
 //! **Source and departures.** Nocedal and Wright, *Numerical Optimization*, 2nd ed., §10.3. Other than
@@ -31,6 +31,9 @@ const STEPS: usize = 8;
 /// Promises are not counted on to fall below this share from step to step: with residuals that remain, Gauss and Newton
 /// converge linearly.
 const STEADY: f64 = 0.05;
+
+/// They are counted on to fall by a twentieth.
+const SLOW: f64 = 0.95;
 
 /// A cost may rise by this share, which is rounding.
 const ROUNDING: f64 = 1e-10;
@@ -79,13 +82,18 @@ impl Step {
 
 /// Moves `x` to the optimum; `false` where that did not come about.
 pub fn descend(task: &dyn Problem, x: &mut Vec<f64>) -> bool {
-    let enough = NEAR * task.rows() as f64;
+    descend_to(task, x, NEAR)
+}
+
+/// The same up to a promise of `near` for each scalar row.
+pub(super) fn descend_to(task: &dyn Problem, x: &mut Vec<f64>, near: f64) -> bool {
+    let enough = near * task.rows() as f64;
     let mut last = f64::MIN_POSITIVE;
     for _ in 0..STEPS {
         let Some(step) = Step::taken(task, x) else { return false };
-        // What the next step would promise, as far as the steps before this one tell.
-        let share = if step.length < 1.0 { 1.0 } else { (step.promise / last).clamp(STEADY, 1.0) };
-        if step.promise < enough || share * step.promise < enough {
+        // What all further steps would promise, as far as the steps before this one tell.
+        let share = if step.length < 1.0 { SLOW } else { (step.promise / last).clamp(STEADY, SLOW) };
+        if step.promise < enough || share / (1.0 - share) * step.promise < enough {
             return true;
         }
         last = step.promise;

@@ -19,6 +19,8 @@ pub(super) struct Story {
     pub(super) picture: Option<Picture>,
     /// Places of its causes in the fit.
     pub(super) causes: Vec<usize>,
+    /// Those of them that are in doubt, where others are told with them.
+    pub(super) doubted: Vec<usize>,
 }
 
 /// Shifts from which on they are one story.
@@ -26,6 +28,12 @@ const MANY_SHIFTS: usize = 3;
 
 /// Share of the error of geometry alone below which a finding is a small disturbance.
 const SMALL: f64 = 0.02;
+
+/// Stories with a cause that are told, where that many are not in doubt or worth much.
+const MOST_TOLD: usize = 9;
+
+/// Share of that error from which a finding is told whatever the doubt.
+const LITTLE: f64 = 0.1;
 
 /// Stories of findings that have causes in the fit, in the order of `findings`.
 pub(super) fn of(findings: Vec<Finding>, finding_of_cause: &[usize], pictures: Vec<Picture>) -> Vec<Story> {
@@ -37,6 +45,7 @@ pub(super) fn of(findings: Vec<Finding>, finding_of_cause: &[usize], pictures: V
             finding,
             picture: Some(picture),
             causes: (0..finding_of_cause.len()).filter(|&k| finding_of_cause[k] == place).collect(),
+            doubted: Vec::new(),
         })
         .collect()
 }
@@ -77,10 +86,32 @@ pub(super) fn told(
         });
     }
     let small = |s: &Story| s.finding.worth_mm.is_some_and(|w| w < SMALL * geometric_mm);
-    if stories.iter().any(small) {
-        merge(&mut stories, small, worth, small_disturbances);
+    let crowd = crowd(&stories, small, LITTLE * geometric_mm);
+    let of_crowd = |s: &Story| s.causes.first().is_some_and(|k| crowd.contains(k));
+    if stories.iter().any(|s| small(s) || of_crowd(s)) {
+        let crowded = !crowd.is_empty();
+        let told = |members: &[Story], mm: f64| small_disturbances(members, mm, crowded);
+        merge(&mut stories, |s| small(s) || of_crowd(s), worth, told);
+        let told = stories.iter_mut().find(|s| s.finding.effect == SMALL_DISTURBANCES);
+        told.into_iter().for_each(|s| s.doubted = crowd.clone());
     }
     stories
+}
+
+/// Causes whose stories are in doubt and worth less than `little_mm`, least first, as many as are beyond what a person reads at
+/// once.
+fn crowd(stories: &[Story], small: impl Fn(&Story) -> bool, little_mm: f64) -> Vec<usize> {
+    let worth = |s: &Story| s.finding.worth_mm.unwrap_or(f64::INFINITY);
+    let told: Vec<&Story> = stories.iter().filter(|s| !small(s)).collect();
+    if told.len() <= MOST_TOLD {
+        return Vec::new();
+    }
+    let doubted = |s: &&&Story| s.finding.confidence == Confidence::Ambiguous && worth(s) < little_mm;
+    let mut least: Vec<&&Story> = told.iter().filter(doubted).collect();
+    least.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
+    // One line more tells of all of them.
+    let beyond = told.len() + 1 - MOST_TOLD;
+    least.into_iter().take(beyond).flat_map(|s| s.causes.iter().copied()).collect()
 }
 
 /// Of each cause whether it is certain enough to move programs.
@@ -91,6 +122,7 @@ pub(super) fn certain(stories: &[Story], confirmations: &[Confirmation]) -> Vec<
             story.causes.iter().for_each(|&k| out[k] = false);
         }
     }
+    stories.iter().flat_map(|s| &s.doubted).for_each(|&k| out[k] = false);
     out
 }
 
@@ -117,7 +149,7 @@ fn merge(
     let size = |s: &Story| s.finding.worth_mm.unwrap_or(0.0);
     let largest = members.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
     let picture = largest.and_then(|s| s.picture);
-    others.insert(first.min(others.len()), Story { finding, picture, causes });
+    others.insert(first.min(others.len()), Story { finding, picture, causes, doubted: Vec::new() });
     *stories = others;
 }
 
@@ -174,7 +206,8 @@ fn set_up_changed(members: &[Story], worth_mm: f64, steps: bool, smooth: bool) -
     }
 }
 
-fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
+fn small_disturbances(members: &[Story], worth_mm: f64, crowded: bool) -> Finding {
+    let doubted = format!(", or less than {:.0} % and in doubt", 100.0 * LITTLE);
     Finding {
         effect: SMALL_DISTURBANCES.to_owned(),
         cause: format!(
@@ -188,8 +221,9 @@ fn small_disturbances(members: &[Story], worth_mm: f64) -> Finding {
         joints: None,
         parameters: Vec::new(),
         evidence: format!(
-            "each is worth less than {:.0} % of the error that geometry alone leaves",
-            100.0 * SMALL
+            "each is worth less than {:.0} % of the error that geometry alone leaves{}",
+            100.0 * SMALL,
+            if crowded { doubted.as_str() } else { "" }
         ),
         p_value: members.iter().map(|s| s.finding.p_value).fold(1.0, f64::min),
         non_centrality: None,

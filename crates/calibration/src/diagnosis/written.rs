@@ -33,14 +33,17 @@ pub(super) fn written(
         })
         .map(|(_, cause)| cause.clone())
         .collect();
-    let wandered = discrepancy.filter(|d| d.in_time());
+    // Readings that resemble those before them may do so for what the model gets wrong along the way: freed of that, the rows
+    // would say little of the arm's lengths.
+    let wandered = discrepancy.filter(|d| d.in_time() && d.correlation == 0.0);
     let kept =
         if kept.len() == extended.causes.len() { extended.clone() } else { refit(subject, &kept, extended) };
     let wide = subject.tolerance;
     let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
     let tolerance = learned(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
-    wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held)
+    let written = wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held);
+    written.whole(&Subject { tolerance: &tolerance, ..*subject })
 }
 
 fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
@@ -51,10 +54,7 @@ fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
 fn beside(subject: &Subject<'_>, fit: &Extended, wandered: &Discrepancy) -> Option<Extended> {
     let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
     let linear = Linear::of(subject, fit);
-    let whole = linear
-        .beside(&wandered.in_time_columns())
-        .filtered(wandered.correlation, &numbers, wandered.noise)
-        .whole();
+    let whole = linear.beside(&wandered.in_time_columns()).filtered(0.0, &numbers, wandered.noise).whole();
     let (x, covariance) = whole.estimate(fit.x.len());
     if !x.iter().all(|v| v.is_finite()) {
         return None;

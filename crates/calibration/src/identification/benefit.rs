@@ -20,6 +20,9 @@
 //! them. Evidence of linear models with normal priors as in any text (Bishop 2006, section 3.5).
 //! Checked against: simulated arms at fresh poses (tests, and the sweep in `benches/verdict.rs`).
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::{MatMut, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -372,10 +375,26 @@ fn factored(matrix: &DMatrix<f64>) -> Option<(Scaled, f64)> {
         return None;
     }
     let unit = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * size[i] * size[j]);
-    let factor = Cholesky::new(unit)?;
+    let factor = if unit.nrows() > MANY { of_many(unit)? } else { Cholesky::new(unit)? };
     let determinant: f64 = factor.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum();
     let scaling: f64 = size.iter().map(|s| 2.0 * s.ln()).sum();
     Some((Scaled { factor, size }, determinant - scaling))
+}
+
+/// AᵀA, of many columns in blocks.
+fn squared(a: &DMatrix<f64>) -> DMatrix<f64> {
+    if a.ncols() > MANY { a.transpose() * a } else { a.tr_mul(a) }
+}
+
+/// The factor of a large matrix, in blocks.
+fn of_many(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let n = matrix.nrows();
+    let request = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(request);
+    let place = MatMut::from_column_major_slice_mut(matrix.as_mut_slice(), n, n);
+    let stack = MemStack::new(&mut memory);
+    llt::factor::cholesky_in_place(place, Default::default(), Par::Seq, stack, Default::default()).ok()?;
+    Some(Cholesky::pack_dirty(matrix))
 }
 
 struct Scaled {
@@ -461,7 +480,7 @@ fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
         }
         let jacobian = DMatrix::from_vec(n, all, jacobian);
         let met = jacobian.columns(0, p) * DVector::from_column_slice(x) - DVector::from_vec(residuals);
-        out.matrix += jacobian.tr_mul(&jacobian);
+        out.matrix += squared(&jacobian);
         out.right += jacobian.tr_mul(&met);
         out.square += met.norm_squared();
         out.count += n;
@@ -530,7 +549,7 @@ fn moved(fitted: &Fitted, estimated: &Estimated) -> Option<DMatrix<f64>> {
         &arm - &basis * basis.tr_mul(&arm)
     };
     let mut out = DMatrix::zeros(fitted.parameters.len(), fitted.parameters.len());
-    let square = apart.tr_mul(&apart) / poses.len().max(1) as f64;
+    let square = squared(&apart) / poses.len().max(1) as f64;
     for (i, &a) in places.iter().enumerate() {
         for (j, &b) in places.iter().enumerate() {
             out[(a, b)] = square[(i, j)];

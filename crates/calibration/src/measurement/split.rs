@@ -133,18 +133,54 @@ pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
 }
 
 /// k-fold cross-validation over random poses: k splits whose test rows cover every row once. `folds` above the number
-/// of poses is that number.
+/// of poses is that number. Chance is drawn from the poses themselves, not from their places: a row more or less, or another order of
+/// the rows, leaves nearly all others where they were.
 pub fn folds(data: &Dataset, folds: usize, seed: u64) -> Vec<Split> {
-    let poses = shuffled(poses(data), seed);
+    let poses = drawn(data, poses(data), seed);
     let k = folds.clamp(1, poses.len().max(1));
-    let mut test: Vec<Vec<usize>> = vec![Vec::new(); k];
-    for pose in poses {
-        // The smallest fold next: repetitions are shared out evenly too.
-        if let Some(fold) = test.iter_mut().min_by_key(|fold| fold.len()) {
-            fold.extend(pose);
-        }
+    complements(data.rows.len(), shared_out(poses, k))
+}
+
+/// Groups in an order that only their own angles and the seed determine.
+pub(crate) fn drawn(data: &Dataset, groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
+    /// Step to which angles are rounded first (rad), so that their last digits decide nothing.
+    const STEP_RAD: f64 = 1e-3;
+    let key = |group: &Vec<usize>| {
+        let steps = data.rows[group[0]].joints.iter().map(|q| (q / STEP_RAD).round() as i64 as u64);
+        steps.fold(mixed(seed, 0), mixed)
+    };
+    in_order_of(groups, key)
+}
+
+/// Groups in the order of their keys; equal ones as they were.
+fn in_order_of<T>(groups: Vec<T>, key: impl Fn(&T) -> u64) -> Vec<T> {
+    let mut keyed: Vec<(u64, T)> = groups.into_iter().map(|group| (key(&group), group)).collect();
+    keyed.sort_by_key(|(key, _)| *key);
+    keyed.into_iter().map(|(_, group)| group).collect()
+}
+
+/// The next of a series of numbers that look random: SplitMix64, Steele, Lea and Flood 2014.
+fn mixed(state: u64, value: u64) -> u64 {
+    let mut z = (state ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Groups in k parts of nearly as many rows, each of groups that follow each other; none is empty where there are k groups.
+fn shared_out(groups: Vec<Vec<usize>>, k: usize) -> Vec<Vec<usize>> {
+    let (count, rows) = (groups.len(), groups.iter().map(Vec::len).sum::<usize>().max(1));
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); k];
+    let (mut part, mut before) = (0, 0);
+    for (i, group) in groups.into_iter().enumerate() {
+        // The part of its middle row; the next one at most, and so early that as many groups are left as parts.
+        let wanted = (2 * before + group.len()) * k / (2 * rows);
+        let next = part + usize::from(!parts[part].is_empty());
+        part = wanted.clamp(part, next.min(k - 1)).max((k + i).saturating_sub(count).min(next));
+        before += group.len();
+        parts[part].extend(group);
     }
-    complements(data.rows.len(), test)
+    parts
 }
 
 /// Folds of rows that resemble those before and after them: stretches of rows, shared out at random over `folds` folds, and
@@ -163,14 +199,11 @@ pub fn purged(data: &Dataset, folds: usize, reach: usize, seed: u64) -> Vec<Spli
     }
     let stretches: Vec<Vec<usize>> =
         (0..n.div_ceil(stretch)).map(|b| (b * stretch..n.min((b + 1) * stretch)).collect()).collect();
-    let mut test: Vec<Vec<usize>> = vec![Vec::new(); k];
-    for rows in shuffled(stretches, seed) {
-        if let Some(fold) = test.iter_mut().min_by_key(|fold| fold.len()) {
-            fold.extend(rows);
-        }
-    }
+    let order = in_order_of((0..stretches.len()).collect(), |b| mixed(mixed(seed, 0), *b as u64));
+    let stretches = order.into_iter().map(|b| stretches[b].clone()).collect();
     let pose_of = pose_of_rows(data);
-    test.into_iter()
+    shared_out(stretches, k)
+        .into_iter()
         .map(|mut test| {
             test.sort_unstable();
             let mut near = vec![false; n];

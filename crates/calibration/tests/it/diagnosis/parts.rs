@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::effect::map::JointMap;
+use truegrind_arm::parameter::Parameter;
 use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::catalogue::Candidate;
 use truegrind_calibration::diagnosis::cause::Cause;
@@ -186,6 +189,31 @@ fn a_refit_by_one_step_is_a_refit() {
             // Regressors are taken at the nominal arm.
             assert!((back / whole - 1.0).abs() < 1e-3, "{cause:?}: {back} against {whole}");
         }
+    });
+}
+
+/// What no row reaches is no work: a map of a joint that moved through a part of its turn has as many free knots as the rows
+/// reach, and its fit is that of all of them, since the others stay where their priors hold them.
+#[test]
+fn knots_that_no_row_reaches_are_not_searched_for_and_change_nothing() {
+    fitted(90, |subject, fitted| {
+        let map = JointMap { joint: 1, knots_rad: vec![0.0; 72] };
+        let angles =
+            || subject.observed.dataset.rows.iter().map(|row| (subject.nominal.joint_map * row.joints)[1]);
+        let mut seen: Vec<usize> = angles().flat_map(|u| map.reached(u)).collect();
+        seen.sort_unstable();
+        seen.dedup();
+        let causes = [Cause::Arm(Effect::GearMap(map))];
+        let found = fit(subject, &causes, Freedom::All, Some(fitted));
+        assert!(seen.len() < 72, "all {} knots are reached", seen.len());
+        let free = found.places(0).into_iter().map(|k| match found.parameters[k] {
+            Parameter::Effect { parameter, .. } => parameter,
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(free.collect::<Vec<_>>(), seen);
+        let Cause::Arm(Effect::GearMap(map)) = &found.causes[0] else { panic!("{:?}", found.causes) };
+        assert_eq!(map.knots_rad.len(), 72);
+        assert!((0..72).all(|k| seen.contains(&k) || map.knots_rad[k] == 0.0));
     });
 }
 

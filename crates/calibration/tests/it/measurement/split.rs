@@ -49,6 +49,33 @@ fn folds_cover_every_row_once() {
     assert_eq!(split::folds(&data, 1000, 1).len(), 100, "no more folds than poses");
 }
 
+/// What belongs together in two splits of the same rows, one of which was left out of the second.
+fn moved(before: &[Split], after: &[Split], gone: usize) -> usize {
+    let same = |i: usize| i - usize::from(i > gone);
+    let held = |folds: &[Split], i: usize| folds.iter().position(|fold| fold.test.contains(&i));
+    (0..200).filter(|&i| i != gone && held(before, i) != held(after, same(i))).count()
+}
+
+/// Chance that hangs on the number or the order of the rows gives another split, and so other findings, for one row more or
+/// less. It is drawn from what a row holds.
+#[test]
+fn folds_hardly_change_where_a_row_is_left_out_and_not_at_all_where_angles_lose_their_last_digits() {
+    let data = repeated();
+    for split in [|data: &Dataset| split::folds(data, 5, 1), |data: &Dataset| split::purged(data, 5, 3, 1)] {
+        let whole = split(&data);
+        for gone in [0, 57, 120, 199] {
+            let rest: Vec<usize> = (0..200).filter(|&i| i != gone).collect();
+            let moved = moved(&whole, &split(&data.subset(&rest)), gone);
+            assert!(moved <= 40, "without row {gone} {moved} of 199 rows are held out in another fold");
+        }
+        let mut rounded = data.clone();
+        for row in rounded.rows.iter_mut() {
+            row.joints = row.joints.map(|q| (q * 1e8).round() * 1e-8);
+        }
+        assert_eq!(whole, split(&rounded));
+    }
+}
+
 #[test]
 fn blocks_leave_repetitions_of_their_poses_out_of_the_fit() {
     let data = repeated();
