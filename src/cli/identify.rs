@@ -262,12 +262,21 @@ fn options(arguments: &Arguments, limits: Limits) -> anyhow::Result<Options> {
 
 /// Reads robot and measurements, and checks that their units fit each other.
 pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)> {
-    read_bytes(arguments, &files::read(&arguments.data)?)
+    // A robot that there is not is told before measurements that there are not.
+    let robot = inputs::robot(&arguments.robot)?;
+    let bytes = files::read(&arguments.data)?;
+    let dataset = measured(arguments, &robot, &bytes)?;
+    Ok((robot, dataset))
 }
 
 /// The same of measurements whose bytes are there.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(&arguments.robot)?;
+    let dataset = measured(arguments, &robot, bytes)?;
+    Ok((robot, dataset))
+}
+
+fn measured(arguments: &DataArguments, robot: &Robot, bytes: &[u8]) -> anyhow::Result<Dataset> {
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
     let name = files::name(&arguments.data);
@@ -284,7 +293,7 @@ pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Res
             Mismatch::Units(_) => anyhow!("{mismatch} (--allow-odd-units takes the file at its word)"),
             _ => anyhow!("{mismatch}"),
         })?;
-    Ok((robot, dataset))
+    Ok(dataset)
 }
 
 /// The rows to fit and to hold out; repeated poses stay together.

@@ -30,7 +30,7 @@ pub struct StageError {
 }
 
 /// Scalar rows times squared parameters from which a fold is refitted by one step.
-const MUCH_WORK: f64 = 2e8;
+const MUCH_WORK: f64 = 1e9;
 
 /// How a stage is held out.
 #[derive(Debug, Clone)]
