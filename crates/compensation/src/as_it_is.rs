@@ -37,7 +37,7 @@ pub(super) struct Start {
     pub(super) meant: Pose,
     pub(super) joints: Joints,
     pub(super) conf: Configuration,
-    /// [`Solved::margins`] before.
+    /// [`Solved::margins`](super::solved::Solved::margins) before.
     pub(super) margins: [f64; 3],
     pub(super) guess: Guess,
 }

@@ -36,7 +36,7 @@ pub struct Plan {
     pub changes: Vec<Change>,
     /// One entry for each motion of the listing.
     pub outcomes: Vec<MotionOutcome>,
-    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`].
+    /// The ends of all motions that have a pose, in order; empty unless [`Options::points`](super::options::Options::points).
     pub points: Vec<PathPoint>,
     /// What was assumed of tools and work objects.
     pub notes: Vec<String>,

@@ -228,7 +228,7 @@ impl<'s> Follower<'_, 's> {
                 self.say_again(motion, written);
             }
             let file = motion.place.file as usize;
-            self.pass(&task.trees[file], task.dialects[file], written);
+            self.pass(&task.trees[file], task.dialects[file], written, motion.conditional);
             return Outcome::Unchanged;
         };
         let start: [Option<f64>; 3] =

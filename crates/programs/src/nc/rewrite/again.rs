@@ -128,15 +128,22 @@ impl<'s> Follower<'_, 's> {
         self.now.vector = conditional.then_some(([f64::NAN; 3], f64::NAN));
     }
 
-    /// After a motion that stays as it is written: its words say again what the original says, the others hold on.
-    pub(super) fn pass(&mut self, tree: &NcTree<'s>, dialect: Dialect, written: &Written) {
+    /// After a motion that stays as it is written: its words say again what the original says, the others hold on. Where the block
+    /// may be skipped, what it states may be either: it is said again by whatever comes next.
+    pub(super) fn pass(&mut self, tree: &NcTree<'s>, dialect: Dialect, written: &Written, conditional: bool) {
         let slots = slots(tree, dialect, written);
         for axis in 0..3 {
             if slots.axes[axis].is_some() {
-                (self.now.position[axis], self.now.meant[axis]) = (None, None);
+                match (self.now.position[axis], self.now.meant[axis]) {
+                    (Some(now), Some(meant)) if conditional && now != meant => {
+                        self.now.position[axis] = Some(f64::NAN);
+                    }
+                    _ => (self.now.position[axis], self.now.meant[axis]) = (None, None),
+                }
             }
             if slots.angles[axis].is_some() {
-                self.now.angles[axis] = None;
+                let moved = self.now.angles[axis].is_some_and(|now| Some(now) != written.start_angles[axis]);
+                self.now.angles[axis] = (conditional && moved).then_some(f64::NAN);
             }
         }
         if slots.vector.iter().any(Option::is_some) {

@@ -79,6 +79,16 @@ fn words_that_such_a_path_leaves_out_hold_what_they_held() {
     );
 }
 
+/// The class: a block that may be skipped states an axis, and the place before it has moved. What comes next says it again, so
+/// that an origin that is set there, or a motion that leaves the axis out, is where it always was.
+#[test]
+fn what_a_block_states_that_may_be_skipped_is_said_again() {
+    let text = rewritten(LinuxCnc, "X10\n/X10\nY5\nG5.1 X30 Y15 I2 J3");
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].starts_with("X10.5000") && lines[1].starts_with("/X10"), "{text}");
+    assert!(lines[2].contains("X10.0000"), "{text}");
+}
+
 #[test]
 fn a_cycle_runs_where_it_always_ran() {
     assert_eq!(rewritten(Heidenhain, "L X+4 M99\nL IX+2 M99"), "L X+4 Y+2.0000 Z+3.0000 M99\nL IX+2 M99\n");
