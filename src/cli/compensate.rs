@@ -310,7 +310,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.shares.on() && arguments.output.as_deref() == Some(Path::new("-")) {
         bail!("-o -: the standard output takes one program, a shared run is of several: name a folder");
     }
-    witness::begin();
+    if arguments.shares.on() {
+        witness::begin();
+    }
     for (value, name) in
         [(arguments.tolerance, "--tolerance"), (arguments.max_correction, "--max-correction")]
     {

@@ -100,7 +100,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if arguments.shares.on() && arguments.outputs.rrd.is_some() {
         bail!("--rrd shows the programs of one job: leave the options of several jobs out");
     }
-    witness::begin();
+    if arguments.shares.on() {
+        witness::begin();
+    }
     let runners = runners(arguments)?;
     let first = runners.first().ok_or_else(|| anyhow!("--model names no arm"))?;
     let (cell, surface, condition) = arguments.cell.read(first.knowledge.as_deref())?;

@@ -58,7 +58,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let all: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
     Batch::check(&all, &arguments.outputs.files())?;
     let options = options(arguments)?;
-    witness::begin();
+    if arguments.shares.on() {
+        witness::begin();
+    }
     inputs::robot(&arguments.data.robot)?;
     let shared = witness::end();
     let store = if arguments.shares.on() {

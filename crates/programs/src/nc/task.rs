@@ -16,18 +16,19 @@ mod m_words;
 mod motion;
 mod names;
 mod once;
+mod said;
 mod shift;
 mod survey;
 mod tools;
 mod words;
+mod written;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc as Shared;
 
-use super::arc::Arc;
 use super::dialect::Dialect;
 use super::expression::{LARGEST, Variable, literal};
-use super::machine::{Group, Meaning, Mode, State, Turn};
+use super::machine::{Group, Meaning, Mode, State};
 use super::mark;
 use super::orientation::Angles;
 use super::parser::parse;
@@ -38,6 +39,8 @@ use crate::motion::{
     Frame, Listing, Misstated, Motion, MotionKind, OpaqueReason, OpaqueRegion, Place, Reason, Tool,
 };
 use found::Found;
+use said::Said;
+pub(super) use written::{Event, Needs, Written};
 
 /// NC files, read together: each runs on its own, the setup holds for all.
 #[derive(Debug)]
@@ -56,91 +59,6 @@ pub struct Task<'s> {
     pub(super) events: Vec<Event>,
     /// How each motion is written; by motion.
     pub(super) written: Vec<Written>,
-}
-
-/// What a rewrite must know of the order of blocks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Event {
-    /// A file begins.
-    Start,
-    /// A motion of the listing.
-    Motion(u32),
-    /// These axes are not known from here on: bits 0 to 2 X Y Z, 3 to 5 A B C.
-    Lost(u8),
-    /// Position and orientation are not known from here on.
-    Unknown,
-    /// The place where the tool stands gets these values (G92); of the axes that are named some may not be known.
-    Shift {
-        /// The values (mm), where value and place are known.
-        stated: [Option<f64>; 3],
-        /// The axes that are named.
-        named: [bool; 3],
-    },
-    /// The shift of these axes ends, or is said whole: wherever the tool stands.
-    Placed([bool; 3]),
-    /// The same in a block that may be skipped.
-    MaybePlaced([bool; 3]),
-    /// A shift that was kept holds again (G92.3).
-    Restored,
-    /// As [`Event::Unknown`], at a place that can be reached from elsewhere, or from which another place can.
-    Join,
-    /// Another place of the file can be reached from here.
-    Jump,
-    /// Something that stays counts from where the tool stands in these axes (bits as for [`Event::Lost`]): an origin is set by a
-    /// word that is not followed, or a position is read.
-    Held {
-        /// The axes.
-        axes: u8,
-        /// Whether a position is read, and no origin set.
-        read: bool,
-    },
-}
-
-/// How a motion is written.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Written {
-    /// Its block.
-    pub(super) node: u32,
-    pub(super) absolute: bool,
-    pub(super) unit_mm: f64,
-    /// Whether it is not known that `absolute` holds: ways meet before it.
-    pub(super) counting_open: bool,
-    /// Where it starts (mm, shifts included), as far as known.
-    pub(super) start: [Option<f64>; 3],
-    /// A, B, C (or A2, B2, C2) before it.
-    pub(super) start_angles: [Option<f64>; 3],
-    /// The same after it.
-    pub(super) angles: [Option<f64>; 3],
-    /// The tool vector and the turn about it before it.
-    pub(super) start_vector: Option<([f64; 3], f64)>,
-    /// The same after it.
-    pub(super) vector: Option<([f64; 3], f64)>,
-    pub(super) shift: [Option<f64>; 3],
-    pub(super) turn: Turn,
-    pub(super) vector_words: bool,
-    /// The arc, with whether it turns positively and whether its centre is absolute.
-    pub(super) arc: Option<(Arc, bool, bool)>,
-    /// Whether a block may stand before it.
-    pub(super) insertable: bool,
-    /// Whether words that it leaves out can be said again though it stays.
-    pub(super) restates: bool,
-    /// Whether a word of it may say nothing, because its variable may never have been set (Fanuc).
-    pub(super) may_lack: bool,
-    /// Whether it is a positioning block of Heidenhain without L.
-    pub(super) paraxial: bool,
-    /// What its way hangs on where it stays as it is.
-    pub(super) needs: Needs,
-}
-
-/// What the way of a motion that stays hangs on, beside its own words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Needs {
-    /// Nothing: a straight one only begins elsewhere.
-    Nothing,
-    /// Where it starts.
-    Start,
-    /// Where it starts, and in which direction the motion before comes there.
-    Tangent,
 }
 
 impl Task<'_> {
@@ -258,62 +176,6 @@ pub(super) struct Lister<'t, 's> {
 
 /// How long the lists were before a file.
 struct Lengths([usize; 7]);
-
-/// What a block says, word by word.
-#[derive(Default)]
-struct Said<'s> {
-    node: u32,
-    words: Vec<Word<'s>>,
-    axes: [Option<usize>; 3],
-    abc: [Option<usize>; 3],
-    rpy: [Option<usize>; 3],
-    vector: [Option<usize>; 3],
-    centre: [Option<usize>; 3],
-    spin: Option<usize>,
-    radius: Option<usize>,
-    g: Vec<u32>,
-    m: Vec<u32>,
-    p: Option<usize>,
-    l: Option<usize>,
-    q: Option<usize>,
-    feed: Option<usize>,
-    h: Option<usize>,
-    d: Option<usize>,
-    /// U, V, W, E: axes that are not followed.
-    others: bool,
-    /// R0 (false), RL, RR, R+ and R- of Heidenhain.
-    compensates: Option<bool>,
-    /// R+ and R-: the axes of the block go by the tool's radius farther or less far.
-    lengthens: bool,
-    /// NX, NY, NZ: the surface normal.
-    normal: bool,
-    /// LN: the block in which a tool vector may stand.
-    spatial: bool,
-    /// Why the block is left though it moves as its words say: measuring, poles, angles of a contour.
-    aside: Option<Reason>,
-    /// A word that is not known: what it is, and why.
-    unknown: Option<(String, Reason)>,
-    /// A positioning block without L.
-    paraxial: bool,
-    opaque: bool,
-    /// The opaque part may hold more than axes.
-    obscure: bool,
-    skippable: bool,
-    /// G53, SUPA, M91.
-    machine: bool,
-    /// FMAX.
-    rapid: bool,
-    turns: bool,
-    /// Corners that are rounded or cut: `,R5`, `,C2`, RND=, CHF=, CHR=.
-    corner: bool,
-}
-
-impl Said<'_> {
-    fn moves(&self) -> bool {
-        let any = |list: &[Option<usize>]| list.iter().any(Option::is_some);
-        any(&self.axes) || any(&self.abc) || any(&self.rpy) || any(&self.vector) || self.spin.is_some()
-    }
-}
 
 impl<'t, 's> Lister<'t, 's> {
     fn new(tree: &'t NcTree<'s>, file: u32, dialect: Dialect, setup: &'t Setup) -> Self {

@@ -50,6 +50,10 @@ fn the_arm_with_most_to_gain_comes_first() {
     assert!(page.find("lost.csv").unwrap() < page.find("quiet.csv").unwrap(), "{page}");
     let causes = csv::table(&cause_table(&rows));
     assert!(causes.contains("backlash,2,1,0.9,\"worn.csv, joint 2\""), "{causes}");
+    // Two joints of one arm are one arm.
+    let two = vec![cause("backlash", 0.3, true), cause("backlash", 0.2, true)];
+    let causes = csv::table(&cause_table(&[row("both.csv", 1.0, 0.1, two)]));
+    assert!(causes.contains("backlash,1,1,0.3,"), "{causes}");
     assert_eq!(json(&rows)["arms"][2]["rank"], 1);
     assert!(terminal::document(&summary(&rows), 120).contains("no column q1"));
 }

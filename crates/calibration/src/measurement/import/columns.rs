@@ -6,8 +6,10 @@ use super::cell::{Line, Table};
 use super::error::{ImportError, Place};
 use crate::measurement::dataset::Sensor;
 
-const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"];
-const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
+/// The measured point.
+pub(super) const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"];
+/// The measured orientation, beside the point.
+pub(super) const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
 
 /// Where the columns are.
 #[derive(Debug, Clone, PartialEq)]

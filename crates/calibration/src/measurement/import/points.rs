@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::cell::{Cell, Table};
+use super::columns::POSITION;
 use super::csv;
 use super::error::{ImportError, Place};
 
@@ -87,8 +88,10 @@ impl Points {
         for (index, line) in log.rows.iter_mut().enumerate().skip(header) {
             line.cells.resize(width, Cell::Empty);
             if index == header {
-                let names = ["measured_x", "measured_y", "measured_z"];
-                line.cells.extend(names.map(|name| Cell::Text(name.to_owned())));
+                line.cells.extend(POSITION.map(|name| Cell::Text(name.to_owned())));
+                continue;
+            }
+            if line.cells.iter().all(Cell::is_empty) {
                 continue;
             }
             let name = line.cells[column].to_string();

@@ -10,12 +10,13 @@
 use nalgebra::UnitQuaternion;
 
 use super::cell::{Cell, Line, Table};
+use super::columns::{POSITION, QUATERNION};
 use super::error::{ImportError, Place};
 
 /// A point nearer to zero than this in every coordinate was not measured (mm).
 const NOT_MEASURED_MM: f64 = 1e-3;
 
-/// Joints in a table of RoboDK, and where point and TCP begin.
+/// Cells of a row of RoboDK: six joints, the point, the TCP.
 const ROBODK: usize = 12;
 
 /// Cells of a row of DELMIA for an arm of six joints.
@@ -23,22 +24,6 @@ const DELMIA: usize = 13;
 
 /// Fewer rows than these are no measurement that could be told from any other table of numbers.
 const LEAST: usize = 4;
-
-const NAMES: [&str; 13] = [
-    "q1",
-    "q2",
-    "q3",
-    "q4",
-    "q5",
-    "q6",
-    "measured_x",
-    "measured_y",
-    "measured_z",
-    "measured_qw",
-    "measured_qx",
-    "measured_qy",
-    "measured_qz",
-];
 
 /// The table under our header, and what is to be said of it; `None` where it is none of these.
 ///
@@ -165,7 +150,9 @@ fn cell(value: f64) -> Cell {
 
 fn under_our_header(table: &Table, rows: Vec<Line>) -> Table {
     let width = rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
-    let names = NAMES[..width.min(NAMES.len())].iter().map(|name| Cell::Text((*name).to_owned())).collect();
+    let joints = (1..=6).map(|joint| format!("q{joint}"));
+    let measured = POSITION.into_iter().chain(QUATERNION).map(str::to_owned);
+    let names = joints.chain(measured).take(width).map(Cell::Text).collect();
     let header = Line { number: 1, cells: names };
     Table { rows: std::iter::once(header).chain(rows).collect(), width, ..table.clone() }
 }
