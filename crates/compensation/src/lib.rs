@@ -59,6 +59,7 @@ mod segment;
 mod circle;
 mod strayed;
 mod staying;
+mod range;
 mod singular;
 mod notes;
 mod passage;

@@ -7,6 +7,9 @@
 //! change by at most about [`STEEP`] with the way that the flange goes (in half arm lengths and rad); a piece of a way at
 //! whose ends they are larger than that cannot come near one and is not looked at further.
 //!
+//! On the same samples joints must stay in their ranges ([`range`](super::range)): between targets within them a corrected
+//! way can leave one where the told way just kept to it.
+//!
 //! The configuration that is written is read again as the controller reads it. To the sign cfx is that of one solution
 //! only; where the text states another one (some arms do not use it) the written numbers are solved again. Where no
 //! configuration counts, lines stay on their branch, and a joint motion goes to the solution nearest to where it starts.
@@ -24,6 +27,7 @@ use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
 use super::options::{Emit, Options, may_change};
+use super::range;
 use super::solved::{Solved, SolvedTargets, as_joints};
 use super::why::Why;
 use truegrind_arm::inverse::effort::{Allowance, within};
@@ -174,31 +178,23 @@ struct Ways<'a> {
 }
 
 /// Where a motion starts.
-struct From<'s> {
-    solved: &'s Solved,
+struct From {
+    mounted: usize,
+    told: Pose,
+    /// Before and after.
+    joints: [Joints; 2],
+    /// After.
+    margins: [f64; 3],
     corrected: bool,
-}
-
-impl From<'_> {
-    /// Joints before and after.
-    fn joints(&self) -> [Joints; 2] {
-        let Solved { before, after, .. } = self.solved;
-        [*before, if self.corrected { *after } else { *before }]
-    }
-
-    fn margins(&self) -> [f64; 3] {
-        margins(self.solved, self.corrected)
-    }
-}
-
-/// Margins at the end of a motion; for an arm without branches what its distance to singularity says.
-fn margins(solved: &Solved, corrected: bool) -> [f64; 3] {
-    let margins = solved.margins[usize::from(corrected)];
-    if margins == [1.0; 3] { [solved.singularity * WITHOUT_BRANCHES; 3] } else { margins }
 }
 
 /// A margin is about so many times the distance to singularity.
 const WITHOUT_BRANCHES: f64 = 5.0;
+
+/// Margins at some joints of the data-sheet arm; for one without branches what its distance to singularity says.
+fn margins(branches: [f64; 3], joints: &Joints, nominal: &Inverse<'_>) -> [f64; 3] {
+    if branches == [1.0; 3] { [nominal.singularity(joints) * WITHOUT_BRANCHES; 3] } else { branches }
+}
 
 impl Ways<'_> {
     /// All motions side by side; hands back those that are forbidden.
@@ -246,9 +242,13 @@ impl Ways<'_> {
                 stay.insert(motion);
                 found = true;
             }
-            if self.leads_astray(motion, samples, allowance) {
+            if let Some(why) = self.leads_astray(motion, samples, allowance) {
                 let line = self.listing.motions[motion].place.line;
-                self.solved.forbid(previous, Why::BeforeSingularWay { line });
+                let why = match why {
+                    Why::WayOutsideLimits { joint } => Why::BeforeLimitedWay { line, joint },
+                    _ => Why::BeforeSingularWay { line },
+                };
+                self.solved.forbid(previous, why);
                 stay.insert(previous);
                 found = true;
             }
@@ -256,11 +256,11 @@ impl Ways<'_> {
         found
     }
 
-    /// Whether a motion stays and starts where another one is corrected, such that its way comes too close to a singularity from
-    /// there.
-    fn leads_astray(&self, index: usize, samples: usize, allowance: &mut Allowance) -> bool {
+    /// Why a motion that stays must not start where another one is corrected: its way would come too close to a singularity
+    /// from there, or a joint leave its range.
+    fn leads_astray(&self, index: usize, samples: usize, allowance: &mut Allowance) -> Option<Why> {
         let left = Cell::new(samples);
-        within(allowance, || self.strayed_way(index, &left)).is_some()
+        within(allowance, || self.strayed_way(index, &left))
     }
 
     fn strayed_way(&self, index: usize, samples: &Cell<usize>) -> Option<Why> {
@@ -270,25 +270,30 @@ impl Ways<'_> {
         if !stays || !curve || motion.modal.wrist_interpolation == Switch::On {
             return None;
         }
-        let to = self.solved.of(index).last()?.as_ref().ok()?;
         let from = self.from(motion).filter(|from| from.corrected)?;
+        let targets = self.solved.as_it_is(index);
+        let to = targets.last()?;
+        let nominal = &self.arms.nominal;
         let told = self.mountings.list[to.mounted].told;
-        let start = from.joints().map(|joints| told.target_of(&self.arms.nominal.arm().forward(&joints)));
-        let far = way(&start[1], &to.meant, &self.arms.nominal) * LEVER;
-        if motion.kind == MotionKind::Linear && clear(&from.margins(), &margins(to, false), far) {
+        let start = from.joints.map(|joints| told.target_of(&nominal.arm().forward(&joints)));
+        let far = way(&start[1], &to.meant, nominal) * LEVER;
+        let end = margins(to.margins, &to.joints, nominal);
+        if motion.kind == MotionKind::Linear
+            && self.free([&from.joints[1], &to.joints], [&from.margins, &end], far)
+        {
             return None;
         }
-        let curves = match (motion.kind, self.solved.of(index)) {
+        let curves = match (motion.kind, targets.as_slice()) {
             (MotionKind::Linear, _) => start.map(|start| Curve::line(start, to.meant)),
-            (_, [Ok(via), _]) => {
+            (_, [via, _]) => {
                 let round = |start| Curve::round(start, &via.meant, to.meant, motion);
                 [round(start[0])?, round(start[1])?]
             }
             _ => return None,
         };
-        let cost = cost(&curves[1], &told, &self.arms.nominal);
-        let walk = Walk { nominal: &self.arms.nominal, told, curves, cost, samples, options: self.options };
-        walk.between(&walk.reached(0.0, from.joints()[1]), &walk.reached(1.0, to.before))
+        let cost = cost(&curves[1], &told, nominal);
+        let walk = Walk { nominal, told, curves, cost, samples, options: self.options };
+        walk.between(&walk.reached(0.0, from.joints[1]), &walk.reached(1.0, to.joints))
     }
 
     /// The motion with its last target, if it is to be corrected.
@@ -301,11 +306,24 @@ impl Ways<'_> {
     }
 
     /// Where a motion starts, if that is known.
-    fn from(&self, motion: &Motion) -> Option<From<'_>> {
+    fn from(&self, motion: &Motion) -> Option<From> {
         let previous = motion.previous?;
-        let solved = self.solved.of(previous as usize).last()?.as_ref().ok()?;
+        let nominal = &self.arms.nominal;
         let corrected = self.corrected(previous as usize).is_some() && !self.left.contains_key(&previous);
-        Some(From { solved, corrected })
+        if let (true, Some(Ok(end))) = (corrected, self.solved.of(previous as usize).last()) {
+            let margins = margins(end.margins[1], &end.after, nominal);
+            let joints = [end.before, end.after];
+            return Some(From { mounted: end.mounted, told: end.told, joints, margins, corrected });
+        }
+        let end = self.solved.end_as_it_is(previous as usize)?;
+        let margins = margins(end.margins, &end.joints, nominal);
+        Some(From {
+            mounted: end.mounted,
+            told: end.meant,
+            joints: [end.joints; 2],
+            margins,
+            corrected: false,
+        })
     }
 
     /// Whether the way of a motion, or the choice of its configuration, needs a closer look.
@@ -313,19 +331,29 @@ impl Ways<'_> {
         let Some((motion, to)) = self.corrected(index) else { return false };
         let from = self.from(motion);
         let open = self.written(motion) && monitored(motion) != Switch::On;
-        let here = margins(to, true);
+        let here = margins(to.margins[1], &to.after, &self.arms.nominal);
         let Some(from) = from else { return open && here.iter().any(|m| m.abs() < OPEN) };
-        let there = from.margins();
+        let there = from.margins;
         if open && motion.kind == MotionKind::Joint {
-            return (to.after - from.joints()[1]).amax() > LONE * alone(&here);
+            return (to.after - from.joints[1]).amax() > LONE * alone(&here);
         }
         if !self.curve(motion) {
             return false;
         }
         // The told way of a circle is longer than between its ends.
         motion.kind == MotionKind::Circular
-            || from.solved.mounted != to.mounted
-            || !clear(&there, &here, way(&from.solved.told, &to.told, &self.arms.nominal) * LEVER)
+            || from.mounted != to.mounted
+            || !self.free(
+                [&from.joints[1], &to.after],
+                [&there, &here],
+                way(&from.told, &to.told, &self.arms.nominal) * LEVER,
+            )
+    }
+
+    /// Whether nothing can happen on a way between these joints.
+    fn free(&self, joints: [&Joints; 2], margins: [&[f64; 3]; 2], way: f64) -> bool {
+        let limits = &self.arms.nominal.arm().model.limits;
+        clear(margins[0], margins[1], way) && range::keeps(limits, joints, margins, way)
     }
 
     /// Whether the end is written as a pose.
@@ -361,14 +389,14 @@ impl Ways<'_> {
             return (open && to.margins[1].iter().any(|m| m.abs() < OPEN)).then_some(Why::OpenBranch);
         };
         if open && motion.kind == MotionKind::Joint {
-            return self.not_nearest(&from.joints()[1], to).then_some(Why::OpenBranch);
+            return self.not_nearest(&from.joints[1], to).then_some(Why::OpenBranch);
         }
         // With SingArea \Wrist the wrist goes in joints, past its singularity.
         if !self.curve(motion) || motion.modal.wrist_interpolation == Switch::On {
             return None;
         }
         let told = self.mountings.list[to.mounted].told;
-        let start = from.joints().map(|joints| told.target_of(&self.arms.nominal.arm().forward(&joints)));
+        let start = from.joints.map(|joints| told.target_of(&self.arms.nominal.arm().forward(&joints)));
         let curves = match (motion.kind, self.solved.of(index)) {
             (MotionKind::Linear, _) => [Curve::line(start[0], to.meant), Curve::line(start[1], to.told)],
             (_, [Ok(via), _]) => [
@@ -379,7 +407,7 @@ impl Ways<'_> {
         };
         let cost = cost(&curves[1], &told, &self.arms.nominal);
         let walk = Walk { nominal: &self.arms.nominal, told, curves, cost, samples, options: self.options };
-        let begin = walk.reached(0.0, from.joints()[1]);
+        let begin = walk.reached(0.0, from.joints[1]);
         let end = walk.reached(1.0, to.after);
         walk.between(&begin, &end)
     }
@@ -440,6 +468,14 @@ struct Walk<'a> {
     options: &'a Options,
 }
 
+/// Why a way ends where it has no joints.
+fn nowhere(error: InverseError) -> Why {
+    match error {
+        InverseError::OutsideLimits { joint, .. } => Why::WayOutsideLimits { joint },
+        _ => Why::SingularWay,
+    }
+}
+
 /// A place on the corrected way.
 struct Place {
     share: f64,
@@ -459,12 +495,12 @@ impl Walk<'_> {
     /// Why a piece of the way must not be gone.
     fn between(&self, a: &Place, b: &Place) -> Option<Why> {
         let way = (b.share - a.share) * self.cost;
-        if clear(&a.margins, &b.margins, way) {
-            return None;
-        }
         let least = a.margins.iter().chain(&b.margins).fold(f64::INFINITY, |least, m| least.min(m.abs()));
         let crosses = (0..3).any(|k| (a.margins[k] < 0.0) != (b.margins[k] < 0.0));
-        if way < FINEST || (!crosses && way < SHARP * least) || self.samples.get() == 0 {
+        let regular = clear(&a.margins, &b.margins, way) || (!crosses && way < SHARP * least);
+        let limits = &self.nominal.arm().model.limits;
+        let keeps = || range::keeps(limits, [&a.joints, &b.joints], [&a.margins, &b.margins], way);
+        if way < FINEST || (regular && keeps()) || self.samples.get() == 0 {
             return crosses.then_some(Why::SingularWay);
         }
         self.samples.set(self.samples.get() - 1);
@@ -472,6 +508,9 @@ impl Walk<'_> {
             Ok(middle) => middle,
             Err(why) => return why,
         };
+        if regular && range::keeps_curved(limits, [&a.joints, &middle.joints, &b.joints]) {
+            return None;
+        }
         self.between(a, &middle).or_else(|| self.between(&middle, b))
     }
 
@@ -479,9 +518,10 @@ impl Walk<'_> {
     fn place(&self, share: f64, near: &Place) -> Result<Place, Option<Why>> {
         let [meant, flange] = [0, 1].map(|k| self.told.flange_for(&self.curves[k].at(share)));
         let before = || self.nominal.solve_near(&meant, &near.joints).ok();
-        let Ok(solution) = self.nominal.solve_near(&flange, &near.joints) else {
+        let solution = match self.nominal.solve_near(&flange, &near.joints) {
+            Ok(solution) => solution,
             // Where the program as it is cannot go either, the bend of the way says so.
-            return Err(before().map(|_| Why::SingularWay));
+            Err(error) => return Err(before().map(|_| nowhere(error))),
         };
         let place = self.reached(share, solution.joints);
         if (0..3).all(|k| place.margins[k].abs() > CLEAR[k]) {

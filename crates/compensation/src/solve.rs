@@ -89,14 +89,7 @@ impl Work<'_> {
                 motions.map(|m| arms.acting.place([0; 6], load(m))).collect()
             };
             let portions = self.portions(arms, &places, &places, None);
-            let guessed = self.guessed();
-            return SolvedTargets {
-                forbade: Vec::new(),
-                first: self.first.to_vec(),
-                portions,
-                ways: Vec::new(),
-                guessed,
-            };
+            return self.solved(portions, Vec::new());
         }
         let mut doubted: Vec<[bool; 6]> = vec![[false; 6]; count];
         let as_is = self.sides(arms, None, &doubted);
@@ -140,8 +133,34 @@ impl Work<'_> {
             Way { first: first.unwrap_or_else(|| arms.acting.place(course.end, load(m))), later }
         });
         let ways = ways.collect();
+        self.solved(portions, ways)
+    }
+
+    fn solved(&self, portions: Vec<Vec<Result<Solved, Why>>>, ways: Vec<Way>) -> SolvedTargets {
+        let unreached = self.unreached(&portions);
         let guessed = self.guessed();
-        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), portions, ways, guessed }
+        SolvedTargets { forbade: Vec::new(), first: self.first.to_vec(), portions, ways, unreached, guessed }
+    }
+
+    /// The starts of motions of which a target failed though all are known as the program is.
+    fn unreached(&self, portions: &[Vec<Result<Solved, Why>>]) -> BTreeMap<u32, Vec<Start>> {
+        let mut out = BTreeMap::new();
+        for (portion, solved) in portions.iter().enumerate() {
+            if solved.iter().all(Result::is_ok) {
+                continue;
+            }
+            let first = portion * PORTION;
+            let begin = self.first[first];
+            for motion in first..(first + PORTION).min(self.listing.motions.len()) {
+                let targets = self.first[motion]..self.first[motion + 1];
+                if solved[targets.start - begin..targets.end - begin].iter().any(Result::is_err)
+                    && let Ok(starts) = self.starts[targets].iter().cloned().collect()
+                {
+                    out.insert(motion as u32, starts);
+                }
+            }
+        }
+        out
     }
 
     /// Motions of which a target was reached by guess.

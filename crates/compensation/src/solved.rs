@@ -1,6 +1,8 @@
 //! What is worked out of each target, and where it is found.
 
-use super::as_it_is::Guess;
+use std::collections::BTreeMap;
+
+use super::as_it_is::{Guess, Start};
 use super::deviation::Deviation;
 use super::options::Emit;
 use super::way::Way;
@@ -48,6 +50,18 @@ impl Solved {
     pub(super) fn shift_mm(&self) -> f64 {
         (self.told.translation.vector - self.meant.translation.vector).norm()
     }
+
+    /// Where the target leads as the program is.
+    fn as_it_is(&self) -> Start {
+        Start {
+            mounted: self.mounted,
+            meant: self.meant,
+            joints: self.before,
+            conf: self.conf_before,
+            margins: self.margins[0],
+            guess: self.guess,
+        }
+    }
 }
 
 /// The targets of all motions.
@@ -60,6 +74,8 @@ pub(super) struct SolvedTargets {
     pub(super) portions: Vec<Vec<Result<Solved, Why>>>,
     /// The conditions on the way to the end of each motion; empty where no joint has play.
     pub(super) ways: Vec<Way>,
+    /// Where the targets of motions lead of which one is not reached on the actual arm: as the program is.
+    pub(super) unreached: BTreeMap<u32, Vec<Start>>,
     /// Motions of which the configuration is not checked and the start not known; not those that go on from there.
     pub(super) guessed: Vec<u32>,
 }
@@ -91,6 +107,22 @@ impl SolvedTargets {
         let portion = motion / PORTION;
         let begin = self.first[portion * PORTION];
         &self.portions[portion][self.first[motion] - begin..self.first[motion + 1] - begin]
+    }
+
+    /// Where the targets of a motion lead as the program is; none where that is not known.
+    pub(super) fn as_it_is(&self, motion: usize) -> Vec<Start> {
+        let known = |targets: &[Result<Solved, Why>]| {
+            targets.iter().map(|target| Some(target.as_ref().ok()?.as_it_is())).collect::<Option<_>>()
+        };
+        known(self.of(motion)).or_else(|| self.unreached.get(&(motion as u32)).cloned()).unwrap_or_default()
+    }
+
+    /// Where a motion ends as the program is, if that is known.
+    pub(super) fn end_as_it_is(&self, motion: usize) -> Option<Start> {
+        match self.of(motion).last()? {
+            Ok(solved) => Some(solved.as_it_is()),
+            Err(_) => self.unreached.get(&(motion as u32))?.last().copied(),
+        }
     }
 
     /// The conditions on the way to the end of a motion, at which the arm comes under `place`.

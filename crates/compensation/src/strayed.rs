@@ -84,9 +84,8 @@ fn circles(
         };
         let before = &listing.motions[previous as usize];
         let targets = solved.of(previous as usize);
-        let from =
-            targets.last().and_then(|from| from.as_ref().ok()).filter(|from| from.mounted == to.mounted);
-        if from.is_some_and(|from| no_circle(from, via, to, motion)) {
+        let from = solved.end_as_it_is(previous as usize).filter(|from| from.mounted == to.mounted);
+        if from.is_some_and(|from| no_circle(&from.meant, via, to, motion)) {
             strayed.insert(index, Why::NoCircle);
             continue;
         }
@@ -110,9 +109,9 @@ fn circles(
 
 /// Whether a circle has a known start with which its points make none. One that closes is another matter: its ends say
 /// nothing of its plane.
-fn no_circle(from: &Solved, via: &Solved, to: &Solved, motion: &Motion) -> bool {
-    gap(&from.meant.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
-        && Curve::round(from.meant, &via.meant, to.meant, motion).is_none()
+fn no_circle(from: &Pose, via: &Solved, to: &Solved, motion: &Motion) -> bool {
+    gap(&from.translation.vector, &to.meant.translation.vector) >= CLOSED_MM
+        && Curve::round(*from, &via.meant, to.meant, motion).is_none()
 }
 
 /// Where a motion that stays ends, in the frames of the one after it.

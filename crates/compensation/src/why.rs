@@ -39,6 +39,11 @@ pub enum Why {
         /// Joint, 0-based.
         joint: usize,
     },
+    /// On the corrected way to it a joint would leave its range, which it keeps on the told way.
+    WayOutsideLimits {
+        /// Joint, 0-based.
+        joint: usize,
+    },
     /// The correction of the position is larger than the stated bound.
     TooFar {
         /// The correction (mm).
@@ -108,6 +113,13 @@ pub enum Why {
         /// The line of that motion, from 1.
         line: u32,
     },
+    /// A motion that stays starts where it ends, and from there a joint would leave its range on the way.
+    BeforeLimitedWay {
+        /// Its line, 1-based.
+        line: u32,
+        /// Joint, 0-based.
+        joint: usize,
+    },
     /// A whole circle: its ends say nothing of its plane, so its path is not checked.
     WholeCircle,
     /// A joint stands outside the range in which it was measured.
@@ -173,6 +185,7 @@ impl Why {
             Why::Inverse(InverseError::Abandoned) => "too many targets had to be searched for",
             Why::Inverse(_) => "no joints were found",
             Why::OutsideLimits { .. } => "a joint would leave its range",
+            Why::WayOutsideLimits { .. } => "a joint would leave its range on the way to it",
             Why::TooFar { .. } => "correction exceeds the bound (--max-correction)",
             Why::TooMuchTurn { .. } => "correction of the orientation exceeds the bound",
             Why::NearSingularity => "too close to a singularity",
@@ -186,6 +199,9 @@ impl Why {
             Why::BeforeCircle { .. } => "a circular motion that stays starts where it ends",
             Why::BeforeSingularWay { .. } => {
                 "a motion that stays and passes a singularity starts where it ends"
+            }
+            Why::BeforeLimitedWay { .. } => {
+                "a joint would leave its range on a motion that stays and starts here"
             }
             Why::WholeCircle => "a whole circle",
             Why::JointNotMeasured { .. } => "a joint is outside the range in which the arm was measured",
@@ -250,6 +266,9 @@ impl fmt::Display for Why {
             ),
             Why::Inverse(error) => error.fmt(f),
             Why::OutsideLimits { joint } => write!(f, "joint {} would leave its range", joint + 1),
+            Why::WayOutsideLimits { joint } => {
+                write!(f, "on the corrected way to it joint {} would leave its range", joint + 1)
+            }
             Why::TooFar { mm } => write!(f, "correction of {mm:.3} mm exceeds the bound (--max-correction)"),
             Why::TooMuchTurn { deg } => write!(f, "correction of {deg:.3}° exceeds the bound"),
             Why::JointJump { joint, deg, most_deg, on_the_way } => write!(
@@ -285,6 +304,12 @@ impl fmt::Display for Why {
                 f,
                 "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
                  singularity"
+            ),
+            Why::BeforeLimitedWay { line, joint } => write!(
+                f,
+                "the motion of line {line} stays as it is and starts here: from a corrected start joint {} would leave its \
+                 range on the way",
+                joint + 1
             ),
             Why::JointNotMeasured { joint, by_deg } => write!(
                 f,

@@ -8,6 +8,7 @@ mod path;
 mod payload;
 mod placement;
 mod play;
+mod range;
 mod reasons;
 mod singular;
 mod taught;

@@ -26,6 +26,9 @@ fn name(why: &Why) -> &'static str {
         Why::JointTarget => "joint target",
         Why::Inverse(_) => "inverse",
         Why::OutsideLimits { .. } => "outside limits",
+        // tests/it/range.rs.
+        Why::WayOutsideLimits { .. } => "way outside limits",
+        Why::BeforeLimitedWay { .. } => "before limited way",
         Why::TooFar { .. } => "too far",
         Why::TooMuchTurn { .. } => "too much turn",
         Why::NearSingularity => "near singularity",

@@ -17,12 +17,12 @@ use super::*;
 
 const ARMS: [&str; 2] = ["abb-irb-120", "staubli-tx60"];
 
-fn sheet(robot: &str) -> Model {
+pub(super) fn sheet(robot: &str) -> Model {
     truegrind_arm::robots::load(robot).unwrap().model
 }
 
 /// An arm with every link off, some by three times what the blade's arms are.
-fn other(sheet: &Model, seed: u64) -> Model {
+pub(super) fn other(sheet: &Model, seed: u64) -> Model {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let scale = [1.0, 3.0][seed as usize % 2];
     let mut model = sheet.clone();
@@ -37,7 +37,7 @@ fn other(sheet: &Model, seed: u64) -> Model {
     model
 }
 
-fn known(robot: &str, seed: u64) -> Estimated {
+pub(super) fn known(robot: &str, seed: u64) -> Estimated {
     let sheet = sheet(robot);
     let mut out = estimated(other(&sheet, seed), &[Joints::zeros()]);
     (out.robot, out.nominal) = (robot.into(), sheet);
@@ -46,7 +46,7 @@ fn known(robot: &str, seed: u64) -> Estimated {
     out
 }
 
-fn forward(arm: &Model, joints: &Joints) -> Pose {
+pub(super) fn forward(arm: &Model, joints: &Joints) -> Pose {
     arm.at_condition(&Condition::default()).forward(joints)
 }
 
@@ -81,7 +81,7 @@ fn newton(arm: &Model, goal: &Pose, start: &Joints) -> Option<Joints> {
 }
 
 /// RAPID's confdata by the words of the manual, for an arm whose wrist centre lies behind the flange on axis 6.
-fn confdata(arm: &Model, q: &Joints) -> [i32; 4] {
+pub(super) fn confdata(arm: &Model, q: &Joints) -> [i32; 4] {
     let quarter = |angle: f64| (angle / FRAC_PI_2).floor() as i32;
     let [high, upper, behind] = [arm.links[0].d_mm, arm.links[1].a_mm, arm.links[5].d_mm];
     let wrist = forward(arm, q) * Point3::new(0.0, 0.0, -behind);
@@ -153,7 +153,7 @@ impl Controller {
     }
 }
 
-fn target(pose: &Pose, conf: [i32; 4]) -> String {
+pub(super) fn target(pose: &Pose, conf: [i32; 4]) -> String {
     let (t, q) = (pose.translation.vector, pose.rotation.quaternion());
     format!(
         "[[{:.6},{:.6},{:.6}],[{:.10},{:.10},{:.10},{:.10}],[{},{},{},{}],[9E9,9E9,9E9,9E9,9E9,9E9]]",
@@ -161,12 +161,12 @@ fn target(pose: &Pose, conf: [i32; 4]) -> String {
     )
 }
 
-fn module(lines: &[String]) -> String {
+pub(super) fn module(lines: &[String]) -> String {
     format!("MODULE M\n PROC main()\n{} ENDPROC\nENDMODULE\n", lines.concat())
 }
 
 /// What the motions of a program say: pose and configuration of each end.
-fn ends(program: &[u8]) -> Vec<(MotionKind, Pose, [i32; 4])> {
+pub(super) fn ends(program: &[u8]) -> Vec<(MotionKind, Pose, [i32; 4])> {
     let task = Task::read(&[("p.mod", program)]);
     let end = |m: &truegrind_programs::motion::Motion| match m.to()?.value {
         Ok(TargetValue::Cartesian(target)) => Some((m.kind, target.pose(), target.conf)),
@@ -175,7 +175,7 @@ fn ends(program: &[u8]) -> Vec<(MotionKind, Pose, [i32; 4])> {
     task.listing.motions.iter().filter_map(end).collect()
 }
 
-fn corrected(outcome: &MotionOutcome) -> bool {
+pub(super) fn corrected(outcome: &MotionOutcome) -> bool {
     matches!(outcome.status, Status::Changed | Status::Flagged)
 }
 
@@ -315,7 +315,13 @@ fn away_from_singularities_no_correction_of_three_arms_is_refused() {
 }
 
 /// Joints along a line between two poses, from where it begins; `None` where a step cannot be gone without a leap.
-fn marched(arm: &Model, from: &Pose, to: &Pose, start: &Joints, steps: usize) -> Option<Vec<Joints>> {
+pub(super) fn marched(
+    arm: &Model,
+    from: &Pose,
+    to: &Pose,
+    start: &Joints,
+    steps: usize,
+) -> Option<Vec<Joints>> {
     let mut out = vec![*start];
     for k in 1..=steps {
         let s = k as f64 / steps as f64;

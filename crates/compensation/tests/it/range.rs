@@ -1,0 +1,99 @@
+//! Joint ranges on the way. The class of the fault: a bound that is kept at targets and broken between them. A line or an arc
+//! turns some joints beyond where they stand at its ends; where the told way just keeps to a range, the corrected one, or one
+//! that stays but starts at a corrected end, may leave it, and the controller stops there.
+
+use super::singular::{confdata, corrected, ends, forward, known, marched, module, sheet, target};
+use super::*;
+
+const STEPS: usize = 200;
+
+/// How far the told way stays within the narrowed range (rad).
+const ROOM: f64 = 1e-4;
+
+/// The joint that goes farthest beyond both ends of a way, to which side, and how far it comes.
+fn beyond(way: &[Joints]) -> (usize, f64, f64, f64) {
+    let (first, last) = (way[0], way[way.len() - 1]);
+    let mut most = (0, 1.0, 0.0, 0.0);
+    for joint in 0..6 {
+        for sign in [-1.0, 1.0] {
+            let end = (sign * first[joint]).max(sign * last[joint]);
+            let far = way.iter().fold(f64::NEG_INFINITY, |far, q| far.max(sign * q[joint]));
+            if far - end > most.2 {
+                most = (joint, sign, far - end, sign * far);
+            }
+        }
+    }
+    most
+}
+
+struct Scene {
+    source: String,
+    arm: Estimated,
+    joint: usize,
+}
+
+/// A line of which one joint turns on its way, on an arm whose range ends just beyond that.
+fn scene(round: u64, random: &mut ChaCha8Rng) -> Option<Scene> {
+    let robot = "abb-irb-120";
+    let free = sheet(robot);
+    let at = Joints::new(0.2, 0.3, 0.1, 0.4, 0.8, 0.3);
+    let start = at + Joints::from_fn(|_, _| random.random_range(-0.3..0.3));
+    let end = start + Joints::from_fn(|_, _| random.random_range(-0.4..0.4));
+    let (from, to) = (forward(&free, &start), forward(&free, &end));
+    let way = marched(&free, &from, &to, &start, STEPS)?;
+    let (joint, sign, more, far) = beyond(&way);
+    if more < 0.01 || (way[STEPS] - end).amax() > 1e-6 {
+        return None;
+    }
+    let mut arm = known(robot, 2 * round);
+    let limits = &mut arm.nominal.limits;
+    match sign > 0.0 {
+        true => limits.max_rad[joint] = far + ROOM,
+        false => limits.min_rad[joint] = far - ROOM,
+    }
+    arm.model.limits = arm.nominal.limits.clone();
+    let source = module(&[
+        format!("MoveJ {},v100,fine,tool0;\n", target(&from, confdata(&free, &start))),
+        format!("MoveL {},v100,fine,tool0;\n", target(&to, confdata(&free, &end))),
+    ]);
+    Some(Scene { source, arm, joint })
+}
+
+/// Whether the controller goes along the line of a program: all joints keep to the arm's ranges on it.
+fn goes(program: &[u8], arm: &Model, near: &Joints) -> bool {
+    let told = ends(program);
+    let begin = marched(arm, &forward(arm, near), &told[0].1, near, 20).unwrap()[20];
+    let way = marched(arm, &told[0].1, &told[told.len() - 1].1, &begin, STEPS).unwrap();
+    way.iter().all(|q| arm.limits.violated(q).is_none())
+}
+
+#[test]
+fn no_joint_leaves_its_range_on_a_corrected_way() {
+    let mut random = ChaCha8Rng::seed_from_u64(31);
+    let (mut lines, mut written, mut refused) = (0, 0, 0);
+    for round in 0..400 {
+        let Some(Scene { source, arm, joint }) = scene(round, &mut random) else { continue };
+        let options = Options {
+            tolerance_mm: 5.0,
+            cuts: truegrind_compensation::cut::Cuts::Single,
+            placement: truegrind_compensation::placement::Placement::Absolute,
+            max_risk: 1.0,
+            ..Options::default()
+        };
+        let (plan, program) = rewritten(source.as_bytes(), &arm, &Cell::default(), &options);
+        let near = plan.points[0].joints_before.unwrap();
+        assert!(goes(source.as_bytes(), &arm.nominal, &near), "the told way keeps to its range");
+        lines += 1;
+        assert!(goes(&program, &arm.nominal, &near), "{round}: {:?}", plan.outcomes);
+        written += usize::from(plan.outcomes.iter().all(corrected));
+        let ways = plan.outcomes.iter().filter(|outcome| match outcome.reason {
+            Some(Why::WayOutsideLimits { joint: named } | Why::BeforeLimitedWay { joint: named, .. }) => {
+                named == joint
+            }
+            _ => false,
+        });
+        refused += usize::from(ways.count() > 0);
+    }
+    println!("{lines} lines, {written} written, {refused} refused for their way");
+    assert!(lines > 40 && 3 * written > lines && 4 * refused > lines, "{lines} {written} {refused}");
+}
