@@ -265,27 +265,33 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
     // A robot that there is not is told before measurements that there are not.
     let robot = inputs::robot(&arguments.robot)?;
     let bytes = files::read(&arguments.data)?;
-    let dataset = measured(arguments, &robot, &bytes)?;
+    let dataset = imported(arguments, &bytes)?;
+    // Half a gigabyte of text is not needed beside its rows.
+    drop(bytes);
+    let dataset = measured(arguments, &robot, dataset)?;
     Ok((robot, dataset))
 }
 
 /// The same of measurements whose bytes are there.
 pub(super) fn read_bytes(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<(Robot, Dataset)> {
     let robot = inputs::robot(&arguments.robot)?;
-    let dataset = measured(arguments, &robot, bytes)?;
+    let dataset = measured(arguments, &robot, imported(arguments, bytes)?)?;
     Ok((robot, dataset))
 }
 
-fn measured(arguments: &DataArguments, robot: &Robot, bytes: &[u8]) -> anyhow::Result<Dataset> {
+fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> {
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
     let name = files::name(&arguments.data);
-    let dataset = match &arguments.points {
+    Ok(match &arguments.points {
         None => import::read(&name, bytes, &options)?,
         Some(points) => {
             import::joined((&name, bytes), (&files::name(points), &files::read(points)?), &options)?
         }
-    };
+    })
+}
+
+fn measured(arguments: &DataArguments, robot: &Robot, dataset: Dataset) -> anyhow::Result<Dataset> {
     let convention = arguments.angles.map_or_else(|| robot.sheet.joints.angles.into(), AngleConvention::from);
     let (name, odd) = (&robot.sheet.name, arguments.allow_odd_units);
     let dataset =

@@ -367,7 +367,7 @@ fn read(
             bail!("{suspicion} (--allow-odd-units takes the file at its word)");
         }
     }
-    let applied = convention.apply(&dataset, &arm.nominal);
+    let applied = convention.apply(dataset, &arm.nominal);
     applied.map(Some).ok_or_else(|| anyhow!("{}: its joint map cannot be inverted", arm.robot))
 }
 

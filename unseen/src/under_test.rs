@@ -86,7 +86,7 @@ fn read(text: &str) -> Result<Dataset, String> {
 }
 
 fn dataset(rows: &Dataset, convention: AngleConvention, nominal: &Model) -> Result<Dataset, String> {
-    convention.apply(rows, nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
+    convention.apply(rows.clone(), nominal).ok_or_else(|| "the joint map cannot be inverted".to_owned())
 }
 
 /// The rows, where the sensor does not contradict the convention of their angles.

@@ -52,15 +52,15 @@ impl AngleConvention {
 
     /// The data set with the controller's angles in place of the file's, and a note where they differ.
     /// `None` when the arm's joint map cannot be inverted.
-    pub fn apply(self, data: &Dataset, model: &Model) -> Option<Dataset> {
-        let mut out = data.clone();
-        for row in &mut out.rows {
-            row.joints = self.controller_angles(model, &row.joints)?;
-        }
+    pub fn apply(self, mut data: Dataset, model: &Model) -> Option<Dataset> {
+        // Rows that are shared would be copied.
         if self == AngleConvention::Dh {
-            out.notes.push("the angles are DH angles: joint map and theta offsets were taken out".into());
+            for row in &mut data.rows {
+                row.joints = self.controller_angles(model, &row.joints)?;
+            }
+            data.notes.push("the angles are DH angles: joint map and theta offsets were taken out".into());
         }
-        Some(out)
+        Some(data)
     }
 }
 

@@ -42,5 +42,5 @@ pub fn matched(
             }
         }
     }
-    convention.apply(&dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })
+    convention.apply(dataset, nominal).ok_or_else(|| Mismatch::JointMap { robot: robot.to_owned() })
 }

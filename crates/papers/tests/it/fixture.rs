@@ -57,7 +57,7 @@ fn best(convention: AngleConvention) -> f64 {
         .enumerate()
         .map(|(i, r)| Row::new(i, Joints::from_fn(|j, _| r[j].to_radians()), Reading::Cable(r[6])));
     let dataset = Dataset::new("Table II", Sensor::Cable, rows.collect::<Vec<_>>());
-    let dataset = convention.apply(&dataset, &model).unwrap();
+    let dataset = convention.apply(dataset, &model).unwrap();
     let points: Vec<Vector3<f64>> = dataset
         .rows
         .iter()

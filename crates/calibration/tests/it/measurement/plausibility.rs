@@ -101,7 +101,7 @@ fn dh_angles_are_named_and_taken_back() {
         assert_eq!(found.likely.convention, AngleConvention::Dh, "{found:?}");
         assert!(found.to_string().contains("--angles dh"));
         assert_eq!(plausibility(&dh, &model, AngleConvention::Dh), []);
-        let back = AngleConvention::Dh.apply(&dh, &model).unwrap();
+        let back = AngleConvention::Dh.apply(dh, &model).unwrap();
         for (a, b) in back.rows.iter().zip(&data.rows) {
             assert!((a.joints - b.joints).amax() < 1e-12);
         }
