@@ -53,18 +53,7 @@ fn task(rows: usize) -> (Calibration, Vec<f64>) {
         .map(|number| {
             let joints = Joints::from_fn(|_, _| random.random_range(-1.2..1.2));
             let length = (posed.forward(&joints).translation.vector - outlet).norm() + 17.0;
-            Row {
-                number,
-                line: number + 2,
-                joints,
-                reading: Reading::Cable(length + 0.05 * random.random_range(-1.0..1.0)),
-                readout_mm: None,
-                condition: still,
-                anchor: 0,
-                motion: None,
-                session: None,
-                other: Vec::new(),
-            }
+            Row::new(number, joints, Reading::Cable(length + 0.05 * random.random_range(-1.0..1.0)))
         })
         .collect();
     let weights = vec![Weight { per_mm: 1.0 / 0.03, per_rad: 1.0 }; rows.len()];

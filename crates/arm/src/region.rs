@@ -73,9 +73,9 @@ fn farthest(nearest: &mut [f64], poses: &[[f64; 6]], sample: &[f64; 6]) -> Optio
 
 impl Region {
     /// The region of measured joint vectors (rad); `sigma_mm` as in the field. Cost: 200 n distances.
-    pub fn of(joints: &[Joints], sigma_mm: f64) -> Self {
+    pub fn of<'q>(joints: impl IntoIterator<Item = &'q Joints>, sigma_mm: f64) -> Self {
         let degrees: Vec<[f64; 6]> =
-            joints.iter().map(|q| std::array::from_fn(|i| q[i].to_degrees())).collect();
+            joints.into_iter().map(|q| std::array::from_fn(|i| q[i].to_degrees())).collect();
         let mut min_deg = [f64::INFINITY; 6];
         let mut max_deg = [f64::NEG_INFINITY; 6];
         for q in &degrees {

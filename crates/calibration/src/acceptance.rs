@@ -277,9 +277,9 @@ fn cycles(
 
 /// Where a row saw the target, in the base (mm).
 fn seen(observed: &Observed, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
-    let place = match observed.dataset.rows[row].reading {
+    let place = match &observed.dataset.rows[row].reading {
         Reading::Cable(_) => return None,
-        Reading::Position(place) => place,
+        Reading::Position(place) => *place,
         Reading::Pose(pose) => pose.translation.vector,
     };
     Some((base_from_sensor * nalgebra::Point3::from(place)).coords)

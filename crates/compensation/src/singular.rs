@@ -34,7 +34,7 @@ use truegrind_arm::inverse::effort::{Allowance, within};
 use truegrind_arm::inverse::{Inverse, InverseError};
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
-use truegrind_programs::motion::{Listing, Motion, MotionKind, RobTarget, Switch};
+use truegrind_programs::motion::{Listing, Motion, MotionKind, MotionTarget, RobTarget, Switch, TargetValue};
 
 /// How fast a margin changes with the way of the flange, at most: the sine of the wrist by as much as the tool turns and
 /// as joints 2 and 3 turn the forearm below it.
@@ -229,7 +229,16 @@ impl Ways<'_> {
         let mut stay = staying.clone();
         let samples = self.samples(staying.len());
         let mut found = false;
+        let mut open = HashSet::new();
         for motion in 0..self.listing.motions.len() {
+            if self.ends_open(motion, &open) {
+                open.insert(motion);
+                if self.corrected(motion).is_some() && !self.left.contains_key(&(motion as u32)) {
+                    self.solved.forbid(motion, Why::OpenBranch);
+                    stay.insert(motion);
+                    found = true;
+                }
+            }
             let Some(previous) = self.listing.motions[motion].previous.map(|previous| previous as usize)
             else {
                 continue;
@@ -254,6 +263,33 @@ impl Ways<'_> {
             }
         }
         found
+    }
+
+    /// Whether the text leaves open to which of several solutions a motion leads: no configuration is checked there for
+    /// certain, and it goes on from where that is `open`, or is one of those for which it is.
+    fn ends_open(&self, index: usize, open: &HashSet<usize>) -> bool {
+        let motion = &self.listing.motions[index];
+        let pose = |target: &MotionTarget| matches!(target.value, Ok(TargetValue::Cartesian(_)));
+        if monitored(motion) == Switch::On || !motion.to().is_some_and(pose) {
+            return false;
+        }
+        let goes_on = motion.previous.is_some_and(|previous| open.contains(&(previous as usize)));
+        let forbidden = self.solved.of(index).last().and_then(|to| to.as_ref().ok()?.forbidden);
+        if goes_on || forbidden == Some(Why::OpenBranch) {
+            return true;
+        }
+        // A motion that stays for another reason has not been asked yet.
+        if self.corrected(index).is_some() && !self.left.contains_key(&(index as u32)) {
+            return false;
+        }
+        match (self.solved.end_as_it_is(index), self.from(motion)) {
+            (None, _) => false,
+            (Some(end), None) => end.margins.iter().any(|margin| margin.abs() < OPEN),
+            (Some(end), Some(from)) => {
+                motion.kind == MotionKind::Joint
+                    && self.not_nearest(&from.joints[1], end.mounted, &end.meant, &end.joints)
+            }
+        }
     }
 
     /// Why a motion that stays must not start where another one is corrected: its way would come too close to a singularity
@@ -389,7 +425,8 @@ impl Ways<'_> {
             return (open && to.margins[1].iter().any(|m| m.abs() < OPEN)).then_some(Why::OpenBranch);
         };
         if open && motion.kind == MotionKind::Joint {
-            return self.not_nearest(&from.joints[1], to).then_some(Why::OpenBranch);
+            let another = self.not_nearest(&from.joints[1], to.mounted, &to.told, &to.after);
+            return another.then_some(Why::OpenBranch);
         }
         // With SingArea \Wrist the wrist goes in joints, past its singularity.
         if !self.curve(motion) || motion.modal.wrist_interpolation == Switch::On {
@@ -413,13 +450,13 @@ impl Ways<'_> {
     }
 
     /// Whether another solution is as near to where a joint motion starts as the one that was meant.
-    fn not_nearest(&self, near: &Joints, to: &Solved) -> bool {
-        let flange = self.mountings.list[to.mounted].told.flange_for(&to.told);
+    fn not_nearest(&self, near: &Joints, mounted: usize, told: &Pose, joints: &Joints) -> bool {
+        let flange = self.mountings.list[mounted].told.flange_for(told);
         let distance = |joints: &Joints| [(joints - near).norm(), (joints - near).amax()];
-        let [meant, meant_most] = distance(&to.after);
+        let [meant, meant_most] = distance(joints);
         self.arms.nominal.solve_around(&flange, near).iter().any(|other| {
             let [far, most] = distance(other);
-            (other - to.after).amax() > SAME && (far <= meant || most <= meant_most)
+            (other - joints).amax() > SAME && (far <= meant || most <= meant_most)
         })
     }
 }

@@ -282,8 +282,8 @@ fn reading_used(
         });
     }
     let point = nalgebra::Vector3::from(protocol.fixed_point_mm);
-    let position = |row: &Row| match row.reading {
-        Reading::Position(p) => p,
+    let position = |row: &Row| match &row.reading {
+        Reading::Position(p) => *p,
         Reading::Pose(pose) => pose.translation.vector,
         Reading::Cable(_) => nalgebra::Vector3::zeros(),
     };

@@ -148,7 +148,7 @@ pub fn measured_recording(scene: &MeasuredScene<'_>) -> Result<Recording, Visual
         flange_from_tool: flange_from_touched,
     };
     let stands: Vec<Stand> = scene.dataset.rows.iter().map(stand).collect();
-    let condition = scene.dataset.rows[0].condition;
+    let condition = *scene.dataset.rows[0].condition;
     let figure = |model| Figure { model, condition: &condition, meshes: scene.meshes };
     arm::draw(&mut store, "arm/at_row", figure(scene.arm), &Paint::SOLID, (AXIS, &stands))?;
     let shape = scene.nominal.and_then(|nominal| Shape::of(figure(nominal), figure(scene.arm), &stands));

@@ -416,9 +416,8 @@ fn drum(dataset: &Dataset) -> Form {
 /// Forms that the columns allow, with the variants tried of each.
 fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
     let mut out = Vec::new();
-    let has = |rate: bool| {
-        dataset.rows.iter().any(|r| r.motion.as_ref().is_some_and(|m| !rate || m.rate_per_h.is_some()))
-    };
+    let has =
+        |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
     if has(true) {
         out.push((Form::Latency, 1.0));
     } else if has(false) {

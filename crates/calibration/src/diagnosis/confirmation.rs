@@ -237,7 +237,7 @@ impl Confirming<'_> {
     /// Whether the steps of a joint, where it moved, are nearly of one size.
     fn steps_alike(&self, joint: usize) -> bool {
         let rows = self.subject.observed.dataset.rows.iter();
-        let steps = rows.filter_map(|row| Some(row.motion.as_ref()?.step[joint].abs()));
+        let steps = rows.filter_map(|row| Some(row.motion()?.step[joint].abs()));
         let (mut count, mut sum, mut square) = (0.0, 0.0, 0.0);
         for step in steps.filter(|step| *step > 1e-6) {
             (count, sum, square) = (count + 1.0, sum + step, square + step * step);

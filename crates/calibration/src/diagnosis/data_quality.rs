@@ -44,7 +44,7 @@ pub(super) fn rounding_finding(
         ),
         Err(why) => {
             let there =
-                matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm.is_some());
+                matches!(why, NotFused::Nothing) && dataset.rows.iter().all(|r| r.readout_mm().is_some());
             let read_out = match why {
                 _ if there => "the read-out was not used to sharpen them (--raw-columns)",
                 NotFused::Nothing => "there is no read-out to sharpen them",

@@ -539,7 +539,8 @@ fn estimated(
         },
         condition: mean_condition(dataset),
     };
-    let mut estimated = with_region(estimated, &subject.observed.dataset, &fitted);
+    let region = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
+    let mut estimated = with_region(estimated, region, &fitted);
     let rows = &subject.observed.dataset;
     // Links and what the model promises are held against the tolerance of arms, not against the wide priors of a diagnosis.
     let plausible = Tolerance::default();

@@ -69,8 +69,8 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
     let (x_label, x): (Label, Box<dyn Fn(usize) -> f64>) = match cause {
         Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
             ("distance from the sensor".to_owned(), "mm"),
-            Box::new(|i| match dataset.rows[i].reading {
-                Reading::Cable(l) => l,
+            Box::new(|i| match &dataset.rows[i].reading {
+                Reading::Cable(l) => *l,
                 Reading::Position(p) => p.norm(),
                 Reading::Pose(p) => p.translation.vector.norm(),
             }),

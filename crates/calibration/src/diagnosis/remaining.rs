@@ -136,7 +136,7 @@ pub fn noise_model(subject: &Subject<'_>, fit: &Extended, set_aside: &[usize]) -
         .enumerate()
         .filter(|(i, _)| !set_aside.contains(i))
         .map(|(i, row)| {
-            let range = match row.reading {
+            let range = match &row.reading {
                 Reading::Cable(_) => {
                     let at = (fit.model.forward(&row.joints, &row.condition)
                         * nalgebra::Point3::from(fit.frames.flange_from_target.translation.vector))

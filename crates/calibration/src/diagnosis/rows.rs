@@ -4,6 +4,8 @@
 //! read-out lies further from its angles than rounding and the other rows' scatter allow, one of the two was not written
 //! at the same moment, or by the same pose. Such a row keeps its logged angles; the others are sharpened without it.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 
 use super::halves::is_path;
@@ -37,7 +39,7 @@ pub fn mismatches(dataset: &Dataset, nominal: &Model) -> Mismatch {
         .iter()
         .enumerate()
         .map(|(i, row)| {
-            row.readout_mm.map(|at| {
+            row.readout_mm().map(|at| {
                 // The read-out's tool point on the flange, as this row has it.
                 (i, posed.forward(&row.joints).inverse_transform_point(&Point3::from(at)).coords)
             })
@@ -84,7 +86,7 @@ pub fn prepare(dataset: &Dataset, nominal: &Model, fuse: bool) -> Prepared {
     if silent {
         for i in 1..rows.rows.len() {
             let step = dataset.rows[i].joints - dataset.rows[i - 1].joints;
-            rows.rows[i].condition.approach =
+            Arc::make_mut(&mut rows.rows[i].condition).approach =
                 // A joint that moved up came from below, which is −1.
                 std::array::from_fn(|j| if step[j].abs() < 1e-6 { 0 } else { -step[j].signum() as i8 });
         }
@@ -120,6 +122,6 @@ fn fill_motion(dataset: &mut Dataset) {
         let next = (i + 1).min(n - 1);
         let hours = rows[next].1.zip(rows[i - 1].1).map(|(b, a)| b - a).filter(|h| path && *h > 0.0);
         let rate_per_h = hours.map(|h| (rows[next].0 - rows[i - 1].0) / h);
-        row.motion = Some(Box::new(Motion { step, rate_per_h }));
+        row.extra_mut().motion = Some(Motion { step, rate_per_h });
     }
 }

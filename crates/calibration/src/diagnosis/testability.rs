@@ -49,7 +49,7 @@ pub(super) fn not_testable(
             "log t and temperature, and measure from a cold start",
         );
     }
-    if dataset.rows.iter().all(|r| r.readout_mm.is_none()) {
+    if dataset.rows.iter().all(|r| r.readout_mm().is_none()) {
         add(
             "readout-mismatch",
             None,

@@ -18,7 +18,7 @@ use crate::identification::start::different_poses;
 use crate::identification::tolerance::Tolerance;
 use crate::identification::verdict::{Hearing, Limits};
 use crate::measurement::dataset::{Dataset, Sensor};
-use crate::measurement::split::{self, Split};
+use crate::measurement::split::{self, NoiseFloor, Split};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, EstimatedParameter, Judgement, Provenance, StageErrors, Verdict};
 use truegrind_arm::model::{Joints, Model};
@@ -159,6 +159,9 @@ pub fn identify(
     let prepared = options.solver.prepared(nominal, dataset);
     let nominal = &prepared;
     let observed = without(observed, &outliers);
+    // Before the fits, whose columns take room of their own.
+    let repeats = split::noise_floor(&observed.dataset);
+    let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
 
@@ -218,7 +221,7 @@ pub fn identify(
         parameters: of_the_arm(&parameters),
         registered: registered_errors,
         geometry: geometry_errors,
-        noise_floor_mm: noise_floor(&observed, &geometry),
+        noise_floor_mm: noise_floor(repeats, &observed, &geometry),
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
         region: Region {
             min_deg: [0.0; 6],
@@ -230,7 +233,7 @@ pub fn identify(
         condition: mean_condition(dataset),
     };
     tell("judging what the model promises programs");
-    let mut estimated = with_region(estimated, &observed.dataset, &geometry);
+    let mut estimated = with_region(estimated, region, &geometry);
     let benefit = if options.solver.literal {
         None
     } else {
@@ -476,8 +479,8 @@ pub(crate) fn arm_covariance(fitted: &Fitted) -> nalgebra::DMatrix<f64> {
 
 /// What repeated poses scatter by (mm), or else what the rounding of angles alone leaves in a row; `None` where
 /// neither is known.
-fn noise_floor(observed: &Observed, fitted: &Fitted) -> Option<f64> {
-    if let Some(floor) = split::noise_floor(&observed.dataset) {
+fn noise_floor(repeats: Option<NoiseFloor>, observed: &Observed, fitted: &Fitted) -> Option<f64> {
+    if let Some(floor) = repeats {
         return Some(floor.sigma_mm);
     }
     let shares =
@@ -499,9 +502,7 @@ pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
     }
 }
 
-pub(crate) fn with_region(mut estimated: Estimated, dataset: &Dataset, fitted: &Fitted) -> Estimated {
-    let joints: Vec<Joints> = dataset.rows.iter().map(|r| r.joints).collect();
-    let mut region = Region::of(&joints, 0.0);
+pub(crate) fn with_region(mut estimated: Estimated, mut region: Region, fitted: &Fitted) -> Estimated {
     let condition = estimated.condition;
     let posed = estimated.model.at_condition(&condition);
     let target = fitted.frames.flange_from_target;

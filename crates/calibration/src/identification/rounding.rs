@@ -104,7 +104,7 @@ pub fn fuse_readout(
     dataset: &mut Dataset,
     nominal: &Model,
 ) -> Result<(ReadoutFusion, Vec<Matrix6<f64>>), NotFused> {
-    let (Some(step), true) = (dataset.angle_step_rad, dataset.rows.iter().all(|r| r.readout_mm.is_some()))
+    let (Some(step), true) = (dataset.angle_step_rad, dataset.rows.iter().all(|r| r.readout_mm().is_some()))
     else {
         return Err(NotFused::Nothing);
     };
@@ -115,7 +115,7 @@ pub fn fuse_readout(
     // A read-out without a step is taken as single precision would leave it.
     let readout_variance = dataset.readout_step_mm.map_or(1e-3_f64.powi(2), |h| h * h / 12.0);
     let posed = nominal.at_condition(&Condition::default());
-    let readout = |i: usize| dataset.rows[i].readout_mm.unwrap_or_default();
+    let readout = |i: usize| dataset.rows[i].readout_mm().unwrap_or_default();
     // The tool point of the read-out: linear least squares of R t = x − p.
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (i, row) in dataset.rows.iter().enumerate() {
@@ -148,7 +148,7 @@ pub fn fuse_readout(
     let mut covariances = Vec::with_capacity(dataset.rows.len());
     let (mut after, mut narrowed) = (0.0, 0.0);
     for row in &mut dataset.rows {
-        let target = row.readout_mm.unwrap_or_default();
+        let target = row.readout_mm().unwrap_or_default();
         let logged = row.joints;
         let mut covariance = Matrix6::identity() * angle_variance;
         for _ in 0..4 {

@@ -93,7 +93,7 @@ pub fn starts(dataset: &Dataset, nominal: &Model) -> Result<Vec<Frames>, NoStart
             let measured: Vec<Pose> = dataset
                 .rows
                 .iter()
-                .filter_map(|r| if let Reading::Pose(p) = r.reading { Some(p) } else { None })
+                .filter_map(|r| if let Reading::Pose(p) = &r.reading { Some(**p) } else { None })
                 .collect();
             let found = registration::poses(&flanges, &measured).ok_or_else(|| none("sensor frame", 3))?;
             frames.base_from_sensor = found.base_from_sensor;
@@ -120,8 +120,8 @@ fn positions(dataset: &Dataset) -> Vec<Vector3<f64>> {
     dataset
         .rows
         .iter()
-        .map(|r| match r.reading {
-            Reading::Position(p) => p,
+        .map(|r| match &r.reading {
+            Reading::Position(p) => *p,
             Reading::Pose(p) => p.translation.vector,
             Reading::Cable(_) => Vector3::zeros(),
         })

@@ -229,7 +229,7 @@ fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) ->
     let (mut flanges, mut lengths, mut positions, mut poses) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for row in rows {
-        if evidence == Evidence::Readout && row.readout_mm.is_none() {
+        if evidence == Evidence::Readout && row.readout_mm().is_none() {
             continue;
         }
         let file = match meaning.angles {
@@ -238,7 +238,7 @@ fn error(rows: &[&Row], model: &Model, meaning: &Meaning, evidence: Evidence) ->
             AngleUnit::Radians => row.joints.map(f64::to_degrees),
         };
         flanges.push(arm.forward(&meaning.convention.controller_angles(model, &file)?));
-        match (evidence, &row.reading, row.readout_mm) {
+        match (evidence, &row.reading, row.readout_mm()) {
             (Evidence::Readout, _, Some(p)) => positions.push(p * scale),
             (_, Reading::Cable(l), _) => lengths.push(l * scale),
             (_, Reading::Position(p), _) => positions.push(p * scale),

@@ -92,7 +92,8 @@ impl Rig {
                 Some(Reading::Position(base_from_sensor.inverse_transform_point(&at).coords))
             }
             Rig::Pose { base_from_sensor, flange_from_target } => {
-                Some(Reading::Pose(base_from_sensor.inv_mul(&(base_from_flange * flange_from_target))))
+                let seen = base_from_sensor.inv_mul(&(base_from_flange * flange_from_target));
+                Some(Reading::Pose(Box::new(seen)))
             }
         }
     }

@@ -174,7 +174,7 @@ fn noisy(exact: &Reading, distance_mm: f64, noise: &Noise, rng: &mut ChaCha8Rng)
         Reading::Cable(length) => Reading::Cable(length + draw(sigma)),
         Reading::Position(p) => Reading::Position(p + Vector3::from_fn(|_, _| draw(sigma))),
         Reading::Pose(pose) => {
-            let mut out = *pose;
+            let mut out = pose.clone();
             out.translation.vector += Vector3::from_fn(|_, _| draw(sigma));
             let turn = Vector3::from_fn(|_, _| draw(noise.sigma_deg.to_radians()));
             out.rotation = UnitQuaternion::from_scaled_axis(turn) * out.rotation;

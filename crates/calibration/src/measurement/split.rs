@@ -3,8 +3,7 @@
 //! A pose that was measured several times stays on one side of every split: a fit that has seen a pose has seen its
 //! repetitions. All functions return indices of [`Dataset::rows`] in ascending order.
 
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -38,28 +37,41 @@ fn same_rad(data: &Dataset) -> f64 {
 /// log rounded to fixed steps, else to 0.003°) and the controller's read-out, where logged, does not tell them apart,
 /// as it may where angles are rounded coarsely.
 pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
+    let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (row, first) in first_rows(data).into_iter().enumerate() {
+        out.entry(first).or_default().push(row);
+    }
+    out.into_values().collect()
+}
+
+/// The first row of the same pose, for each row.
+fn first_rows(data: &Dataset) -> Vec<usize> {
     // One number for each row, in which equal poses lie close together and others hardly ever: only neighbours have to
     // be compared. The weights are powers of the golden section, so that no grid of angles lines up.
     const WEIGHTS: [f64; 6] = [1.0, 0.618_034, 0.381_966, 0.236_068, 0.145_898, 0.090_170];
     let same = same_rad(data);
     let reach = same * WEIGHTS.iter().sum::<f64>();
-    let place: Vec<f64> =
-        data.rows.iter().map(|row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum()).collect();
-    // Rows that are one to the last bit stand behind the first of them, so that a pose measured a thousand times is not
-    // compared a million times.
-    let mut group: Vec<usize> = (0..data.rows.len()).collect();
-    let mut first: HashMap<[u64; 10], usize> = HashMap::new();
-    let mut order: Vec<usize> = Vec::with_capacity(data.rows.len());
-    for (i, row) in data.rows.iter().enumerate() {
-        match first.entry(bits(row)) {
-            Entry::Occupied(known) => group[i] = *known.get(),
-            Entry::Vacant(new) => {
-                new.insert(i);
-                order.push(i);
-            }
-        }
-    }
+    let along = |row: &Row| row.joints.iter().zip(WEIGHTS).map(|(q, w)| q * w).sum::<f64>() + 0.0;
+    let place: Vec<f64> = data.rows.iter().map(along).collect();
+    let mut order: Vec<usize> = (0..data.rows.len()).collect();
     order.sort_by(|&a, &b| place[a].total_cmp(&place[b]).then(a.cmp(&b)));
+    let mut group: Vec<usize> = (0..data.rows.len()).collect();
+    // Rows that are one to the last bit stand behind the first of them, so that a pose measured a thousand times is not
+    // compared a million times. They are neighbours in the order.
+    let mut different: Vec<(usize, [u64; 10])> = Vec::new();
+    let mut last = None;
+    order.retain(|&i| {
+        if last != Some(place[i]) {
+            different.clear();
+            last = Some(place[i]);
+        }
+        let bits = bits(&data.rows[i]);
+        match different.iter().find(|(_, known)| *known == bits) {
+            Some((first, _)) => group[i] = *first,
+            None => different.push((i, bits)),
+        }
+        group[i] == i
+    });
     for (k, &i) in order.iter().enumerate() {
         for &j in order[k + 1..].iter().take_while(|&&j| place[j] - place[i] <= reach) {
             let (a, b) = (root(&mut group, i), root(&mut group, j));
@@ -69,17 +81,13 @@ pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
             }
         }
     }
-    let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for i in 0..data.rows.len() {
-        out.entry(root(&mut group, i)).or_default().push(i);
-    }
-    out.into_values().collect()
+    (0..data.rows.len()).map(|row| root(&mut group, row)).collect()
 }
 
 /// Joints and read-out of a row, by their bits; −0 and 0 are one.
 fn bits(row: &Row) -> [u64; 10] {
     let mut out = [0; 10];
-    let readout = row.readout_mm;
+    let readout = row.readout_mm();
     for (bits, value) in out.iter_mut().zip(row.joints.iter().chain(readout.iter().flatten())) {
         *bits = (value + 0.0).to_bits();
     }
@@ -98,7 +106,7 @@ fn root(group: &mut [usize], mut i: usize) -> usize {
 
 /// Whether the controller's read-out says that two rows of equal rounded angles are different poses.
 fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
-    match (data.rows[i].readout_mm, data.rows[j].readout_mm) {
+    match (data.rows[i].readout_mm(), data.rows[j].readout_mm()) {
         (Some(a), Some(b)) => (a - b).amax() > 1.5 * data.readout_step_mm.unwrap_or(1e-3),
         _ => false,
     }
@@ -297,23 +305,28 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    let mut repeated: Vec<Vec<Vector3<f64>>> = Vec::new();
-    for pose in poses(data) {
+    let first = first_rows(data);
+    let mut rows: Vec<usize> = (0..data.rows.len()).collect();
+    rows.sort_by_key(|&row| first[row]);
+    let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
+    for pose in rows.chunk_by(|&a, &b| first[a] == first[b]).filter(|pose| pose.len() > 1) {
         let mut alike: BTreeMap<(usize, [i8; 6]), Vec<Vector3<f64>>> = BTreeMap::new();
-        for i in pose {
+        for &i in pose {
             let row = &data.rows[i];
-            alike.entry((row.anchor, row.condition.approach)).or_default().push(match row.reading {
-                Reading::Cable(l) => Vector3::new(l, 0.0, 0.0),
-                Reading::Position(p) => p,
+            alike.entry((row.anchor, row.condition.approach)).or_default().push(match &row.reading {
+                Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
+                Reading::Position(p) => *p,
                 Reading::Pose(pose) => pose.translation.vector,
             });
         }
-        repeated.extend(alike.into_values().filter(|readings| readings.len() > 1));
+        for readings in alike.into_values().filter(|readings| readings.len() > 1) {
+            all.add(&readings);
+            own.add(&different(&readings));
+            finest = finest.min(finest_mm(&readings));
+        }
     }
-    let all = pooled(&repeated)?;
-    let without: Vec<Vec<Vector3<f64>>> = repeated.iter().map(|readings| different(readings)).collect();
-    let own = pooled(&without);
-    let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest_mm(&repeated));
+    let (all, own) = (all.pooled()?, own.pooled());
+    let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest);
     if copied { own } else { Some(all) }
 }
 
@@ -321,15 +334,28 @@ pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
 const NO_CHANCE: f64 = 10.0;
 
 /// Pooled scatter of readings of the same pose.
-fn pooled(repeated: &[Vec<Vector3<f64>>]) -> Option<NoiseFloor> {
-    let (mut square, mut count, mut freedom) = (0.0, 0, 0);
-    for readings in repeated.iter().filter(|r| r.len() > 1) {
-        let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
-        square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
-        freedom += readings.len() - 1;
-        count += 1;
+#[derive(Default)]
+struct Scatter {
+    square: f64,
+    poses: usize,
+    freedom: usize,
+}
+
+impl Scatter {
+    /// Adds the readings of one pose; a single one tells nothing.
+    fn add(&mut self, readings: &[Vector3<f64>]) {
+        if readings.len() > 1 {
+            let mean = readings.iter().sum::<Vector3<f64>>() / readings.len() as f64;
+            self.square += readings.iter().map(|r| (r - mean).norm_squared()).sum::<f64>();
+            self.freedom += readings.len() - 1;
+            self.poses += 1;
+        }
     }
-    (freedom > 0).then(|| NoiseFloor { sigma_mm: (square / freedom as f64).sqrt(), poses: count, freedom })
+
+    fn pooled(&self) -> Option<NoiseFloor> {
+        let Self { square, poses, freedom } = *self;
+        (freedom > 0).then(|| NoiseFloor { sigma_mm: (square / freedom as f64).sqrt(), poses, freedom })
+    }
 }
 
 /// Readings, those that equal an earlier one left out.
@@ -344,16 +370,14 @@ fn different(readings: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// The smallest difference of a coordinate between readings of one pose that is not 0 (mm).
-fn finest_mm(repeated: &[Vec<Vector3<f64>>]) -> f64 {
+fn finest_mm(readings: &[Vector3<f64>]) -> f64 {
     let mut finest = f64::INFINITY;
-    for readings in repeated {
-        for axis in 0..3 {
-            let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();
-            values.sort_by(f64::total_cmp);
-            // Readings that differ by rounding of the last bit are equal.
-            let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-9);
-            finest = steps.fold(finest, f64::min);
-        }
+    for axis in 0..3 {
+        let mut values: Vec<f64> = readings.iter().map(|r| r[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        // Readings that differ by rounding of the last bit are equal.
+        let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-9);
+        finest = steps.fold(finest, f64::min);
     }
     finest
 }

@@ -46,11 +46,13 @@ impl Seen {
         let reading = match (sensor, self.reading.as_slice()) {
             ("cable", [length, ..]) => Reading::Cable(*length),
             ("position", [x, y, z, ..]) => Reading::Position(nalgebra::Vector3::new(*x, *y, *z)),
-            (_, [x, y, z, a, b, c, ..]) => Reading::Pose(pose_from_vector(&[*x, *y, *z, *a, *b, *c])),
+            (_, [x, y, z, a, b, c, ..]) => {
+                Reading::Pose(Box::new(pose_from_vector(&[*x, *y, *z, *a, *b, *c])))
+            }
             _ => Reading::Cable(f64::NAN),
         };
         let mut row = Row::new(self.row, Joints::from(self.joints), reading);
-        row.condition = self.condition;
+        row.condition = self.condition.into();
         row.anchor = self.anchor;
         row
     }

@@ -233,7 +233,7 @@ impl Tracker {
         let mut task = self.task(&seen);
         let mut alarms = Vec::new();
         for (at, row) in observed.dataset.rows.iter().enumerate() {
-            self.condition = row.condition;
+            self.condition = *row.condition;
             let alarm = self.pose(&task, at, seen[at].clone());
             if alarm.as_ref().is_some_and(|alarm| alarm.course == Course::Mounted) {
                 // Its frames are others now, and with them what rounded angles cost.
@@ -340,7 +340,7 @@ impl Tracker {
                 Reading::Position(p) => p.as_slice().to_vec(),
                 Reading::Pose(pose) => vector_from_pose(pose).to_vec(),
             },
-            condition: row.condition,
+            condition: *row.condition,
             anchor: row.anchor,
             per_mm: weight.per_mm,
             per_rad: weight.per_rad,

@@ -272,7 +272,7 @@ fn accidents_that_nothing_explains_raise_an_alarm_that_says_so_and_move_nothing(
     let mut dataset = measured(2, None);
     let other = measured(7, None);
     for at in [60, 66] {
-        dataset.rows[at].reading = other.rows[at].reading;
+        dataset.rows[at].reading = other.rows[at].reading.clone();
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
     assert!(tracker.take(&dataset).unwrap().is_empty());
@@ -315,7 +315,7 @@ fn files_of_a_few_poses_each_begin_a_track_together() {
 fn where_the_arm_was_measured_grows_with_the_track_and_outlives_a_stop() {
     let mut day = measured(2, None);
     day.rows[70].joints[0] = 150f64.to_radians();
-    day.rows[70].reading = day.rows[71].reading;
+    day.rows[70].reading = day.rows[71].reading.clone();
     let far = measured(2, None);
     let mut tracker = Tracker::begin(model(), "hash", &far, &Options::default()).unwrap();
     tracker.take(&far).unwrap();
@@ -347,7 +347,7 @@ fn an_arm_that_stays_raises_no_alarm_and_the_bounds_hold() {
 fn one_wrong_reading_is_an_accident_and_no_alarm() {
     let mut dataset = measured(2, None);
     let other = measured(7, None);
-    dataset.rows[60].reading = other.rows[3].reading;
+    dataset.rows[60].reading = other.rows[3].reading.clone();
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
     assert!(tracker.take(&dataset).unwrap().is_empty());
     assert_eq!(tracker.state().accidents, 1);
@@ -510,7 +510,7 @@ fn a_burst_of_outliers_is_one_alarm_and_no_change() {
     let calm = dataset.clone();
     let other = measured(7, None);
     for at in 60..92 {
-        dataset.rows[at].reading = other.rows[at].reading;
+        dataset.rows[at].reading = other.rows[at].reading.clone();
     }
     let mut tracker = Tracker::begin(model(), "hash", &dataset, &Options::default()).unwrap();
     let alarms = tracker.take(&dataset).unwrap();

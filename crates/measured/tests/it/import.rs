@@ -13,7 +13,7 @@ fn robot_cali() {
     assert_eq!(first.readout_step_mm, Some(0.1));
     assert_eq!(first.reading_step_mm, Some(0.01));
     assert_eq!(first.rows[0].reading, Reading::Cable(509.19));
-    assert_eq!(first.rows[0].readout_mm.unwrap().y, -451.9);
+    assert_eq!(first.rows[0].readout_mm().unwrap().y, -451.9);
     assert!(first.notes.iter().any(|n| n.contains("Sheet2") && n.contains("10 rows")), "{:?}", first.notes);
     let second = data_set("RobotCali.xlsx", Some("Sheet2"));
     assert_eq!(second.rows.len(), 10);

@@ -8,13 +8,13 @@ use truegrind_math::se3::Pose;
 use truegrind_measured::data_set;
 
 fn positions(data: &Dataset) -> Vec<Vector3<f64>> {
-    let of = |reading| if let Reading::Position(p) = reading { p } else { panic!("no position") };
-    data.rows.iter().map(|row| of(row.reading)).collect()
+    let of = |reading: &Reading| if let Reading::Position(p) = reading { *p } else { panic!("no position") };
+    data.rows.iter().map(|row| of(&row.reading)).collect()
 }
 
 fn lengths(data: &Dataset) -> Vec<f64> {
-    let of = |reading| if let Reading::Cable(l) = reading { l } else { panic!("no length") };
-    data.rows.iter().map(|row| of(row.reading)).collect()
+    let of = |reading: &Reading| if let Reading::Cable(l) = reading { *l } else { panic!("no length") };
+    data.rows.iter().map(|row| of(&row.reading)).collect()
 }
 
 /// Frames alone on real arms: the figures that others' tools reach are 0.70 mm (UR5), 0.8 mm (UR10), 0.6 mm
@@ -33,7 +33,7 @@ fn real_arms_with_frames_alone() {
     assert!(found.rmse_mm < 0.75, "{found:?}");
     let ur10 = data_set("ur10-landgraf/series-d.csv", None);
     let measured: Vec<Pose> =
-        ur10.rows.iter().map(|r| if let Reading::Pose(p) = r.reading { p } else { panic!() }).collect();
+        ur10.rows.iter().map(|r| if let Reading::Pose(p) = &r.reading { **p } else { panic!() }).collect();
     let found = registration::poses(&poses("universal-robots-ur10", &ur10), &measured).unwrap();
     assert!(found.rmse_mm < 0.9 && found.rmse_rad < 2e-3, "{found:?}");
     let abb = data_set("RobotCali.xlsx", None);

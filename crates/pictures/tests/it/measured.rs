@@ -37,18 +37,7 @@ fn dataset(count: usize) -> Dataset {
     let rows = (0..count).map(|i| {
         let joints = Joints::from_fn(|j, _| 0.6 * ((i * (j + 3)) as f64 * 0.37 + j as f64).sin());
         let hook = arm.forward(&joints, &Condition::default()) * Point3::from(HOOK);
-        Row {
-            number: i,
-            joints,
-            reading: Reading::Cable((hook - Point3::from(OUTLET)).norm()),
-            readout_mm: None,
-            condition: Condition::default(),
-            anchor: 0,
-            motion: None,
-            session: None,
-            line: i + 2,
-            other: Vec::new(),
-        }
+        Row::new(i, joints, Reading::Cable((hook - Point3::from(OUTLET)).norm()))
     });
     Dataset {
         file: "poses_1.csv".to_owned(),

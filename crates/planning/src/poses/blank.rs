@@ -9,7 +9,7 @@ pub(super) fn blank(number: usize, joints: Joints, sensor: Sensor) -> Row {
     let reading = match sensor {
         Sensor::Cable => Reading::Cable(0.0),
         Sensor::Position => Reading::Position(nalgebra::Vector3::zeros()),
-        Sensor::Pose => Reading::Pose(Pose::identity()),
+        Sensor::Pose => Reading::Pose(Pose::identity().into()),
     };
     Row::new(number, joints, reading)
 }

@@ -164,8 +164,7 @@ fn of_arm(wanted: &Wanted<'_>, rows: &[Row], options: &Options) -> Vec<Asked> {
 fn largest_turn(model: &Model, rows: &[Row]) -> f64 {
     let mut largest = 0.0_f64;
     for row in rows {
-        let condition = Condition { ..row.condition };
-        let turn = model.at_condition(&condition).effect_regressors(0, &row.joints);
+        let turn = model.at_condition(&row.condition).effect_regressors(0, &row.joints);
         largest = turn.first().map_or(largest, |t| largest.max(t.amax()));
     }
     largest

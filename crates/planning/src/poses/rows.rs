@@ -69,7 +69,7 @@ pub(super) fn jacobian(
         .iter()
         .map(|row| {
             let flange = posed.forward(&row.joints);
-            let reading = rig.predict(&flange, row.anchor).unwrap_or(row.reading);
+            let reading = rig.predict(&flange, row.anchor).unwrap_or_else(|| row.reading.clone());
             Row { reading, ..row.clone() }
         })
         .collect();

@@ -246,8 +246,9 @@ pub(super) fn data(planned: &[Row], poses: &[Candidate]) -> Vec<MeasuredRow> {
             let pose = &poses[row.pose];
             let mut out = blank(number, pose.joints, Sensor::Cable);
             out.anchor = pose.anchor;
-            out.condition =
+            let condition =
                 Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };
+            out.condition = condition.into();
             out
         })
         .collect()

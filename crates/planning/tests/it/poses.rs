@@ -216,7 +216,7 @@ fn left_by_geometry(found: &Plan, sensor: Sensor, frames: &Frames, effect: Effec
                 Condition { time_h: Some(row.time_h), approach: row.approach, ..Condition::default() };
             let joints = found.poses[row.pose].joints;
             let reading = rig.predict(&actual.forward(&joints, &condition), 0).unwrap();
-            Row { condition, ..Row::new(number, joints, reading) }
+            Row { condition: condition.into(), ..Row::new(number, joints, reading) }
         })
         .collect();
     let weight = Weight { per_mm: 1.0 / options.noise.reading_mm, per_rad: 1.0 / options.noise.reading_rad };
@@ -329,6 +329,6 @@ fn a_pose_target_reads_what_it_should() {
     let q = Joints::from([0.1, 0.2, -0.3, 0.4, 0.5, 0.6]);
     let flange = nominal.forward(&q, &Condition::default());
     let Some(Reading::Pose(pose)) = rig(&wanted).predict(&flange, 0) else { panic!("no pose") };
-    let back = frames.base_from_sensor * pose * frames.flange_from_target.inverse();
+    let back = frames.base_from_sensor * *pose * frames.flange_from_target.inverse();
     assert!((back.translation.vector - flange.translation.vector).norm() < 1e-9);
 }

@@ -230,7 +230,7 @@ pub fn outlier_table(found: &Identification, dataset: &Dataset) -> Table {
         let row = dataset.rows.get(*index);
         table.push([
             row_number(dataset, *index).into(),
-            row.and_then(|row| row.session.clone()).into(),
+            row.and_then(|row| row.session().map(str::to_owned)).into(),
             (*size).into(),
         ]);
     }

@@ -223,7 +223,7 @@ fn outliers_are_listed_by_the_rows_of_the_spreadsheet() {
     // Blank rows in the file: lines run ahead of the index, and rows are called by them.
     for row in &mut dataset.rows {
         row.line += 10;
-        row.number = row.line;
+        row.number = row.line as usize;
     }
     found.outliers.rows = vec![(3, 41.26), (0, 7.5)];
     let table = view::outlier_table(&found, &dataset);
@@ -232,7 +232,7 @@ fn outliers_are_listed_by_the_rows_of_the_spreadsheet() {
     assert_eq!(lines[1], "Row  Size [robust σ]");
     assert_eq!(lines[3], " 15             41.3");
     assert_eq!(lines[4], " 12              7.5");
-    dataset.rows[3].session = Some("monday".to_owned());
+    dataset.rows[3].extra_mut().session = Some("monday".to_owned());
     let text = terminal::table(&view::outlier_table(&found, &dataset), 80);
     assert!(text.contains("monday") && text.contains('–'), "{text}");
     let json = view::json(&found, &dataset);

@@ -16,6 +16,13 @@ impl LinuxCnc<'_> {
         self.machine.recount(chain);
     }
 
+    /// The same of a shift, known or not: it does not turn, so how the tool is turned is told as before.
+    fn unturned(&mut self) {
+        let turn = self.machine.turn;
+        self.recount();
+        self.machine.turn = turn;
+    }
+
     pub(super) fn act(&mut self, block: &Block) -> Result<(), String> {
         if let Some(feed) = block.get('F') {
             self.machine.feed = format!("{feed}");
@@ -148,7 +155,7 @@ impl LinuxCnc<'_> {
                 }
             }
             self.kept_shift = self.shift;
-            self.recount();
+            self.unturned();
             for (axis, place) in places.iter().enumerate() {
                 if place.is_some() && self.machine.at[axis].is_none() {
                     self.machine.at[axis] = *place;
@@ -162,7 +169,7 @@ impl LinuxCnc<'_> {
                     self.shift[axis] = *place;
                 }
             }
-            self.recount();
+            self.unturned();
             return Ok(true);
         }
         if block.has(921) || block.has(922) {
@@ -172,11 +179,11 @@ impl LinuxCnc<'_> {
                 self.kept_shift = self.shift;
             }
             self.shift = [Some(0.0); 3];
-            self.recount();
+            self.unturned();
         }
         if block.has(923) {
             self.shift = self.kept_shift;
-            self.recount();
+            self.unturned();
         }
         for (code, begins) in [(280, false), (300, false), (530, false), (382, true), (383, true)] {
             if block.has(code) {

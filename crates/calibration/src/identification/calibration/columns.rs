@@ -23,7 +23,7 @@ pub(super) struct Columns {
     pub(super) reading: Vec<Vec<f64>>,
     pub(super) per_mm: Vec<f64>,
     pub(super) per_rad: Vec<f64>,
-    pub(super) anchor: Vec<usize>,
+    pub(super) anchor: Vec<u32>,
     /// Joint rotations that the starting model's effects add; empty without effects.
     pub(super) extra: Option<[Vec<f64>; 6]>,
     /// Relative growth of the starting model's links; empty without.
@@ -116,7 +116,7 @@ impl Columns {
         if n == 0 {
             return Self::default();
         }
-        let mapped: Vec<_> = (0..padded).map(|i| start.joint_map * row(i).joints).collect();
+        let mapped = |i: usize, j: usize| (start.joint_map * row(i).joints)[j];
         let components = match dataset.sensor {
             Sensor::Cable => 1,
             Sensor::Position => 3,
@@ -134,12 +134,12 @@ impl Columns {
             .collect();
         let weight = |i: usize| (i < n).then(|| weights[i]);
         let mut out = Self {
-            sin: std::array::from_fn(|j| column(&|i| mapped[i][j].sin())),
-            cos: std::array::from_fn(|j| column(&|i| mapped[i][j].cos())),
+            sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
+            cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
             reading,
             per_mm: column(&|i| weight(i).map_or(0.0, |w| w.per_mm)),
             per_rad: column(&|i| weight(i).map_or(0.0, |w| w.per_rad)),
-            anchor: (0..padded).map(|i| row(i).anchor).collect(),
+            anchor: (0..padded).map(|i| row(i).anchor as u32).collect(),
             ..Self::default()
         };
         let turned = frames.disturbances.iter().any(|d| d.kind.turns_joints());
@@ -218,7 +218,7 @@ impl Columns {
         let still = Condition::default();
         let mut posed = start.at_condition(&still);
         for (i, row) in dataset.rows.iter().enumerate() {
-            if posed.condition != row.condition {
+            if posed.condition != *row.condition {
                 posed = start.at_condition(&row.condition);
             }
             let rotation = posed.rotations(&row.joints) - start.joint_map * row.joints;

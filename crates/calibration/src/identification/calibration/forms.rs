@@ -21,7 +21,7 @@ fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
     let of_motion = |value: &dyn Fn(&Motion, usize) -> f64| {
         vec![std::array::from_fn(|j| {
-            Some(rows.iter().map(|r| r.motion.as_ref().map_or(0.0, |m| value(m, j))).collect())
+            Some(rows.iter().map(|r| r.motion().map_or(0.0, |m| value(m, j))).collect())
         })]
     };
     match form {
@@ -86,7 +86,7 @@ pub fn shifts(form: Form, dataset: &Dataset, model: &Model, frames: &Frames) -> 
     };
     match form {
         Form::SlowReading => pushed(&|row, _| {
-            let Some(motion) = &row.motion else { return vec![Vector3::zeros()] };
+            let Some(motion) = row.motion() else { return vec![Vector3::zeros()] };
             let (here, before) =
                 (posed.forward(&row.joints) * touched, posed.forward(&(row.joints - motion.step)) * touched);
             vec![here - before]

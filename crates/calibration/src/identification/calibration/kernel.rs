@@ -269,7 +269,7 @@ fn sagging<R: Real>(away: &V<R>, length: R) -> R {
 fn of_anchor<R: Real>(like: R, task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> R {
     let mut lanes = [0.0; WIDTH];
     for (lane, anchor) in lanes.iter_mut().zip(&task.columns.anchor[at..at + R::ROWS]) {
-        *lane = value(*anchor);
+        *lane = value(*anchor as usize);
     }
     like.load(&lanes, 0)
 }

@@ -1,5 +1,7 @@
 //! One measured row.
 
+use std::sync::{Arc, LazyLock};
+
 use nalgebra::Vector3;
 
 use truegrind_arm::condition::Condition;
@@ -7,14 +9,14 @@ use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
 
 /// One reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Reading {
     /// Cable length (mm), its zero unknown.
     Cable(f64),
     /// Position in the sensor's frame (mm).
     Position(Vector3<f64>),
     /// Pose in the sensor's frame (mm).
-    Pose(Pose),
+    Pose(Box<Pose>),
 }
 
 /// How the arm came to a pose, from the rows around it.
@@ -26,46 +28,71 @@ pub struct Motion {
     pub rate_per_h: Option<Joints>,
 }
 
-/// One measured pose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// What the row is called where people read of it: its line in a file that was read, counted as the spreadsheet counts;
-    /// an index where there is no file.
-    pub number: usize,
-    /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
-    pub line: usize,
-    /// Logged joint angles of the controller (rad).
-    pub joints: Joints,
-    /// What the sensor read.
-    pub reading: Reading,
+/// What only some rows have.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Extra {
     /// The controller's own Cartesian read-out (mm), where logged.
     pub readout_mm: Option<Vector3<f64>>,
-    /// Time, temperature, payload and approach sides, where logged.
-    pub condition: Condition,
-    /// Which cable outlet (0-based) the row belongs to.
-    pub anchor: usize,
     /// How the arm came here, where the order of the rows is that of measuring; filled in by a diagnosis.
-    pub motion: Option<Box<Motion>>,
+    pub motion: Option<Motion>,
     /// Session label, where logged.
     pub session: Option<String>,
     /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), as text, up to the last one that holds something.
     pub other: Vec<String>,
 }
 
+/// One measured pose. Kept small, as there may be a million of them: what few rows have, or many share, stands apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What the row is called where people read of it: its line in a file that was read, counted as the spreadsheet counts;
+    /// an index where there is no file.
+    pub number: usize,
+    /// Line of the file or row of the sheet, from 1, as an editor or spreadsheet shows it.
+    pub line: u32,
+    /// Logged joint angles of the controller (rad).
+    pub joints: Joints,
+    /// What the sensor read.
+    pub reading: Reading,
+    /// Time, temperature, payload and approach sides, where logged; rows of one condition share it.
+    pub condition: Arc<Condition>,
+    /// Which cable outlet (0-based) the row belongs to.
+    pub anchor: usize,
+    /// What only some rows have.
+    pub extra: Option<Box<Extra>>,
+}
+
+/// The condition of a row of which none is logged.
+static UNKNOWN: LazyLock<Arc<Condition>> = LazyLock::new(Arc::default);
+
 impl Row {
     /// A row of nothing but joint angles (rad) and a reading, line `number + 2` of a file with a header.
     pub fn new(number: usize, joints: Joints, reading: Reading) -> Self {
-        Self {
-            number,
-            line: number + 2,
-            joints,
-            reading,
-            readout_mm: None,
-            condition: Condition::default(),
-            anchor: 0,
-            motion: None,
-            session: None,
-            other: Vec::new(),
-        }
+        let line = u32::try_from(number).unwrap_or(u32::MAX).saturating_add(2);
+        Self { number, line, joints, reading, condition: UNKNOWN.clone(), anchor: 0, extra: None }
+    }
+
+    /// The controller's own Cartesian read-out (mm), where logged.
+    pub fn readout_mm(&self) -> Option<Vector3<f64>> {
+        self.extra.as_ref()?.readout_mm
+    }
+
+    /// How the arm came here, where that is known.
+    pub fn motion(&self) -> Option<&Motion> {
+        self.extra.as_ref()?.motion.as_ref()
+    }
+
+    /// Session label, where logged.
+    pub fn session(&self) -> Option<&str> {
+        self.extra.as_ref()?.session.as_deref()
+    }
+
+    /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), up to the last one that holds something.
+    pub fn other(&self) -> &[String] {
+        self.extra.as_ref().map_or(&[], |extra| &extra.other)
+    }
+
+    /// What only some rows have, to be filled in.
+    pub fn extra_mut(&mut self) -> &mut Extra {
+        self.extra.get_or_insert_default()
     }
 }

@@ -1,6 +1,8 @@
 //! Rows of a table as measured rows: every cell checked, units converted.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -9,7 +11,7 @@ use super::columns::Columns;
 use super::error::{ImportError, Place};
 use super::options::Options;
 use super::rounding;
-use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
+use crate::measurement::dataset::{Dataset, Extra, Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -28,6 +30,7 @@ pub(super) fn dataset(
     let mut notes = columns.notes.clone();
     let reader = Reader { file, sheet: table.sheet.as_deref(), header: &table.rows[columns.header] };
     let (mut rows, mut blank, mut unnamed, mut as_text) = (Vec::new(), table.blank_lines, 0usize, 0usize);
+    let mut conditions = Conditions::default();
     let lines = table.rows[columns.header + 1..].iter().map(|line| Ok(Cow::Borrowed(line)));
     for line in lines.chain(further.map(|line| line.map(Cow::Owned))) {
         let line: Cow<'_, Line> = line?;
@@ -46,7 +49,7 @@ pub(super) fn dataset(
         let widest = line.cells.iter().rposition(|c| !c.is_empty()).map_or(0, |i| i + 1);
         unnamed = unnamed.max((0..widest).filter(|&i| !headed(i) && !line.cells[i].is_empty()).count());
         as_text += line.cells.iter().filter(|c| matches!(c, Cell::Number { as_text: true, .. })).count();
-        rows.push(reader.row(line, columns)?);
+        rows.push(reader.row(line, columns, &mut conditions)?);
     }
     if rows.is_empty() {
         return Err(ImportError::Empty { place: reader.place() });
@@ -81,7 +84,7 @@ pub(super) fn dataset(
     }
     let degrees = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()));
     let angle_step_rad = rounding::step(degrees).map(f64::to_radians);
-    let readouts = rows.iter().filter_map(|r| r.readout_mm).flat_map(|v| [v.x, v.y, v.z]);
+    let readouts = rows.iter().filter_map(Row::readout_mm).flat_map(|v| [v.x, v.y, v.z]);
     let readout_step_mm = rounding::step(readouts);
     let reading_step_mm = reading_step(&rows, columns.sensor);
     Ok(Dataset {
@@ -116,6 +119,33 @@ const LENGTH: &str = "a length in mm, below a kilometre";
 const MOST_OUTLETS: usize = 64;
 /// No arm carries more.
 const LARGEST_KG: f64 = 1e4;
+
+/// Conditions that rows may share: many rows have one of few.
+#[derive(Default)]
+struct Conditions {
+    seen: HashMap<Bits, Arc<Condition>>,
+}
+
+/// What a file says of a condition, to the bit: time, temperature, payload; sides.
+type Bits = ([Option<u64>; 3], [i8; 6]);
+
+/// A log of times has a condition for each row, of which none comes back.
+const MOST_SHARED: usize = 4096;
+
+impl Conditions {
+    fn share(&mut self, condition: Condition) -> Arc<Condition> {
+        let Condition { time_h, temperature_c, payload_kg, approach, .. } = condition;
+        let key = ([time_h, temperature_c, payload_kg].map(|value| value.map(f64::to_bits)), approach);
+        if let Some(shared) = self.seen.get(&key) {
+            return shared.clone();
+        }
+        let new = Arc::new(condition);
+        if self.seen.len() < MOST_SHARED {
+            self.seen.insert(key, new.clone());
+        }
+        new
+    }
+}
 
 struct Reader<'a> {
     file: &'a str,
@@ -178,7 +208,7 @@ impl Reader<'_> {
         }
     }
 
-    fn row(&self, line: &Line, columns: &Columns) -> Result<Row, ImportError> {
+    fn row(&self, line: &Line, columns: &Columns, conditions: &mut Conditions) -> Result<Row, ImportError> {
         let mut joints = Joints::zeros();
         for (q, &column) in joints.iter_mut().zip(&columns.joints) {
             let angle = self.bounded(line, column, LARGEST_DEG, "an angle in degrees, within ±3600")?;
@@ -227,18 +257,16 @@ impl Reader<'_> {
         let kept = columns.other.iter().rposition(|(_, i)| line.cells.get(*i).is_some_and(|c| !c.is_empty()));
         let kept = kept.map_or(0, |last| last + 1);
         let text = |i: usize| line.cells.get(i).map(Cell::to_string).unwrap_or_default();
-        Ok(Row {
-            number: line.number,
-            line: line.number,
-            joints,
-            reading,
+        let extra = Extra {
             readout_mm,
-            condition,
-            anchor,
             motion: None,
             session: columns.session.map(text).filter(|s| !s.is_empty()),
             other: columns.other[..kept].iter().map(|(_, i)| text(*i)).collect(),
-        })
+        };
+        let extra = (extra != Extra::default()).then(|| Box::new(extra));
+        let condition = conditions.share(condition);
+        let place = u32::try_from(line.number).unwrap_or(u32::MAX);
+        Ok(Row { number: line.number, line: place, joints, reading, condition, anchor, extra })
     }
 
     /// What the sensor read.
@@ -253,7 +281,7 @@ impl Reader<'_> {
             (_, [x, y, z]) => Reading::Position(Vector3::new(*x, *y, *z)),
             (_, [x, y, z, w, i, j, k]) => {
                 let rotation = self.quaternion(line, columns, Quaternion::new(*w, *i, *j, *k))?;
-                Reading::Pose(Pose::from_parts(Translation3::new(*x, *y, *z), rotation))
+                Reading::Pose(Box::new(Pose::from_parts(Translation3::new(*x, *y, *z), rotation)))
             }
             // The columns were chosen for the sensor: one, three or seven.
             _ => return Err(ImportError::Empty { place: self.place() }),
@@ -350,7 +378,7 @@ fn check_units(reader: &Reader<'_>, rows: &[Row], sensor: Sensor) -> Result<(), 
             "multiply the readings by 1000, or allow odd units (--allow-odd-units) if the sensor really saw so little",
         );
     }
-    let readout = |r: &Row| r.readout_mm;
+    let readout = Row::readout_mm;
     let largest = rows.iter().filter_map(readout).map(|v| v.amax()).fold(0.0, f64::max);
     if rows.iter().filter_map(readout).count() >= 3 && spread_deg > 20.0 && largest > 0.0 && largest < 10.0 {
         return units(

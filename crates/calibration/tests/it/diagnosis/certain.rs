@@ -1,6 +1,8 @@
 //! What may be called identified: what wins beside what nobody has described, comes back in halves of the rows, and is of a
 //! size that nature has. Here stand disturbances that the catalogue does not hold, or holds as one story of several.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -78,7 +80,7 @@ fn path(delay_s: f64, rows: usize) -> Dataset {
             let at = (arm.forward(&joints(t - delay_s), &Condition::default()) * target).coords;
             let noise = Vector3::from_fn(|_, _| 0.02 * normal(&mut rng));
             let mut row = Row::new(number, joints(t), Reading::Position(at + noise));
-            row.condition.time_h = Some(t / 3600.0);
+            Arc::make_mut(&mut row.condition).time_h = Some(t / 3600.0);
             row
         })
         .collect();

@@ -121,12 +121,13 @@ fn rows_whose_columns_contradict_each_other_are_named() {
     let mut data = run(&nominal, &[], &setup).dataset;
     let step = 0.1_f64.to_radians();
     for row in &mut data.rows {
-        row.readout_mm = Some(nominal.forward(&row.joints, &Condition::default()).translation.vector);
+        row.extra_mut().readout_mm =
+            Some(nominal.forward(&row.joints, &Condition::default()).translation.vector);
         row.joints = row.joints.map(|q| (q / step).round() * step);
     }
     data.angle_step_rad = Some(step);
     for wrong in [7, 31] {
-        if let Some(at) = &mut data.rows[wrong].readout_mm {
+        if let Some(at) = &mut data.rows[wrong].extra_mut().readout_mm {
             at.y += 30.0;
         }
     }

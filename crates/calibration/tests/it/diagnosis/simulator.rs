@@ -413,10 +413,10 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
                 v * sigma
             }
         };
-        let mut reading = match exact {
+        let mut reading = match &exact {
             Reading::Cable(l) => Reading::Cable(l + noise()),
             Reading::Position(p) => Reading::Position(p + Vector3::new(noise(), noise(), noise())),
-            other => other,
+            other => other.clone(),
         };
         for h in hidden {
             if let Hidden::Outliers { list, mm } = h
@@ -433,15 +433,16 @@ pub fn run(nominal: &Model, hidden: &[Hidden], setup: &Setup) -> Run {
         let log = &setup.log;
         let logged = log.angle_step_rad.map_or(*q, |step| q.map(|v| (v / step).round() * step));
         let mut row = Row::new(i, logged, reading);
-        row.condition = Condition {
+        let condition = Condition {
             time_h: log.clock.then_some(time),
             temperature_c: log.thermometer.then_some(20.0 + kelvin),
             approach: if log.sides { approach } else { [0; 6] },
             ..Condition::default()
         };
+        row.condition = condition.into();
         if log.angle_step_rad.is_some() {
             let at = nominal.forward(q, &Condition::default()) * nalgebra::Point3::new(0.0, 0.0, 35.0);
-            row.readout_mm = Some(at.coords.map(|v| (v * 100.0).round() / 100.0));
+            row.extra_mut().readout_mm = Some(at.coords.map(|v| (v * 100.0).round() / 100.0));
         }
         rows.push(row);
     }

@@ -79,21 +79,15 @@ fn dataset(sensor: Sensor, rows: usize, seed: u64) -> Dataset {
             let reading = match sensor {
                 Sensor::Cable => Reading::Cable(random.random_range(400.0..900.0)),
                 Sensor::Position => Reading::Position(pose.translation.vector + Vector3::new(3.0, -2.0, 1.0)),
-                Sensor::Pose => Reading::Pose(pose_from_vector(&[2.0, 1.0, -3.0, 0.02, -0.03, 0.01]) * pose),
+                Sensor::Pose => {
+                    Reading::Pose(Box::new(pose_from_vector(&[2.0, 1.0, -3.0, 0.02, -0.03, 0.01]) * pose))
+                }
             };
             let anchor = if sensor == Sensor::Cable { number % 2 } else { 0 };
-            Row {
-                number,
-                line: number + 2,
-                joints,
-                reading,
-                readout_mm: None,
-                condition,
-                anchor,
-                motion: Some(Box::new(Motion { step: joints * 0.3, rate_per_h: Some(joints * 700.0) })),
-                session: None,
-                other: Vec::new(),
-            }
+            let mut row = Row::new(number, joints, reading);
+            (row.condition, row.anchor) = (condition.into(), anchor);
+            row.extra_mut().motion = Some(Motion { step: joints * 0.3, rate_per_h: Some(joints * 700.0) });
+            row
         })
         .collect();
     Dataset {

@@ -35,10 +35,10 @@ fn columns_in_any_order_with_others_between() {
     assert_eq!((row.number, row.line), (2, 2));
     assert_eq!(row.condition.time_h, Some(0.5));
     assert_eq!(row.condition.approach, [0, -1, 0, 0, 0, 0]);
-    assert_eq!(row.session.as_deref(), Some("monday"));
+    assert_eq!(row.session(), Some("monday"));
     assert_eq!(data.other_columns, ["operator"]);
-    assert_eq!(row.other, ["Ann"]);
-    assert_eq!((data.rows[1].condition.time_h, &data.rows[1].session), (None, &None));
+    assert_eq!(row.other(), ["Ann"]);
+    assert_eq!((data.rows[1].condition.time_h, data.rows[1].session()), (None, None));
     assert!(data.notes.iter().any(|n| n.contains("`operator`")));
     assert!(data.notes.iter().any(|n| n == "1 blank row(s) skipped"));
     assert_eq!(data.sha256.len(), 64);
@@ -52,7 +52,7 @@ fn full_pose_scalar_first() {
     )
     .unwrap();
     assert_eq!(data.sensor, Sensor::Pose);
-    let Reading::Pose(pose) = data.rows[0].reading else { panic!() };
+    let Reading::Pose(pose) = &data.rows[0].reading else { panic!() };
     let turned = pose.rotation.scaled_axis();
     assert!((turned.x - std::f64::consts::FRAC_PI_2).abs() < 1e-6 && turned.y == 0.0);
     assert_eq!(pose.translation.vector.z, 3.0);

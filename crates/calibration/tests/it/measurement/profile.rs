@@ -30,7 +30,7 @@ fn a_calibration_table_of_robodk_leaves_out_what_was_not_measured() {
         assert_eq!((point.x, point.y, point.z), (803.0, 7.0, 900.5));
         assert!((data.rows[2].joints[3].to_degrees() - 12.0).abs() < 1e-12);
         // The line of the file, counted as an editor does.
-        assert_eq!(data.rows[2].line, 4 + usize::from(!header.is_empty()));
+        assert_eq!(data.rows[2].line, 4 + u32::from(!header.is_empty()));
         assert!(
             data.notes[0].contains("RoboDK") && data.notes[0].contains("(0, 5, 120)"),
             "{:?}",
@@ -71,7 +71,7 @@ fn tags_of_delmia_are_points_or_poses() {
         assert!((data.rows[1].joints[5].to_degrees() - 61.25).abs() < 1e-12);
         assert!(data.notes[0].contains("DELMIA"), "{:?}", data.notes);
         let data = read(&format!("{header}{}", delmia(true, 6))).unwrap();
-        let Reading::Pose(pose) = data.rows[1].reading else { panic!("a pose") };
+        let Reading::Pose(pose) = &data.rows[1].reading else { panic!("a pose") };
         assert_eq!(pose.translation.vector.as_slice(), [701.5, -200.0, 950.0]);
         // Roll about x first: its z points along −y then, which the yaw of 30° turns on.
         let z = pose.rotation * nalgebra::Vector3::z();

@@ -18,8 +18,8 @@ fn flanges(simulation: &Simulation) -> Vec<Pose> {
 fn positions(data: &Dataset) -> Vec<Vector3<f64>> {
     data.rows
         .iter()
-        .map(|row| match row.reading {
-            Reading::Position(p) => p,
+        .map(|row| match &row.reading {
+            Reading::Position(p) => *p,
             Reading::Pose(pose) => pose.translation.vector,
             Reading::Cable(_) => panic!("a cable has no position"),
         })
@@ -80,7 +80,7 @@ fn poses_find_both_frames() {
         measure(&random(30, &format!("{SIX}[noise]\nsigma_mm = 0.02\nsigma_deg = 0.01\n")));
     let Rig::Pose { base_from_sensor, flange_from_target } = simulation.rig else { panic!() };
     let measured: Vec<Pose> =
-        data.rows.iter().map(|r| if let Reading::Pose(p) = r.reading { p } else { panic!() }).collect();
+        data.rows.iter().map(|r| if let Reading::Pose(p) = &r.reading { **p } else { panic!() }).collect();
     let found = registration::poses(&flanges(&simulation), &measured).unwrap();
     let [sensor, target] =
         [(base_from_sensor, found.base_from_sensor), (flange_from_target, found.flange_from_target)]

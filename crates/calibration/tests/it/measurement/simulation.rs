@@ -111,7 +111,7 @@ fn rounding_leaves_its_steps() {
     for (row, truth) in data.rows.iter().zip(&simulation.rows) {
         assert!((row.joints - truth.joints).amax() <= 0.05f64.to_radians() * 1.0001);
         let exact = simulation.nominal.forward(&truth.joints, &Condition::default()).translation.vector;
-        assert!((row.readout_mm.unwrap() - exact).amax() <= 0.05 * 1.0001);
+        assert!((row.readout_mm().unwrap() - exact).amax() <= 0.05 * 1.0001);
     }
 }
 
@@ -125,13 +125,13 @@ fn circumstances_are_logged_and_felt() {
     ) + TRACKER;
     let (_, data) = measure(&recipe);
     assert_eq!(data.rows.len(), 160);
-    let last = data.rows.last().unwrap().condition;
+    let last = *data.rows.last().unwrap().condition;
     assert_eq!((last.time_h, last.payload_kg), (Some(4.0), Some(2.0)));
     assert!((last.temperature_c.unwrap() - (32.0 - 12.0 * (-4f64).exp())).abs() < 1e-3);
     let mut widest = 0f64;
     for pair in data.rows.iter().collect::<Vec<_>>().chunks(2) {
         assert_eq!((pair[0].condition.approach, pair[1].condition.approach), ([-1; 6], [1; 6]));
-        let [Reading::Position(a), Reading::Position(b)] = [pair[0].reading, pair[1].reading] else {
+        let [Reading::Position(a), Reading::Position(b)] = [&pair[0].reading, &pair[1].reading] else {
             panic!()
         };
         let moved = (a - b).norm();

@@ -102,8 +102,8 @@ fn nearly_equal_poses_are_one_unless_the_read_out_differs() {
     let mut data =
         Dataset::new("made", Sensor::Cable, vec![row(0, 10.0), row(1, 40.0), row(2, 10.002), row(3, 10.02)]);
     assert_eq!(split::poses(&data), [vec![0, 2], vec![1], vec![3]]);
-    data.rows[0].readout_mm = Some(nalgebra::Vector3::new(1.0, 2.0, 3.0));
-    data.rows[2].readout_mm = Some(nalgebra::Vector3::new(1.0, 2.3, 3.0));
+    data.rows[0].extra_mut().readout_mm = Some(nalgebra::Vector3::new(1.0, 2.0, 3.0));
+    data.rows[2].extra_mut().readout_mm = Some(nalgebra::Vector3::new(1.0, 2.3, 3.0));
     assert_eq!(split::poses(&data).len(), 4);
 }
 
@@ -120,12 +120,12 @@ fn poses_are_those_that_comparing_every_pair_gives() {
             row.joints[2] += 2e-6 * (i % 3) as f64;
         }
         if i % 11 == 0 {
-            row.readout_mm = Some(nalgebra::Vector3::new((i % 2) as f64, 0.0, -0.0));
+            row.extra_mut().readout_mm = Some(nalgebra::Vector3::new((i % 2) as f64, 0.0, -0.0));
         }
     }
     let alike = |i: usize, j: usize| {
         let (a, b) = (&data.rows[i], &data.rows[j]);
-        let apart = match (a.readout_mm, b.readout_mm) {
+        let apart = match (a.readout_mm(), b.readout_mm()) {
             (Some(a), Some(b)) => (a - b).amax() > 1.5e-3,
             _ => false,
         };
