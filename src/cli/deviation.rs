@@ -147,20 +147,22 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     shown.write(found, Batch::sparing(&all), |batch, name, reports| {
         #[cfg(feature = "visual")]
         if let Some(path) = &arguments.outputs.rrd {
-            let is = if first.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
-            let arms = super::recording::Arms {
-                real: &first.model,
-                is,
-                nominal: &first.nominal,
-                robot: arguments.robot.as_deref(),
-            };
-            let bytes = super::recording::path(name, arms, condition, reports, surface.as_ref())?;
-            batch.add(path, bytes);
+            let arms = first.drawn(arguments.robot.as_deref());
+            batch.add(path, super::recording::path(name, arms, condition, reports, surface.as_ref())?);
         }
         #[cfg(not(feature = "visual"))]
         let _ = (batch, name, reports);
         Ok(())
     })
+}
+
+#[cfg(feature = "visual")]
+impl Runner {
+    /// The arms of a recording.
+    fn drawn<'a>(&'a self, robot: Option<&'a str>) -> super::recording::Arms<'a> {
+        let is = if self.after == After::Achieved { "simulated actual arm" } else { "estimated arm" };
+        super::recording::Arms { real: &self.model, is, nominal: &self.nominal, robot }
+    }
 }
 
 /// How a report calls what it is of.

@@ -61,4 +61,7 @@ pub mod finding;
 pub mod words;
 pub mod picture;
 mod findings;
+mod options;
+mod search;
+mod telling;
 pub mod diagnose;

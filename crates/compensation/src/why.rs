@@ -170,6 +170,29 @@ impl Why {
         }
     }
 
+    /// Why it stays for the motion behind it.
+    fn before_one_that_stays(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Why::BeforeCircle { line } => write!(
+                f,
+                "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
+                 circle"
+            ),
+            Why::BeforeSingularWay { line } => write!(
+                f,
+                "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
+                 singularity"
+            ),
+            Why::BeforeLimitedWay { line, joint } => write!(
+                f,
+                "the motion of line {line} stays as it is and starts here: from a corrected start joint {} would leave its \
+                 range on the way",
+                joint + 1
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// The reason without the figures of one motion.
     pub fn kind(&self) -> &'static str {
         match self {
@@ -295,22 +318,9 @@ impl fmt::Display for Why {
                 "at the programmed speed joint {} turns {ratio:.2} times as fast as it can",
                 joint + 1
             ),
-            Why::BeforeCircle { line } => write!(
-                f,
-                "the circular motion of line {line} stays as it is and starts here: from a corrected start it would be another \
-                 circle"
-            ),
-            Why::BeforeSingularWay { line } => write!(
-                f,
-                "the motion of line {line} stays as it is and starts here: from a corrected start it would come too close to a \
-                 singularity"
-            ),
-            Why::BeforeLimitedWay { line, joint } => write!(
-                f,
-                "the motion of line {line} stays as it is and starts here: from a corrected start joint {} would leave its \
-                 range on the way",
-                joint + 1
-            ),
+            Why::BeforeCircle { .. } | Why::BeforeSingularWay { .. } | Why::BeforeLimitedWay { .. } => {
+                self.before_one_that_stays(f)
+            }
             Why::JointNotMeasured { joint, by_deg } => write!(
                 f,
                 "joint {} is {by_deg:.1}° outside the range in which the arm was measured",

@@ -8,6 +8,8 @@
 //! Near another fit the steps are Gauss and Newton's (see `newton`) as long as they descend. A search leaves it at that; any
 //! other fit ends with Levenberg and Marquardt.
 
+use std::ops::Range;
+
 use super::cause::Cause;
 use super::newton::{self, Step};
 use crate::identification::calibration::{Calibration, Frames, Weight};
@@ -214,75 +216,26 @@ pub(super) fn warm_fit(
         round += 1;
         let base = rounding::weights(dataset, &model, &frames, &observed.angles, sigma.0, sigma.1);
         let task = plain_task.reweighted(&with_robust_weights(&base, &robust_weight));
-        let step = if nearby { Step::taken(&task, &mut x) } else { None };
-        let mut covariance = None;
-        nearby = step.is_some();
-        if !nearby {
-            // Weights still change: what is beyond a few steps would be thrown away.
-            let steps = if near.is_some() { 1 } else { 3 };
-            let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
-            let estimate = lm::solve(&task, &x, &rough);
-            x.clone_from(&estimate.x);
-            covariance = estimate.covariance;
-        }
+        let gone = Gone::one(&task, &mut x, nearby, near.is_some());
+        nearby = matches!(gone, Gone::Step(_));
         (model, frames) = task.apply(&x);
         let plain = task.plain_residuals(&x);
-        let whitened = |i: usize| {
-            let w = &base[i];
-            let row = &plain[i * per..(i + 1) * per];
-            row.iter().enumerate().map(move |(c, r)| r * if c < 3 { w.per_mm } else { w.per_rad })
-        };
-        let size = |i: usize, range: std::ops::Range<usize>| {
-            let count = range.len().max(1) as f64;
-            let sum: f64 = whitened(i).skip(range.start).take(range.len()).map(|v| v * v).sum();
-            let size = (sum / count).sqrt();
-            if size.is_finite() { size } else { 1e6 }
-        };
-        let spread = |range: std::ops::Range<usize>| {
-            let k = range.len();
-            let all: Vec<f64> = (0..n).map(|i| size(i, range.clone())).collect();
-            (median(&all).unwrap_or(1.0) / median_size(k)).clamp(1e-6, 1e6)
-        };
-        let of_lengths = spread(0..lengths);
-        let of_angles = if angles > 0 { spread(lengths..per) } else { 1.0 };
-        let sizes: Vec<f64> = (0..n)
-            .map(|i| {
-                let a = size(i, 0..lengths) / of_lengths;
-                if angles > 0 {
-                    let b = size(i, lengths..per) / of_angles;
-                    (0.5 * (a * a + b * b)).sqrt()
-                } else {
-                    a
-                }
-            })
-            .collect();
+        let whitened = Whitened { base: &base, plain: &plain, per };
+        let of_lengths = whitened.spread(0..lengths);
+        let of_angles = if angles > 0 { whitened.spread(lengths..per) } else { 1.0 };
+        let sizes = whitened.sizes([lengths, angles], [of_lengths, of_angles]);
         let next: Vec<f64> = sizes.iter().map(|s| (BEND / s).min(1.0)).collect();
         let moved = next.iter().zip(&robust_weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {
-            // The scale under which the weighted squares have their degrees of freedom.
-            let variances = match (&step, &covariance) {
-                (Some(step), _) => step.variances(),
-                (None, Some(covariance)) => covariance.diagonal().as_slice().to_vec(),
-                (None, None) => Vec::new(),
+            let spent = gone.spent(&priors);
+            let freedom_share = (((n * per) as f64 - spent) / (n * per) as f64).max(0.05);
+            let by_length = whitened.dispersion(0..lengths, &robust_weight, freedom_share);
+            let by_angle = if angles > 0 {
+                whitened.dispersion(lengths..per, &robust_weight, freedom_share)
+            } else {
+                1.0
             };
-            // Each parameter counts by the share that its prior does not determine.
-            let shares =
-                priors.iter().zip(&variances).map(|(p, v)| (1.0 - v / p.sigma.powi(2)).clamp(0.0, 1.0));
-            let spent: f64 = shares.sum();
-            let rows = (n * per) as f64;
-            let dispersion = |range: std::ops::Range<usize>| {
-                let sum: f64 = (0..n)
-                    .map(|i| {
-                        let row: f64 = whitened(i).skip(range.start).take(range.len()).map(|v| v * v).sum();
-                        if row.is_finite() { robust_weight[i] * row } else { 0.0 }
-                    })
-                    .sum();
-                let freedom = (n * range.len()) as f64 * ((rows - spent) / rows).max(0.05);
-                (sum / freedom.max(1.0)).sqrt().max(1e-6)
-            };
-            let by_length = dispersion(0..lengths);
-            let by_angle = if angles > 0 { dispersion(lengths..per) } else { 1.0 };
             let weights: Vec<Weight> = base
                 .iter()
                 .map(|w| Weight {
@@ -291,23 +244,7 @@ pub(super) fn warm_fit(
                 })
                 .collect();
             let task = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
-            let descended = nearby && newton::descend_to(&task, &mut x, SEARCHED);
-            let estimate = if descended {
-                Estimate {
-                    covariance: None,
-                    cost: task.row_cost(&x) + prior_cost(&priors, &x),
-                    evaluations: Evaluations::default(),
-                    termination: Termination::Cost,
-                    trace: Vec::new(),
-                    x,
-                }
-            } else if nearby {
-                // A promise is held against the cost, half the rows: the same as above.
-                let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
-                Estimate { covariance: None, ..lm::solve(&task, &x, &loose) }
-            } else {
-                lm::solve(&task, &x, &lm::Options::default())
-            };
+            let estimate = descended(&task, &priors, x, nearby);
             let (model, frames) = task.apply(&estimate.x);
             return Extended {
                 causes: filled(causes, &model, &frames),
@@ -327,6 +264,113 @@ pub(super) fn warm_fit(
         robust_weight = next;
         sigma = (narrowed(sigma.0, of_lengths, &base, true), narrowed(sigma.1, of_angles, &base, false));
     }
+}
+
+/// How a round of a fit went on.
+enum Gone {
+    /// By a step of Gauss and Newton.
+    Step(Step),
+    /// By a few of Levenberg and Marquardt, with the covariance there.
+    Solved(Option<DMatrix<f64>>),
+}
+
+impl Gone {
+    /// Goes on by one step where the optimum is nearby and that is taken, else by a few.
+    fn one(task: &Calibration, x: &mut Vec<f64>, nearby: bool, near: bool) -> Self {
+        if nearby && let Some(step) = Step::taken(task, x) {
+            return Self::Step(step);
+        }
+        // Weights still change: what is beyond a few steps would be thrown away.
+        let steps = if near { 1 } else { 3 };
+        let rough = lm::Options { max_iterations: steps, cost_tolerance: 1e-4, ..lm::Options::default() };
+        let estimate = lm::solve(task, x, &rough);
+        x.clone_from(&estimate.x);
+        Self::Solved(estimate.covariance)
+    }
+
+    /// Degrees of freedom that are used up: each parameter counts by the share that its prior does not determine.
+    fn spent(&self, priors: &[Prior]) -> f64 {
+        let variances = match self {
+            Self::Step(step) => step.variances(),
+            Self::Solved(Some(covariance)) => covariance.diagonal().as_slice().to_vec(),
+            Self::Solved(None) => Vec::new(),
+        };
+        priors.iter().zip(&variances).map(|(p, v)| (1.0 - v / p.sigma.powi(2)).clamp(0.0, 1.0)).sum()
+    }
+}
+
+/// Residuals over what the sensor and the angles promise.
+struct Whitened<'a> {
+    base: &'a [Weight],
+    plain: &'a [f64],
+    /// Residuals of a row.
+    per: usize,
+}
+
+impl Whitened<'_> {
+    /// The sum of squares of some residuals of a row.
+    fn squares(&self, i: usize, range: &Range<usize>) -> f64 {
+        let w = &self.base[i];
+        let row = &self.plain[i * self.per..(i + 1) * self.per];
+        let whitened = row.iter().enumerate().map(|(c, r)| r * if c < 3 { w.per_mm } else { w.per_rad });
+        whitened.skip(range.start).take(range.len()).map(|v| v * v).sum()
+    }
+
+    /// Their root mean square.
+    fn size(&self, i: usize, range: Range<usize>) -> f64 {
+        let size = (self.squares(i, &range) / range.len().max(1) as f64).sqrt();
+        if size.is_finite() { size } else { 1e6 }
+    }
+
+    /// The standard deviation of all, from the median row.
+    fn spread(&self, range: Range<usize>) -> f64 {
+        let all: Vec<f64> = (0..self.base.len()).map(|i| self.size(i, range.clone())).collect();
+        (median(&all).unwrap_or(1.0) / median_size(range.len())).clamp(1e-6, 1e6)
+    }
+
+    /// How large each row is, lengths and angles over their spreads.
+    fn sizes(&self, [lengths, angles]: [usize; 2], [of_lengths, of_angles]: [f64; 2]) -> Vec<f64> {
+        let size = |i: usize| {
+            let a = self.size(i, 0..lengths) / of_lengths;
+            if angles == 0 {
+                return a;
+            }
+            let b = self.size(i, lengths..lengths + angles) / of_angles;
+            (0.5 * (a * a + b * b)).sqrt()
+        };
+        (0..self.base.len()).map(size).collect()
+    }
+
+    /// The scale under which the weighted squares have their degrees of freedom.
+    fn dispersion(&self, range: Range<usize>, robust_weight: &[f64], freedom_share: f64) -> f64 {
+        let of_row = |i: usize| {
+            let row = self.squares(i, &range);
+            if row.is_finite() { robust_weight[i] * row } else { 0.0 }
+        };
+        let sum: f64 = (0..self.base.len()).map(of_row).sum();
+        let freedom = (self.base.len() * range.len()) as f64 * freedom_share;
+        (sum / freedom.max(1.0)).sqrt().max(1e-6)
+    }
+}
+
+/// The end of a fit under weights that stay.
+fn descended(task: &Calibration, priors: &[Prior], mut x: Vec<f64>, nearby: bool) -> Estimate {
+    if nearby && newton::descend_to(task, &mut x, SEARCHED) {
+        return Estimate {
+            covariance: None,
+            cost: task.row_cost(&x) + prior_cost(priors, &x),
+            evaluations: Evaluations::default(),
+            termination: Termination::Cost,
+            trace: Vec::new(),
+            x,
+        };
+    }
+    if nearby {
+        // A promise is held against the cost, half the rows: the same as above.
+        let loose = lm::Options { cost_tolerance: 2.0 * SEARCHED, ..lm::Options::default() };
+        return Estimate { covariance: None, ..lm::solve(task, &x, &loose) };
+    }
+    lm::solve(task, &x, &lm::Options::default())
 }
 
 /// The sensor's σ after the spread of whole residuals turned out `spread` times what σ and the angles' share promised.

@@ -3,12 +3,13 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::candidates::Scored;
 use super::catalogue::{Candidate, Columns};
 use super::cause::{Cause, MAP_KNOTS};
-use super::design::FullDesign;
+use super::design::{Design, FullDesign};
 use super::extension::{Extended, Subject};
 use super::finding::{Alternative, Confidence, Finding, Gain, Step};
-use super::held::FoldErrors;
+use super::held::{FoldErrors, Reduced};
 use super::picture::{Picture, picture};
 use super::score::VISIBLE;
 use super::score::{non_centrality, score};
@@ -118,6 +119,22 @@ impl Context<'_> {
         })
     }
 
+    /// The nearest rivals of an accepted cause, each in its place.
+    fn rivals(&self, own: &Accepted, without: &Design, held: &Reduced<'_>) -> Vec<Alternative> {
+        let alternative = |rival: &Scored| {
+            let columns = rival.candidate.columns(without);
+            let sizes = rival.candidate.cause.sizes();
+            Alternative {
+                effect: rival.candidate.cause.name().to_owned(),
+                joints: pendant(&rival.candidate.cause.joints()),
+                rows: rival.candidate.cause.rows(),
+                cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
+                beaten_by: own.own.merit - rival.score.merit,
+            }
+        };
+        own.rivals.iter().take(3).map(alternative).collect()
+    }
+
     fn finding(&self, index: usize, own: &Accepted, after_mm: f64, last: usize) -> (Finding, Picture) {
         let cause = &self.extended.causes[index];
         let parameters = words::parameters(self.extended, index);
@@ -125,22 +142,7 @@ impl Context<'_> {
         let without = self.whole.without(&places);
         let held = self.held.without(&places);
         let before_mm = held.rmse_mm(None, self.set_aside);
-        let mut alternatives: Vec<Alternative> = own
-            .rivals
-            .iter()
-            .take(3)
-            .map(|rival| {
-                let columns = rival.candidate.columns(&without);
-                let sizes = rival.candidate.cause.sizes();
-                Alternative {
-                    effect: rival.candidate.cause.name().to_owned(),
-                    joints: pendant(&rival.candidate.cause.joints()),
-                    rows: rival.candidate.cause.rows(),
-                    cv_rmse_mm: held.rmse_mm(Some((&columns, &sizes)), self.set_aside),
-                    beaten_by: own.own.merit - rival.score.merit,
-                }
-            })
-            .collect();
+        let mut alternatives = self.rivals(own, &without, &held);
         let beaten = |a: &Alternative| a.beaten_by >= CLEAR && !(a.cv_rmse_mm < BETTER * after_mm);
         let mut clear = alternatives.iter().all(beaten);
         // FoldErrors-out rows that are told better without the finding do not confirm it, however well it explains the others.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::cause::Cause;
 use super::design::Design;
 use super::extension::Subject;
-use crate::measurement::dataset::{Reading, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Kind};
 use truegrind_arm::effect::Effect;
 
@@ -66,31 +66,7 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
             rows: None,
         };
     }
-    let (x_label, x): (Label, Box<dyn Fn(usize) -> f64>) = match cause {
-        Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
-            ("distance from the sensor".to_owned(), "mm"),
-            Box::new(|i| match &dataset.rows[i].reading {
-                Reading::Cable(l) => *l,
-                Reading::Position(p) => p.norm(),
-                Reading::Pose(p) => p.translation.vector.norm(),
-            }),
-        ),
-        Cause::Measurement(d) if matches!(d.course, Course::Thermometer { .. }) => (
-            ("temperature".to_owned(), "°C"),
-            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
-        ),
-        Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => (
-            ("temperature".to_owned(), "°C"),
-            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
-        ),
-        Cause::Arm(Effect::ThermalDrift(_)) => {
-            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
-        }
-        Cause::Measurement(d) if matches!(d.course, Course::Clock { .. }) => {
-            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
-        }
-        _ => (("data row".to_owned(), ""), Box::new(number)),
-    };
+    let (x_label, x) = across(cause, dataset);
     let along = direction(cause);
     let y_label = match (dataset.sensor, along) {
         (Sensor::Cable, _) => "residual of the cable's length".to_owned(),
@@ -113,6 +89,35 @@ pub fn picture(subject: &Subject<'_>, cause: &Cause, before: &Design, after: &De
             .collect()
     };
     Picture { x: x_label, y: (y_label, "mm"), before: shown(before), after: shown(after), rows: cause.rows() }
+}
+
+/// What a cause of the measurement, or of warmth, is drawn over.
+fn across<'d>(cause: &Cause, dataset: &'d Dataset) -> (Label, Box<dyn Fn(usize) -> f64 + 'd>) {
+    match cause {
+        Cause::Measurement(d) if matches!(d.kind, Kind::Scale | Kind::Sag) => (
+            ("distance from the sensor".to_owned(), "mm"),
+            Box::new(|i| match &dataset.rows[i].reading {
+                Reading::Cable(l) => *l,
+                Reading::Position(p) => p.norm(),
+                Reading::Pose(p) => p.translation.vector.norm(),
+            }),
+        ),
+        Cause::Measurement(d) if matches!(d.course, Course::Thermometer { .. }) => (
+            ("temperature".to_owned(), "°C"),
+            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
+        ),
+        Cause::Arm(Effect::ThermalDrift(t)) if t.growth == 0.0 => (
+            ("temperature".to_owned(), "°C"),
+            Box::new(|i| dataset.rows[i].condition.temperature_c.unwrap_or(f64::NAN)),
+        ),
+        Cause::Arm(Effect::ThermalDrift(_)) => {
+            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
+        }
+        Cause::Measurement(d) if matches!(d.course, Course::Clock { .. }) => {
+            (("time".to_owned(), "h"), Box::new(|i| dataset.rows[i].condition.time_h.unwrap_or(f64::NAN)))
+        }
+        _ => (("data row".to_owned(), ""), Box::new(|i| dataset.rows[i].number as f64)),
+    }
 }
 
 /// Unit vector of a shift of the sensor in the base, where that is the direction to look along.

@@ -99,10 +99,7 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             match review(&board, options, &all, &How { quick: false, ahead }) {
                 Review::Changed(settled) => {
                     // A cause that was turned out twice does not come back, and it gets harder to turn one out.
-                    for gone in current.causes.iter().filter(|c| !already(&settled.causes, c)) {
-                        let list = if already(&turned_out, gone) { &mut refused } else { &mut turned_out };
-                        list.push(gone.clone());
-                    }
+                    note_gone(&current, &settled, &mut turned_out, &mut refused);
                     ahead *= HARDER;
                     current = Arc::new(*settled);
                     continue;
@@ -128,23 +125,11 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
         };
         let cause = taken.candidate.cause.clone();
         tell(&format!("{}. {}", current.causes.len() + 1, cause.name()));
-        let near: Vec<Cause> = left
-            .iter()
-            .filter(|s| !s.candidate.cause.same_story(&cause) && s.score.merit > taken.score.merit - DOUBT)
-            .map(|s| s.candidate.cause.clone())
-            .collect();
+        let asked = asked_again(taken, &left, &mut doubtful);
         let mut causes = current.causes.clone();
         causes.push(cause.clone());
         let count = current.causes.len();
         current = Arc::new(warm_fit(subject, &causes, Freedom::All, Some(&current)));
-        let asked: Vec<Cause> = doubtful
-            .iter()
-            .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(&cause)))
-            .map(|(doubted, _)| doubted.clone())
-            .collect();
-        if !near.is_empty() {
-            doubtful.push((cause.clone(), near));
-        }
         for _ in 0..options.most {
             let unsure: Vec<usize> =
                 (0..current.causes.len()).filter(|&k| already(&asked, &current.causes[k])).collect();
@@ -165,12 +150,50 @@ pub fn select(subject: &Subject<'_>, options: &Options, tell: &(dyn Fn(&str) + S
             refused.push(cause);
         }
     }
-    // Causes that take turns without end: the last state is judged as it stands.
-    let board = CandidateScores::of(&catalogue, subject, Arc::clone(&current));
+    as_it_stands(&catalogue, subject, geometric, current)
+}
+
+/// Causes that take turns without end: the last state is judged as it stands.
+fn as_it_stands(
+    catalogue: &Catalogue,
+    subject: &Subject<'_>,
+    geometric: Extended,
+    current: Arc<Extended>,
+) -> Selection {
+    let board = CandidateScores::of(catalogue, subject, Arc::clone(&current));
     let left = board.scored(&board.whole.design, true);
     let accepted = (0..current.causes.len()).map(|index| looked_at(&board, index, true).0).collect();
+    drop(board);
     let families = catalogue.families;
     Selection { geometric, extended: Arc::unwrap_or_clone(current).refine(), accepted, left, families }
+}
+
+/// Notes the causes that a review turned out, in `refused` those that were turned out before.
+fn note_gone(current: &Extended, settled: &Extended, turned_out: &mut Vec<Cause>, refused: &mut Vec<Cause>) {
+    for gone in current.causes.iter().filter(|c| !already(&settled.causes, c)) {
+        let list = if already(turned_out, gone) { &mut *refused } else { &mut *turned_out };
+        list.push(gone.clone());
+    }
+}
+
+/// Accepted causes that were not far ahead of the one that comes in; where that is not far ahead of others either it is noted with
+/// them.
+fn asked_again(taken: &Scored, left: &[Scored], doubtful: &mut Vec<(Cause, Vec<Cause>)>) -> Vec<Cause> {
+    let cause = &taken.candidate.cause;
+    let near: Vec<Cause> = left
+        .iter()
+        .filter(|s| !s.candidate.cause.same_story(cause) && s.score.merit > taken.score.merit - DOUBT)
+        .map(|s| s.candidate.cause.clone())
+        .collect();
+    let asked = doubtful
+        .iter()
+        .filter(|(_, rivals)| rivals.iter().any(|r| r.same_story(cause)))
+        .map(|(doubted, _)| doubted.clone())
+        .collect();
+    if !near.is_empty() {
+        doubtful.push((cause.clone(), near));
+    }
+    asked
 }
 
 /// The best candidate that is significant and lowers the error on random folds, and hardly raises that on blocks.

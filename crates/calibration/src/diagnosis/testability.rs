@@ -77,42 +77,16 @@ pub(super) fn not_testable(
             "turn every axis through its whole range",
         );
     }
-    // The smallest peak rotation that would show, for every joint and effect of the arm.
     for name in ["joint-compliance", "gear-eccentricity", "gear-ratio", "joint-coupling", "backlash"] {
-        let mut hidden: Vec<(usize, f64)> = Vec::new();
-        for joint in 0..6 {
-            if still.contains(&joint) || (name == "backlash" && prepared.sides_from_order) {
-                continue;
-            }
-            let smallest = left
-                .iter()
-                .filter(|s| {
-                    s.candidate.cause.name() == name
-                        && s.candidate.cause.joints().last() == Some(&joint)
-                        && !matches!(
-                            s.candidate.cause,
-                            Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_))
-                        )
-                })
-                .filter_map(smallest_rad)
-                .fold(f64::NAN, f64::max);
-            if smallest > PRACTICAL_RAD {
-                hidden.push((joint, smallest));
-            }
-        }
-        let told = found.iter().any(|f| f == name);
-        if !hidden.is_empty() && !told {
+        let without_sides = name == "backlash" && prepared.sides_from_order;
+        let asked = (0..6).filter(|joint| !still.contains(joint) && !without_sides);
+        let hidden: Vec<(usize, f64)> = asked
+            .map(|joint| (joint, smallest_that_shows(name, joint, left)))
+            .filter(|(_, smallest)| *smallest > PRACTICAL_RAD)
+            .collect();
+        if !hidden.is_empty() && missing(name) {
             let joints: Vec<usize> = hidden.iter().map(|h| h.0).collect();
-            let sizes: Vec<String> = hidden
-                .iter()
-                .map(|(j, s)| {
-                    if s.is_finite() && s.to_degrees() < 90.0 {
-                        format!("joint {}: {:.2}°", j + 1, s.to_degrees())
-                    } else {
-                        format!("joint {}: nothing at all", j + 1)
-                    }
-                })
-                .collect();
+            let sizes: Vec<String> = hidden.iter().map(said).collect();
             add(
                 name,
                 pendant(&joints),
@@ -125,6 +99,25 @@ pub(super) fn not_testable(
         }
     }
     out
+}
+
+/// The smallest peak rotation of a joint by an effect of the arm that would show (rad); NaN where it was not tried.
+fn smallest_that_shows(name: &str, joint: usize, left: &[Scored]) -> f64 {
+    let asked = |s: &&Scored| {
+        let cause = &s.candidate.cause;
+        cause.name() == name
+            && cause.joints().last() == Some(&joint)
+            && !matches!(cause, Cause::Arm(Effect::GearMap(_) | Effect::LumpedCompliance(_)))
+    };
+    left.iter().filter(asked).filter_map(smallest_rad).fold(f64::NAN, f64::max)
+}
+
+fn said((joint, smallest): &(usize, f64)) -> String {
+    if smallest.is_finite() && smallest.to_degrees() < 90.0 {
+        format!("joint {}: {:.2}°", joint + 1, smallest.to_degrees())
+    } else {
+        format!("joint {}: nothing at all", joint + 1)
+    }
 }
 
 /// Smallest peak rotation with the non-centrality of [`VISIBLE`] (rad), in the least favourable phase.

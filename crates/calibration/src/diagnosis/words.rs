@@ -3,7 +3,7 @@
 use super::cause::Cause;
 use super::extension::Extended;
 use super::finding::FoundParameter;
-use crate::measurement::sensor::disturbance::{Course, Kind};
+use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::sensor::form::Form;
 use truegrind_arm::effect::Effect;
 
@@ -128,40 +128,40 @@ pub fn cause(cause: &Cause, parameters: &[FoundParameter], last_row: usize) -> S
                 )
             }
         }
-        Cause::Measurement(d) => {
-            let rows = when(cause.rows());
-            match (&d.kind, &d.course) {
-                (Kind::Form(form), _) => of_form(*form, parameters),
-                (Kind::Load { compliance: Some(_), .. }, _) => {
-                    format!("{rows} the arm carried {value:.1} kg more than the log says")
-                }
-                (Kind::Load { .. }, _) => {
-                    format!("{rows} the arm carried a load that the log does not tell of")
-                }
-                (_, Course::Clock { time_constant_h }) => format!(
-                    "the sensor drifts against the base while things warm up: {:.2} mm, time constant {time_constant_h:.2} h",
-                    size(parameters)
-                ),
-                (_, Course::Thermometer { .. }) => format!(
-                    "the sensor drifts against the base with temperature: {:.1} µm per kelvin",
-                    size(parameters) * 1e3
-                ),
-                (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
-                (Kind::Frame { .. }, _) => {
-                    format!(
-                        "the sensor stood {:.3} mm elsewhere {rows}: its stand was moved",
-                        size(parameters)
-                    )
-                }
-                (Kind::Tool, _) => format!(
-                    "the touched point sat {:.3} mm elsewhere on the flange {rows}: hook or reflector slipped",
-                    size(parameters)
-                ),
-                (Kind::Scale, _) => format!("the sensor's scale is off by {:.3} %", value * 100.0),
-                (Kind::Sag, _) => {
-                    format!("the cable sags: weight over tension {:.4} per metre", value.max(0.0).sqrt())
-                }
-            }
+        Cause::Measurement(d) => of_measurement(d, &when(cause.rows()), parameters),
+    }
+}
+
+/// One sentence for a disturbance of the measurement; `rows`: when.
+fn of_measurement(d: &Disturbance, rows: &str, parameters: &[FoundParameter]) -> String {
+    let value = found(parameters, 0);
+    match (&d.kind, &d.course) {
+        (Kind::Form(form), _) => of_form(*form, parameters),
+        (Kind::Load { compliance: Some(_), .. }, _) => {
+            format!("{rows} the arm carried {value:.1} kg more than the log says")
+        }
+        (Kind::Load { .. }, _) => {
+            format!("{rows} the arm carried a load that the log does not tell of")
+        }
+        (_, Course::Clock { time_constant_h }) => format!(
+            "the sensor drifts against the base while things warm up: {:.2} mm, time constant {time_constant_h:.2} h",
+            size(parameters)
+        ),
+        (_, Course::Thermometer { .. }) => format!(
+            "the sensor drifts against the base with temperature: {:.1} µm per kelvin",
+            size(parameters) * 1e3
+        ),
+        (Kind::Zero, _) => format!("the cable's zero jumped by {value:.3} mm {rows}"),
+        (Kind::Frame { .. }, _) => {
+            format!("the sensor stood {:.3} mm elsewhere {rows}: its stand was moved", size(parameters))
+        }
+        (Kind::Tool, _) => format!(
+            "the touched point sat {:.3} mm elsewhere on the flange {rows}: hook or reflector slipped",
+            size(parameters)
+        ),
+        (Kind::Scale, _) => format!("the sensor's scale is off by {:.3} %", value * 100.0),
+        (Kind::Sag, _) => {
+            format!("the cable sags: weight over tension {:.4} per metre", value.max(0.0).sqrt())
         }
     }
 }

@@ -164,34 +164,13 @@ pub fn identify(
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
     let Split { train, test } = split(&observed.dataset);
     let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
-
-    tell("fitting without the rows that are held out");
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
-    // Stages on the training rows: errors. Literal forms move frames first, then links without priors.
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
-    let registered = stages.registered(&fitted_rows);
-    let rmse_mm = summary_on(&fitted_rows, &registered.model, &registered.frames).rmse;
-    if !(rmse_mm < WRONG_ARM_MM) {
-        return Err(IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm });
-    }
-    let on = |fitted: &Fitted| {
-        let held = errors_on(&held_rows, &fitted.model, &fitted.frames);
-        let errors = StageErrors {
-            fitted: summary_on(&fitted_rows, &fitted.model, &fitted.frames),
-            held_out: ErrorSummary::of(held.iter().copied()),
-        };
-        (errors, held)
-    };
-    let mut training = stages.geometry(&fitted_rows, &registered);
-    training.task.forget_rows();
-    let ((registered_errors, before), (geometry_errors, after)) = (on(&registered), on(&training));
-    let held_out = test
-        .iter()
-        .zip(before)
-        .zip(after)
-        .map(|((&i, before), after)| (observed.dataset.rows[i].number, before, after))
-        .collect();
+    let trained = trained(&stages, &fitted_rows, &held_rows);
+    let wrong =
+        |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
+    let trained = trained.map_err(wrong)?;
     // The model itself: all rows.
     tell("fitting all rows");
     let registered = stages.registered(&observed);
@@ -199,52 +178,30 @@ pub fn identify(
     let raw = options.stated_frames.as_ref().map(|f| summary_on(&observed, nominal, f));
     let identifiability = geometry.identifiability();
     let parameters = parameter_table(&geometry, nominal);
-    let provenance = Provenance {
-        file: dataset.file.clone(),
-        sha256: dataset.sha256.clone(),
-        rows: observed.dataset.rows.len(),
-        set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
-        sensor: sensor_name(dataset.sensor).to_owned(),
-        method: options.solver.name.to_owned(),
-        seed: options.seed,
-        held_out: options.held_out,
-        sharpened: readout_fusion.is_ok(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-    };
+    let sharpened = readout_fusion.is_ok();
     let estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal.clone(),
         model: geometry.model.clone(),
         order: arm_of(&geometry),
         covariance: arm_covariance(&geometry),
-        provenance,
+        provenance: Provenance { sharpened, ..provenance(dataset, &observed, &outliers, options) },
         parameters: of_the_arm(&parameters),
-        registered: registered_errors,
-        geometry: geometry_errors,
+        registered: trained.registered,
+        geometry: trained.geometry,
         noise_floor_mm: noise_floor(repeats, &observed, &geometry),
         verdict: Verdict { status: Judgement::NotEvaluated, reasons: Vec::new() },
-        region: Region {
-            min_deg: [0.0; 6],
-            max_deg: [0.0; 6],
-            samples_deg: Vec::new(),
-            spacing_deg: 0.0,
-            sigma_mm: 0.0,
-        },
+        region,
         condition: mean_condition(dataset),
     };
     tell("judging what the model promises programs");
-    let mut estimated = with_region(estimated, region, &geometry);
-    let benefit = if options.solver.literal {
-        None
-    } else {
-        let lack = lack(&training, &held_rows);
-        benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack)
-    };
+    let mut estimated = with_sigma_in_region(estimated, &geometry);
+    let lack = || lack(&trained.training, &held_rows);
+    let promised = || benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack());
+    let benefit = (!options.solver.literal).then(promised).flatten();
     let case = Case {
-        training: &training,
+        trained: &trained,
         geometry: &geometry,
-        registered: &registered_errors,
-        after: &geometry_errors,
         parameters: &parameters,
         outliers: &outliers,
         benefit: benefit.as_ref(),
@@ -256,14 +213,67 @@ pub fn identify(
         benefit,
         geometry,
         registered,
-        training,
+        training: trained.training,
         raw,
         identifiability,
         readout_fusion,
         outliers,
-        held_out,
+        held_out: trained.held_out,
         parameters,
     })
+}
+
+/// The fit without the rows that are held out.
+struct Trained {
+    training: Fitted,
+    /// Errors with frames alone.
+    registered: StageErrors,
+    /// Errors with geometry.
+    geometry: StageErrors,
+    /// Rows that were held out, as the file counts them, with their errors before and after (mm).
+    held_out: Vec<(usize, f64, f64)>,
+}
+
+/// Fits some rows and judges by others; the error with frames alone (mm) where that is no tolerance but a mistake. Literal forms move
+/// frames first, then links without priors.
+fn trained(stages: &Stages<'_>, rows: &Observed, held: &Observed) -> Result<Trained, f64> {
+    tell("fitting without the rows that are held out");
+    let registered = stages.registered(rows);
+    let rmse_mm = summary_on(rows, &registered.model, &registered.frames).rmse;
+    if !(rmse_mm < WRONG_ARM_MM) {
+        return Err(rmse_mm);
+    }
+    let on = |fitted: &Fitted| {
+        let held = errors_on(held, &fitted.model, &fitted.frames);
+        let errors = StageErrors {
+            fitted: summary_on(rows, &fitted.model, &fitted.frames),
+            held_out: ErrorSummary::of(held.iter().copied()),
+        };
+        (errors, held)
+    };
+    let mut training = stages.geometry(rows, &registered);
+    training.task.forget_rows();
+    let ((registered, before), (geometry, after)) = (on(&registered), on(&training));
+    let numbers = held.dataset.rows.iter().map(|row| row.number);
+    let held_out =
+        numbers.zip(before).zip(after).map(|((number, before), after)| (number, before, after)).collect();
+    Ok(Trained { training, registered, geometry, held_out })
+}
+
+/// Where a model is from, as far as the file and the options tell.
+fn provenance(dataset: &Dataset, observed: &Observed, outliers: &Outliers, options: &Options) -> Provenance {
+    Provenance {
+        file: dataset.file.clone(),
+        sha256: dataset.sha256.clone(),
+        rows: observed.dataset.rows.len(),
+        set_aside: outliers.rows.iter().map(|(i, _)| dataset.rows[*i].number).collect(),
+        sensor: sensor_name(dataset.sensor).to_owned(),
+        method: options.solver.name.to_owned(),
+        seed: options.seed,
+        held_out: options.held_out,
+        sharpened: false,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
 }
 
 /// The rows but for those that are outliers.
@@ -502,11 +512,13 @@ pub(crate) fn mean_condition(dataset: &Dataset) -> Condition {
     }
 }
 
-pub(crate) fn with_region(mut estimated: Estimated, mut region: Region, fitted: &Fitted) -> Estimated {
+/// The largest standard deviation that the arm's parameters leave at the poses of its region.
+pub(crate) fn with_sigma_in_region(mut estimated: Estimated, fitted: &Fitted) -> Estimated {
     let condition = estimated.condition;
     let posed = estimated.model.at_condition(&condition);
     let target = fitted.frames.flange_from_target;
-    let sigmas: Vec<f64> = region
+    let sigmas: Vec<f64> = estimated
+        .region
         .samples_deg
         .par_iter()
         .map(|q| {
@@ -516,16 +528,13 @@ pub(crate) fn with_region(mut estimated: Estimated, mut region: Region, fitted: 
             if variance <= 0.0 { 0.0 } else { variance.sqrt() }
         })
         .collect();
-    region.sigma_mm = largest(sigmas);
-    estimated.region = region;
+    estimated.region.sigma_mm = largest(sigmas);
     estimated
 }
 
 struct Case<'a> {
-    training: &'a Fitted,
+    trained: &'a Trained,
     geometry: &'a Fitted,
-    registered: &'a StageErrors,
-    after: &'a StageErrors,
     parameters: &'a [EstimatedParameter],
     outliers: &'a Outliers,
     benefit: Option<&'a Benefit>,
@@ -534,7 +543,7 @@ struct Case<'a> {
 
 fn judge(case: &Case<'_>, options: &Options) -> Verdict {
     let mut hearing = Hearing::default();
-    for (fitted, rows) in [(case.training, "the rows of the split"), (case.geometry, "all rows")] {
+    for (fitted, rows) in [(&case.trained.training, "the rows of the split"), (case.geometry, "all rows")] {
         let filtered =
             options.solver.family == Family::Filter && fitted.termination() == Termination::DataProcessed;
         if fitted.termination().is_converged() {
@@ -558,12 +567,12 @@ fn judge(case: &Case<'_>, options: &Options) -> Verdict {
             case.outliers.too_many
         ));
     }
-    let (before, held) = (case.registered.held_out.rmse, case.after.held_out.rmse);
+    let (before, held) = (case.trained.registered.held_out.rmse, case.trained.geometry.held_out.rmse);
     hearing.held_out(before, held);
     if !options.solver.literal {
         hearing.benefit(case.benefit, case.sensor);
     }
     let limits = Limits { rmse_mm: options.limit_rmse_mm, max_mm: options.limit_max_mm };
-    hearing.limits(&limits, &case.after.held_out);
+    hearing.limits(&limits, &case.trained.geometry.held_out);
     hearing.verdict()
 }
