@@ -19,6 +19,9 @@ const MOST_TURN: f64 = 0.01;
 /// Radii at both ends that differ by less are the same to every control (mm).
 const SAME_MM: f64 = 5e-4;
 
+/// Radii at the ends of a nearly closed arc that differ by no more than as they did, and this, are taken by every control (mm).
+const ALIKE_MM: f64 = 2e-3;
+
 /// Pieces between which two arcs are compared.
 const SAMPLES: u8 = 12;
 
@@ -178,18 +181,22 @@ impl Arc {
             return Arc::through(self.plane, start, via, end, positive, self.is_whole());
         }
         let mut centre_mm = self.moved_centre(meant, told);
+        if length < 1e-6 {
+            return None;
+        }
+        // Where both ends are as far, unless they are anyway, to what controls allow.
+        let along = chord.map(|x| x / length);
+        let middle = [start[a] + 0.5 * chord[0], start[b] + 0.5 * chord[1]];
+        let off = along[0] * (centre_mm[0] - middle[0]) + along[1] * (centre_mm[1] - middle[1]);
+        let end_radius = (meant[2][a] - self.centre_mm[0]).hypot(meant[2][b] - self.centre_mm[1]);
+        let apart_mm = off.abs() * length / radius - (end_radius - radius).abs();
         if self.sweep_rad.abs() < PI {
-            if length < 1e-6 {
-                return None;
-            }
-            // Where both ends are as far, unless they are anyway, to what controls allow.
-            let along = chord.map(|x| x / length);
-            let middle = [start[a] + 0.5 * chord[0], start[b] + 0.5 * chord[1]];
-            let off = along[0] * (centre_mm[0] - middle[0]) + along[1] * (centre_mm[1] - middle[1]);
-            let end_radius = (meant[2][a] - self.centre_mm[0]).hypot(meant[2][b] - self.centre_mm[1]);
-            if off.abs() * length > (SAME_MM + (end_radius - radius).abs()) * radius {
+            if apart_mm > SAME_MM {
                 centre_mm = [centre_mm[0] - off * along[0], centre_mm[1] - off * along[1]];
             }
+        } else if apart_mm > ALIKE_MM {
+            // That centre would take the far side of a nearly closed arc along by twice its way.
+            return None;
         }
         Arc::about(self.plane, start, end, centre_mm, positive)
     }
