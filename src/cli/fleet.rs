@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         None => jobs(arguments)?,
     };
     refuse_one_place_for_two(&jobs)?;
-    if arguments.data.points.is_some() {
+    if arguments.data.points.points.is_some() {
         bail!("--points belong to one log of joints, and these are several arms: diagnose each by itself");
     }
     if !arguments.also.is_empty() {

@@ -6,7 +6,7 @@
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -297,19 +297,47 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
-    let mut repeated: Vec<Vec<Vector3<f64>>> = Vec::new();
+    scatter(repeated(data).into_iter().map(|rows| {
+        let place = |&i: &usize| match data.rows[i].reading {
+            Reading::Cable(l) => Vector3::new(l, 0.0, 0.0),
+            Reading::Position(p) => p,
+            Reading::Pose(pose) => pose.translation.vector,
+        };
+        rows.iter().map(place).collect()
+    }))
+}
+
+/// The same of orientations, as turns against the first reading of a pose: the root of the sum over the coordinates of the turn (rad).
+/// `None` where no pose was repeated or the sensor sees no orientation.
+pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
+    let turn = |&i: &usize| match data.rows[i].reading {
+        Reading::Pose(pose) => Some(pose.rotation),
+        _ => None,
+    };
+    let turns = |rows: Vec<usize>| {
+        let all: Vec<UnitQuaternion<f64>> = rows.iter().filter_map(turn).collect();
+        all.iter().map(|turn| (all[0].inverse() * turn).scaled_axis()).collect()
+    };
+    scatter(repeated(data).into_iter().map(turns)).map(|floor| floor.sigma_mm)
+}
+
+/// Rows of the same pose, outlet and approach, where there are several.
+fn repeated(data: &Dataset) -> Vec<Vec<usize>> {
+    let mut repeated: Vec<Vec<usize>> = Vec::new();
     for pose in poses(data) {
-        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<Vector3<f64>>> = BTreeMap::new();
+        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
         for i in pose {
             let row = &data.rows[i];
-            alike.entry((row.anchor, row.condition.approach)).or_default().push(match row.reading {
-                Reading::Cable(l) => Vector3::new(l, 0.0, 0.0),
-                Reading::Position(p) => p,
-                Reading::Pose(pose) => pose.translation.vector,
-            });
+            alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
         }
-        repeated.extend(alike.into_values().filter(|readings| readings.len() > 1));
+        repeated.extend(alike.into_values().filter(|rows| rows.len() > 1));
     }
+    repeated
+}
+
+/// The pooled scatter of repeated readings, copies left out.
+fn scatter(repeated: impl Iterator<Item = Vec<Vector3<f64>>>) -> Option<NoiseFloor> {
+    let repeated: Vec<Vec<Vector3<f64>>> = repeated.collect();
     let all = pooled(&repeated)?;
     let without: Vec<Vec<Vector3<f64>>> = repeated.iter().map(|readings| different(readings)).collect();
     let own = pooled(&without);
