@@ -483,11 +483,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| file_to_file(shop, job, &programs),
-        lighten: |done: &mut Done| {
-            if arguments.outputs.json.is_none() {
-                done.json = Vec::new();
-            }
-        },
+        whole: arguments.outputs.json.is_some(),
     };
     let done: Vec<Done> = on_threads(arguments.common.threads, || each(store, jobs, &doing))??;
     drop(work);

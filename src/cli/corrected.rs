@@ -3,12 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use truegrind::compensation::cell::Used;
 use truegrind::report::batch::{self, Ended, Row};
 use truegrind::report::kept::{Packed, unpacked};
+use truegrind::units::done::Recorded;
 
 use super::ending::Ending;
 use super::files::Batch;
@@ -50,14 +52,14 @@ struct Writing<'a> {
 
 /// The same, as it is read.
 #[derive(Deserialize)]
-struct Reading {
+struct Reading<J> {
     row: Row,
     diff: String,
     notes: Vec<String>,
     clean: bool,
     changed: bool,
     undeclared: usize,
-    json: Value,
+    json: J,
 }
 
 impl Kept for Done {
@@ -82,18 +84,35 @@ impl Kept for Done {
         })?)
     }
 
-    fn from_record(record: Value) -> Option<Self> {
-        let record: Reading = serde_json::from_value(record).ok()?;
-        let Value::Array(json) = unpacked(record.json) else { return None };
-        Some(Self {
-            row: record.row,
+    fn read(bytes: &[u8], key: &str, whole: bool) -> Option<Recorded<Self>> {
+        if whole {
+            let entries = |packed: Value| match unpacked(packed) {
+                Value::Array(json) => Some(json),
+                _ => None,
+            };
+            Recorded::<Reading<Value>>::from_bytes(bytes, key)?.and_then(|read| read.done(entries))
+        } else {
+            let read = Recorded::<Reading<IgnoredAny>>::from_bytes(bytes, key)?;
+            read.and_then(|read| read.done(|_| Some(Vec::new())))
+        }
+    }
+
+    fn lighten(&mut self) {
+        self.json = Vec::new();
+    }
+}
+
+impl<J> Reading<J> {
+    fn done(self, json: impl FnOnce(J) -> Option<Vec<Value>>) -> Option<Done> {
+        Some(Done {
+            row: self.row,
             written: Vec::new(),
-            diff: record.diff.chars().map(|c| u8::try_from(c).ok()).collect::<Option<_>>()?,
-            notes: record.notes,
-            clean: record.clean,
-            changed: record.changed,
-            undeclared: record.undeclared,
-            json,
+            diff: self.diff.chars().map(|c| u8::try_from(c).ok()).collect::<Option<_>>()?,
+            notes: self.notes,
+            clean: self.clean,
+            changed: self.changed,
+            undeclared: self.undeclared,
+            json: json(self.json)?,
             used: None,
         })
     }
@@ -181,15 +200,11 @@ impl Reports<'_> {
 
 /// The reports of a shared run, from what was kept of each program.
 pub(super) fn gathered(
-    records: Vec<Value>,
+    done: Vec<Done>,
     context: &Value,
     outputs: &Outputs,
     diff: Option<&Path>,
     batch: Batch,
 ) -> anyhow::Result<Ending> {
-    let done: Option<Vec<Done>> = records.into_iter().map(Done::from_record).collect();
-    let done = done.ok_or_else(|| {
-        anyhow!("a record is none of `compensate`: was the folder of another run put there?")
-    })?;
     Reports { outputs, diff, judging: Judging::from_value(context) }.write(done, batch, false)
 }

@@ -107,7 +107,14 @@ const LONGEST_S: f64 = 3600.0;
 impl DataArguments {
     /// A file as it is, of a robot.
     pub(super) fn of(data: PathBuf, robot: String) -> Self {
-        Self { data, robot, points: PointsArguments::default(), sheet: None, angles: None, allow_odd_units: false }
+        Self {
+            data,
+            robot,
+            points: PointsArguments::default(),
+            sheet: None,
+            angles: None,
+            allow_odd_units: false,
+        }
     }
 
     /// The files that are read.

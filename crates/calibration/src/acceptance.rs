@@ -156,7 +156,9 @@ pub fn accept(
     length("the tolerance", options.tolerance_mm)?;
     options.uncertainty_mm.map_or(Ok(()), |mm| length("the uncertainty of the sensor", mm))?;
     options.tolerance_rad.map_or(Ok(()), |rad| angle("the tolerance of the orientation", rad))?;
-    options.uncertainty_rad.map_or(Ok(()), |rad| angle("the uncertainty of the sensor's orientation", rad))?;
+    options
+        .uncertainty_rad
+        .map_or(Ok(()), |rad| angle("the uncertainty of the sensor's orientation", rad))?;
     if is_of_the_fit(dataset, estimated) {
         return Err(AcceptError::RowsOfTheFit { file: dataset.file.clone() });
     }
@@ -172,7 +174,8 @@ pub fn accept(
     let numbered = |errors: Vec<f64>| dataset.rows.iter().map(|row| row.number).zip(errors).collect();
     let orientation = (dataset.sensor == Sensor::Pose).then(|| {
         let model = ErrorSummary::of(found_rad.iter().copied());
-        let (uncertainty_rad, uncertainty) = Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
+        let (uncertainty_rad, uncertainty) =
+            Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
         let decided = |tolerance| Decision::of(groups.len(), model.max, uncertainty_rad, tolerance);
         Orientation {
             nominal: ErrorSummary::of(nominal_rad),

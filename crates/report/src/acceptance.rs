@@ -105,7 +105,8 @@ fn headline(found: &Acceptance) -> (Status, String) {
     let (max, limit, u) = (found.model.max, found.tolerance_mm, found.uncertainty_mm);
     match overall {
         Decision::Accepted => {
-            let turn = found.orientation.as_ref().and_then(|turns| Some((turns.model.max, turns.tolerance_rad?)));
+            let turn =
+                found.orientation.as_ref().and_then(|turns| Some((turns.model.max, turns.tolerance_rad?)));
             let turn = turn.map_or_else(String::new, |(max, limit)| {
                 let [max, limit] = [max, limit].map(f64::to_degrees);
                 format!("; the largest turn is {max:.4}°, the tolerance {limit:.4}°")
@@ -133,8 +134,11 @@ fn headline(found: &Acceptance) -> (Status, String) {
 
 /// The same of an orientation that decides.
 fn orientation_headline(found: &Acceptance) -> (Status, String) {
-    let Some((turns, limit)) = found.orientation.as_ref().and_then(|turns| Some((turns, turns.tolerance_rad?))) else {
-        let headline = "Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
+    let Some((turns, limit)) =
+        found.orientation.as_ref().and_then(|turns| Some((turns, turns.tolerance_rad?)))
+    else {
+        let headline =
+            "Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
         return (Status::NotEvaluated, headline.to_owned());
     };
     let [max, limit, u] = [turns.model.max, limit, turns.uncertainty_rad].map(f64::to_degrees);
@@ -388,7 +392,8 @@ fn by_row(found: &Acceptance, sensor: Sensor) -> String {
 }
 
 fn turns_by_row(turns: &Orientation) -> String {
-    let points: Vec<[f64; 2]> = turns.errors_rad.iter().map(|row| [row.0 as f64, row.1.to_degrees()]).collect();
+    let points: Vec<[f64; 2]> =
+        turns.errors_rad.iter().map(|row| [row.0 as f64, row.1.to_degrees()]).collect();
     let limit = |rad: f64| Reference::Horizontal(rad.to_degrees(), "tolerance".to_owned());
     Graph {
         title: "Errors of the orientation by row".to_owned(),

@@ -28,7 +28,12 @@ pub struct Orientation {
 }
 
 /// The error of each of these rows (rad); `None` where a reading has no orientation.
-pub(super) fn errors(observed: &Observed, rows: &[usize], model: &Model, frames: &Frames) -> Option<Vec<f64>> {
+pub(super) fn errors(
+    observed: &Observed,
+    rows: &[usize],
+    model: &Model,
+    frames: &Frames,
+) -> Option<Vec<f64>> {
     let error = |&row: &usize| {
         let row = &observed.dataset.rows[row];
         let Reading::Pose(seen) = row.reading else { return None };

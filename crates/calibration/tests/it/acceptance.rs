@@ -126,7 +126,8 @@ fn poses(series: f64, count: usize, turn_rad: f64) -> Vec<Row> {
     let at = |k: usize| {
         let q = pose(series, k);
         let mut seen = nominal.at_condition(&Condition::default()).forward(&q);
-        let axis = Vector3::from_fn(|i, _| ((k + 1) as f64 * [0.31, 0.57, 0.83][i]).fract() - 0.5).normalize();
+        let axis =
+            Vector3::from_fn(|i, _| ((k + 1) as f64 * [0.31, 0.57, 0.83][i]).fract() - 0.5).normalize();
         seen.rotation = UnitQuaternion::new(axis * turn_rad) * seen.rotation;
         Row::new(k, q, Reading::Pose(seen))
     };
@@ -145,12 +146,21 @@ fn the_orientation_is_judged_as_the_position_is() {
         frames: Some(Frames::at_origin(1)),
         ..options(1.0)
     };
-    let of = |tolerance_rad: Option<f64>| accept(&other, &model, &Options { tolerance_rad, ..stated.clone() }).unwrap();
+    let of = |tolerance_rad: Option<f64>| {
+        accept(&other, &model, &Options { tolerance_rad, ..stated.clone() }).unwrap()
+    };
     let told = of(None);
     let turns = told.orientation.as_ref().unwrap();
-    assert_eq!((turns.decision, told.overall(), turns.errors_rad.len()), (Decision::NotEvaluated, Decision::Accepted, 110));
+    assert_eq!(
+        (turns.decision, told.overall(), turns.errors_rad.len()),
+        (Decision::NotEvaluated, Decision::Accepted, 110)
+    );
     // The arm of the data sheet sees exactly the turn that was put in.
-    assert!((turns.nominal.max - turn).abs() < 1e-12 && (turns.nominal.mean - turn).abs() < 1e-12, "{:?}", turns.nominal);
+    assert!(
+        (turns.nominal.max - turn).abs() < 1e-12 && (turns.nominal.mean - turn).abs() < 1e-12,
+        "{:?}",
+        turns.nominal
+    );
     assert!(turns.nominal.standard_deviation < 1e-12);
     let largest = turns.model.max;
     assert!(largest > 0.9 * turn && largest < 2.0 * turn, "{largest}");
@@ -165,7 +175,12 @@ fn the_orientation_is_judged_as_the_position_is() {
         assert_eq!((found.overall(), found.decision), (expected, Decision::Accepted), "{tolerance}");
     }
     // A position that fails is not saved by its orientation.
-    let tight = Options { tolerance_mm: 1e-6, uncertainty_mm: Some(1e-9), tolerance_rad: Some(0.1), ..stated.clone() };
+    let tight = Options {
+        tolerance_mm: 1e-6,
+        uncertainty_mm: Some(1e-9),
+        tolerance_rad: Some(0.1),
+        ..stated.clone()
+    };
     let found = accept(&other, &model, &tight).unwrap();
     assert_eq!((found.decision, found.overall()), (Decision::Refused, Decision::Refused));
     // Too few poses, and an orientation that nobody measured.

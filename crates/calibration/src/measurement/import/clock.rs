@@ -10,7 +10,8 @@ pub(super) struct Stamp {
 }
 
 /// The forms that are understood, for messages.
-pub(super) const FORMS: &str = "a time such as 10:15:30.25, with a date (2026-11-23, 11/23/2026 month first, 23.11.2026) or without";
+pub(super) const FORMS: &str =
+    "a time such as 10:15:30.25, with a date (2026-11-23, 11/23/2026 month first, 23.11.2026) or without";
 
 impl Stamp {
     /// The one time in a text of several words; `None` where there is none, or more than one, or a date that is none.
@@ -21,9 +22,11 @@ impl Stamp {
             let cut = if joined(word) { word.split_once(['T', 't', '_']) } else { None };
             cut.map_or([word, ""], |(date, time)| [date, time])
         });
-        let words: Vec<&str> = words.map(|word| word.trim_matches('"')).filter(|word| !word.is_empty()).collect();
+        let words: Vec<&str> =
+            words.map(|word| word.trim_matches('"')).filter(|word| !word.is_empty()).collect();
         let mut times = words.iter().enumerate();
-        let mut times = std::iter::from_fn(|| times.find_map(|(at, word)| seconds(word, words.get(at + 1).copied())));
+        let mut times =
+            std::iter::from_fn(|| times.find_map(|(at, word)| seconds(word, words.get(at + 1).copied())));
         let (seconds, None) = (times.next()?, times.next()) else { return None };
         let mut dates = words.iter().filter(|word| is_date(word));
         let (date, None) = (dates.next(), dates.next()) else { return None };
@@ -54,7 +57,8 @@ fn seconds(word: &str, next: Option<&str>) -> Option<f64> {
         None => *hours,
     };
     let whole = hours.fract() == 0.0 && minutes.fract() == 0.0;
-    (whole && hours < 24.0 && *minutes < 60.0 && *seconds < 60.0).then_some(hours * 3600.0 + minutes * 60.0 + seconds)
+    (whole && hours < 24.0 && *minutes < 60.0 && *seconds < 60.0)
+        .then_some(hours * 3600.0 + minutes * 60.0 + seconds)
 }
 
 /// Digits, with decimals after a point or a comma, and nothing else.
@@ -69,7 +73,8 @@ const SEPARATORS: [char; 3] = ['/', '-', '.'];
 fn is_date(word: &str) -> bool {
     SEPARATORS.iter().any(|&sign| {
         let parts: Vec<&str> = word.split(sign).collect();
-        parts.len() == 3 && parts.iter().all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()))
+        parts.len() == 3
+            && parts.iter().all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()))
     })
 }
 

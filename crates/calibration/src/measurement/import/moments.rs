@@ -40,7 +40,8 @@ pub(super) fn joined(
     let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
     let header = log.rows.iter().position(|line| headed(line, &TIMES).is_some());
     let Some((header, column)) = header.and_then(|at| Some((at, headed(&log.rows[at], &TIMES)?))) else {
-        let message = "has no column with the time of each row; expected `time` beside q1 to q6, such as 10:15:30.25";
+        let message =
+            "has no column with the time of each row; expected `time` beside q1 to q6, such as 10:15:30.25";
         return Err(broken(place, message.to_owned()));
     };
     let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
@@ -65,7 +66,12 @@ pub(super) fn joined(
 }
 
 /// The times of the rows, in their order, and of the points, in theirs (s, by a start that both have in common).
-fn times(points: &Points, log: &Table, column: usize, place: &Place) -> Result<(Vec<Logged>, Vec<f64>), ImportError> {
+fn times(
+    points: &Points,
+    log: &Table,
+    column: usize,
+    place: &Place,
+) -> Result<(Vec<Logged>, Vec<f64>), ImportError> {
     let time = log.rows[0].cells[column].to_string();
     let rows: Vec<(usize, &Line)> = log
         .rows
@@ -120,12 +126,18 @@ fn days(place: &Place, stamps: &[Stamp]) -> Result<bool, ImportError> {
     if dated == 0 || dated == stamps.len() {
         return Ok(dated > 0);
     }
-    let message = format!("{dated} of {} times have a date; expected one in every line or in none", stamps.len());
+    let message =
+        format!("{dated} of {} times have a date; expected one in every line or in none", stamps.len());
     Err(broken(place.clone(), message))
 }
 
 /// The file, and its first and last day, whose dates are needed where the other has none.
-fn over_midnight(place: &Place, rows: &[Stamp], points: &Points, measured: &[Stamp]) -> Option<(Place, [i64; 2])> {
+fn over_midnight(
+    place: &Place,
+    rows: &[Stamp],
+    points: &Points,
+    measured: &[Stamp],
+) -> Option<(Place, [i64; 2])> {
     let range = |stamps: &[Stamp]| {
         let days = || stamps.iter().filter_map(|stamp| stamp.day);
         Some([days().min()?, days().max()?]).filter(|[first, last]| first < last)
@@ -164,7 +176,9 @@ impl Pairing<'_> {
             let from = order.partition_point(|row| row.time_s < time - within);
             let to = order.partition_point(|row| row.time_s <= time + within);
             let apart = |row: &&&Logged| (row.time_s - time).abs();
-            let near = |rows: &[&Logged]| rows.iter().map(|row| (row.time_s - time).abs()).fold(f64::INFINITY, f64::min);
+            let near = |rows: &[&Logged]| {
+                rows.iter().map(|row| (row.time_s - time).abs()).fold(f64::INFINITY, f64::min)
+            };
             nearest_s.push(near(&order[from.saturating_sub(1)..(to + 1).min(order.len())]));
             let rows = &order[from..to];
             let Some(row) = rows.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { continue };
@@ -249,8 +263,14 @@ impl Pairing<'_> {
         };
         let joined = |point: usize| pairs.iter().any(|pair| pair.point == point);
         let alone = self.points.all.iter().enumerate().filter(|(at, _)| !joined(*at));
-        left_out("points without a row at their time", alone.map(|(_, point)| format!("`{}`", point.name)).collect());
-        let rows = self.logged.iter().filter(|row| pairs.binary_search_by_key(&row.index, |pair| pair.index).is_err());
+        left_out(
+            "points without a row at their time",
+            alone.map(|(_, point)| format!("`{}`", point.name)).collect(),
+        );
+        let rows = self
+            .logged
+            .iter()
+            .filter(|row| pairs.binary_search_by_key(&row.index, |pair| pair.index).is_err());
         left_out("rows without a point at their time", rows.map(|row| row.number.to_string()).collect());
         notes
     }

@@ -152,8 +152,7 @@ impl Points {
             return Err(broken(place, message));
         }
         log.rows.retain(|line| !line.cells.is_empty());
-        let mut notes =
-            vec![format!("{used} rows joined by name with {} measured points", by_name.len())];
+        let mut notes = vec![format!("{used} rows joined by name with {} measured points", by_name.len())];
         if !without.is_empty() {
             let shown = without.iter().take(5).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
             notes.push(format!("{} rows without a measured point are left out: {shown}", without.len()));

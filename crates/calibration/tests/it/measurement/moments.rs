@@ -5,7 +5,12 @@ use truegrind_calibration::measurement::import::{Clocks, ImportError, Options, j
 
 fn read(log: &str, points: &str, within_s: f64, ahead_s: f64) -> Result<Dataset, ImportError> {
     let clocks = Clocks { within_s, ahead_s };
-    joined_by_time(("log.csv", log.as_bytes()), ("points.txt", points.as_bytes()), &clocks, &Options::default())
+    joined_by_time(
+        ("log.csv", log.as_bytes()),
+        ("points.txt", points.as_bytes()),
+        &clocks,
+        &Options::default(),
+    )
 }
 
 fn complaint(log: &str, points: &str, within_s: f64) -> String {
@@ -20,7 +25,8 @@ fn log(times: &[&str]) -> String {
 
 /// Points at these times, the first at x = 100 mm, the next at 200 mm.
 fn points(times: &[&str]) -> String {
-    let line = |(k, time): (usize, &&str)| format!("Main p{k} {}.5 -20.25 900.0 0.012 {time}\n", 100 * (k + 1));
+    let line =
+        |(k, time): (usize, &&str)| format!("Main p{k} {}.5 -20.25 900.0 0.012 {time}\n", 100 * (k + 1));
     "// Units: Millimeters\n".to_owned() + &times.iter().enumerate().map(line).collect::<String>()
 }
 
@@ -41,7 +47,8 @@ fn a_point_belongs_to_the_row_nearest_in_time_and_the_rest_is_told() {
     let data = read(&log, &points, 0.5, 0.0).unwrap();
     assert_eq!(pairs(&data), [(10.0, 200.5), (11.0, 400.5), (12.0, 100.5)]);
     assert_eq!(data.rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 3, 4]);
-    let note = |part: &str| assert!(data.notes.iter().any(|note| note.contains(part)), "{part}: {:?}", data.notes);
+    let note =
+        |part: &str| assert!(data.notes.iter().any(|note| note.contains(part)), "{part}: {:?}", data.notes);
     note("3 rows joined by time with 4 measured points, at most 0.300 s apart (0.5 s were allowed)");
     note("1 points without a row at their time are left out: `p2`");
     note("1 rows without a point at their time are left out: 5");
@@ -52,7 +59,10 @@ fn a_point_belongs_to_the_row_nearest_in_time_and_the_rest_is_told() {
 fn clocks_write_as_they_like() {
     let expected = [(10.0, 100.5), (11.0, 200.5)];
     for (of_log, of_points) in [
-        (["2026-11-23T10:15:30Z", "2026-11-23T22:15:30.25Z"], ["11/23/2026 10:15:30 AM", "11/23/2026 10:15:30 PM"]),
+        (
+            ["2026-11-23T10:15:30Z", "2026-11-23T22:15:30.25Z"],
+            ["11/23/2026 10:15:30 AM", "11/23/2026 10:15:30 PM"],
+        ),
         (["23.11.2026 10:15:30", "24.11.2026 10:15:30"], ["2026-11-23 10:15:30", "2026-11-24 10:15:30"]),
         (["12:00:00 AM", "12:00:00pm"], ["11/23/2026 0:00:00", "11/23/2026 12:00:00.1"]),
         (["2026-02-28 23:59:59.9", "2026-03-01 12:00:00"], ["03/01/2026 00:00:00", "03/01/2026 12:00:00"]),
@@ -67,7 +77,10 @@ fn clocks_write_as_they_like() {
     assert!(data.notes[0].contains("3612 s ahead"), "{:?}", data.notes);
     // Whoever does not know it is told how far they are apart.
     let said = complaint(&early, &late, 0.5);
-    assert!(said.contains("no row lies within 0.5 s") && said.contains("3602.000 to 3612.200 s away"), "{said}");
+    assert!(
+        said.contains("no row lies within 0.5 s") && said.contains("3602.000 to 3612.200 s away"),
+        "{said}"
+    );
     assert!(said.contains("--points-ahead"), "{said}");
 }
 
@@ -76,11 +89,20 @@ fn clocks_write_as_they_like() {
 fn what_is_ambiguous_is_refused() {
     // The arm moves between two rows, both near.
     let said = complaint(&log(&["10:15:30", "10:15:31"]), &points(&["10:15:30.4"]), 1.0);
-    assert!(said.starts_with("points.txt, row 2") && said.contains("`p0` is ambiguous: 2 rows of log.csv"), "{said}");
-    assert!(said.contains("rows 2 to 3") && said.contains("1.000°") && said.contains("--points-within"), "{said}");
+    assert!(
+        said.starts_with("points.txt, row 2") && said.contains("`p0` is ambiguous: 2 rows of log.csv"),
+        "{said}"
+    );
+    assert!(
+        said.contains("rows 2 to 3") && said.contains("1.000°") && said.contains("--points-within"),
+        "{said}"
+    );
     // Two points at one row.
     let said = complaint(&log(&["10:15:30", "10:16:30"]), &points(&["10:15:30.4", "10:15:29.5"]), 1.0);
-    assert!(said.starts_with("log.csv, row 2") && said.contains("`p0` (points.txt, row 2, 0.400 s away)"), "{said}");
+    assert!(
+        said.starts_with("log.csv, row 2") && said.contains("`p0` (points.txt, row 2, 0.400 s away)"),
+        "{said}"
+    );
     assert!(said.contains("and `p1`"), "{said}");
     // A dense log of an arm that stands is not ambiguous: two readings of one pose, each with its own row.
     let row = |k: usize| format!("10:15:30.{k},{},20,30,40,50,60\n", 10.0 + 0.001 * k as f64);
@@ -94,13 +116,25 @@ fn a_time_that_is_none_is_told_with_its_place() {
     let good = points(&["10:15:30"]);
     let bad = |time: &str| complaint(&log(&["10:15:20", time]), &good, 0.5);
     // 23/11 is no month, and with a dash nobody can say which is the month; an hour that there is not, minutes alone, a zone, nothing.
-    for time in ["23/11/2026 10:15:30", "11-12-2026 10:15:30", "25:15:30", "10:15", "10:15:30+02:00", "noon", "30", "13:00:00 PM"] {
+    for time in [
+        "23/11/2026 10:15:30",
+        "11-12-2026 10:15:30",
+        "25:15:30",
+        "10:15",
+        "10:15:30+02:00",
+        "noon",
+        "30",
+        "13:00:00 PM",
+    ] {
         let said = bad(time);
         assert!(said.starts_with("log.csv, row 3, column time") && said.contains(time), "{said}");
         assert!(said.contains("a time such as 10:15:30.25"), "{said}");
     }
     let said = complaint(&log(&["10:15:30"]), "Main p1 1.5 2.5 3.5 0.012\n", 0.5);
-    assert!(said.starts_with("points.txt, row 1") && said.contains("`p1`") && said.contains("time stamps"), "{said}");
+    assert!(
+        said.starts_with("points.txt, row 1") && said.contains("`p1`") && said.contains("time stamps"),
+        "{said}"
+    );
     let said = complaint("q1,q2,q3,q4,q5,q6\n1,2,3,4,5,6\n", &good, 0.5);
     assert!(said.contains("no column with the time") && said.contains("`time`"), "{said}");
     // Dates in some lines, and dates of several days against none.
