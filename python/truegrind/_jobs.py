@@ -175,10 +175,10 @@ def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedPr
 
 
 def compensating(
-    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any]
+    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any], with_json: bool = True
 ) -> Command:
-    """The command that corrects programs."""
-    chosen = options({"model": model, "output": output, **given})
+    """The command that corrects programs. ``with_json``: each record holds what only the report as JSON shows, motion by motion."""
+    chosen = options({"model": model, "output": output, "brief_records": not with_json, **given})
     return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
 
 

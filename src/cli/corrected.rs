@@ -32,8 +32,8 @@ pub(super) struct Done {
     pub(super) changed: bool,
     /// Motions that are left because what they use is declared in none of the files.
     pub(super) undeclared: usize,
-    /// Entries of the contract.
-    pub(super) json: Vec<Value>,
+    /// Entries of the contract; absent where nothing that is asked for shows them.
+    pub(super) json: Option<Vec<Value>>,
     /// What it uses of the cell file; absent where it was not looked at.
     pub(super) used: Option<Used>,
 }
@@ -47,7 +47,7 @@ struct Writing<'a> {
     clean: bool,
     changed: bool,
     undeclared: usize,
-    json: Vec<Packed<'a>>,
+    json: Option<Vec<Packed<'a>>>,
 }
 
 /// The same, as it is read.
@@ -80,30 +80,31 @@ impl Kept for Done {
             clean: self.clean,
             changed: self.changed,
             undeclared: self.undeclared,
-            json: self.json.iter().map(Packed).collect(),
+            json: self.json.as_ref().map(|json| json.iter().map(Packed).collect()),
         })?)
     }
 
     fn read(bytes: &[u8], key: &str, whole: bool) -> Option<Recorded<Self>> {
         if whole {
+            // A brief record has none: then its unit counts as one that is not done.
             let entries = |packed: Value| match unpacked(packed) {
-                Value::Array(json) => Some(json),
+                Value::Array(json) => Some(Some(json)),
                 _ => None,
             };
             Recorded::<Reading<Value>>::from_bytes(bytes, key)?.and_then(|read| read.done(entries))
         } else {
             let read = Recorded::<Reading<IgnoredAny>>::from_bytes(bytes, key)?;
-            read.and_then(|read| read.done(|_| Some(Vec::new())))
+            read.and_then(|read| read.done(|_| Some(None)))
         }
     }
 
     fn lighten(&mut self) {
-        self.json = Vec::new();
+        self.json = None;
     }
 }
 
 impl<J> Reading<J> {
-    fn done(self, json: impl FnOnce(J) -> Option<Vec<Value>>) -> Option<Done> {
+    fn done(self, json: impl FnOnce(J) -> Option<Option<Vec<Value>>>) -> Option<Done> {
         Some(Done {
             row: self.row,
             written: Vec::new(),
@@ -127,7 +128,8 @@ fn failed(job: &Job, error: &str) -> Done {
         clean: false,
         changed: false,
         undeclared: 0,
-        json: Vec::new(),
+        // There is none, whatever is asked for.
+        json: Some(Vec::new()),
         used: None,
     }
 }
@@ -177,7 +179,7 @@ impl Reports<'_> {
         let (mut rows, mut programs, mut diff) = (Vec::new(), Vec::new(), Vec::new());
         for done in done {
             rows.push(done.row);
-            programs.extend(done.json);
+            programs.extend(done.json.unwrap_or_default());
             diff.extend_from_slice(&done.diff);
         }
         self.outputs.print(&batch::summary(&rows))?;

@@ -379,6 +379,7 @@ fn verbs() -> Vec<Verb> {
                 "--work",
                 "--units",
                 "--list-units",
+                "--brief-records",
             ],
         },
     ]
