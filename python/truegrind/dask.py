@@ -84,8 +84,8 @@ class _Do:
     def __init__(self, command: _jobs.Command) -> None:
         self.command = command
 
-    def __call__(self, units: list[dict[str, Any]]) -> int:
-        return _jobs.do(self.command, units)
+    def __call__(self, units: str) -> None:
+        _jobs.do(self.command, units)
 
 
 def compensate_folder(

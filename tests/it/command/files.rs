@@ -305,6 +305,7 @@ fn verbs() -> Vec<Verb> {
                 "--work",
                 "--units",
                 "--list-units",
+                "--brief-records",
             ],
         },
         Verb {
@@ -379,7 +380,6 @@ fn verbs() -> Vec<Verb> {
                 "--work",
                 "--units",
                 "--list-units",
-                "--brief-records",
             ],
         },
     ]
