@@ -35,6 +35,15 @@ RETRIES = 5
 """As often Dask tries a chunk again whose worker died."""
 
 
+_QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.tick.cycle": "5s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+"""Workers of our own only wait for processes: looking at themselves fifty times a second takes the processor from those."""
+
+
 @contextmanager
 def _client(given: Client | None):
     """The client that was given, else the current one, else one of this machine with one thread a worker."""
@@ -44,8 +53,7 @@ def _client(given: Client | None):
     try:
         yield get_client()
     except ValueError:
-        # What a worker's thread waits for is a process of its own: sampling the thread a hundred times a second says nothing of it.
-        with dask.config.set({"distributed.worker.profile.enabled": False}), Client(threads_per_worker=1) as made:
+        with dask.config.set(_QUIET), Client(threads_per_worker=1) as made:
             yield made
 
 
