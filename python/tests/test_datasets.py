@@ -47,6 +47,128 @@ def test_data_frames(library):
     assert same(tg.Dataset.from_dataframe(frame), tg.Dataset.from_csv(DATA / "irb120-tracker.csv"))
 
 
+class Buffer:
+    def __init__(self, array: np.ndarray) -> None:
+        self.array = array
+        self.bufsize, self.ptr = array.nbytes, array.ctypes.data
+
+
+class Column:
+    """A column of the interchange protocol and nothing else; gaps are marked by a number of their own."""
+
+    offset, metadata = 0, {}
+
+    def __init__(self, values: np.ndarray, mark: float | None) -> None:
+        self.values, self.mark = np.ascontiguousarray(values), mark
+        kind = {"f": 2, "i": 0}[values.dtype.kind]
+        self.dtype = (kind, values.dtype.itemsize * 8, values.dtype.char, "=")
+        self.describe_null = (0, None) if mark is None else (2, mark)
+        self.null_count = None
+
+    def size(self) -> int:
+        return len(self.values)
+
+    def get_buffers(self):
+        return {"data": (Buffer(self.values), self.dtype), "validity": None, "offsets": None}
+
+
+class Frame:
+    """A data frame of nobody's library: all that it has is the protocol, in chunks."""
+
+    def __init__(self, columns: dict[str, np.ndarray], marks: dict[str, float], parts: int = 1) -> None:
+        self._columns, self._marks, self._parts = columns, marks, parts
+
+    def __dataframe__(self, nan_as_null: bool = False, allow_copy: bool = True):
+        return _Interchange(self._columns, self._marks, self._parts)
+
+
+class _Interchange:
+    def __init__(self, columns, marks, parts) -> None:
+        self._columns, self._marks, self._parts = columns, marks, parts
+
+    def column_names(self):
+        return iter(self._columns)
+
+    def get_column_by_name(self, name):
+        return Column(self._columns[name], self._marks.get(name))
+
+    def get_chunks(self, n_chunks=None):
+        pieces = {name: np.array_split(values, self._parts) for name, values in self._columns.items()}
+        for part in range(self._parts):
+            yield _Interchange({name: piece[part] for name, piece in pieces.items()}, self._marks, 1)
+
+
+@pytest.mark.parametrize("parts", [1, 3])
+def test_any_object_with_the_interchange_protocol_is_a_data_frame(parts):
+    """No library of data frames is installed, or known, or asked."""
+    table = columns()
+    table["temperature"] = np.where(np.arange(len(table["q1"])) % 3 == 0, -999.0, 21.5)
+    table["q2"] = table["q2"].astype(np.float64)
+    given = Frame(table, {"temperature": -999.0}, parts)
+    assert not hasattr(given, "columns") and not hasattr(given, "keys")
+    assert same(tg.Dataset.from_dataframe(given), tg.Dataset.from_csv(DATA / "irb120-tracker.csv"))
+    # A gap where a number has to be is told with its place, as in a file.
+    table["q4"] = np.where(np.arange(len(table["q1"])) == 5, 10**6, 30).astype(np.int32)
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_dataframe(Frame(table, {"q4": 10**6}, parts))
+    assert (raised.value.row, raised.value.column) == (5, "q4")
+
+
+def workbook(path, rows: list[list[object]]) -> None:
+    """The least that is a workbook."""
+    import zipfile
+
+    def cell(value: object) -> str:
+        if isinstance(value, str):
+            return f'<c t="inlineStr"><is><t>{value}</t></is></c>'
+        return f"<c><v>{value!r}</v></c>"
+
+    lines = "".join("<row>" + "".join(map(cell, row)) + "</row>" for row in rows)
+    spreadsheet = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    relations = "http://schemas.openxmlformats.org/package/2006/relationships"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    types = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr(
+            "[Content_Types].xml",
+            '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+            '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+            f'<Override PartName="/xl/workbook.xml" ContentType="{types}.sheet.main+xml"/>'
+            f'<Override PartName="/xl/worksheets/sheet1.xml" ContentType="{types}.worksheet+xml"/></Types>',
+        )
+        file.writestr(
+            "_rels/.rels",
+            f'<Relationships xmlns="{relations}"><Relationship Id="r" Type="{office}/officeDocument" Target="xl/workbook.xml"/>'
+            "</Relationships>",
+        )
+        file.writestr(
+            "xl/workbook.xml",
+            f'<workbook xmlns="{spreadsheet}" xmlns:r="{office}"><sheets><sheet name="Poses" sheetId="1" r:id="s"/></sheets></workbook>',
+        )
+        file.writestr(
+            "xl/_rels/workbook.xml.rels",
+            f'<Relationships xmlns="{relations}"><Relationship Id="s" Type="{office}/worksheet" Target="worksheets/sheet1.xml"/>'
+            "</Relationships>",
+        )
+        file.writestr(
+            "xl/worksheets/sheet1.xml", f'<worksheet xmlns="{spreadsheet}"><sheetData>{lines}</sheetData></worksheet>'
+        )
+
+
+def test_a_workbook_is_read_as_the_same_rows_of_a_text(tmp_path):
+    table = columns()
+    rows = [list(table), *([float(table[name][row]) for name in table] for row in range(len(table["q1"])))]
+    workbook(tmp_path / "poses.xlsx", rows)
+    assert same(tg.Dataset.from_xlsx(tmp_path / "poses.xlsx"), tg.Dataset.from_csv(DATA / "irb120-tracker.csv"))
+    assert same(tg.Dataset.from_xlsx(tmp_path / "poses.xlsx", sheet="Poses"), tg.Dataset.from_csv(DATA / "irb120-tracker.csv"))
+    with pytest.raises(tg.DatasetError, match="Poses"):
+        tg.Dataset.from_xlsx(tmp_path / "poses.xlsx", sheet="Others")
+    workbook(tmp_path / "wrong.xlsx", [[*NAMES, "L"], [1, 2, "three", 4, 5, 6, 500]])
+    with pytest.raises(tg.DatasetError) as raised:
+        tg.Dataset.from_xlsx(tmp_path / "wrong.xlsx")
+    assert (raised.value.row, raised.value.column, raised.value.found) == (2, "q3", "`three`")
+
+
 def test_gaps_and_text_of_a_data_frame():
     arrow = pytest.importorskip("pyarrow")
     count = 20

@@ -18,10 +18,42 @@ def test_the_example_runs(capsys):
     assert "held-out RMSE" in told and "MODULE Grind" in told
 
 
+def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
+    """As they stand there, in a folder with files of those names."""
+    root = Path(__file__).resolve().parents[2]
+    text = (root / "README.md").read_text(encoding="utf-8")
+    lines = text.split("## From Python")[1].split("```python\n")[1].split("```")[0]
+    assert len(lines.splitlines()) <= 10
+    for name, source in {
+        "poses.csv": DATA / "irb120-tracker.csv",
+        "blade.mod": PROGRAMS / "told.mod",
+        "arm.urdf": root / "crates" / "arm" / "tests" / "data" / "tool-turned.urdf",
+    }.items():
+        (tmp_path / name).write_bytes(source.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    found: dict[str, object] = {}
+    exec(compile(lines, "README.md", "exec"), found)
+    assert (tmp_path / "blade-real.mod").read_bytes() != (tmp_path / "blade.mod").read_bytes()
+    assert found["where"].position_mm.shape == (len(found["rows"]), 3)
+
+
+def test_nothing_but_numpy_is_required():
+    from importlib.metadata import metadata, requires
+
+    needed = [line for line in requires("truegrind") if "extra ==" not in line]
+    assert [line.replace(" ", "") for line in needed] == ["numpy>=1.24"]
+    assert metadata("truegrind")["Requires-Python"] == ">=3.10"
+    assert (Path(tg.__file__).parent / "py.typed").exists()
+    # One wheel for every Python from 3.10 on.
+    assert ".abi3." in Path(tg._truegrind.__file__).name or Path(tg._truegrind.__file__).suffix == ".pyd"
+
+
 def test_every_result_has_a_page_and_json(identified, model, cable):
     results = [
         tg.Robot("abb-irb-120"),
         identified,
+        tg.diagnose(cable, "abb-irb-120"),
+        tg.track(model, cable),
         tg.compensate(PROGRAMS / "told.mod", model, allow_doubtful=True),
         tg.deviation(PROGRAMS / "told.mod", model),
         tg.plan("abb-irb-120", "position", poses=8, candidates=100, touched_point=[20, 0, 50]),

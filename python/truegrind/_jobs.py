@@ -110,36 +110,37 @@ def listed(command: Command) -> list[dict[str, Any]]:
     return json.loads((Path(command.work) / "run.json").read_text(encoding="utf-8"))["units"]
 
 
-def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[list[dict[str, Any]]]:
-    """The units, so many at a time."""
+def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[str]:
+    """The units, so many at a time, as the command line takes them: one text, since an engine looks into lists and dictionaries for
+    results of other jobs, which takes longer than some programs."""
     if size < 1:
         raise ArgumentError(f"chunk: {size}, expected at least 1", found=str(size), expected="at least 1")
     for start in range(0, len(units), size):
-        yield list(units[start : start + size])
+        yield json.dumps(list(units[start : start + size]))
 
 
-def do(command: Command, units: Sequence[dict[str, Any]]) -> int:
+def do(command: Command, units: str) -> None:
     """One job: does what of a chunk is not done yet. A process that dies is started again; the command line itself lists a unit that
     kills it every time.
 
-    :returns: how many units the chunk has.
+    :param units: a list of units as JSON; see :func:`chunks`.
     :raises TruegrindError: what the command line refuses.
     """
-    given = json.dumps(list(units)).encode()
     idle = 0
     while True:
         before = _state(command)
         done = subprocess.run(
-            command.arguments("--units", "-", "--resume", "--threads", "1"), input=given, capture_output=True
+            command.arguments("--units", "-", "--resume", "--threads", "1"), input=units.encode(), capture_output=True
         )
         if done.returncode >= 0:
             _checked(done)
-            return len(units)
+            return
         idle = idle + 1 if _state(command) == before else 0
         if idle >= DEATHS_WITHOUT_PROGRESS:
-            names = ", ".join(", ".join(unit["paths"]) for unit in units[:NAMED])
+            listed = json.loads(units)
+            names = ", ".join(", ".join(unit["paths"]) for unit in listed[:NAMED])
             raise TruegrindError(
-                f"the process was killed {idle} times (signal {-done.returncode}) before it began anything, of {len(units)} units "
+                f"the process was killed {idle} times (signal {-done.returncode}) before it began anything, of {len(listed)} units "
                 f"({names} …): too little memory on this worker?"
             )
 
@@ -175,10 +176,10 @@ def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedPr
 
 
 def compensating(
-    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any]
+    programs: object, model: object, output: object, work: object | None, given: Mapping[str, Any], with_json: bool = True
 ) -> Command:
-    """The command that corrects programs."""
-    chosen = options({"model": model, "output": output, **given})
+    """The command that corrects programs. ``with_json``: each record holds what only the report as JSON shows, motion by motion."""
+    chosen = options({"model": model, "output": output, "brief_records": not with_json, **given})
     return Command("compensate", inputs(programs), chosen, os.fspath(work if work is not None else output))  # type: ignore[arg-type]
 
 

@@ -21,6 +21,7 @@ from contextlib import contextmanager
 from os import PathLike
 from typing import Any
 
+import dask
 from distributed import Client, as_completed, get_client
 
 from . import _jobs, _power
@@ -34,6 +35,15 @@ RETRIES = 5
 """As often Dask tries a chunk again whose worker died."""
 
 
+_QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.tick.cycle": "5s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+"""Workers of our own only wait for processes: looking at themselves fifty times a second takes the processor from those."""
+
+
 @contextmanager
 def _client(given: Client | None):
     """The client that was given, else the current one, else one of this machine with one thread a worker."""
@@ -43,7 +53,7 @@ def _client(given: Client | None):
     try:
         yield get_client()
     except ValueError:
-        with Client(threads_per_worker=1) as made:
+        with dask.config.set(_QUIET), Client(threads_per_worker=1) as made:
             yield made
 
 
@@ -82,8 +92,8 @@ class _Do:
     def __init__(self, command: _jobs.Command) -> None:
         self.command = command
 
-    def __call__(self, units: list[dict[str, Any]]) -> int:
-        return _jobs.do(self.command, units)
+    def __call__(self, units: str) -> None:
+        _jobs.do(self.command, units)
 
 
 def compensate_folder(
@@ -107,14 +117,15 @@ def compensate_folder(
     :param programs: a folder, or several programs and folders.
     :param model: an estimated arm.
     :param output: the folder for what is written; what jobs keep for each other lies there too, unless ``work`` names another.
-    :param csv: where the table of all programs goes; likewise ``json``, ``html``, ``md`` and ``parquet``.
+    :param csv: where the table of all programs goes; likewise ``json``, ``html``, ``md`` and ``parquet``. What a run made without
+        ``json`` is done again where a later one asks for it.
     :param client: of Dask; else the current one, else this machine.
     :param chunk: programs of one job.
     :param progress: called with the number of jobs that are done and of all.
     :param options: those of the command line: ``cell="cell.toml"``, ``max_correction=5``, ``partial=True``.
     :raises TruegrindError: what the command line refuses, or what could not be done, listed.
     """
-    command = _jobs.compensating(programs, model, output, work, options)
+    command = _jobs.compensating(programs, model, output, work, options, with_json=json is not None)
     reports = {"csv": csv, "json": json, "html": html, "md": md, "parquet": parquet}
     return _run(command, reports, client, chunk, progress)
 

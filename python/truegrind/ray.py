@@ -18,7 +18,8 @@ def _run(command: _jobs.Command, reports: dict[str, Any], chunk: int) -> Gathere
 
 def compensate_folder(programs, model, output, *, reports=None, chunk=CHUNK, work=None, **options) -> Gathered:
     """See :func:`truegrind.dask.compensate_folder`; ``reports={"html": "page.html"}``."""
-    return _run(_jobs.compensating(programs, model, output, work, options), reports or {}, chunk)
+    command = _jobs.compensating(programs, model, output, work, options, with_json="json" in (reports or {}))
+    return _run(command, reports or {}, chunk)
 
 
 def diagnose_many(data, robot, output, *, reports=None, chunk=1, work=None, **options) -> Gathered:

@@ -11,7 +11,7 @@ use truegrind::report::acceptance::{self as view, Statement};
 use super::computation::{Common, watching};
 use super::ending::Ending;
 use super::files::{self, Batch};
-use super::identify::{DataArguments, read};
+use super::identify::{DataArguments, PointsArguments, read};
 use super::inputs::{self, NamedModel};
 use super::outputs::Outputs;
 use super::progress::Work;
@@ -32,15 +32,21 @@ pub(super) struct Arguments {
     /// Expanded uncertainty of the sensor, k = 2 (mm); else twice the scatter of repeated poses.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     sensor_uncertainty: Option<f64>,
+    /// The largest error of the orientation that is accepted (°), where the sensor measures it; without it the orientation is told and
+    /// not judged.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    tolerance_angle: Option<f64>,
+    /// Expanded uncertainty of the sensor's orientation, k = 2 (°); else twice the scatter of repeated poses.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    sensor_uncertainty_angle: Option<f64>,
     /// A serial number or the like for the page, such as --serial arm=120-503211; any number of times.
     #[arg(long, value_name = "WHAT=TEXT")]
     serial: Vec<String>,
     /// The robot, where the model is of one that is not in the catalogue: its file.
     #[arg(long)]
     robot: Option<String>,
-    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
-    #[arg(long, value_name = "POINTS.txt")]
-    points: Option<PathBuf>,
+    #[command(flatten)]
+    points: PointsArguments,
     /// Sheet of a workbook; the first with the columns otherwise.
     #[arg(long)]
     sheet: Option<String>,
@@ -60,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         bail!("--rrd: an acceptance has no recording; `truegrind identify DATA --rrd` draws the same rows");
     }
     let mut given: Vec<&Path> = vec![&arguments.data, &arguments.model];
-    given.extend(arguments.points.as_deref());
+    given.extend(arguments.points.points.as_deref());
     Batch::check(&given, &arguments.outputs.files())?;
     let serials = arguments.serial.iter().map(|text| serial(text)).collect::<anyhow::Result<Vec<_>>>()?;
     let named = inputs::model(&arguments.model.to_string_lossy())?;
@@ -82,6 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let options = Options {
         tolerance_mm: arguments.tolerance,
         uncertainty_mm: arguments.sensor_uncertainty,
+        tolerance_rad: arguments.tolerance_angle.map(f64::to_radians),
+        uncertainty_rad: arguments.sensor_uncertainty_angle.map(f64::to_radians),
         frames: arguments.stated.frames(&dataset)?,
         seed: arguments.common.seed,
     };

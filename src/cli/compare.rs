@@ -20,7 +20,7 @@ use truegrind::report::format;
 use super::computation::{Common, on_threads};
 use super::ending::Ending;
 use super::files::{self, Batch};
-use super::identify::{Angles, DataArguments};
+use super::identify::{Angles, DataArguments, PointsArguments};
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::terminal::{say, tell, tell_lines, width};
@@ -218,7 +218,7 @@ fn measured(arguments: &Arguments, experiment: &Experiment) -> anyhow::Result<Me
     let (robot, dataset) = identify::read(&DataArguments {
         data: data.clone(),
         robot,
-        points: None,
+        points: PointsArguments::default(),
         sheet: arguments.sheet.clone(),
         angles: arguments.angles,
         allow_odd_units: arguments.allow_odd_units,

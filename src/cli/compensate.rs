@@ -250,16 +250,36 @@ pub(super) struct Arguments {
     outputs: Outputs,
     #[command(flatten)]
     shares: Shares,
+    /// Keep no entry for every motion of what is done: `gather` makes all reports but --json of it, and where --json is asked for
+    /// the programs are done again.
+    #[arg(long, help_heading = "Several jobs, on one machine or many")]
+    brief_records: bool,
 }
 
 impl Arguments {
+    /// Whether records are kept from which every report can be made.
+    fn keeps_all(&self) -> bool {
+        self.shares.on() && !self.brief_records
+    }
+
     /// Every option that has a part in what is written, in words. What has none is taken out by name, so that one that comes anew
     /// counts until somebody says that it does not.
     fn that_count(&self) -> String {
         let common = Common { threads: None, ..self.common.clone() };
         let diff = self.diff.as_ref().map(|_| PathBuf::new());
         let (outputs, shares) = (Outputs::default(), Shares::default());
-        format!("{:?}", Self { programs: Vec::new(), common, diff, outputs, shares, ..self.clone() })
+        format!(
+            "{:?}",
+            Self {
+                programs: Vec::new(),
+                common,
+                diff,
+                outputs,
+                shares,
+                brief_records: false,
+                ..self.clone()
+            }
+        )
     }
 }
 
@@ -306,6 +326,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     Batch::check(&inputs_of, &checked)?;
     if !dry {
         refuse_report_over_program(&jobs, arguments.output.as_deref(), &checked)?;
+    }
+    if arguments.brief_records && !arguments.shares.on() {
+        bail!(
+            "--brief-records: a run that no jobs share keeps no records: leave it out, or give --shard or --resume"
+        );
     }
     if arguments.shares.on() && arguments.output.as_deref() == Some(Path::new("-")) {
         bail!("-o -: the standard output takes one program, a shared run is of several: name a folder");
@@ -483,11 +508,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| file_to_file(shop, job, &programs),
-        lighten: |done: &mut Done| {
-            if arguments.outputs.json.is_none() {
-                done.json = Vec::new();
-            }
-        },
+        whole: arguments.outputs.json.is_some(),
     };
     let done: Vec<Done> = on_threads(arguments.common.threads, || each(store, jobs, &doing))??;
     drop(work);
@@ -517,14 +538,14 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
 /// One program of many: rewritten and written.
 fn file_to_file(shop: &Shop<'_>, job: &Job, programs: &Programs) -> anyhow::Result<(Done, Written)> {
     let targets = outputs_of(shop.arguments, job, programs, true)?;
-    let with_json = shop.arguments.outputs.json.is_some() || shop.arguments.shares.on();
-    let mut entries = Vec::new();
+    let with_json = shop.arguments.outputs.json.is_some() || shop.arguments.keeps_all();
+    let mut entries = with_json.then(Vec::new);
     let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
         if with_json
             && let Value::Object(mut all) = view::json(planned, program.listing(), files)
             && let Some(Value::Array(list)) = all.remove("programs")
         {
-            entries = list;
+            entries = Some(list);
         }
         Ok(())
     };
@@ -591,7 +612,7 @@ fn rewritten(
         clean: false,
         changed: false,
         undeclared: 0,
-        json: Vec::new(),
+        json: None,
         used: None,
     };
     let marked = already(shop, &program, programs, &mut notes)?;
@@ -693,7 +714,7 @@ fn rewritten(
         // To take a million pieces apart just before all memory goes back takes a tenth of the time of the whole.
         std::mem::forget((program, planned, rewritten));
     }
-    Ok(Done { row, written, diff, notes, clean, changed, undeclared, json: Vec::new(), used })
+    Ok(Done { row, written, diff, notes, clean, changed, undeclared, json: None, used })
 }
 
 /// Where each file of a program goes.

@@ -3,12 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use truegrind::compensation::cell::Used;
 use truegrind::report::batch::{self, Ended, Row};
 use truegrind::report::kept::{Packed, unpacked};
+use truegrind::units::done::Recorded;
 
 use super::ending::Ending;
 use super::files::Batch;
@@ -30,8 +32,8 @@ pub(super) struct Done {
     pub(super) changed: bool,
     /// Motions that are left because what they use is declared in none of the files.
     pub(super) undeclared: usize,
-    /// Entries of the contract.
-    pub(super) json: Vec<Value>,
+    /// Entries of the contract; absent where nothing that is asked for shows them.
+    pub(super) json: Option<Vec<Value>>,
     /// What it uses of the cell file; absent where it was not looked at.
     pub(super) used: Option<Used>,
 }
@@ -45,19 +47,19 @@ struct Writing<'a> {
     clean: bool,
     changed: bool,
     undeclared: usize,
-    json: Vec<Packed<'a>>,
+    json: Option<Vec<Packed<'a>>>,
 }
 
 /// The same, as it is read.
 #[derive(Deserialize)]
-struct Reading {
+struct Reading<J> {
     row: Row,
     diff: String,
     notes: Vec<String>,
     clean: bool,
     changed: bool,
     undeclared: usize,
-    json: Value,
+    json: J,
 }
 
 impl Kept for Done {
@@ -78,22 +80,40 @@ impl Kept for Done {
             clean: self.clean,
             changed: self.changed,
             undeclared: self.undeclared,
-            json: self.json.iter().map(Packed).collect(),
+            json: self.json.as_ref().map(|json| json.iter().map(Packed).collect()),
         })?)
     }
 
-    fn from_record(record: Value) -> Option<Self> {
-        let record: Reading = serde_json::from_value(record).ok()?;
-        let Value::Array(json) = unpacked(record.json) else { return None };
-        Some(Self {
-            row: record.row,
+    fn read(bytes: &[u8], key: &str, whole: bool) -> Option<Recorded<Self>> {
+        if whole {
+            // A brief record has none: then its unit counts as one that is not done.
+            let entries = |packed: Value| match unpacked(packed) {
+                Value::Array(json) => Some(Some(json)),
+                _ => None,
+            };
+            Recorded::<Reading<Value>>::from_bytes(bytes, key)?.and_then(|read| read.done(entries))
+        } else {
+            let read = Recorded::<Reading<IgnoredAny>>::from_bytes(bytes, key)?;
+            read.and_then(|read| read.done(|_| Some(None)))
+        }
+    }
+
+    fn lighten(&mut self) {
+        self.json = None;
+    }
+}
+
+impl<J> Reading<J> {
+    fn done(self, json: impl FnOnce(J) -> Option<Option<Vec<Value>>>) -> Option<Done> {
+        Some(Done {
+            row: self.row,
             written: Vec::new(),
-            diff: record.diff.chars().map(|c| u8::try_from(c).ok()).collect::<Option<_>>()?,
-            notes: record.notes,
-            clean: record.clean,
-            changed: record.changed,
-            undeclared: record.undeclared,
-            json,
+            diff: self.diff.chars().map(|c| u8::try_from(c).ok()).collect::<Option<_>>()?,
+            notes: self.notes,
+            clean: self.clean,
+            changed: self.changed,
+            undeclared: self.undeclared,
+            json: json(self.json)?,
             used: None,
         })
     }
@@ -108,7 +128,8 @@ fn failed(job: &Job, error: &str) -> Done {
         clean: false,
         changed: false,
         undeclared: 0,
-        json: Vec::new(),
+        // There is none, whatever is asked for.
+        json: Some(Vec::new()),
         used: None,
     }
 }
@@ -158,7 +179,7 @@ impl Reports<'_> {
         let (mut rows, mut programs, mut diff) = (Vec::new(), Vec::new(), Vec::new());
         for done in done {
             rows.push(done.row);
-            programs.extend(done.json);
+            programs.extend(done.json.unwrap_or_default());
             diff.extend_from_slice(&done.diff);
         }
         self.outputs.print(&batch::summary(&rows))?;
@@ -181,15 +202,11 @@ impl Reports<'_> {
 
 /// The reports of a shared run, from what was kept of each program.
 pub(super) fn gathered(
-    records: Vec<Value>,
+    done: Vec<Done>,
     context: &Value,
     outputs: &Outputs,
     diff: Option<&Path>,
     batch: Batch,
 ) -> anyhow::Result<Ending> {
-    let done: Option<Vec<Done>> = records.into_iter().map(Done::from_record).collect();
-    let done = done.ok_or_else(|| {
-        anyhow!("a record is none of `compensate`: was the folder of another run put there?")
-    })?;
     Reports { outputs, diff, judging: Judging::from_value(context) }.write(done, batch, false)
 }

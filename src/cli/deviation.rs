@@ -15,6 +15,7 @@ use truegrind::compensation::verify::{Acting, Judged, judge};
 use truegrind::programs::nc::setup::Setup;
 use truegrind::report::deviation as view;
 use truegrind::surfaces::SurfaceFile;
+use truegrind::units::done::Recorded;
 
 use super::belonging;
 use super::compensate::{CellArguments, agreed, say_unused};
@@ -131,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         work: |job: &Job, programs: Programs| {
             Ok((shop.judged(job, &programs, surface.as_ref())?, Vec::new()))
         },
-        lighten: |_: &mut Found| (),
+        whole: true,
     };
     let mut found: Vec<Found> =
         on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
@@ -174,7 +175,7 @@ fn name_of(programs: usize, reports: &[PathReport]) -> String {
 }
 
 /// What was found of one program.
-struct Found {
+pub(super) struct Found {
     /// The program, for messages.
     name: String,
     /// One per arm.
@@ -199,13 +200,16 @@ impl Kept for Found {
         Ok(json!({ "name": self.name, "reports": reports, "failed": self.failed }).to_string())
     }
 
-    fn from_record(record: Value) -> Option<Self> {
-        Some(Self {
-            name: record["name"].as_str()?.to_owned(),
-            reports: record["reports"].as_array()?.iter().map(view::from_kept).collect::<Option<_>>()?,
-            used: None,
-            failed: record["failed"].as_str().map(str::to_owned),
-        })
+    fn read(bytes: &[u8], key: &str, _: bool) -> Option<Recorded<Self>> {
+        let found = |record: Value| {
+            Some(Self {
+                name: record["name"].as_str()?.to_owned(),
+                reports: record["reports"].as_array()?.iter().map(view::from_kept).collect::<Option<_>>()?,
+                used: None,
+                failed: record["failed"].as_str().map(str::to_owned),
+            })
+        };
+        Recorded::from_bytes(bytes, key)?.and_then(found)
     }
 }
 
@@ -251,11 +255,7 @@ impl Reports<'_> {
 }
 
 /// The reports of a shared run, from what was kept of each program.
-pub(super) fn gathered(records: Vec<Value>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
-    let found: Option<Vec<Found>> = records.into_iter().map(Found::from_record).collect();
-    let found = found.ok_or_else(|| {
-        anyhow!("a record is none of `deviation`: was the folder of another run put there?")
-    })?;
+pub(super) fn gathered(found: Vec<Found>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
     Reports { outputs, is_part: false }.write(found, batch, |_, _, _| Ok(()))
 }
 

@@ -19,7 +19,7 @@ use truegrind::report::diagnosis as view;
 use super::computation::{Common, watching};
 use super::ending::Ending;
 use super::files::Batch;
-use super::identify::{DataArguments, FitArguments, read, write_model};
+use super::identify::{DataArguments, FitArguments, PointsArguments, read, write_model};
 use super::outputs::Outputs;
 use super::progress::Work;
 use super::shares::Shares;
@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         .map(|data| {
             Ok(read(&DataArguments {
                 data: data.clone(),
-                points: None,
+                points: PointsArguments::default(),
                 sheet: None,
                 ..arguments.data.clone()
             })?

@@ -9,7 +9,8 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::robots::export::{Format, left_out, write};
+use truegrind::robots::export::{Format, coupled_beyond, left_out, write};
+use truegrind::robots::foreign::{Choice, read_any};
 
 use super::ending::Ending;
 use super::files::Batch;
@@ -66,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut notes = vec![format!("{} as estimated from {}", arm.robot, arm.provenance.file)];
     notes.extend(left_out(&arm.model, format));
     notes.push(match &arguments.data {
-        Some(data) => judged(data, arm, &bare)?,
+        Some(data) => judged(data, arm, &read_back(&bare, &arm.robot, format)?)?,
         None => known(arm),
     });
     let text = write(&bare, &arm.robot, format, &notes);
@@ -79,6 +80,22 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     // What is not the arm that was identified is flagged.
     Ok(if arm.model.effects.is_empty() { Ending::Done } else { Ending::Flagged })
+}
+
+/// The arm as whoever reads the file has it.
+fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model> {
+    let name = match format {
+        Format::Urdf => "exported.urdf",
+        Format::Standard | Format::Modified => "exported.csv",
+        Format::UrYaml => "exported.yaml",
+    };
+    let text = write(bare, robot, format, &[]);
+    let mut back = read_any(&text, name, &Choice::default())?.robot.model;
+    if coupled_beyond(bare, format) {
+        // The file's angles are those of the links: its user turns the controller's into them.
+        back.joint_map = bare.joint_map;
+    }
+    Ok(back)
 }
 
 /// What the model file says of the error of its links.
@@ -96,13 +113,13 @@ fn known(arm: &Estimated) -> String {
     }
 }
 
-/// The error of the links alone on measurements.
-fn judged(data: &Path, arm: &Estimated, bare: &Model) -> anyhow::Result<String> {
+/// The error of what was exported on measurements.
+fn judged(data: &Path, arm: &Estimated, exported: &Model) -> anyhow::Result<String> {
     let reading = DataArguments::of(data.to_path_buf(), arm.robot.clone());
     let (_, rows) = read(&reading)?;
     let tolerance = Tolerance::default();
     let frames = starting_frames(&rows, &arm.nominal, &tolerance, true)?;
-    let found = transfer(&rows, &frames, &arm.nominal, bare, &arm.model, &tolerance, true);
+    let found = transfer(&rows, &frames, &arm.nominal, exported, &arm.model, &tolerance, true);
     let seen = if rows.sha256 == arm.provenance.sha256 {
         "which the model was fitted to, so that this is no held-out error"
     } else {

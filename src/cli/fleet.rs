@@ -10,6 +10,7 @@ use truegrind::calibration::diagnosis::diagnose::Options;
 use truegrind::report::diagnosis as page;
 use truegrind::report::fleet::{self as view, Row};
 use truegrind::report::format;
+use truegrind::units::done::Recorded;
 use truegrind::units::key::sha256;
 
 use super::computation::{Common, on_threads};
@@ -43,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         None => jobs(arguments)?,
     };
     refuse_one_place_for_two(&jobs)?;
-    if arguments.data.points.is_some() {
+    if arguments.data.points.points.is_some() {
         bail!("--points belong to one log of joints, and these are several arms: diagnose each by itself");
     }
     if !arguments.also.is_empty() {
@@ -79,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             read.iter().map(|(path, bytes)| (path.display().to_string(), sha256(bytes))).collect()
         },
         work: |job: &Job, read: Vec<(PathBuf, Vec<u8>)>| one(arguments, &options, job, &read),
-        lighten: |_: &mut Found| (),
+        whole: true,
     };
     let found: Vec<Found> = on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
     drop(work);
@@ -136,7 +137,7 @@ fn refuse_one_place_for_two(jobs: &[Job]) -> anyhow::Result<()> {
 }
 
 /// What was found of one arm.
-struct Found {
+pub(super) struct Found {
     row: Row,
     notes: Vec<String>,
     /// Whether its model may be used, and nothing is unexplained.
@@ -157,12 +158,15 @@ impl Kept for Found {
             .to_string())
     }
 
-    fn from_record(mut record: Value) -> Option<Self> {
-        Some(Self {
-            row: serde_json::from_value(record["row"].take()).ok()?,
-            notes: serde_json::from_value(record["notes"].take()).ok()?,
-            clean: record["clean"].as_bool()?,
-        })
+    fn read(bytes: &[u8], key: &str, _: bool) -> Option<Recorded<Self>> {
+        let found = |mut record: Value| {
+            Some(Self {
+                row: serde_json::from_value(record["row"].take()).ok()?,
+                notes: serde_json::from_value(record["notes"].take()).ok()?,
+                clean: record["clean"].as_bool()?,
+            })
+        };
+        Recorded::from_bytes(bytes, key)?.and_then(found)
     }
 }
 
@@ -227,9 +231,6 @@ fn write(found: Vec<Found>, outputs: &Outputs, mut batch: Batch, is_part: bool) 
 }
 
 /// The table of a shared run, from what was kept of each arm.
-pub(super) fn gathered(records: Vec<Value>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
-    let found: Option<Vec<Found>> = records.into_iter().map(Found::from_record).collect();
-    let found = found
-        .ok_or_else(|| anyhow!("a record is none of `diagnose`: was the folder of another run put there?"))?;
+pub(super) fn gathered(found: Vec<Found>, outputs: &Outputs, batch: Batch) -> anyhow::Result<Ending> {
     write(found, outputs, batch, false)
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use rayon::prelude::*;
-use truegrind::units::done::{Done, Ended};
+use truegrind::units::done::Ended;
 use truegrind::units::key::sha256;
 use truegrind::units::run::Run;
 use truegrind::units::share::Share;
@@ -18,7 +18,7 @@ use super::ending::Ending;
 use super::files::{self, Batch};
 use super::outputs::Outputs;
 use super::programs::{Job, Programs};
-use super::shares::Store;
+use super::shares::{Kept, Store};
 use super::{corrected, deviation, fleet};
 
 /// Arguments of `gather`.
@@ -38,8 +38,8 @@ pub(super) struct Arguments {
 }
 
 /// What became of a unit.
-enum State {
-    Done(Box<Done>),
+enum State<T> {
+    Done(T),
     Missing,
     /// Outputs are not as they were written.
     Changed(Vec<PathBuf>),
@@ -66,42 +66,76 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let mut targets = arguments.outputs.files();
     targets.extend(arguments.diff.as_deref());
     Batch::check(&inputs, &targets)?;
-    let states = on_threads(arguments.threads, || {
-        jobs.par_iter().map(|job| state(&store, &run.verb, job)).collect::<anyhow::Result<Vec<_>>>()
-    })??;
-    complete(&run, &jobs, &states)?;
-    let done = states.into_iter().filter_map(|state| match state {
-        State::Done(done) => Some(done.record),
-        _ => None,
-    });
-    let (records, batch) = (done.collect(), Batch::sparing(inputs));
+    let here = Here { arguments, store: &store, run: &run, jobs: &jobs };
+    let batch = || Batch::sparing(inputs.iter());
     match run.verb.as_str() {
         "compensate" => {
-            corrected::gathered(records, &run.context, &arguments.outputs, arguments.diff.as_deref(), batch)
+            let records = here.records(arguments.outputs.json.is_some(), programs)?;
+            corrected::gathered(records, &run.context, &arguments.outputs, arguments.diff.as_deref(), batch())
         }
-        "deviation" => deviation::gathered(records, &arguments.outputs, batch),
-        "diagnose" => fleet::gathered(records, &arguments.outputs, batch),
+        "deviation" => deviation::gathered(here.records(true, programs)?, &arguments.outputs, batch()),
+        "diagnose" => fleet::gathered(here.records(true, tables)?, &arguments.outputs, batch()),
         verb => bail!("{}: a run of `{verb}`, which is not known", arguments.work.display()),
     }
 }
 
-fn state(store: &Store, verb: &str, job: &Job) -> anyhow::Result<State> {
-    let content = if verb == "diagnose" {
-        let read = |path: &PathBuf| Ok((path.display().to_string(), sha256(&files::read(path)?)));
-        job.paths.iter().map(read).collect::<anyhow::Result<Vec<_>>>().ok()
-    } else {
-        Programs::read(&job.paths).ok().map(|programs| programs.content())
-    };
-    let Some(done) = store.record(&store.key(job, content.as_deref()))? else { return Ok(State::Missing) };
+/// The files of a unit by name and content; `None` where one cannot be read.
+type Content = Option<Vec<(String, String)>>;
+
+fn programs(job: &Job) -> Content {
+    Programs::read(&job.paths).ok().map(|programs| programs.content())
+}
+
+fn tables(job: &Job) -> Content {
+    let read = |path: &PathBuf| Ok((path.display().to_string(), sha256(&files::read(path)?)));
+    job.paths.iter().map(read).collect::<anyhow::Result<_>>().ok()
+}
+
+/// A run whose units are looked at.
+struct Here<'a> {
+    arguments: &'a Arguments,
+    store: &'a Store,
+    run: &'a Run,
+    jobs: &'a [Job],
+}
+
+impl Here<'_> {
+    /// What was kept of all units, in their order. Each is read into what its verb makes of it and nothing else, since all of them
+    /// are held at once.
+    fn records<T: Kept>(
+        &self,
+        whole: bool,
+        content: impl Fn(&Job) -> Content + Sync,
+    ) -> anyhow::Result<Vec<T>> {
+        let state = |job: &Job| state(self.store, job, content(job).as_deref(), whole);
+        let states = on_threads(self.arguments.threads, || {
+            self.jobs.par_iter().map(state).collect::<anyhow::Result<Vec<_>>>()
+        })??;
+        complete(self.run, self.jobs, &states)?;
+        let done = states.into_iter().filter_map(|state| match state {
+            State::Done(record) => Some(record),
+            _ => None,
+        });
+        Ok(done.collect())
+    }
+}
+
+fn state<T: Kept>(
+    store: &Store,
+    job: &Job,
+    content: Option<&[(String, String)]>,
+    whole: bool,
+) -> anyhow::Result<State<T>> {
+    let Some(done) = store.record::<T>(&store.key(job, content), whole)? else { return Ok(State::Missing) };
     let changed = if done.ended == Ended::Done { store.changed(&done) } else { Vec::new() };
-    Ok(if changed.is_empty() { State::Done(Box::new(done)) } else { State::Changed(changed) })
+    Ok(if changed.is_empty() { State::Done(done.record) } else { State::Changed(changed) })
 }
 
 /// Units that are named one by one.
 const NAMED: usize = 50;
 
 /// Refuses a run of which anything is missing, and says what, by shares where there were some.
-fn complete(run: &Run, jobs: &[Job], states: &[State]) -> anyhow::Result<()> {
+fn complete<T>(run: &Run, jobs: &[Job], states: &[State<T>]) -> anyhow::Result<()> {
     let mut open: Vec<(Option<u32>, String)> = Vec::new();
     for (job, state) in jobs.iter().zip(states) {
         let what = match state {

@@ -16,7 +16,7 @@ use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::identification::verdict::Limits;
 use truegrind::calibration::measurement::convention::AngleConvention;
 use truegrind::calibration::measurement::dataset::Dataset;
-use truegrind::calibration::measurement::import;
+use truegrind::calibration::measurement::import::{self, Clocks};
 use truegrind::calibration::measurement::matching::{Mismatch, matched};
 use truegrind::calibration::measurement::split::{self, Split};
 use truegrind::report::format;
@@ -58,9 +58,8 @@ pub(super) struct DataArguments {
     /// Robot: a name of `truegrind robots`, or a TOML file.
     #[arg(long)]
     pub(super) robot: String,
-    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
-    #[arg(long, value_name = "POINTS.txt")]
-    pub(super) points: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) points: PointsArguments,
     /// Sheet of a workbook; the first with the columns otherwise.
     #[arg(long)]
     pub(super) sheet: Option<String>,
@@ -72,15 +71,55 @@ pub(super) struct DataArguments {
     pub(super) allow_odd_units: bool,
 }
 
+/// Measured points in a file of their own.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct PointsArguments {
+    /// Points that the tracker's software exported (SpatialAnalyzer, ASCII), joined with the joints by their column `name`.
+    #[arg(long, value_name = "POINTS.txt")]
+    pub(super) points: Option<PathBuf>,
+    /// Join the points by time, with the log's column `time`: each with the row nearest to it, at most so far away (s). Points and rows
+    /// without a partner are left out and told; where several rows or points could be meant, nothing is joined.
+    #[arg(long, value_name = "S", requires = "points", allow_negative_numbers = true)]
+    points_within: Option<f64>,
+    /// By how much the clock of the points is ahead of that of the log (s).
+    #[arg(long, value_name = "S", requires = "points_within", allow_negative_numbers = true)]
+    points_ahead: Option<f64>,
+}
+
+impl PointsArguments {
+    /// How the points are joined by time, where that is asked for.
+    fn clocks(&self) -> anyhow::Result<Option<Clocks>> {
+        let Some(within_s) = self.points_within else { return Ok(None) };
+        if !(0.0..=LONGEST_S).contains(&within_s) || within_s == 0.0 {
+            bail!("--points-within {within_s}: expected a time above 0 s, up to {LONGEST_S} s");
+        }
+        let ahead_s = self.points_ahead.unwrap_or(0.0);
+        if !ahead_s.is_finite() {
+            bail!("--points-ahead {ahead_s}: expected a time in s");
+        }
+        Ok(Some(Clocks { within_s, ahead_s }))
+    }
+}
+
+/// No point belongs to a row that is further away in time.
+const LONGEST_S: f64 = 3600.0;
+
 impl DataArguments {
     /// A file as it is, of a robot.
     pub(super) fn of(data: PathBuf, robot: String) -> Self {
-        Self { data, robot, points: None, sheet: None, angles: None, allow_odd_units: false }
+        Self {
+            data,
+            robot,
+            points: PointsArguments::default(),
+            sheet: None,
+            angles: None,
+            allow_odd_units: false,
+        }
     }
 
     /// The files that are read.
     pub(super) fn files(&self) -> Vec<&Path> {
-        std::iter::once(&self.data).chain(&self.points).map(PathBuf::as_path).collect()
+        std::iter::once(&self.data).chain(&self.points.points).map(PathBuf::as_path).collect()
     }
 }
 
@@ -283,10 +322,16 @@ fn imported(arguments: &DataArguments, bytes: &[u8]) -> anyhow::Result<Dataset> 
     let options =
         import::Options { sheet: arguments.sheet.clone(), allow_odd_units: arguments.allow_odd_units };
     let name = files::name(&arguments.data);
-    Ok(match &arguments.points {
-        None => import::read(&name, bytes, &options)?,
-        Some(points) => {
-            import::joined((&name, bytes), (&files::name(points), &files::read(points)?), &options)?
+    Ok(match (&arguments.points.points, arguments.points.clocks()?) {
+        (None, _) => import::read(&name, bytes, &options)?,
+        (Some(points), clocks) => {
+            let (export, exported) = (files::name(points), files::read(points)?);
+            match clocks {
+                None => import::joined((&name, bytes), (&export, &exported), &options)?,
+                Some(clocks) => {
+                    import::joined_by_time((&name, bytes), (&export, &exported), &clocks, &options)?
+                }
+            }
         }
     })
 }

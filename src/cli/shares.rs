@@ -14,7 +14,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::Value;
-use truegrind::units::done::{Done, Ended, Output, SCHEMA};
+use truegrind::units::done::{Ended, Output, Recorded, SCHEMA};
 use truegrind::units::key;
 use truegrind::units::run::{self, Run, Unit};
 use truegrind::units::share::Share;
@@ -82,37 +82,39 @@ pub(super) trait Kept: Sized + Send {
     fn is_failed(&self) -> bool;
     /// As JSON, every bit.
     fn record(&self) -> anyhow::Result<String>;
-    /// From JSON; `None` where it is none of this verb.
-    fn from_record(record: Value) -> Option<Self>;
+    /// From the bytes of the record with this key; `None` where it is not whole, or none of this verb. `whole`: with what no report but
+    /// --json shows; a run may be of a million units.
+    fn read(bytes: &[u8], key: &str, whole: bool) -> Option<Recorded<Self>>;
+    /// Lets go of what is only read where it is asked for `whole`.
+    fn lighten(&mut self) {}
 }
 
 /// Files that were written, each with the SHA-256 of its bytes.
 pub(super) type Written = Vec<(PathBuf, String)>;
 
 /// How a verb reads and does a unit.
-pub(super) struct Doing<R, C, W, L> {
+pub(super) struct Doing<R, C, W> {
     /// Reads its files.
     pub(super) read: R,
     /// Their names and contents; see [`key::of_unit`].
     pub(super) content: C,
     /// Does it, and writes its outputs.
     pub(super) work: W,
-    /// Lets go of it what only the record needs: a job may be of a million units.
-    pub(super) lighten: L,
+    /// Whether the reports of this job need all of a unit; see [`Kept::read`].
+    pub(super) whole: bool,
 }
 
 /// Does all units, each by itself: what one brings to light does not take the others with it.
-pub(super) fn each<I, T, R, C, W, L>(
+pub(super) fn each<I, T, R, C, W>(
     store: Option<&Store>,
     jobs: &[Job],
-    doing: &Doing<R, C, W, L>,
+    doing: &Doing<R, C, W>,
 ) -> anyhow::Result<Vec<T>>
 where
     T: Kept,
     R: Fn(&Job) -> anyhow::Result<I> + Sync,
     C: Fn(&I) -> Vec<(String, String)> + Sync,
     W: Fn(&Job, I) -> anyhow::Result<(T, Written)> + Sync,
-    L: Fn(&mut T) + Sync,
 {
     let Some(store) = store else {
         let one = |job: &Job| isolated(|| (doing.work)(job, (doing.read)(job)?));
@@ -230,12 +232,12 @@ impl Store {
     }
 
     /// The record of a unit, where it is there whole.
-    pub(super) fn record(&self, key: &str) -> anyhow::Result<Option<Done>> {
-        Ok(own::there(&self.record_place(key))?.and_then(|bytes| Done::from_bytes(&bytes, key)))
+    pub(super) fn record<T: Kept>(&self, key: &str, whole: bool) -> anyhow::Result<Option<Recorded<T>>> {
+        Ok(own::there(&self.record_place(key))?.and_then(|bytes| T::read(&bytes, key, whole)))
     }
 
     /// The outputs of a unit that are not as they were written.
-    pub(super) fn changed(&self, done: &Done) -> Vec<PathBuf> {
+    pub(super) fn changed<R>(&self, done: &Recorded<R>) -> Vec<PathBuf> {
         let place = |output: &Output| match output.below {
             true => self.work.join(&output.file),
             false => PathBuf::from(&output.file),
@@ -261,13 +263,13 @@ impl Store {
             let file = below.unwrap_or(&path).display().to_string();
             Output { file, below: below.is_some(), sha256 }
         };
-        let done = Done {
+        let done = Recorded {
             schema: SCHEMA.to_owned(),
             key: key.to_owned(),
             unit: job.name(),
             ended,
             outputs: written.into_iter().map(output).collect(),
-            record: Value::Null,
+            record: (),
         };
         let text = done.to_text(&kept.record()?);
         let text = text.with_context(|| format!("{}: the record cannot be made", job.name()))?;
@@ -295,10 +297,10 @@ impl<'s> Here<'s> {
     }
 
     /// A unit that is done, or does it. `None` where it was begun before and not ended, unless it is done `alone` now.
-    fn done_or_do<I, T, R, C, W, L>(
+    fn done_or_do<I, T, R, C, W>(
         &self,
         job: &Job,
-        doing: &Doing<R, C, W, L>,
+        doing: &Doing<R, C, W>,
         alone: bool,
     ) -> anyhow::Result<Option<T>>
     where
@@ -306,7 +308,6 @@ impl<'s> Here<'s> {
         R: Fn(&Job) -> anyhow::Result<I>,
         C: Fn(&I) -> Vec<(String, String)>,
         W: Fn(&Job, I) -> anyhow::Result<(T, Written)>,
-        L: Fn(&mut T),
     {
         let read = isolated(|| (doing.read)(job));
         let content = read.as_ref().ok().map(&doing.content);
@@ -314,13 +315,11 @@ impl<'s> Here<'s> {
         let begun = self.store.work.join("begun").join(&key);
         let mut times = 0;
         if self.store.resume
-            && let Some(done) = self.store.record(&key)?
+            && let Some(done) = self.store.record::<T>(&key, doing.whole)?
             && done.ended != Ended::Failed
             && self.store.changed(&done).is_empty()
-            && let Some(mut kept) = T::from_record(done.record)
         {
-            (doing.lighten)(&mut kept);
-            return Ok(Some(kept));
+            return Ok(Some(done.record));
         }
         if self.careful {
             // One that cannot be read was being noted.
@@ -352,7 +351,9 @@ impl<'s> Here<'s> {
         if self.careful {
             own::gone(&begun);
         }
-        (doing.lighten)(&mut kept);
+        if !doing.whole {
+            kept.lighten();
+        }
         Ok(Some(kept))
     }
 }

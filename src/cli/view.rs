@@ -165,7 +165,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
     let data = identify::DataArguments {
         data: file.to_path_buf(),
         robot,
-        points: None,
+        points: identify::PointsArguments::default(),
         sheet: arguments.sheet.clone(),
         angles: None,
         allow_odd_units: false,

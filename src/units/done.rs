@@ -3,6 +3,7 @@
 //! It is written after all outputs of the unit are in their places, and says what is in them; so whoever finds it, and finds the
 //! outputs as it says, has nothing to do. A record that a crash of the machine tore does not read, and counts for nothing.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -32,9 +33,13 @@ pub enum Ended {
     Killed,
 }
 
-/// The record of a unit.
+/// The record of a unit, with what the reports of the run need of it as JSON.
+pub type Done = Recorded<Value>;
+
+/// The record of a unit; `R`: what the reports of the run need of it. A reader that needs less of it takes a type that passes over the
+/// rest, and builds nothing for that.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Done {
+pub struct Recorded<R> {
     /// [`SCHEMA`].
     pub schema: String,
     /// Its key; see [`super::key::of_unit`].
@@ -46,10 +51,10 @@ pub struct Done {
     /// What was written.
     pub outputs: Vec<Output>,
     /// What the reports of the run need of it, every bit.
-    pub record: Value,
+    pub record: R,
 }
 
-impl Done {
+impl<R> Recorded<R> {
     /// As a file; `record`: JSON, in place of that of `self`, which a job of many need not build first.
     ///
     /// # Errors
@@ -62,6 +67,14 @@ impl Done {
         Ok(format!("{{{head},\"ended\":{ended},\"outputs\":{outputs},\"record\":{record}}}\n"))
     }
 
+    /// The same unit with something else of it; `None` where there is nothing.
+    pub fn and_then<T>(self, of: impl FnOnce(R) -> Option<T>) -> Option<Recorded<T>> {
+        let Self { schema, key, unit, ended, outputs, record } = self;
+        Some(Recorded { schema, key, unit, ended, outputs, record: of(record)? })
+    }
+}
+
+impl<R: DeserializeOwned> Recorded<R> {
     /// From the bytes of a file; `None` where it is not the whole record of the unit with this key.
     pub fn from_bytes(bytes: &[u8], key: &str) -> Option<Self> {
         let done: Self = serde_json::from_slice(bytes).ok()?;

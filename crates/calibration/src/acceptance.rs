@@ -6,6 +6,9 @@
 //! where the largest error exceeds it by more than U, open between them. Pose accuracy and repeatability (ISO 9283: thirty
 //! cycles at five poses) are worked out only where so many cycles were measured.
 
+pub mod decision;
+pub mod orientation;
+
 use nalgebra::Vector3;
 use thiserror::Error;
 use truegrind_arm::condition::Condition;
@@ -15,6 +18,7 @@ use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_math::work::tell;
 
+use self::orientation::Orientation;
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observed, errors_on};
 use crate::identification::identify::observe;
@@ -22,10 +26,10 @@ use crate::identification::register::register;
 use crate::identification::start::NoStart;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
-use crate::measurement::split::{Split, folds, noise_floor, poses};
+use crate::measurement::split::{Split, folds, noise_floor, noise_floor_rad, poses};
 
-/// Fewer poses decide nothing.
-pub const FEWEST_POSES: usize = 100;
+pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
+
 /// Poses and cycles at each for pose accuracy and repeatability (ISO 9283).
 pub const ISO_POSES: usize = 5;
 /// See [`ISO_POSES`].
@@ -42,6 +46,10 @@ pub struct Options {
     pub tolerance_mm: f64,
     /// Expanded uncertainty of the sensor, k = 2 (mm); else twice the scatter of repeated poses, where any was repeated.
     pub uncertainty_mm: Option<f64>,
+    /// The largest error of the orientation that is accepted (rad); without it the orientation is told and not judged.
+    pub tolerance_rad: Option<f64>,
+    /// Expanded uncertainty of the sensor's orientation, k = 2 (rad); else as that of the position.
+    pub uncertainty_rad: Option<f64>,
     /// Frames that were measured by other means: then nothing is fitted.
     pub frames: Option<Frames>,
     /// Seed of the folds.
@@ -60,6 +68,14 @@ pub enum AcceptError {
         /// What was found.
         found: f64,
     },
+    /// The tolerance or the uncertainty of the orientation is no angle.
+    #[error("{name} {found}: expected an angle above 0° and up to 180°")]
+    Angle {
+        /// Which.
+        name: &'static str,
+        /// What was found (°).
+        found: f64,
+    },
     /// The rows of the fit.
     #[error(
         "{file}: these are the rows that the model was fitted to: an acceptance needs poses that were measured for it, at least \
@@ -72,30 +88,6 @@ pub enum AcceptError {
     /// The frames cannot be found.
     #[error(transparent)]
     NoStart(#[from] NoStart),
-}
-
-/// The decision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decision {
-    /// The largest error and the uncertainty lie within the tolerance.
-    Accepted,
-    /// The largest error exceeds it by more than the uncertainty.
-    Refused,
-    /// The uncertainty does not let it be decided.
-    Open,
-    /// Too few poses.
-    NotEvaluated,
-}
-
-/// Where the uncertainty of the sensor comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Uncertainty {
-    /// It was stated.
-    Stated,
-    /// Twice the scatter of repeated poses.
-    Repeats,
-    /// Nothing tells it, and it is left out.
-    Unknown,
 }
 
 /// Pose accuracy and repeatability, the largest over the poses (mm).
@@ -130,14 +122,26 @@ pub struct Acceptance {
     pub uncertainty: Uncertainty,
     /// The largest error that is accepted (mm).
     pub tolerance_mm: f64,
-    /// The decision.
+    /// The decision by the position alone.
     pub decision: Decision,
+    /// What was found of the orientation, where the sensor measured it.
+    pub orientation: Option<Orientation>,
+    /// Whether a tolerance of the orientation was stated.
+    pub orientation_asked: bool,
     /// Pose accuracy and repeatability, where cycles were measured.
     pub cycles: Option<Cycles>,
     /// Most readings of one pose.
     pub most_cycles: usize,
     /// Smallest and largest of time (h), temperature (°C) and payload (kg), where logged.
     pub conditions: [Option<[f64; 2]>; 3],
+}
+
+impl Acceptance {
+    /// The decision by all that a tolerance was stated for: an orientation that was to be judged and was not measured is not evaluated.
+    pub fn overall(&self) -> Decision {
+        let orientation = self.orientation.as_ref().map_or(Decision::NotEvaluated, |found| found.decision);
+        if self.orientation_asked { self.decision.and(orientation) } else { self.decision }
+    }
 }
 
 /// Judges `estimated` by the rows of `dataset`.
@@ -151,30 +155,49 @@ pub fn accept(
 ) -> Result<Acceptance, AcceptError> {
     length("the tolerance", options.tolerance_mm)?;
     options.uncertainty_mm.map_or(Ok(()), |mm| length("the uncertainty of the sensor", mm))?;
+    options.tolerance_rad.map_or(Ok(()), |rad| angle("the tolerance of the orientation", rad))?;
+    options
+        .uncertainty_rad
+        .map_or(Ok(()), |rad| angle("the uncertainty of the sensor's orientation", rad))?;
     if is_of_the_fit(dataset, estimated) {
         return Err(AcceptError::RowsOfTheFit { file: dataset.file.clone() });
     }
     let (observed, _) = observe(dataset, &estimated.nominal, true);
     tell("judging the arm of the data sheet");
-    let nominal = errors(&observed, &estimated.nominal, options)?;
+    let [nominal, nominal_rad] = errors(&observed, &estimated.nominal, options)?;
     tell("judging the estimated arm");
-    let found = errors(&observed, &estimated.model, options)?;
+    let [found, found_rad] = errors(&observed, &estimated.model, options)?;
     let model = ErrorSummary::of(found.iter().copied());
     let groups = poses(dataset);
-    let (uncertainty_mm, uncertainty) = match (options.uncertainty_mm, noise_floor(dataset)) {
-        (Some(mm), _) => (mm, Uncertainty::Stated),
-        (None, Some(floor)) => (2.0 * floor.sigma_mm, Uncertainty::Repeats),
-        (None, None) => (0.0, Uncertainty::Unknown),
-    };
+    let (uncertainty_mm, uncertainty) =
+        Uncertainty::of(options.uncertainty_mm, noise_floor(dataset).map(|floor| floor.sigma_mm));
+    let numbered = |errors: Vec<f64>| dataset.rows.iter().map(|row| row.number).zip(errors).collect();
+    let orientation = (dataset.sensor == Sensor::Pose).then(|| {
+        let model = ErrorSummary::of(found_rad.iter().copied());
+        let (uncertainty_rad, uncertainty) =
+            Uncertainty::of(options.uncertainty_rad, noise_floor_rad(dataset));
+        let decided = |tolerance| Decision::of(groups.len(), model.max, uncertainty_rad, tolerance);
+        Orientation {
+            nominal: ErrorSummary::of(nominal_rad),
+            errors_rad: numbered(found_rad),
+            uncertainty_rad,
+            uncertainty,
+            tolerance_rad: options.tolerance_rad,
+            decision: options.tolerance_rad.map_or(Decision::NotEvaluated, decided),
+            model,
+        }
+    });
     Ok(Acceptance {
         poses: groups.len(),
         rows: dataset.rows.len(),
         nominal: ErrorSummary::of(nominal),
-        errors_mm: dataset.rows.iter().map(|row| row.number).zip(found).collect(),
+        errors_mm: numbered(found),
         uncertainty_mm,
         uncertainty,
         tolerance_mm: options.tolerance_mm,
-        decision: decision(groups.len(), model.max, uncertainty_mm, options.tolerance_mm),
+        decision: Decision::of(groups.len(), model.max, uncertainty_mm, options.tolerance_mm),
+        orientation,
+        orientation_asked: options.tolerance_rad.is_some(),
         cycles: cycles(&observed, &groups, &estimated.model, options)?,
         most_cycles: groups.iter().map(Vec::len).max().unwrap_or(0),
         conditions: [
@@ -188,6 +211,11 @@ pub fn accept(
 
 fn length(name: &'static str, found: f64) -> Result<(), AcceptError> {
     if found > 0.0 && found.is_finite() { Ok(()) } else { Err(AcceptError::Length { name, found }) }
+}
+
+fn angle(name: &'static str, found_rad: f64) -> Result<(), AcceptError> {
+    let found = found_rad.to_degrees();
+    if found > 0.0 && found <= 180.0 { Ok(()) } else { Err(AcceptError::Angle { name, found }) }
 }
 
 /// The same file, or more than half of the poses that the model keeps of its fit.
@@ -205,30 +233,27 @@ fn is_of_the_fit(dataset: &Dataset, estimated: &Estimated) -> bool {
     2 * samples.iter().filter(near).count() > samples.len()
 }
 
-/// The error of each row (mm), with frames that have not seen it.
-fn errors(observed: &Observed, model: &Model, options: &Options) -> Result<Vec<f64>, NoStart> {
+/// The errors of each row, of the position (mm) and of the orientation (rad; none where none was measured), with frames that have not
+/// seen it.
+fn errors(observed: &Observed, model: &Model, options: &Options) -> Result<[Vec<f64>; 2], NoStart> {
+    let count = observed.dataset.rows.len();
     if let Some(frames) = &options.frames {
-        return Ok(errors_on(observed, model, frames));
+        let rows: Vec<usize> = (0..count).collect();
+        let turns = orientation::errors(observed, &rows, model, frames).unwrap_or_default();
+        return Ok([errors_on(observed, model, frames), turns]);
     }
-    let mut out = vec![f64::NAN; observed.dataset.rows.len()];
+    let (mut places, mut turns) = (vec![f64::NAN; count], vec![f64::NAN; count]);
+    let mut oriented = true;
     for Split { train, test } in folds(&observed.dataset, FOLDS, options.seed) {
-        let registered = register(&observed.subset(&train), model, &Tolerance::default())?;
-        let errors = errors_on(&observed.subset(&test), model, &registered.fitted.frames);
-        test.into_iter().zip(errors).for_each(|(row, error)| out[row] = error);
+        let frames = register(&observed.subset(&train), model, &Tolerance::default())?.fitted.frames;
+        match orientation::errors(observed, &test, model, &frames) {
+            Some(errors) => test.iter().zip(errors).for_each(|(row, error)| turns[*row] = error),
+            None => oriented = false,
+        }
+        let errors = errors_on(&observed.subset(&test), model, &frames);
+        test.into_iter().zip(errors).for_each(|(row, error)| places[row] = error);
     }
-    Ok(out)
-}
-
-fn decision(poses: usize, largest_mm: f64, uncertainty_mm: f64, tolerance_mm: f64) -> Decision {
-    if poses < FEWEST_POSES || !largest_mm.is_finite() {
-        Decision::NotEvaluated
-    } else if largest_mm + uncertainty_mm <= tolerance_mm {
-        Decision::Accepted
-    } else if largest_mm - uncertainty_mm > tolerance_mm {
-        Decision::Refused
-    } else {
-        Decision::Open
-    }
+    Ok([places, if oriented { turns } else { Vec::new() }])
 }
 
 fn range(dataset: &Dataset, value: fn(&Condition) -> Option<f64>) -> Option<[f64; 2]> {

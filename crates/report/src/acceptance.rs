@@ -7,10 +7,12 @@ use super::plot::{Axis, Graph, Histogram, Ink, Reference, Sample, Series};
 use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::estimated::Estimated;
+use truegrind_calibration::acceptance::orientation::Orientation;
 use truegrind_calibration::acceptance::{
     Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, Uncertainty,
 };
 use truegrind_calibration::measurement::dataset::{Dataset, Sensor};
+use truegrind_math::statistics::ErrorSummary;
 
 /// What is said beside the measurement.
 #[derive(Debug, Clone, Default)]
@@ -37,6 +39,12 @@ pub fn document(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, sa
         by_row(found, dataset.sensor),
         "The same by row, in the order of the file, with the tolerance.",
     );
+    if let Some(turns) = &found.orientation {
+        page.figure(
+            turns_by_row(turns),
+            "The error of the orientation by row, the angle between the target as it was seen and as the arm says.",
+        );
+    }
     page.heading(2, "Circumstances");
     page.push(circumstances(found, estimated));
     page.heading(2, "How this was decided");
@@ -57,20 +65,54 @@ pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> 
     page.push(verdict(found, dataset.sensor));
     page.push(Block::KeyFigures(figures(found)));
     page.push(table(found, dataset.sensor));
+    page.push(orientation_table(found));
     page.push(iso(found, dataset.sensor));
     page
 }
 
 /// Whether a run ends well.
 pub fn is_accepted(found: &Acceptance) -> bool {
-    found.decision == Decision::Accepted
+    found.overall() == Decision::Accepted
 }
 
 fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
+    let (status, headline) = headline(found);
+    let mut reasons = Vec::new();
+    match found.uncertainty {
+        Uncertainty::Unknown => reasons.push(
+            "the uncertainty of the sensor is not known and left out: state it (--sensor-uncertainty), or repeat some poses"
+                .to_owned(),
+        ),
+        Uncertainty::Repeats => reasons.push(
+            "the uncertainty is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
+                .to_owned(),
+        ),
+        Uncertainty::Stated => {}
+    }
+    reasons.extend(orientation_reason(found));
+    if sensor == Sensor::Cable {
+        reasons.push("a cable sees the error along itself alone: across it nothing is judged".to_owned());
+    }
+    Verdict::new(status, headline, reasons)
+}
+
+/// What was decided. Of position and orientation that one is told which decides, and both where both hold.
+fn headline(found: &Acceptance) -> (Status, String) {
+    let overall = found.overall();
+    if found.orientation_asked && overall != Decision::Accepted && overall != found.decision {
+        return orientation_headline(found);
+    }
     let (max, limit, u) = (found.model.max, found.tolerance_mm, found.uncertainty_mm);
-    let (status, headline) = match found.decision {
+    match overall {
         Decision::Accepted => {
-            (Status::Good, format!("Accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm"))
+            let turn =
+                found.orientation.as_ref().and_then(|turns| Some((turns.model.max, turns.tolerance_rad?)));
+            let turn = turn.map_or_else(String::new, |(max, limit)| {
+                let [max, limit] = [max, limit].map(f64::to_degrees);
+                format!("; the largest turn is {max:.4}°, the tolerance {limit:.4}°")
+            });
+            let place = format!("Accepted: the largest error is {max:.3} mm, the tolerance {limit:.3} mm");
+            (Status::Good, place + &turn)
         }
         Decision::Refused => (
             Status::Bad,
@@ -87,23 +129,48 @@ fn verdict(found: &Acceptance, sensor: Sensor) -> Verdict {
             Status::NotEvaluated,
             format!("Not evaluated: {} poses, at least {FEWEST_POSES} are asked for", found.poses),
         ),
+    }
+}
+
+/// The same of an orientation that decides.
+fn orientation_headline(found: &Acceptance) -> (Status, String) {
+    let Some((turns, limit)) =
+        found.orientation.as_ref().and_then(|turns| Some((turns, turns.tolerance_rad?)))
+    else {
+        let headline =
+            "Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
+        return (Status::NotEvaluated, headline.to_owned());
     };
-    let mut reasons = Vec::new();
-    match found.uncertainty {
-        Uncertainty::Unknown => reasons.push(
-            "the uncertainty of the sensor is not known and left out: state it (--sensor-uncertainty), or repeat some poses"
+    let [max, limit, u] = [turns.model.max, limit, turns.uncertainty_rad].map(f64::to_degrees);
+    match turns.decision {
+        Decision::Refused => {
+            (Status::Bad, format!("Not accepted: the largest turn is {max:.4}°, the tolerance {limit:.4}°"))
+        }
+        _ => (
+            Status::Warning,
+            format!(
+                "Not decided: the largest turn of {max:.4}° lies within {u:.4}°, the uncertainty of the sensor, of the tolerance of \
+                 {limit:.4}°"
+            ),
+        ),
+    }
+}
+
+/// What qualifies the decision on the orientation.
+fn orientation_reason(found: &Acceptance) -> Option<String> {
+    let turns = found.orientation.as_ref()?;
+    turns.tolerance_rad?;
+    match turns.uncertainty {
+        Uncertainty::Stated => None,
+        Uncertainty::Repeats => Some(
+            "the uncertainty of the orientation is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
                 .to_owned(),
         ),
-        Uncertainty::Repeats => reasons.push(
-            "the uncertainty is twice the scatter of repeated poses: what the sensor is off by everywhere is not in it"
+        Uncertainty::Unknown => Some(
+            "the uncertainty of the orientation is not known and left out: state it (--sensor-uncertainty-angle), or repeat some poses"
                 .to_owned(),
         ),
-        Uncertainty::Stated => {}
     }
-    if sensor == Sensor::Cable {
-        reasons.push("a cable sees the error along itself alone: across it nothing is judged".to_owned());
-    }
-    Verdict::new(status, headline, reasons)
 }
 
 fn figures(found: &Acceptance) -> Vec<KeyFigure> {
@@ -147,12 +214,72 @@ pub fn table(found: &Acceptance, sensor: Sensor) -> Table {
     table
 }
 
+/// The errors of the orientation, and what was decided by them, or why nothing was.
+pub fn orientation_table(found: &Acceptance) -> Table {
+    let mut table = Table::new(
+        "Orientation",
+        vec![
+            Column::text("arm", "Arm"),
+            Column::number("mean_deg", "mean", "°", 4),
+            Column::number("standard_deviation_deg", "SD", "°", 4),
+            Column::number("max_deg", "max", "°", 4),
+            Column::number("max_mrad", "max", "mrad", 3),
+            Column::number("tolerance_deg", "Tolerance", "°", 4),
+            Column::text("remark", "Remark"),
+        ],
+    );
+    let Some(turns) = &found.orientation else {
+        let mut row = vec![Cell::from("estimated")];
+        row.extend((0..5).map(|_| Cell::Missing));
+        row.push("not evaluated: the sensor saw no orientation".into());
+        table.push(row);
+        return table;
+    };
+    let remark = match (turns.tolerance_rad, turns.decision) {
+        (None, _) => "not evaluated: no tolerance was stated (--tolerance-angle)".to_owned(),
+        (_, Decision::NotEvaluated) => {
+            format!("not evaluated: {} poses, at least {FEWEST_POSES} are asked for", found.poses)
+        }
+        (_, decision) => word(decision).to_owned(),
+    };
+    let limit = turns.tolerance_rad.map(f64::to_degrees);
+    for (name, errors, limit, remark) in [
+        ("data sheet, sensor registered", &turns.nominal, None, ""),
+        ("estimated", &turns.model, limit, remark.as_str()),
+    ] {
+        table.push([
+            name.into(),
+            errors.mean.to_degrees().into(),
+            errors.standard_deviation.to_degrees().into(),
+            errors.max.to_degrees().into(),
+            (1e3 * errors.max).into(),
+            limit.into(),
+            remark.into(),
+        ]);
+    }
+    table
+}
+
+fn word(decision: Decision) -> &'static str {
+    match decision {
+        Decision::Accepted => "accepted",
+        Decision::Refused => "not accepted",
+        Decision::Open => "not decided",
+        Decision::NotEvaluated => "not evaluated",
+    }
+}
+
 /// The error of each row.
 pub fn row_table(found: &Acceptance) -> Table {
-    let mut table =
-        Table::new("Rows", vec![Column::count("row", "Row"), Column::number("error_mm", "Error", "mm", 4)]);
+    let mut columns = vec![Column::count("row", "Row"), Column::number("error_mm", "Error", "mm", 4)];
+    if found.orientation.is_some() {
+        columns.push(Column::number("error_deg", "Orientation", "°", 5));
+    }
+    let mut table = Table::new("Rows", columns);
+    let mut turns = found.orientation.iter().flat_map(|turns| &turns.errors_rad);
     for &(row, error) in &found.errors_mm {
-        table.push([row.into(), error.into()]);
+        let turn = turns.next().map(|(_, rad)| Cell::from(rad.to_degrees()));
+        table.push([row.into(), error.into()].into_iter().chain(turn));
     }
     table
 }
@@ -226,7 +353,14 @@ fn method(found: &Acceptance, said: &Statement) -> Vec<String> {
          error exceeds it by more than the uncertainty, else not decided (the rule of ISO 14253-1).",
         found.uncertainty_mm
     );
-    vec![frames, rule]
+    let mut method = vec![frames, rule];
+    if let Some(turns) = found.orientation.as_ref().filter(|turns| turns.tolerance_rad.is_some()) {
+        method.push(format!(
+            "The orientation is judged by the same rule, at the same poses, with an uncertainty of {:.4}°; both have to hold.",
+            turns.uncertainty_rad.to_degrees()
+        ));
+    }
+    method
 }
 
 fn axis(sensor: Sensor) -> Axis {
@@ -252,6 +386,21 @@ fn by_row(found: &Acceptance, sensor: Sensor) -> String {
         y: axis(sensor),
         series: vec![Series::points("estimated arm", points).ink(Ink::Blue)],
         references,
+        ..Graph::default()
+    }
+    .svg()
+}
+
+fn turns_by_row(turns: &Orientation) -> String {
+    let points: Vec<[f64; 2]> =
+        turns.errors_rad.iter().map(|row| [row.0 as f64, row.1.to_degrees()]).collect();
+    let limit = |rad: f64| Reference::Horizontal(rad.to_degrees(), "tolerance".to_owned());
+    Graph {
+        title: "Errors of the orientation by row".to_owned(),
+        x: Axis::new("row of the file", ""),
+        y: Axis::new("turn", "°"),
+        series: vec![Series::points("estimated arm", points).ink(Ink::Blue)],
+        references: turns.tolerance_rad.map(limit).into_iter().collect(),
         ..Graph::default()
     }
     .svg()
@@ -287,30 +436,45 @@ fn provenance(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said
 
 /// Everything; schema `truegrind.acceptance/1`.
 pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Value {
-    let decision = match found.decision {
-        Decision::Accepted => "accepted",
-        Decision::Refused => "not accepted",
-        Decision::Open => "not decided",
-        Decision::NotEvaluated => "not evaluated",
-    };
-    let uncertainty = match found.uncertainty {
+    let known = |uncertainty: Uncertainty| match uncertainty {
         Uncertainty::Stated => "stated",
         Uncertainty::Repeats => "repeated poses",
         Uncertainty::Unknown => "unknown",
     };
+    let uncertainty = known(found.uncertainty);
+    let orientation = found.orientation.as_ref().map(|turns| {
+        let expanded = turns.uncertainty_rad.to_degrees();
+        let degrees = |errors: &ErrorSummary| {
+            json!({
+                "rmse_deg": errors.rmse.to_degrees(), "mean_deg": errors.mean.to_degrees(), "max_deg": errors.max.to_degrees(),
+                "standard_deviation_deg": errors.standard_deviation.to_degrees(),
+            })
+        };
+        json!({
+            "decision": word(turns.decision),
+            "tolerance_deg": turns.tolerance_rad.map(f64::to_degrees),
+            "uncertainty": {
+                "expanded_deg": (turns.uncertainty != Uncertainty::Unknown).then_some(expanded), "from": known(turns.uncertainty),
+            },
+            "nominal": degrees(&turns.nominal),
+            "model": degrees(&turns.model),
+            "errors": turns.errors_rad.iter().map(|(row, rad)| json!({ "row": row, "error_deg": rad.to_degrees() })).collect::<Vec<_>>(),
+        })
+    });
     let [time_h, temperature_c, payload_kg] = found.conditions;
     let serials: serde_json::Map<String, Value> =
         said.serials.iter().map(|(name, text)| (name.clone(), json!(text))).collect();
     json!({
         "schema": "truegrind.acceptance/1",
         "robot": estimated.robot,
-        "decision": decision,
+        "decision": word(found.overall()),
         "tolerance_mm": found.tolerance_mm,
         "uncertainty": { "expanded_mm": (found.uncertainty != Uncertainty::Unknown).then_some(found.uncertainty_mm), "from": uncertainty },
         "poses": found.poses,
         "rows": found.rows,
         "nominal": found.nominal,
         "model": found.model,
+        "orientation": orientation,
         "iso_9283": found.cycles.map(|cycles| json!({
             "poses": cycles.poses, "cycles": cycles.cycles, "ap_mm": cycles.accuracy_mm, "rp_mm": cycles.repeatability_mm,
         })),

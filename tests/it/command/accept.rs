@@ -55,12 +55,88 @@ fn a_model_is_accepted_by_poses_of_its_own() {
     for (more, expected) in [
         (vec!["0"], "expected a length above 0"),
         (vec!["1", "--sensor-uncertainty", "-1"], "the uncertainty of the sensor"),
+        (
+            vec!["1", "--tolerance-angle", "0"],
+            "the tolerance of the orientation 0: expected an angle above 0°",
+        ),
+        (vec!["1", "--sensor-uncertainty-angle", "200"], "the uncertainty of the sensor's orientation 200"),
         (vec!["1", "--serial", "arm"], "expected WHAT=TEXT"),
         (vec!["1", "--rrd", "a.rrd"], "--rrd"),
     ] {
         let (code, _, err) = accept("later.csv", &more);
         assert!(code == 2 && err.contains(expected), "{more:?}: {err}");
     }
+}
+
+/// A tolerance of the orientation counts where the sensor measures it, and decides nothing where it does not.
+#[test]
+fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
+    let dir = folder();
+    let at = dir.path();
+    let recipe = RECIPE
+        .replace("kind = \"position\"", "kind = \"pose\"")
+        .replace(
+            "reflector_mm = [38.2, 12.6, 61.3]",
+            "target = { position_mm = [38.2, 12.6, 61.3], wxyz = [0.9, 0.1, 0.4, 0.1] }",
+        )
+        .replace("sigma_mm = 0.015", "sigma_mm = 0.015\nsigma_deg = 0.003");
+    assert_ne!(recipe, RECIPE);
+    for (name, seed) in [("poses", "121"), ("later", "122")] {
+        fs::write(at.join(format!("{name}.toml")), recipe.replace("seed = 121", &format!("seed = {seed}")))
+            .unwrap();
+        let (code, _, err) =
+            truegrind(at, &["simulate", &format!("{name}.toml"), "-o", &format!("{name}.csv")]);
+        assert_eq!(code, 0, "{err}");
+    }
+    let identify =
+        ["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml", "--allow-doubtful"];
+    let (code, _, err) = truegrind(at, &identify);
+    assert!(code < 2, "{err}");
+    let accept = |data: &str, more: &[&str]| {
+        truegrind(at, &[&["accept", data, "--model", "model.toml", "--tolerance", "5"], more].concat())
+    };
+    let (code, out, err) =
+        accept("later.csv", &["--html", "page.html", "--json", "page.json", "--csv", "rows.csv"]);
+    assert_eq!(code, 0, "{out}{err}");
+    // A terminal breaks lines.
+    let on_one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let page = || fs::read_to_string(at.join("page.html")).unwrap();
+    for words in
+        ["Errors of the orientation by row", "not evaluated: no tolerance was stated (--tolerance-angle)"]
+    {
+        assert!(page().contains(words), "{words}");
+    }
+    assert!(fs::read_to_string(at.join("rows.csv")).unwrap().lines().next().unwrap().contains("error_deg"));
+    let json =
+        || -> serde_json::Value { serde_json::from_slice(&fs::read(at.join("page.json")).unwrap()).unwrap() };
+    let found = json();
+    assert_eq!(found["orientation"]["decision"], "not evaluated");
+    let largest = found["orientation"]["model"]["max_deg"].as_f64().unwrap();
+    assert!(largest > 0.0 && largest < 0.2, "{largest}");
+    let (code, out, _) =
+        accept("later.csv", &["--tolerance-angle", "2", "--sensor-uncertainty-angle", "0.01"]);
+    let said = on_one_line(&out);
+    assert!(
+        code == 0 && said.contains("; the largest turn is") && said.contains("the tolerance 2.0000°"),
+        "{out}"
+    );
+    let half = format!("{}", 0.5 * largest);
+    let tight = ["--tolerance-angle", &half, "--sensor-uncertainty-angle", "0.0001", "--json", "page.json"];
+    let (code, out, _) = accept("later.csv", &tight);
+    assert!(code == 1 && on_one_line(&out).contains("[failed] Not accepted: the largest turn is"), "{out}");
+    assert_eq!(json()["decision"], "not accepted");
+    // Positions alone.
+    let places: String = fs::read_to_string(at.join("later.csv"))
+        .unwrap()
+        .lines()
+        .map(|line| line.split(',').take(9).collect::<Vec<_>>().join(",") + "\n")
+        .collect();
+    fs::write(at.join("places.csv"), places).unwrap();
+    let (code, out, err) = accept("places.csv", &["--html", "page.html"]);
+    assert!(code == 0 && page().contains("not evaluated: the sensor saw no orientation"), "{out}{err}");
+    let (code, out, _) = accept("places.csv", &["--tolerance-angle", "1"]);
+    let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
+    assert!(code == 1 && on_one_line(&out).contains(headline), "{out}");
 }
 
 #[test]

@@ -93,3 +93,53 @@ fn points_of_the_tracker_are_joined_with_a_log_of_joints_by_name() {
     assert!(code == 2 && err.contains("points.txt"), "{err}");
     assert_eq!(fs::read_to_string(at.join("points.txt")).unwrap(), "1 2 3 4\n5 6\n");
 }
+
+/// By time: the same model as by name. Options that make no sense are refused by name.
+#[test]
+fn points_of_the_tracker_are_joined_with_a_log_of_joints_by_time() {
+    let dir = folder();
+    let at = dir.path();
+    let rows: Vec<Vec<&str>> = TRACKER.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let clock = |k: usize, late_s: f64| format!("{:02}:{:02}:{:05.2}", 10 + k / 60, k % 60, 20.0 + late_s);
+    let mut log = "name,time,q1,q2,q3,q4,q5,q6\nextra,23:00:00,0,0,0,0,90,0\n".to_owned();
+    let mut points = "// Units: Millimeters\n".to_owned();
+    for (k, row) in rows.iter().enumerate() {
+        log += &format!("p{k},{},{}\n", clock(k, 0.0), row[..6].join(","));
+        points += &format!(
+            "A Arm p{k} {} 0.012 11/23/2026 {}\n",
+            row[6..9].join(" "),
+            clock(k, 4.0 + 0.01 * (k % 7) as f64)
+        );
+    }
+    fs::write(at.join("log.csv"), &log).unwrap();
+    fs::write(at.join("points.txt"), &points).unwrap();
+    let run = |more: &[&str]| {
+        let begin =
+            ["identify", "log.csv", "--robot", "abb-irb-120", "--points", "points.txt", "--json", "o.json"];
+        truegrind(at, &[&begin[..], more].concat())
+    };
+    let parameters = || {
+        let json: Value = serde_json::from_str(&fs::read_to_string(at.join("o.json")).unwrap()).unwrap();
+        json["parameters"].clone()
+    };
+    let (code, _, err) = run(&[]);
+    assert!(code < 2, "{err}");
+    let by_name = parameters();
+    let (code, _, err) = run(&["--points-within", "0.5", "--points-ahead", "4"]);
+    assert!(code < 2 && err.contains("rows joined by time with"), "{err}");
+    assert!(err.contains("1 rows without a point at their time are left out: 2"), "{err}");
+    assert_eq!(parameters(), by_name);
+    for (more, expected) in [
+        (&["--points-within", "0"][..], "--points-within 0: expected a time above 0 s"),
+        (&["--points-within", "nan"], "--points-within NaN"),
+        (&["--points-ahead", "4"], "--points-within"),
+        (&["--points-within", "0.5"], "--points-ahead"),
+        (&["--points-within", "70", "--points-ahead", "4"], "is ambiguous"),
+    ] {
+        let (code, _, err) = run(more);
+        assert!(code == 2 && err.contains(expected), "{more:?}: {err}");
+    }
+    let (code, _, err) =
+        truegrind(at, &["identify", "log.csv", "--robot", "abb-irb-120", "--points-within", "1"]);
+    assert!(code == 2 && err.contains("--points"), "{err}");
+}

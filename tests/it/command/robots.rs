@@ -73,6 +73,24 @@ fn what_is_exported_says_its_own_error() {
         code == 1 && out.contains("which the model was fitted to, so that this is no held-out error"),
         "{out}{err}"
     );
+    // Each format by rows that the fit has not seen, read back as its user reads it: the links of this arm are the model.
+    let recipe = include_str!("../../data/irb120-cable.toml");
+    let seed = recipe.lines().find(|line| line.starts_with("seed =")).unwrap();
+    fs::write(at.join("later.toml"), recipe.replacen(seed, "seed = 4711", 1)).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "later.toml", "-o", "later.csv"]);
+    assert_eq!(code, 0, "{err}");
+    let number = |text: &str, after: &str| -> f64 {
+        text.split(after).nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap()
+    };
+    for form in ["urdf", "dh-csv", "mdh-csv", "ur-yaml"] {
+        let (code, out, err) = export("links.toml", &[form, "-o", "-", "--data", "later.csv"]);
+        assert!(code == 0 && out.contains("which the model was not fitted to"), "{form}: {out}{err}");
+        let (links, whole) = (number(&out, "sensor's frame fitted: "), number(&out, "whole model "));
+        assert!((links - whole).abs() < 2e-4 && links > 0.01, "{form}: {links} {whole}");
+        let (_, out, _) = export("whole.toml", &[form, "-o", "-", "--data", "later.csv"]);
+        let (links, whole) = (number(&out, "sensor's frame fitted: "), number(&out, "whole model "));
+        assert!(links > whole, "{form}: {links} {whole}");
+    }
     // And back in again.
     let (code, _, err) = export("links.toml", &["urdf", "-o", "links.urdf"]);
     assert_eq!(code, 0, "{err}");

@@ -113,6 +113,43 @@ fn with<'a>(base: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
     [base, more].concat()
 }
 
+/// Records without an entry for every motion make every report but --json; whoever asks for that one is told that the programs have to
+/// be done again, and gets the same bytes then.
+#[test]
+fn brief_records_make_every_report_but_one() {
+    let (one, many) = (plant(), plant());
+    let expected = one_run(one.path(), &COMPENSATE);
+    let at = many.path();
+    let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--resume", "--brief-records"]));
+    assert!(code < 2, "{err}");
+    let (code, _, err) = truegrind(at, &["gather", "real", "--csv", "all.csv", "--html", "all.html"]);
+    assert_eq!(code, expected.0, "{err}");
+    for name in ["all.csv", "all.html"] {
+        assert!(
+            fs::read(one.path().join(name)).unwrap() == fs::read(at.join(name)).unwrap(),
+            "{name} differs"
+        );
+    }
+    let (code, _, err) = truegrind(at, &["gather", "real", "--json", "all.json"]);
+    // What could not be done has no entries, and is complete.
+    assert!(code == 2 && err.contains("7 of 8 are not done") && !at.join("all.json").exists(), "{err}");
+    let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--resume", "--json", "some.json"]));
+    assert!(code < 2, "{err}");
+    gathered_like(one.path(), &expected, at, "real", &[]);
+    // Whole records serve who wants less.
+    let before: BTreeMap<PathBuf, Vec<u8>> = super::files(&at.join("real/done"))
+        .into_iter()
+        .map(|path| (path.clone(), fs::read(path).unwrap()))
+        .collect();
+    let (code, _, err) = truegrind(at, &with(&COMPENSATE, &["--resume", "--brief-records"]));
+    assert!(code < 2, "{err}");
+    let failed = |text: &[u8]| String::from_utf8_lossy(text).contains("\"ended\":\"failed\"");
+    assert!(before.iter().all(|(path, text)| failed(text) || fs::read(path).unwrap() == *text));
+    let (code, _, err) =
+        truegrind(at, &["compensate", "in", "--model", "model.toml", "-o", "real", "--brief-records"]);
+    assert!(code == 2 && err.contains("--brief-records"), "{err}");
+}
+
 #[test]
 fn shares_put_together_are_what_one_run_writes() {
     let (one, many) = (plant(), plant());

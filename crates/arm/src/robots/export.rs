@@ -45,7 +45,7 @@ pub fn left_out(model: &Model, format: Format) -> Vec<String> {
             place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k
         ));
     }
-    if format != Format::Standard && format != Format::Modified && coupled(model) {
+    if coupled_beyond(model, format) {
         out.push("joints that turn several links are not held: angles are those of the links".to_owned());
     }
     if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
@@ -66,6 +66,11 @@ pub fn behind(model: &Model, format: Format) -> Pose {
             Pose::from_parts(Vector3::new(last.a_mm, 0.0, 0.0).into(), turn) * model.flange
         }
     }
+}
+
+/// Whether the controller's joints turn links in a way that the format does not hold: its angles are those of the links then.
+pub fn coupled_beyond(model: &Model, format: Format) -> bool {
+    format != Format::Standard && format != Format::Modified && coupled(model)
 }
 
 /// Whether a controller's joint turns another link than its own, or turns it by more or less than one for one.

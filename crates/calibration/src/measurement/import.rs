@@ -12,8 +12,10 @@ pub mod cell;
 pub mod csv;
 pub mod xlsx;
 pub mod template;
+mod clock;
 mod columns;
 mod error;
+mod moments;
 mod options;
 mod points;
 mod profile;
@@ -21,7 +23,7 @@ mod rows;
 mod rounding;
 
 pub use error::{ImportError, Place};
-pub use options::Options;
+pub use options::{Clocks, Options};
 
 use sha2::{Digest, Sha256};
 
@@ -79,6 +81,43 @@ pub fn read(file: &str, bytes: &[u8], options: &Options) -> Result<Dataset, Impo
 /// [`ImportError`]: as of [`read`], and where lines of the export are not alike, a point stands twice, the log has no names, or none of
 /// them is that of a point.
 pub fn joined(log: (&str, &[u8]), points: (&str, &[u8]), options: &Options) -> Result<Dataset, ImportError> {
+    together(log, points, options, |measured, table| measured.joined(log.0, table))
+}
+
+/// The same by the times of the log's column `time` and of the export's time stamps. A point is joined with the row nearest to it; a row
+/// or a point that has no partner within the tolerance is left out and told in the notes.
+///
+/// ```
+/// use truegrind_calibration::measurement::dataset::Reading;
+/// use truegrind_calibration::measurement::import::{Clocks, Options, joined_by_time};
+///
+/// let log = b"time,q1,q2,q3,q4,q5,q6\n10:15:30,10,20,30,40,50,60\n10:15:40,11,21,31,41,51,61\n";
+/// let points = b"Main p1 800.5 -41.0 900.25 11/23/2026 10:15:39.8\n";
+/// let clocks = Clocks { within_s: 0.5, ahead_s: 0.0 };
+/// let rows = joined_by_time(("joints.csv", log), ("tracker.txt", points), &clocks, &Options::default())?;
+/// assert_eq!(rows.rows.len(), 1);
+/// assert!((rows.rows[0].joints[0].to_degrees() - 11.0).abs() < 1e-12);
+/// # Ok::<(), truegrind_calibration::measurement::import::ImportError>(())
+/// ```
+///
+/// # Errors
+/// [`ImportError`]: as of [`joined`], where a row or a point has no time, where no row lies within the tolerance of a point, and where it
+/// would be a guess which row a point belongs to: the arm moved within the tolerance, or a row is the nearest to two points.
+pub fn joined_by_time(
+    log: (&str, &[u8]),
+    points: (&str, &[u8]),
+    clocks: &Clocks,
+    options: &Options,
+) -> Result<Dataset, ImportError> {
+    together(log, points, options, |measured, table| moments::joined(&measured, log.0, table, clocks))
+}
+
+fn together(
+    log: (&str, &[u8]),
+    points: (&str, &[u8]),
+    options: &Options,
+    join: impl FnOnce(Points, Table) -> Result<(Table, Vec<String>), ImportError>,
+) -> Result<Dataset, ImportError> {
     let measured = Points::read(points.0, points.1)?;
     let table = match xlsx::is_workbook(log.1) {
         true => sheet_of(log.0, xlsx::tables(log.0, log.1)?, options)?,
@@ -88,7 +127,7 @@ pub fn joined(log: (&str, &[u8]), points: (&str, &[u8]), options: &Options) -> R
             Table { rows, ..text.empty() }
         }
     };
-    let (table, notes) = measured.joined(log.0, table)?;
+    let (table, notes) = join(measured, table)?;
     let columns = Columns::find(log.0, &table)?;
     let mut dataset = rows::dataset(log.0, &table, &columns, options, std::iter::empty())?;
     dataset.notes.splice(0..0, notes);

@@ -305,21 +305,49 @@ pub struct NoiseFloor {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn noise_floor(data: &Dataset) -> Option<NoiseFloor> {
+    scatter(data, |row| match &row.reading {
+        Reading::Cable(l) => Some(Vector3::new(*l, 0.0, 0.0)),
+        Reading::Position(p) => Some(*p),
+        Reading::Pose(pose) => Some(pose.translation.vector),
+    })
+}
+
+/// The same of orientations, as turns against the first reading of a pose: the root of the sum over the coordinates of the turn (rad).
+/// `None` where no pose was repeated or the sensor sees no orientation.
+pub fn noise_floor_rad(data: &Dataset) -> Option<f64> {
+    let turn = |row: &Row| if let Reading::Pose(pose) = &row.reading { Some(pose.rotation) } else { None };
+    let mut first = None;
+    let against = |row: &Row, begins: bool| {
+        let here = turn(row)?;
+        let first = *if begins { first.insert(here) } else { first.get_or_insert(here) };
+        Some((first.inverse() * here).scaled_axis())
+    };
+    scattered(data, against).map(|floor| floor.sigma_mm)
+}
+
+/// The pooled scatter of repeated readings, copies left out.
+fn scatter(data: &Dataset, place: impl Fn(&Row) -> Option<Vector3<f64>>) -> Option<NoiseFloor> {
+    scattered(data, |row, _| place(row))
+}
+
+/// The same of what may be counted from the first row of each pose; rows of one pose, outlet and approach follow each other.
+fn scattered(
+    data: &Dataset,
+    mut place: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
+) -> Option<NoiseFloor> {
     let first = first_rows(data);
     let mut rows: Vec<usize> = (0..data.rows.len()).collect();
     rows.sort_by_key(|&row| first[row]);
     let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
     for pose in rows.chunk_by(|&a, &b| first[a] == first[b]).filter(|pose| pose.len() > 1) {
-        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<Vector3<f64>>> = BTreeMap::new();
+        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
         for &i in pose {
             let row = &data.rows[i];
-            alike.entry((row.anchor, row.condition.approach)).or_default().push(match &row.reading {
-                Reading::Cable(l) => Vector3::new(*l, 0.0, 0.0),
-                Reading::Position(p) => *p,
-                Reading::Pose(pose) => pose.translation.vector,
-            });
+            alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
         }
-        for readings in alike.into_values().filter(|readings| readings.len() > 1) {
+        for rows in alike.into_values().filter(|rows| rows.len() > 1) {
+            let of = |(k, &i): (usize, &usize)| place(&data.rows[i], k == 0);
+            let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
             all.add(&readings);
             own.add(&different(&readings));
             finest = finest.min(finest_mm(&readings));

@@ -1,5 +1,6 @@
 //! Acceptance by poses that a model was not fitted to.
 
+use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
@@ -46,7 +47,14 @@ fn model(rows: &Dataset) -> Estimated {
 }
 
 fn options(tolerance_mm: f64) -> Options {
-    Options { tolerance_mm, uncertainty_mm: Some(0.02), frames: None, seed: 0 }
+    Options {
+        tolerance_mm,
+        uncertainty_mm: Some(0.02),
+        tolerance_rad: None,
+        uncertainty_rad: None,
+        frames: None,
+        seed: 0,
+    }
 }
 
 #[test]
@@ -110,4 +118,99 @@ fn cycles_give_accuracy_and_repeatability() {
     // One cycle less, and there is nothing to be said.
     cycled.pop();
     assert!(accept(&dataset(cycled), &model, &stated).unwrap().cycles.is_none());
+}
+
+/// Rows of the arm of the data sheet, seen as poses from its base, each turned by `turn_rad` about an axis of its own.
+fn poses(series: f64, count: usize, turn_rad: f64) -> Vec<Row> {
+    let nominal = robots::load("abb-irb-120").unwrap().model;
+    let at = |k: usize| {
+        let q = pose(series, k);
+        let mut seen = nominal.at_condition(&Condition::default()).forward(&q);
+        let axis =
+            Vector3::from_fn(|i, _| ((k + 1) as f64 * [0.31, 0.57, 0.83][i]).fract() - 0.5).normalize();
+        seen.rotation = UnitQuaternion::new(axis * turn_rad) * seen.rotation;
+        Row::new(k, q, Reading::Pose(seen.into()))
+    };
+    (0..count).map(at).collect()
+}
+
+/// The orientation is judged by the rule of the position, and only where it was measured and a tolerance was stated.
+#[test]
+fn the_orientation_is_judged_as_the_position_is() {
+    let model = model(&dataset(rows(0.1, 120)));
+    let (turn, u) = (0.001, 0.0002);
+    let other = Dataset::new("poses.csv", Sensor::Pose, poses(0.7, 110, turn));
+    let stated = Options {
+        uncertainty_rad: Some(u),
+        // The model comes from positions: of the flange it knows no more than the data sheet.
+        frames: Some(Frames::at_origin(1)),
+        ..options(1.0)
+    };
+    let of = |tolerance_rad: Option<f64>| {
+        accept(&other, &model, &Options { tolerance_rad, ..stated.clone() }).unwrap()
+    };
+    let told = of(None);
+    let turns = told.orientation.as_ref().unwrap();
+    assert_eq!(
+        (turns.decision, told.overall(), turns.errors_rad.len()),
+        (Decision::NotEvaluated, Decision::Accepted, 110)
+    );
+    // The arm of the data sheet sees exactly the turn that was put in.
+    assert!(
+        (turns.nominal.max - turn).abs() < 1e-12 && (turns.nominal.mean - turn).abs() < 1e-12,
+        "{:?}",
+        turns.nominal
+    );
+    assert!(turns.nominal.standard_deviation < 1e-12);
+    let largest = turns.model.max;
+    assert!(largest > 0.9 * turn && largest < 2.0 * turn, "{largest}");
+    for (tolerance, expected) in [
+        (largest + 1.1 * u, Decision::Accepted),
+        (largest + 0.9 * u, Decision::Open),
+        (largest - 0.9 * u, Decision::Open),
+        (largest - 1.1 * u, Decision::Refused),
+    ] {
+        let found = of(Some(tolerance));
+        assert_eq!(found.orientation.as_ref().unwrap().decision, expected, "{tolerance}");
+        assert_eq!((found.overall(), found.decision), (expected, Decision::Accepted), "{tolerance}");
+    }
+    // A position that fails is not saved by its orientation.
+    let tight = Options {
+        tolerance_mm: 1e-6,
+        uncertainty_mm: Some(1e-9),
+        tolerance_rad: Some(0.1),
+        ..stated.clone()
+    };
+    let found = accept(&other, &model, &tight).unwrap();
+    assert_eq!((found.decision, found.overall()), (Decision::Refused, Decision::Refused));
+    // Too few poses, and an orientation that nobody measured.
+    let few = Dataset::new("poses.csv", Sensor::Pose, poses(0.7, 99, turn));
+    let asked = Options { tolerance_rad: Some(0.1), ..stated.clone() };
+    assert_eq!(accept(&few, &model, &asked).unwrap().overall(), Decision::NotEvaluated);
+    let places = accept(&dataset(rows(0.7, 110)), &model, &asked).unwrap();
+    assert!(places.orientation.is_none());
+    assert_eq!((places.decision, places.overall()), (Decision::Accepted, Decision::NotEvaluated));
+    let none = Options { tolerance_rad: Some(-0.1), ..stated };
+    assert!(matches!(accept(&other, &model, &none), Err(AcceptError::Angle { .. })));
+}
+
+/// Without a stated frame, each orientation is judged by one that has not seen it; repeated poses tell the uncertainty.
+#[test]
+fn the_uncertainty_of_the_orientation_comes_from_repeats() {
+    let model = model(&dataset(rows(0.1, 120)));
+    let mut seen = poses(0.7, 110, 0.0005);
+    let sigma = 0.0003;
+    for k in 0..40 {
+        let mut again = seen[k].clone();
+        let Reading::Pose(pose) = &mut again.reading else { panic!("a pose") };
+        pose.rotation *= UnitQuaternion::new(Vector3::x() * sigma * 2_f64.sqrt() * [-1.0, 1.0][k % 2]);
+        seen.push(again);
+    }
+    let data = Dataset::new("poses.csv", Sensor::Pose, seen);
+    let found = accept(&data, &model, &Options { tolerance_rad: Some(0.01), ..options(1.0) }).unwrap();
+    let turns = found.orientation.unwrap();
+    assert_eq!((turns.uncertainty, turns.decision), (Uncertainty::Repeats, Decision::Accepted));
+    // Two readings that differ by d scatter by d / √2.
+    assert!((turns.uncertainty_rad - 2.0 * sigma).abs() < 1e-9, "{}", turns.uncertainty_rad);
+    assert!(turns.model.max < 0.003 && turns.model.rmse > 0.0003, "{:?}", turns.model);
 }

@@ -1,6 +1,7 @@
 //! Tests of `measurement`.
 
 mod import;
+mod moments;
 mod plausibility;
 mod profile;
 mod registration;

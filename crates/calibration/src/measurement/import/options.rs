@@ -8,3 +8,12 @@ pub struct Options {
     /// Takes angles that look like radians and lengths that look like metres at their word.
     pub allow_odd_units: bool,
 }
+
+/// How far the times of two clocks may be apart where a log and measured points are joined by them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clocks {
+    /// The largest difference (s).
+    pub within_s: f64,
+    /// By how much the clock of the points is ahead of that of the log (s).
+    pub ahead_s: f64,
+}

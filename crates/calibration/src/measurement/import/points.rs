@@ -1,11 +1,12 @@
-//! Points that the tracker's software exports, joined with a log of the joints by name.
+//! Points that the tracker's software exports, joined with a log of the joints by name (`moments` joins them by time).
 //!
 //! SpatialAnalyzer, "Export ASCII Points" (user's manual): lines of a name, x, y, z and more, separated by blanks, tabs or commas; the
-//! name is that of the target alone, or of its group and collection before it; lines that begin with `//` are comments.
+//! name is that of the target alone, or of its group and collection before it; lines that begin with `//` are comments. What follows the
+//! coordinates (offsets, time stamps, comments) is as the user chose.
 
 use std::collections::BTreeMap;
 
-use super::cell::{Cell, Table};
+use super::cell::{Cell, Line, Table};
 use super::columns::POSITION;
 use super::csv;
 use super::error::{ImportError, Place};
@@ -16,13 +17,29 @@ const NAMES: [&str; 4] = ["name", "point", "target", "tag"];
 /// Fields that may stand before x: collection, group, target.
 const MOST_NAMES: usize = 3;
 
-/// Measured points by the name of their target.
+/// A measured point.
 #[derive(Debug)]
-pub(super) struct Points {
-    by_name: BTreeMap<String, [f64; 3]>,
+pub(super) struct Point {
+    /// Its line in the export, from 1.
+    pub(super) row: usize,
+    /// The name of its target, without group and collection.
+    pub(super) name: String,
+    /// Where it is (mm).
+    pub(super) at_mm: [f64; 3],
+    /// What stands after the coordinates.
+    pub(super) more: String,
 }
 
-fn broken(place: Place, message: String) -> ImportError {
+/// The measured points of an export, in its order.
+#[derive(Debug)]
+pub(super) struct Points {
+    /// The export, as messages name it.
+    pub(super) file: String,
+    /// At least one.
+    pub(super) all: Vec<Point>,
+}
+
+pub(super) fn broken(place: Place, message: String) -> ImportError {
     ImportError::Format { place, message }
 }
 
@@ -52,7 +69,7 @@ impl Points {
                            and collection before it or not), the same in every line";
             broken(place(lines.first().map(|(row, _)| *row)), message.to_owned())
         })?;
-        let mut by_name = BTreeMap::new();
+        let mut all = Vec::new();
         for (row, fields) in &lines {
             let number = |at: usize| fields.get(names + at).and_then(|text| csv::number(text, false));
             let (Some(x), Some(y), Some(z)) = (number(0), number(1), number(2)) else {
@@ -62,24 +79,41 @@ impl Points {
                 );
                 return Err(broken(place(Some(*row)), message));
             };
-            let name = target(fields[names - 1]).to_owned();
-            if by_name.insert(name.clone(), [x, y, z]).is_some() {
+            all.push(Point {
+                row: *row,
+                name: target(fields[names - 1]).to_owned(),
+                at_mm: [x, y, z],
+                more: fields[names + 3..].join(" "),
+            });
+        }
+        Ok(Self { file: file.to_owned(), all })
+    }
+
+    /// The points by the names of their targets.
+    fn by_name(&self) -> Result<BTreeMap<&str, [f64; 3]>, ImportError> {
+        let mut by_name = BTreeMap::new();
+        for Point { row, name, at_mm, .. } in &self.all {
+            if by_name.insert(name.as_str(), *at_mm).is_some() {
+                let place = Place { row: Some(*row), ..Place::file(&self.file) };
                 let message = format!(
-                    "point `{name}` stands twice; expected each name once: export one group, or rename the repeats"
+                    "point `{name}` stands twice; expected each name once: export one group, rename the repeats, or join by time \
+                     (--points-within)"
                 );
-                return Err(broken(place(Some(*row)), message));
+                return Err(broken(place, message));
             }
         }
-        Ok(Self { by_name })
+        Ok(by_name)
     }
 
     /// The log with the measured points as columns of ours, and what was left out.
     pub(super) fn joined(&self, file: &str, mut log: Table) -> Result<(Table, Vec<String>), ImportError> {
+        let by_name = self.by_name()?;
         let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
         let header = log.rows.iter().position(|line| named(line).is_some());
         let Some((header, column)) = header.and_then(|at| Some((at, named(&log.rows[at])?))) else {
             let message =
-                "has no column that names the measured points; expected `name` beside q1 to q6".to_owned();
+                "has no column that names the measured points; expected `name` beside q1 to q6, or join by time (--points-within)"
+                    .to_owned();
             return Err(broken(place, message));
         };
         let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
@@ -95,10 +129,10 @@ impl Points {
                 continue;
             }
             let name = line.cells[column].to_string();
-            match self.by_name.get(target(name.trim())) {
+            match by_name.get(target(name.trim())) {
                 Some(point) => {
                     used += 1;
-                    line.cells.extend(point.map(|value| Cell::Number { value, as_text: false }));
+                    line.cells.extend(cells(*point));
                 }
                 None => {
                     without.push(name);
@@ -107,25 +141,29 @@ impl Points {
             }
         }
         if used == 0 {
-            let some = |names: &mut dyn Iterator<Item = &String>| {
+            let some = |names: &mut dyn Iterator<Item = &str>| {
                 names.take(3).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
             };
             let message = format!(
                 "none of its names is that of a measured point: the log has {}, the points are {}",
-                some(&mut without.iter()),
-                some(&mut self.by_name.keys())
+                some(&mut without.iter().map(String::as_str)),
+                some(&mut by_name.keys().copied())
             );
             return Err(broken(place, message));
         }
         log.rows.retain(|line| !line.cells.is_empty());
-        let mut notes =
-            vec![format!("{used} rows joined by name with {} measured points", self.by_name.len())];
+        let mut notes = vec![format!("{used} rows joined by name with {} measured points", by_name.len())];
         if !without.is_empty() {
             let shown = without.iter().take(5).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
             notes.push(format!("{} rows without a measured point are left out: {shown}", without.len()));
         }
         Ok((log, notes))
     }
+}
+
+/// A point as cells of a row.
+pub(super) fn cells(at_mm: [f64; 3]) -> [Cell; 3] {
+    at_mm.map(|value| Cell::Number { value, as_text: false })
 }
 
 /// The fields of a line: between commas where there are some, else between blanks.
@@ -154,7 +192,12 @@ fn target(name: &str) -> &str {
     name.rsplit("::").next().unwrap_or(name).trim_matches('"')
 }
 
-fn named(line: &super::cell::Line) -> Option<usize> {
+fn named(line: &Line) -> Option<usize> {
+    headed(line, &NAMES)
+}
+
+/// The column under the first of these names that the line holds, whatever its case.
+pub(super) fn headed(line: &Line, names: &[&str]) -> Option<usize> {
     let is = |wanted: &str| line.cells.iter().position(|cell| cell.to_string().eq_ignore_ascii_case(wanted));
-    NAMES.iter().find_map(|name| is(name))
+    names.iter().find_map(|name| is(name))
 }

@@ -1,0 +1,277 @@
+//! Points that the tracker's software exports, joined with a log of the joints by the times of two clocks.
+//!
+//! A point belongs to the row nearest to it in time. It is joined only where that is no guess: within the stated tolerance all rows
+//! have the same joints (the arm stood), and no second point belongs to the same row.
+
+use super::cell::{Cell, Line, Table};
+use super::clock::{FORMS, Stamp};
+use super::columns::{Columns, POSITION};
+use super::error::{ImportError, Place};
+use super::options::Clocks;
+use super::points::{Point, Points, broken, cells, headed};
+
+/// Columns of a log that hold the time, in this order of preference.
+const TIMES: [&str; 5] = ["time", "timestamp", "time_stamp", "datetime", "date_time"];
+
+/// Joints that differ by less are one pose (°): encoders flicker by some thousandths.
+const SAME_DEG: f64 = 0.01;
+
+const SECONDS_A_DAY: f64 = 86_400.0;
+
+/// Points and rows that a message or a note names.
+const NAMED: usize = 5;
+
+/// A row of the log.
+struct Logged {
+    /// Its place in the table.
+    index: usize,
+    /// Its line in the file.
+    number: usize,
+    time_s: f64,
+}
+
+/// The log with the measured points as columns of ours, and what was left out.
+pub(super) fn joined(
+    points: &Points,
+    file: &str,
+    mut log: Table,
+    clocks: &Clocks,
+) -> Result<(Table, Vec<String>), ImportError> {
+    let place = Place { sheet: log.sheet.as_deref().map(Into::into), ..Place::file(file) };
+    let header = log.rows.iter().position(|line| headed(line, &TIMES).is_some());
+    let Some((header, column)) = header.and_then(|at| Some((at, headed(&log.rows[at], &TIMES)?))) else {
+        let message =
+            "has no column with the time of each row; expected `time` beside q1 to q6, such as 10:15:30.25";
+        return Err(broken(place, message.to_owned()));
+    };
+    let width = log.rows.iter().map(|line| line.cells.len()).max().unwrap_or(0);
+    log.rows.drain(..header);
+    log.rows.iter_mut().for_each(|line| line.cells.resize(width, Cell::Empty));
+    log.rows[0].cells.extend(POSITION.map(|name| Cell::Text(name.to_owned())));
+    let columns = Columns::find(file, &log)?;
+    let (logged, measured) = times(points, &log, column, &place)?;
+    let pairing = Pairing { points, log: &log, joints: columns.joints, clocks, logged, measured };
+    let pairs = pairing.pairs(file, &place)?;
+    let notes = pairing.notes(&pairs);
+    let mut partner: Vec<Option<usize>> = vec![None; log.rows.len()];
+    pairs.iter().for_each(|pair| partner[pair.index] = Some(pair.point));
+    let mut rows = std::mem::take(&mut log.rows).into_iter().zip(partner);
+    let first = rows.next().map(|(line, _)| line);
+    let taken = rows.filter_map(|(mut line, point)| {
+        line.cells.extend(cells(points.all[point?].at_mm));
+        Some(line)
+    });
+    log.rows = first.into_iter().chain(taken).collect();
+    Ok((log, notes))
+}
+
+/// The times of the rows, in their order, and of the points, in theirs (s, by a start that both have in common).
+fn times(
+    points: &Points,
+    log: &Table,
+    column: usize,
+    place: &Place,
+) -> Result<(Vec<Logged>, Vec<f64>), ImportError> {
+    let time = log.rows[0].cells[column].to_string();
+    let rows: Vec<(usize, &Line)> = log
+        .rows
+        .iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, line)| line.cells.iter().any(|cell| !cell.is_empty()))
+        .collect();
+    let stamp = |place: Place, text: &str| {
+        Stamp::of(text).ok_or_else(|| broken(place, format!("found `{text}`; expected {FORMS}")))
+    };
+    let of_rows = rows.iter().map(|(_, line)| {
+        let place = Place { row: Some(line.number), column: Some(time.as_str().into()), ..place.clone() };
+        stamp(place, &line.cells[column].to_string())
+    });
+    let of_rows = of_rows.collect::<Result<Vec<_>, _>>()?;
+    let of_points = points.all.iter().map(|point| {
+        let place = Place { row: Some(point.row), ..Place::file(&points.file) };
+        let without = || {
+            let message = format!(
+                "no time after the coordinates of point `{}`, found `{}`; expected {FORMS}: export the points with their time stamps",
+                point.name, point.more
+            );
+            broken(place.clone(), message)
+        };
+        Stamp::of(&point.more).ok_or_else(without)
+    });
+    let of_points = of_points.collect::<Result<Vec<_>, _>>()?;
+    let dated = days(place, &of_rows)? && days(&Place::file(&points.file), &of_points)?;
+    if !dated && let Some((place, [first, last])) = over_midnight(place, &of_rows, points, &of_points) {
+        let message = format!(
+            "has times of {} days, and the other file has no dates; expected dates in both, or one day",
+            last - first + 1
+        );
+        return Err(broken(place, message));
+    }
+    let base = of_rows.first().and_then(|stamp| stamp.day).unwrap_or(0);
+    let seconds = |stamp: &Stamp| {
+        let days = if dated { stamp.day.unwrap_or(base) - base } else { 0 };
+        days as f64 * SECONDS_A_DAY + stamp.seconds
+    };
+    let logged = rows.iter().zip(&of_rows);
+    let logged = logged
+        .map(|((index, line), stamp)| Logged { index: *index, number: line.number, time_s: seconds(stamp) })
+        .collect();
+    Ok((logged, of_points.iter().map(seconds).collect()))
+}
+
+/// Whether the times of a file have dates; all or none.
+fn days(place: &Place, stamps: &[Stamp]) -> Result<bool, ImportError> {
+    let dated = stamps.iter().filter(|stamp| stamp.day.is_some()).count();
+    if dated == 0 || dated == stamps.len() {
+        return Ok(dated > 0);
+    }
+    let message =
+        format!("{dated} of {} times have a date; expected one in every line or in none", stamps.len());
+    Err(broken(place.clone(), message))
+}
+
+/// The file, and its first and last day, whose dates are needed where the other has none.
+fn over_midnight(
+    place: &Place,
+    rows: &[Stamp],
+    points: &Points,
+    measured: &[Stamp],
+) -> Option<(Place, [i64; 2])> {
+    let range = |stamps: &[Stamp]| {
+        let days = || stamps.iter().filter_map(|stamp| stamp.day);
+        Some([days().min()?, days().max()?]).filter(|[first, last]| first < last)
+    };
+    let of_points = || Some((Place::file(&points.file), range(measured)?));
+    range(rows).map(|days| (place.clone(), days)).or_else(of_points)
+}
+
+/// A row and its point.
+struct Pair {
+    /// The row's place in the table.
+    index: usize,
+    point: usize,
+    /// How far their times are apart (s).
+    apart_s: f64,
+}
+
+struct Pairing<'a> {
+    points: &'a Points,
+    log: &'a Table,
+    joints: [usize; 6],
+    clocks: &'a Clocks,
+    logged: Vec<Logged>,
+    measured: Vec<f64>,
+}
+
+impl Pairing<'_> {
+    fn pairs(&self, file: &str, place: &Place) -> Result<Vec<Pair>, ImportError> {
+        let mut order: Vec<&Logged> = self.logged.iter().collect();
+        order.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let within = self.clocks.within_s;
+        let mut pairs: Vec<Pair> = Vec::new();
+        let mut nearest_s = Vec::new();
+        for (at, (point, time)) in self.points.all.iter().zip(&self.measured).enumerate() {
+            let time = time - self.clocks.ahead_s;
+            let from = order.partition_point(|row| row.time_s < time - within);
+            let to = order.partition_point(|row| row.time_s <= time + within);
+            let apart = |row: &&&Logged| (row.time_s - time).abs();
+            let near = |rows: &[&Logged]| {
+                rows.iter().map(|row| (row.time_s - time).abs()).fold(f64::INFINITY, f64::min)
+            };
+            nearest_s.push(near(&order[from.saturating_sub(1)..(to + 1).min(order.len())]));
+            let rows = &order[from..to];
+            let Some(row) = rows.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { continue };
+            self.stood(point, rows, file)?;
+            pairs.push(Pair { index: row.index, point: at, apart_s: apart(&row) });
+        }
+        if pairs.is_empty() {
+            nearest_s.sort_by(f64::total_cmp);
+            let message = format!(
+                "no row lies within {within} s of a measured point; the nearest rows are {:.3} to {:.3} s away; state a wider \
+                 --points-within, or by how much the tracker's clock is ahead (--points-ahead)",
+                nearest_s.first().copied().unwrap_or(f64::NAN),
+                nearest_s.last().copied().unwrap_or(f64::NAN)
+            );
+            return Err(broken(place.clone(), message));
+        }
+        self.each_once(pairs, place)
+    }
+
+    /// Refuses a point near which the arm moved: which of the rows it belongs to would be a guess.
+    fn stood(&self, point: &Point, rows: &[&Logged], file: &str) -> Result<(), ImportError> {
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 6];
+        for row in rows {
+            for (range, column) in range.iter_mut().zip(self.joints) {
+                let angle = self.log.rows[row.index].cells[column].number().unwrap_or(f64::NAN);
+                *range = [range[0].min(angle), range[1].max(angle)];
+            }
+        }
+        let spread = range.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+        let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
+        if spread <= SAME_DEG {
+            return Ok(());
+        }
+        let message = format!(
+            "point `{}` is ambiguous: {} rows of {file} lie within {} s of it (rows {} to {}) and their joints differ by {spread:.3}°; \
+             expected one pose: state a narrower --points-within, or leave the point out",
+            point.name,
+            rows.len(),
+            self.clocks.within_s,
+            first.number.min(last.number),
+            first.number.max(last.number),
+        );
+        Err(broken(Place { row: Some(point.row), ..Place::file(&self.points.file) }, message))
+    }
+
+    /// Refuses two points for one row. The pairs come back in the order of the rows.
+    fn each_once(&self, mut pairs: Vec<Pair>, place: &Place) -> Result<Vec<Pair>, ImportError> {
+        pairs.sort_by_key(|pair| (pair.index, pair.point));
+        let mut beside = pairs.iter().zip(pairs.iter().skip(1));
+        let Some((one, two)) = beside.find(|(one, two)| one.index == two.index) else { return Ok(pairs) };
+        let named = |pair: &Pair| {
+            let Point { row, name, .. } = &self.points.all[pair.point];
+            format!("`{name}` ({}, row {row}, {:.3} s away)", self.points.file, pair.apart_s)
+        };
+        let message = format!(
+            "is ambiguous: it is the row nearest to two points, {} and {}; expected one: state a narrower --points-within, or leave \
+             one of the points out",
+            named(one),
+            named(two)
+        );
+        Err(broken(Place { row: Some(self.log.rows[one.index].number), ..place.clone() }, message))
+    }
+
+    fn notes(&self, pairs: &[Pair]) -> Vec<String> {
+        let largest = pairs.iter().map(|pair| pair.apart_s).fold(0.0, f64::max);
+        let ahead = match self.clocks.ahead_s {
+            0.0 => String::new(),
+            ahead => format!(", the tracker's clock taken as {ahead} s ahead"),
+        };
+        let mut notes = vec![format!(
+            "{} rows joined by time with {} measured points, at most {largest:.3} s apart ({} s were allowed){ahead}",
+            pairs.len(),
+            self.points.all.len(),
+            self.clocks.within_s
+        )];
+        let mut left_out = |what: &str, names: Vec<String>| {
+            let more = if names.len() > NAMED { ", …" } else { "" };
+            if !names.is_empty() {
+                let shown = names.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+                notes.push(format!("{} {what} are left out: {shown}{more}", names.len()));
+            }
+        };
+        let joined = |point: usize| pairs.iter().any(|pair| pair.point == point);
+        let alone = self.points.all.iter().enumerate().filter(|(at, _)| !joined(*at));
+        left_out(
+            "points without a row at their time",
+            alone.map(|(_, point)| format!("`{}`", point.name)).collect(),
+        );
+        let rows = self
+            .logged
+            .iter()
+            .filter(|row| pairs.binary_search_by_key(&row.index, |pair| pair.index).is_err());
+        left_out("rows without a point at their time", rows.map(|row| row.number.to_string()).collect());
+        notes
+    }
+}
