@@ -9,6 +9,7 @@ mod payload;
 mod placement;
 mod play;
 mod reasons;
+mod remedy;
 mod singular;
 mod taught;
 
