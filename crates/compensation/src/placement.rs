@@ -146,7 +146,8 @@ pub(super) fn placed(
         Placement::Auto => Placement::Shape,
         other => other,
     };
-    let placement = ObjectPlacement { work_object: name.to_owned(), taken, off_mm, sigma_mm, taught, remedy: None };
+    let placement =
+        ObjectPlacement { work_object: name.to_owned(), taken, off_mm, sigma_mm, taught, remedy: None };
     if taken == Placement::Absolute || !off_mm.is_finite() {
         return Some((placement, None));
     }

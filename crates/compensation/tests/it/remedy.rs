@@ -263,7 +263,6 @@ fn where_the_axis_of_joint_6_is_not_known_a_target_beside_it_is_named_and_brings
     let (there, back) = (unseen(1.0), unseen(-1.0));
     let (unseen, moved) = if there.1 < back.1 { there } else { back };
     assert!(moved < 0.02, "a target on the axis moves by {moved} mm");
-    drop(arm);
     known.covariance += &unseen * unseen.transpose();
     known.provenance.sensor = "position".to_owned();
     known.geometry.held_out.rmse = 0.03 * 3.0_f64.sqrt();
