@@ -6,7 +6,11 @@
 //! program → program. The true arm then runs the corrected program. Programs lie inside the measured region.
 //!
 //! `cargo bench --no-default-features --bench uncertainty [-- ARMS [CAUSES]]`: so many arms without causes (identified), and
-//! so many with (diagnosed). With `TRUEGRIND_SWEEP=FILE` every arm as a line of CSV in that file.
+//! so many with (diagnosed). With `TRUEGRIND_SWEEP=FILE` every arm as a line of CSV in that file, and every cut in `FILE.cuts`.
+//!
+//! Cuts of one arm share its model's error, so they get worse together. Whether as many get worse as was said is therefore asked
+//! arm by arm: z is the sum of (found − said) over the root of the sum of its squares by arm. Beside it stands the z that would
+//! hold if every cut were an arm of its own (binomial), which is too large where they are not.
 
 // A benchmark says what it measured.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
@@ -201,7 +205,11 @@ type Within = [usize; 4];
 /// A cut: chance of worse that was stated, RMS before and after as the true arm runs it.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
+    /// Seed of its arm: cuts of one arm get worse together.
+    arm: u64,
     placement: Placement,
+    /// Predicted sigma of the correction, as a whole (RMS, mm).
+    sigma_mm: f64,
     chance: f64,
     off_mm: [f64; 2],
     auto_takes: bool,
@@ -272,13 +280,13 @@ fn outcome(case: &Case) -> Option<Outcome> {
                 }
             }
         }
-        cuts(&module(&path, &inverse), &estimated, actual, &mut out);
+        cuts(&module(&path, &inverse), &estimated, actual, case.seed, &mut out);
     }
     Some(out)
 }
 
 /// Corrects a program for its shape and as a whole, and lets the true arm run it.
-fn cuts(text: &str, estimated: &Estimated, actual: &Model, out: &mut Outcome) {
+fn cuts(text: &str, estimated: &Estimated, actual: &Model, arm: u64, out: &mut Outcome) {
     let program = Program::Rapid(Task::read(&[("cut.mod", text.as_bytes())]));
     let cell = truegrind::Cell::default();
     let options = |placement, max_risk| CompensateOptions {
@@ -330,7 +338,7 @@ fn cuts(text: &str, estimated: &Estimated, actual: &Model, out: &mut Outcome) {
         };
         let off_mm = [rms(&|p| p.before.unwrap().vector_mm), rms(&|p| p.after.unwrap().vector_mm)];
         let auto_takes = auto.plan.placements[0].taken == placement;
-        out.cuts.push(Cut { placement, chance: cut.chance, off_mm, auto_takes });
+        out.cuts.push(Cut { arm, placement, sigma_mm: cut.sigma_mm, chance: cut.chance, off_mm, auto_takes });
     }
 }
 
@@ -366,7 +374,10 @@ fn main() {
         }
     }
     if let Some(path) = std::env::var_os("TRUEGRIND_SWEEP") {
-        std::fs::write(path, csv(&outcomes)).unwrap();
+        std::fs::write(&path, csv(&outcomes)).unwrap();
+        let mut of_cuts = path;
+        of_cuts.push(".cuts");
+        std::fs::write(of_cuts, csv_of_cuts(&outcomes)).unwrap();
     }
     println!(
         "{:44} {:>26}   {:>26}  {:>6}",
@@ -408,6 +419,32 @@ fn csv(outcomes: &[(Case, Option<Outcome>)]) -> String {
     out
 }
 
+fn csv_of_cuts(outcomes: &[(Case, Option<Outcome>)]) -> String {
+    let mut out = String::from("arm,placement,chance,before_mm,after_mm,sigma_mm,auto_takes\n");
+    for cut in outcomes.iter().filter_map(|(_, o)| o.as_ref()).flat_map(|o| &o.cuts) {
+        let Cut { arm, placement, chance, off_mm: [before, after], sigma_mm, auto_takes } = cut;
+        let _ = writeln!(
+            out,
+            "{arm},{placement:?},{chance:.5},{before:.5},{after:.5},{sigma_mm:.5},{auto_takes}"
+        );
+    }
+    out
+}
+
+/// How far what was found lies from what was said, in sigma: cuts of one arm taken as one draw, and each as its own.
+fn apart(cuts: &[&Cut]) -> [f64; 2] {
+    let (mut sums, mut variance) = (BTreeMap::<u64, f64>::new(), 0.0);
+    for cut in cuts {
+        let worse = f64::from(cut.off_mm[1] > cut.off_mm[0]);
+        *sums.entry(cut.arm).or_default() += worse - cut.chance;
+        variance += cut.chance * (1.0 - cut.chance);
+    }
+    let sum: f64 = sums.values().sum();
+    let by_arm: f64 = sums.values().map(|s| s * s).sum();
+    let z = |variance: f64| if variance > 0.0 { sum / variance.sqrt() } else { 0.0 };
+    [z(by_arm), z(variance)]
+}
+
 /// Whether cuts get worse as often as was said.
 fn risks(key: &str, cuts: &[Cut]) {
     println!("\n{key}: cuts that get worse, said and found");
@@ -424,6 +461,14 @@ fn risks(key: &str, cuts: &[Cut]) {
                 here.len()
             );
         }
+        let all: Vec<&Cut> = cuts.iter().filter(|c| c.placement == placement).collect();
+        let said: f64 = all.iter().map(|c| c.chance).sum();
+        let found = all.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();
+        let [by_arm, binomial] = apart(&all);
+        println!(
+            "  {placement:?} all: {:5} cuts, said {said:6.1}, found {found}, z {by_arm:.2} by arm ({binomial:.2} binomial)",
+            all.len()
+        );
         let written: Vec<&Cut> =
             cuts.iter().filter(|c| c.placement == placement && c.chance <= 0.1).collect();
         let worse = written.iter().filter(|c| c.off_mm[1] > c.off_mm[0]).count();

@@ -525,8 +525,9 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
     let alone = |job: &Job| job.under.is_some() && job.paths.len() == 1 && job.paths.iter().any(module);
     if undeclared > 0 && jobs.iter().any(alone) {
         tell(format_args!(
-            "note: {undeclared} motions use tools, work objects or targets that their own file does not declare: where the \
-             modules of a folder run together, --together reads them as one task"
+            "note: {} tools, work objects or targets that their own file does not declare: where the modules of a folder run \
+             together, --together reads them as one task",
+            if undeclared == 1 { "1 motion uses".to_owned() } else { format!("{undeclared} motions use") }
         ));
     }
     let inputs = jobs.iter().flat_map(|job| &job.paths);

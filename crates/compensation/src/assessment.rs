@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::circumstance::Circumstances;
 use super::cut::{self, CutsOf};
+use super::foreseen::{self, Place};
 use super::mounting::Mounted;
 use super::placement::{self, Commanded, ObjectPlacement, Off, Placement, Wanted, placed, spread};
 use super::probability::chance;
@@ -136,7 +137,12 @@ pub(super) fn assessed(
         let targets: Vec<Commanded> = motions.iter().filter_map(|m| at.get(m).copied()).collect();
         let name = &listing.work_objects[*object as usize].name;
         let found = placed(name, &targets, list, acting, knowledge, wanted);
-        let Some((placement, displaced)) = found else { continue };
+        let Some((mut placement, displaced)) = found else { continue };
+        if placement.taken == Placement::Shape {
+            let max_risk = wanted.max_risk;
+            let place = Place { targets: &targets, list: &*list, acting, knowledge, max_risk };
+            placement.remedy = foreseen::remedy(&place);
+        }
         taken.insert(*object, placement.taken);
         out.placements.push(placement);
         if let Some(motion) = displaced {

@@ -8,6 +8,7 @@
 //! - [`compensate`]: the main job, from a program that was read to its new bytes.
 //! - [`rewrite`]: plans the rewrite of a program; [`cut`]: which motions are corrected together or not at all; [`why`]: the closed list of reasons.
 //! - [`placement`]: whether the place of a path is corrected or its shape alone; [`risk`]: the chance that a cut gets worse.
+//! - [`remedy`]: the cheapest measurement that would make a place known.
 //! - [`undeclared`]: tools and work objects that no file declares, and what to give.
 //! - [`untouched`]: the plan that changes nothing, for the nominal arm.
 //! - [`curve`]: the way from target to target as the controller interpolates it; [`corner`]: how it rounds a point.
@@ -38,6 +39,9 @@ pub mod undeclared;
 pub mod placement;
 pub mod risk;
 mod registration;
+pub mod remedy;
+mod information;
+mod foreseen;
 mod assessment;
 mod probability;
 mod effort;

@@ -153,16 +153,28 @@ fn object_note(
     }
 }
 
-/// How a frame through three taught points moves with each parameter of the arm: the points' velocities, carried
-/// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
+/// How the frame of a work object that was taught moves with each parameter of the arm.
 fn carried_frame(
     knowledge: &Estimated,
     estimated: &PreparedModel<'_>,
     taught: &TaughtFrame,
 ) -> Option<Carried> {
-    const STEP: f64 = 1e-4;
     let TaughtFrame { pointer, joints, points, frame } = taught;
-    let tip = Pose::translation(pointer.real.x, pointer.real.y, pointer.real.z);
+    carried_through(knowledge, estimated, &pointer.real, joints, points, frame)
+}
+
+/// How a frame through three points, touched with `tip`, moves with each parameter of the arm: the points' velocities, carried
+/// through the construction of the frame by a central difference over ± 1 unit of 1e-4.
+pub(super) fn carried_through(
+    knowledge: &Estimated,
+    estimated: &PreparedModel<'_>,
+    tip: &Vector3<f64>,
+    joints: &[Joints; 3],
+    points: &[Point3<f64>; 3],
+    frame: &Pose,
+) -> Option<Carried> {
+    const STEP: f64 = 1e-4;
+    let tip = Pose::translation(tip.x, tip.y, tip.z);
     let jacobians = joints.map(|q| knowledge.position_jacobian(estimated, &q, &tip));
     let twists = (0..knowledge.order.len())
         .map(|k| {

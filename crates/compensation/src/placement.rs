@@ -13,6 +13,7 @@ use super::circumstance::Circumstances;
 use super::mounting::Mounted;
 use super::probability::chance;
 use super::registration::Registration;
+use super::remedy::Remedy;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -53,6 +54,8 @@ pub struct ObjectPlacement {
     pub sigma_mm: f64,
     /// Whether the arm itself placed the work object, by touching it.
     pub taught: bool,
+    /// What would make its place known; absent where it is corrected, and where nothing can be foreseen.
+    pub remedy: Option<Remedy>,
 }
 
 /// A target of the program as it is.
@@ -143,7 +146,8 @@ pub(super) fn placed(
         Placement::Auto => Placement::Shape,
         other => other,
     };
-    let placement = ObjectPlacement { work_object: name.to_owned(), taken, off_mm, sigma_mm, taught };
+    let placement =
+        ObjectPlacement { work_object: name.to_owned(), taken, off_mm, sigma_mm, taught, remedy: None };
     if taken == Placement::Absolute || !off_mm.is_finite() {
         return Some((placement, None));
     }

@@ -201,7 +201,7 @@ pub fn summary(plan: &Plan, listing: &Listing, files: &[ProgramFile]) -> Documen
     if !listing.opaque.is_empty() {
         page.push(opaque_table(listing, files));
     }
-    let notes = [placement::sentences(plan), plan.notes.clone()].concat();
+    let notes = [placement::sentences(plan, listing), plan.notes.clone()].concat();
     if !notes.is_empty() {
         page.push(Block::List(notes));
     }
@@ -220,7 +220,7 @@ pub fn document(plan: &Plan, listing: &Listing, files: &[ProgramFile], reports: 
     if let Some(farthest) = farthest(plan, listing, files) {
         page.push(farthest);
     }
-    let placed = placement::sentences(plan);
+    let placed = placement::sentences(plan, listing);
     if !placed.is_empty() {
         page.heading(2, "Shape and place");
         page.push(Block::List(placed));

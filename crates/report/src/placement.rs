@@ -6,6 +6,7 @@ use super::table::{Column, Table};
 use truegrind_calibration::identification::verdict::percent_of;
 use truegrind_compensation::deviation::Status;
 use truegrind_compensation::placement::{ObjectPlacement, Placement};
+use truegrind_compensation::remedy::Remedy;
 use truegrind_compensation::rewrite::{MotionOutcome, Plan};
 use truegrind_compensation::risk::CutRisk;
 use truegrind_programs::motion::Listing;
@@ -21,28 +22,47 @@ fn word(placement: Placement) -> &'static str {
 }
 
 /// One sentence for each work object: what was corrected of it and why, and what would make its place known.
-pub fn sentences(plan: &Plan) -> Vec<String> {
-    plan.placements.iter().map(sentence).collect()
+pub fn sentences(plan: &Plan, listing: &Listing) -> Vec<String> {
+    let what = object_word(listing);
+    plan.placements.iter().map(|placement| sentence(placement, what)).collect()
 }
 
-fn sentence(placement: &ObjectPlacement) -> String {
-    let ObjectPlacement { work_object, taken, off_mm, sigma_mm, taught } = placement;
+/// What a program of this language calls the frame in which it cuts.
+fn object_word(listing: &Listing) -> &'static str {
+    if listing.numbered { "work offset" } else { "work object" }
+}
+
+fn sentence(placement: &ObjectPlacement, what: &str) -> String {
+    let ObjectPlacement { work_object, taken, off_mm, sigma_mm, remedy, .. } = placement;
     let known = format!(
         "the path as a whole lies {off_mm:.3} mm from where it is meant, which the model knows to ± {sigma_mm:.3} mm (1σ)"
     );
     if *taken == Placement::Absolute {
-        return format!("work object {work_object}: shape and place are corrected; {known}");
+        return format!("{what} {work_object}: shape and place are corrected; {known}");
     }
-    let remedy = if *taught {
-        "to correct its place too, measure with the target beside the axis of joint 6, at more orientations of the wrist"
-    } else {
-        "to correct its place too, touch three points of the work object with this arm and give their joints (cell file, origin \
-         = \"taught\"), or state where the sensor stands (--sensor-frame with --frame-sigma); --placement absolute corrects it \
-         all the same"
-    };
+    let remedy =
+        remedy.as_ref().map(|remedy| format!("{}; ", to_be_measured(remedy, what))).unwrap_or_default();
     format!(
-        "work object {work_object}: the shape is corrected, the path stays where it is; {known}; {remedy}"
+        "{what} {work_object}: the shape is corrected, the path stays where it is; {known}; {remedy}--placement absolute \
+         corrects the place all the same"
     )
+}
+
+/// What is to be measured so that a place becomes known, what it costs and what it leaves.
+fn to_be_measured(remedy: &Remedy, what: &str) -> String {
+    let what = remedy.measurements.iter().map(|m| m.told(what)).collect::<Vec<_>>().join(", and ");
+    let (minutes, left) = (remedy.minutes(), remedy.sigma_mm);
+    if remedy.suffices {
+        format!(
+            "the cheapest measurement that would make the place known: {what} (some {minutes:.0} minutes; it is then known to \
+             ± {left:.3} mm)"
+        )
+    } else {
+        format!(
+            "no measurement that was looked at would make the place known well enough to correct it; the best: {what} (some \
+             {minutes:.0} minutes) would leave ± {left:.3} mm"
+        )
+    }
 }
 
 /// The cuts, those first whose correction is most likely to make them worse; `None` where none is known.
@@ -142,12 +162,27 @@ pub fn chance(plan: &Plan) -> Option<String> {
     ))
 }
 
+fn remedy_json(remedy: &Remedy, what: &str) -> Value {
+    let measurements: Vec<Value> = remedy
+        .measurements
+        .iter()
+        .map(
+            |m| json!({ "name": m.name(), "poses": m.poses(), "minutes": m.minutes(), "what": m.told(what) }),
+        )
+        .collect();
+    json!({
+        "measurements": measurements, "minutes": remedy.minutes(), "sigma_mm": remedy.sigma_mm,
+        "suffices": remedy.suffices,
+    })
+}
+
 /// What of it the contract holds.
 pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
+    let what = object_word(listing);
     let placements = plan.placements.iter().map(|p| {
         json!({
             "work_object": p.work_object, "corrected": word(p.taken), "off_mm": p.off_mm, "sigma_mm": p.sigma_mm,
-            "taught": p.taught,
+            "taught": p.taught, "remedy": p.remedy.as_ref().map(|remedy| remedy_json(remedy, what)),
         })
     });
     let cuts = plan.cuts.iter().map(|cut| {

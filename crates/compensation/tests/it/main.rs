@@ -10,6 +10,7 @@ mod placement;
 mod play;
 mod range;
 mod reasons;
+mod remedy;
 mod singular;
 mod taught;
 
