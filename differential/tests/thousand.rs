@@ -35,7 +35,9 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame;
 /// a turn about the tool that a block states which is left;
 /// a work offset that a called program has set.
-const ONCE_WRONG: [(Dialect, u64); 44] = [
+const ONCE_WRONG: [(Dialect, u64); 46] = [
+    (Dialect::Rapid, 72_001_316),
+    (Dialect::Fanuc, 72_017_982),
     (Dialect::Siemens, 72_010_984),
     (Dialect::Rapid, 71_018_673),
     (Dialect::Rapid, 64_006_661),

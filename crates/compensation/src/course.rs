@@ -635,7 +635,8 @@ impl Samples {
         self.passes.push(passes);
     }
 
-    /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along.
+    /// The joints at the samples of each motion, each reached from the one before; `None` where the arm cannot go along: a joint would
+    /// leap, or the way crosses a singularity, as between solutions of two branches it must, however near they lie.
     fn passed(&self, nominal: &Inverse<'_>) -> Vec<Option<Sampled>> {
         let of = |motion: usize| {
             let [start, end] = &self.ends_rad[motion];
@@ -645,6 +646,9 @@ impl Samples {
             }
             let mut out = Vec::with_capacity(flanges.len());
             let mut last = *start;
+            if nominal.branch(start) != nominal.branch(end) {
+                return None;
+            }
             for (k, reached) in self.range(motion).zip(nominal.reach_path(flanges, start)) {
                 let joints = reached.ok()?.joints;
                 let steady = (joints - last).amax() < MOST_STEP_RAD;

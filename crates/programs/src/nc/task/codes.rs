@@ -156,9 +156,10 @@ impl Lister<'_, '_> {
             }
             // Beside a motion word it only ends the cycle.
             800 if said.g.iter().any(|code| matches!(code, 0 | 10 | 20 | 30)) => return false,
-            // The motion word of before holds on a Fanuc; LinuxCNC wants a new one.
+            // The motion word of before holds on a Fanuc, or the rapid motion of the cycle, which controls tell differently;
+            // LinuxCNC wants a new one.
             800 if fanuc && self.state.mode != Mode::Other(Reason::Cycle) => return false,
-            800 if fanuc => self.state.before_cycle,
+            800 if fanuc && self.state.before_cycle == Mode::Rapid => Mode::Rapid,
             800 => Mode::Lost(Reason::NoMotionCode),
             _ => return false,
         };

@@ -157,3 +157,12 @@ fn after_g80_linuxcnc_wants_a_motion_word() {
     check(Iso, &[("G80\nX11", &[left(NoMotionCode)])]);
     check(Fanuc, &[("G80\nX11.", &[None])]);
 }
+
+/// Which motion word holds behind a cycle differs between controls: that of before it, or the rapid motion with which it ends.
+#[test]
+fn behind_a_cycle_that_began_under_a_line_a_fanuc_wants_a_motion_word() {
+    let line = "G1 X5. F100.\nG81 X6. Z-5. R2. F100.\nG80\nX11. Y5. Z5.";
+    check(Fanuc, &[(line, &[None, left(Cycle), left(NoMotionCode)])]);
+    let rapid = "G0 X5.\nG81 X6. Z-5. R2. F100.\nG80\nX11. Y5. Z5.";
+    check(Fanuc, &[(rapid, &[None, left(Cycle), None])]);
+}
