@@ -7,7 +7,7 @@
 //! change by at most about [`STEEP`] with the way that the flange goes (in half arm lengths and rad); a piece of a way at
 //! whose ends they are larger than that cannot come near one and is not looked at further.
 //!
-//! On the same samples joints must stay in their ranges ([`range`](super::range)): between targets within them a corrected
+//! On the same samples joints must stay in their ranges ([`range`]): between targets within them a corrected
 //! way can leave one where the told way just kept to it.
 //!
 //! The configuration that is written is read again as the controller reads it. To the sign cfx is that of one solution
