@@ -262,6 +262,11 @@ impl Arguments {
         self.shares.on() && !self.brief_records
     }
 
+    /// Whether something that is asked for, or kept, shows the motions of each of many programs.
+    fn shows_motions(&self) -> bool {
+        self.outputs.json.is_some() || self.keeps_all()
+    }
+
     /// Every option that has a part in what is written, in words. What has none is taken out by name, so that one that comes anew
     /// counts until somebody says that it does not.
     fn that_count(&self) -> String {
@@ -386,6 +391,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         max_risk: arguments.max_risk,
         condition,
         points: jobs.len() == 1 && arguments.outputs.of_points(),
+        remedies: jobs.len() == 1 || arguments.shows_motions(),
         ..Options::default()
     };
     let setup = programs::setup(&cell, arguments.robot.as_deref().or(Some(robot.as_str())));
@@ -539,7 +545,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
 /// One program of many: rewritten and written.
 fn file_to_file(shop: &Shop<'_>, job: &Job, programs: &Programs) -> anyhow::Result<(Done, Written)> {
     let targets = outputs_of(shop.arguments, job, programs, true)?;
-    let with_json = shop.arguments.outputs.json.is_some() || shop.arguments.keeps_all();
+    let with_json = shop.arguments.shows_motions();
     let mut entries = with_json.then(Vec::new);
     let mut report = |planned: &mut Plan, program: &Program<'_>, files: &[ProgramFile]| {
         if with_json

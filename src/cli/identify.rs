@@ -305,7 +305,7 @@ pub(super) fn read(arguments: &DataArguments) -> anyhow::Result<(Robot, Dataset)
     let robot = inputs::robot(&arguments.robot)?;
     let bytes = files::read(&arguments.data)?;
     let dataset = imported(arguments, &bytes)?;
-    // Half a gigabyte of text is not needed beside its rows.
+    // The text is not needed beside its rows.
     drop(bytes);
     let dataset = measured(arguments, &robot, dataset)?;
     Ok((robot, dataset))

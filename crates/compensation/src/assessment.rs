@@ -138,7 +138,7 @@ pub(super) fn assessed(
         let name = &listing.work_objects[*object as usize].name;
         let found = placed(name, &targets, list, acting, knowledge, wanted);
         let Some((mut placement, displaced)) = found else { continue };
-        if placement.taken == Placement::Shape {
+        if placement.taken == Placement::Shape && wanted.remedies {
             let max_risk = wanted.max_risk;
             let place = Place { targets: &targets, list: &*list, acting, knowledge, max_risk };
             placement.remedy = foreseen::remedy(&place);

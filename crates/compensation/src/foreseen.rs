@@ -58,11 +58,13 @@ pub(super) struct Place<'a, 'm> {
 /// foreseen: a covariance that is none.
 pub(super) fn remedy(place: &Place<'_, '_>) -> Option<Remedy> {
     let known = Known::of(place)?;
-    let touched = place.touched();
-    let foreseen: Vec<(f64, Remedy)> = candidates(touched.is_some(), place.has_rows())
+    let touched = place.touched().map(|touched| known.touching(place, &touched));
+    let candidates = candidates(touched.is_some(), place.has_rows());
+    let informations = Informations::of(place, &candidates);
+    let foreseen: Vec<(f64, Remedy)> = candidates
         .into_par_iter()
         .filter_map(|measurements| {
-            let remedy = known.with(place, measurements, touched.as_ref())?;
+            let remedy = known.with(measurements, &informations, touched.as_ref(), place.max_risk)?;
             Some((remedy.minutes(), remedy))
         })
         .collect();
@@ -91,11 +93,47 @@ fn candidates(touch: bool, rows: bool) -> Vec<Vec<Measurement>> {
     out
 }
 
+/// What each measurement tells of the arm's parameters, once for all candidates: it is the same beside any other, but that a
+/// sensor's frame that is stated is known to all of them.
+struct Informations(Vec<((Measurement, bool), DMatrix<f64>)>);
+
+impl Informations {
+    fn of(place: &Place<'_, '_>, candidates: &[Vec<Measurement>]) -> Self {
+        let mut asked: Vec<(Measurement, bool)> = Vec::new();
+        for set in candidates {
+            let stated = set.contains(&Measurement::Frame);
+            for measurement in set.iter().filter(|m| **m != Measurement::Touch) {
+                if !asked.contains(&(*measurement, stated)) {
+                    asked.push((*measurement, stated));
+                }
+            }
+        }
+        let one = |asked: (Measurement, bool)| (asked, place.information(asked.0, asked.1));
+        Self(asked.into_par_iter().map(one).collect())
+    }
+
+    /// What all measurements of a candidate tell, of so many parameters.
+    fn sum(&self, measurements: &[Measurement], parameters: usize) -> DMatrix<f64> {
+        let stated = measurements.contains(&Measurement::Frame);
+        let of = |m: &Measurement| self.0.iter().find(|(asked, _)| *asked == (*m, stated));
+        let zero = DMatrix::zeros(parameters, parameters);
+        measurements.iter().filter_map(of).fold(zero, |sum, (_, information)| sum + information)
+    }
+}
+
 /// Where the work object's frame goes with the arm once the arm has touched it, and by how much touching is unsure, in the base.
 struct Touched {
     carried: Carried,
     /// Twists of the frame by each coordinate of each touched point, of one standard deviation.
     unsure: Vec<Vector6<f64>>,
+}
+
+/// What touching changes of what is known.
+struct Touching {
+    /// How the path hangs on the arm's parameters, against the frame that the arm has touched.
+    twists: DMatrix<f64>,
+    /// The covariance that the hand adds.
+    adds: Matrix6<f64>,
 }
 
 /// What is known now of where the path lies.
@@ -130,38 +168,33 @@ impl Known {
     /// What is known with `measurements` too.
     fn with(
         &self,
-        place: &Place<'_, '_>,
         measurements: Vec<Measurement>,
-        touched: Option<&Touched>,
+        informations: &Informations,
+        touching: Option<&Touching>,
+        max_risk: f64,
     ) -> Option<Remedy> {
-        let mut information = DMatrix::zeros(self.factor.nrows(), self.factor.nrows());
-        let stated = measurements.contains(&Measurement::Frame);
-        for measurement in &measurements {
-            information += place.information(*measurement, stated);
-        }
-        let touched = touched.filter(|_| measurements.contains(&Measurement::Touch));
-        let twists = match touched {
-            Some(touched) => twists_of(&self.registration, &place.off(Some(&touched.carried))),
-            None => self.twists.clone(),
-        };
-        let left = updated(&self.factor, &information, &twists)?;
+        let information = informations.sum(&measurements, self.factor.nrows());
+        let touching = touching.filter(|_| measurements.contains(&Measurement::Touch));
+        let twists = touching.map_or(&self.twists, |touching| &touching.twists);
+        let left = updated(&self.factor, &information, twists)?;
         let mut left = Matrix6::from_iterator(left.iter().copied());
-        if let Some(touched) = touched {
-            left += self.touching(place, touched);
+        if let Some(touching) = touching {
+            left += touching.adds;
         }
         let sigma_mm = self.registration.mean_square(&left).max(0.0).sqrt();
         sigma_mm.is_finite().then(|| Remedy {
             measurements,
             sigma_mm,
-            suffices: self.would_be_taken(&left, sigma_mm, place.max_risk),
+            suffices: self.would_be_taken(&left, sigma_mm, max_risk),
         })
     }
 
-    /// What touching adds.
-    fn touching(&self, place: &Place<'_, '_>, touched: &Touched) -> Matrix6<f64> {
-        let Some(first) = place.targets.first() else { return Matrix6::zeros() };
+    /// What touching changes.
+    fn touching(&self, place: &Place<'_, '_>, touched: &Touched) -> Touching {
+        let twists = twists_of(&self.registration, &place.off(Some(&touched.carried)));
+        let mut adds = Matrix6::zeros();
+        let Some(first) = place.targets.first() else { return Touching { twists, adds } };
         let object = place.list[first.mounted].real.object;
-        let mut out = Matrix6::zeros();
         for unsure in &touched.unsure {
             let shifts: Vec<Vector3<f64>> = self
                 .off
@@ -174,9 +207,9 @@ impl Known {
                 })
                 .collect();
             let twist = self.registration.twist(shifts.iter());
-            out += twist * twist.transpose();
+            adds += twist * twist.transpose();
         }
-        out
+        Touching { twists, adds }
     }
 
     /// Whether the place has to be expected to be corrected with `left` for its covariance.
@@ -300,9 +333,10 @@ impl Place<'_, '_> {
             let rows = self.knowledge.provenance.rows.max(poses.len()) as f64;
             let there = Readings { weight: rows / poses.len() as f64, ..readings };
             let free = Readings { stand_known: FREE, ..there };
-            return there.information(self.knowledge, arm) - free.information(self.knowledge, arm);
+            let normal = there.normal(self.knowledge, arm);
+            return normal.information(&there.own()) - normal.information(&free.own());
         }
-        readings.information(self.knowledge, arm)
+        readings.normal(self.knowledge, arm).information(&readings.own())
     }
 
     /// Three points of the work object that the arm can touch: across the path, and no nearer to each other than a hand would

@@ -52,13 +52,34 @@ pub(super) struct Readings<'a> {
     pub(super) sigma_mm: f64,
 }
 
+/// AᵀWA, AᵀWB and BᵀWB of readings.
+pub(super) struct Normal {
+    arms: DMatrix<f64>,
+    mixed: DMatrix<f64>,
+    owns: DMatrix<f64>,
+}
+
+impl Normal {
+    /// The information on the arm's parameters, with the standard deviations that the measurement's own have beforehand.
+    pub(super) fn information(&self, own: &[f64]) -> DMatrix<f64> {
+        let Self { arms, mixed, owns } = self;
+        let mut owns = owns.clone();
+        for (k, sigma) in own.iter().enumerate() {
+            owns[(k, k)] += sigma.powi(-2);
+        }
+        match Cholesky::new(owns) {
+            Some(factor) => arms - mixed * factor.solve(&mixed.transpose()),
+            None => DMatrix::zeros(arms.nrows(), arms.ncols()),
+        }
+    }
+}
+
 impl Readings<'_> {
-    /// The information that they bring on the parameters of `knowledge`.
-    pub(super) fn information(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> DMatrix<f64> {
-        let (parameters, own) = (knowledge.order.len(), self.own());
+    /// Their normal equations, on the parameters of `knowledge` and on their own.
+    pub(super) fn normal(&self, knowledge: &Estimated, arm: &PreparedModel<'_>) -> Normal {
+        let (parameters, own) = (knowledge.order.len(), self.own().len());
         let mut arms = DMatrix::zeros(parameters, parameters);
-        let (mut mixed, mut owns) =
-            (DMatrix::zeros(parameters, own.len()), DMatrix::zeros(own.len(), own.len()));
+        let (mut mixed, mut owns) = (DMatrix::zeros(parameters, own), DMatrix::zeros(own, own));
         let weight = self.weight / (self.sigma_mm * self.sigma_mm);
         for q in self.poses {
             let flange = arm.forward(q);
@@ -83,18 +104,12 @@ impl Readings<'_> {
                 owns += by_own.tr_mul(&by_own) * weight;
             }
         }
-        for (k, sigma) in own.iter().enumerate() {
-            owns[(k, k)] += sigma.powi(-2);
-        }
-        match Cholesky::new(owns) {
-            Some(factor) => arms - &mixed * factor.solve(&mixed.transpose()),
-            None => DMatrix::zeros(parameters, parameters),
-        }
+        Normal { arms, mixed, owns }
     }
 
     /// Standard deviations of the measurement's own parameters: six of the frame, or three of the outlet and the zero of its
     /// cable, then three for each target.
-    fn own(&self) -> Vec<f64> {
+    pub(super) fn own(&self) -> Vec<f64> {
         let Spread { mm, rad } = self.stand_known;
         let mut out = match self.stand {
             Stand::Tracker(_) => vec![mm, mm, mm, rad, rad, rad],

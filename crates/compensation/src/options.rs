@@ -64,11 +64,15 @@ pub struct Options {
     pub placement: Placement,
     /// A cut that the correction makes worse with a larger probability is left.
     pub max_risk: f64,
-    /// Whether motions are flagged one by one ([`Why::OpenStart`](super::why::Why::OpenStart)) that rest on a configuration which the controller does not
-    /// check, from a start that the text does not tell. Otherwise a note says where such a way begins.
+    /// Whether motions are flagged one by one ([`Why::OpenStart`](super::why::Why::OpenStart)) that rest on a configuration which the
+    /// controller does not check, from a start that the text does not tell. Otherwise a note says where such a way begins.
     pub open_starts: bool,
-    /// Whether [`Plan::points`](super::outcome::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself does not.
+    /// Whether [`Plan::points`](super::outcome::Plan::points) are filled: tables and pictures of the path need them, the rewrite itself
+    /// does not.
     pub points: bool,
+    /// Whether [`ObjectPlacement::remedy`](super::placement::ObjectPlacement::remedy) is worked out, which takes longer than a small
+    /// program: who reads of many programs at once does not see it.
+    pub remedies: bool,
 }
 
 impl Default for Options {
@@ -91,6 +95,7 @@ impl Default for Options {
             max_risk: 0.1,
             open_starts: false,
             points: true,
+            remedies: true,
         }
     }
 }

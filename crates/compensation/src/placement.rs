@@ -39,6 +39,8 @@ pub(super) struct Wanted {
     pub(super) placement: Placement,
     /// Cuts, and places, that get worse with a larger probability are left.
     pub(super) max_risk: f64,
+    /// Whether it is worked out what would make a place known.
+    pub(super) remedies: bool,
 }
 
 /// What was done about the place of one work object.

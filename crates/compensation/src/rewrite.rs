@@ -156,7 +156,7 @@ fn assess(
     let with = Knowing { acting: &arms.acting, knowledge };
     // Experiments take every motion as it is.
     let max_risk = if options.cuts == Cuts::Single { 1.0 } else { options.max_risk };
-    let wanted = Wanted { placement: options.placement, max_risk };
+    let wanted = Wanted { placement: options.placement, max_risk, remedies: options.remedies };
     assessed(listing, &chosen, &at, &mut mountings.list, &objects, &with, wanted)
 }
 
