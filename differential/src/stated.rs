@@ -39,4 +39,11 @@ impl Stated {
         }
         out
     }
+
+    /// Of a point at which the tool is turned as the way turns it, not as is told there: the path is right to what is said of it.
+    pub fn of_the_way(mut self, row: Option<&Row>) -> Self {
+        self.mm += row.and_then(|row| row.bend_mm).unwrap_or(0.0);
+        self.rad = std::f64::consts::PI;
+        self
+    }
 }

@@ -33,9 +33,12 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// otherwise than it is told there; an arc that stays and whose ends come to lie apart, or that
 /// passes a singularity from a corrected start; a configuration that may not be checked; a part that is
 /// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame;
-/// a turn about the tool that a block states which is left;
-/// a work offset that a called program has set.
-const ONCE_WRONG: [(Dialect, u64); 46] = [
+/// a turn about the tool that a block states which is left; a work offset that a called program has set; sides of play told from
+/// guessed joints; a way so near to a singularity that joints are fast.
+const ONCE_WRONG: [(Dialect, u64); 49] = [
+    (Dialect::Rapid, 72_012_597),
+    (Dialect::Rapid, 72_002_671),
+    (Dialect::Rapid, 74_004_353),
     (Dialect::Rapid, 72_001_316),
     (Dialect::Fanuc, 72_017_982),
     (Dialect::Siemens, 72_010_984),

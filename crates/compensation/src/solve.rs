@@ -244,7 +244,13 @@ impl Work<'_> {
             Stop::At(Reached { motion, mounted, told, joints, via, links, as_joints, may_cut })
         };
         let stops: Vec<Stop<'_>> = (0..motions.len()).map(stop).collect();
-        let before: Vec<Option<u32>> = motions.iter().map(|m| m.previous).collect();
+        // From guessed joints, which may be whole turns elsewhere, one does not know which way a joint comes to where it is told.
+        let guessed = |m: usize| {
+            let targets = self.first[m]..self.first[m + 1];
+            targets.rev().find_map(|t| self.starts[t].as_ref().ok()).is_some_and(|s| s.guess != Guess::No)
+        };
+        let follows = |m: usize| motions[m].previous.filter(|from| guessed(m) || !guessed(*from as usize));
+        let before: Vec<Option<u32>> = (0..motions.len()).map(follows).collect();
         let told = |mounted: usize| self.mountings.list[mounted].told;
         courses(&stops, &before, &arms.nominal, &arms.acting.play_rad, &told, doubted)
     }

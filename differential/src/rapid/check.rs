@@ -358,7 +358,10 @@ impl Comparison<'_> {
             }
         };
         let (mm, rad) = off(joints, &at);
-        let stated = Stated::of(row, arm, index + 1 < old.goals.len());
+        let mut stated = Stated::of(row, arm, index + 1 < old.goals.len());
+        if now.turned {
+            stated = stated.of_the_way(row);
+        }
         let within = |(mm, rad): (f64, f64), stated: &Stated| {
             mm <= ROUNDING_MM + stated.mm && rad <= ROUNDING_RAD + stated.rad
         };

@@ -17,6 +17,9 @@ const PIECES_OF_ARCS: usize = 640;
 /// A joint that would have to go farther from one piece to the next has no way there (rad).
 const FARTHEST: f64 = 0.6;
 
+/// How often a piece is halved before that is said.
+const HALVINGS: u32 = 6;
+
 /// Nearer points (mm), or such that its point and its end are seen from its start under a smaller angle (rad), make no arc: 0.1 mm
 /// and 1° (ABB, RAPID, limitations of `MoveC`).
 const NEAREST: f64 = 0.1;
@@ -38,6 +41,8 @@ pub struct Point {
     pub along: Option<Unit<Vector3<f64>>>,
     /// The joints on the way there, where that is followed: the tool is turned as the way turns it.
     pub passing: Option<[f64; 6]>,
+    /// Whether the tool is turned so far from what is told at a circle point that the joints there are those of the way.
+    pub turned: bool,
     /// Whether the controller has stopped at a motion before that it cannot carry out: how the arm went on is not told.
     pub adrift: bool,
 }
@@ -84,7 +89,16 @@ impl<'a> Course<'a> {
                 }
             };
             let (behind, flanks, adrift) = ([0.0; 6], String::new(), self.adrift);
-            out.push(Point { flange, joints, behind, flanks, along: None, passing: None, adrift });
+            out.push(Point {
+                flange,
+                joints,
+                behind,
+                flanks,
+                along: None,
+                passing: None,
+                turned: false,
+                adrift,
+            });
         }
         if !motion.monitored && motion.way != Way::Joint && !motion.wrist {
             self.along(motion, &mut out);
@@ -136,15 +150,24 @@ impl<'a> Course<'a> {
         if way.len() + 1 < self.pieces(motion) {
             return;
         }
-        let passing = self.passing(motion, points);
         let count = points.len();
-        for (k, point) in points.iter_mut().enumerate() {
-            let share = if k + 1 == count { 1.0 } else { passing };
-            let near = way.iter().rev().find(|(s, _)| *s <= share).map_or(start, |(_, q)| *q);
-            let reached = self.arm.nominal_nearest(&point.flange, &near);
-            // On its way through the circle point the tool may be turned far from what is told there.
-            let ends = k + 1 == count;
-            point.joints = reached.filter(|q| !ends || (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST));
+        let near_to = |point: &Point, near: &[f64; 6]| {
+            let reached = self.arm.nominal_nearest(&point.flange, near);
+            reached.filter(|q| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST))
+        };
+        let (last, before) = way.split_last().map_or((start, &way[..]), |(last, before)| (last.1, before));
+        points[count - 1].joints = near_to(&points[count - 1], &last);
+        let passing = self.passing(motion, points);
+        let [via, _] = points else { return };
+        let from = way.iter().rev().find(|(share, _)| *share <= passing).copied().unwrap_or((0.0, start));
+        via.joints = near_to(via, &from.1);
+        let Some(to) = way.iter().find(|(share, _)| *share > passing).or(before.last()) else { return };
+        if via.joints.is_none() {
+            // On its way the tool is turned far from what is told at the circle point: what it has there, it has on the way.
+            let there = part_of(from, *to, passing);
+            let tip = |q: &[f64; 6]| tool_in_object(motion, &self.arm.nominal_forward(q)).translation.vector;
+            via.along = Unit::try_new(tip(&to.1) - tip(&from.1), 1e-6);
+            (via.joints, via.passing, via.turned) = (Some(there), Some(there), true);
         }
     }
 
@@ -232,28 +255,29 @@ impl<'a> Course<'a> {
             .flatten();
         let mut near = *start;
         let pieces = self.pieces(motion);
-        for k in 1..pieces {
-            let s = k as f64 / pieces as f64;
-            let tip = match &circle {
-                Some((arc, turn)) => {
-                    let turned = arc.turned(s) * a.rotation * UnitQuaternion::from_scaled_axis(turn * s);
-                    Isometry3::from_parts(Translation3::from(arc.at(s)), turned)
-                }
-                None => {
-                    let place = a.translation.vector.lerp(&b.translation.vector, s);
-                    Isometry3::from_parts(Translation3::from(place), between(&a.rotation, &b.rotation, s))
-                }
-            };
-            let joints = if motion.wrist {
+        let tip = |s: f64| match &circle {
+            Some((arc, turn)) => {
+                let turned = arc.turned(s) * a.rotation * UnitQuaternion::from_scaled_axis(turn * s);
+                Isometry3::from_parts(Translation3::from(arc.at(s)), turned)
+            }
+            None => {
+                let place = a.translation.vector.lerp(&b.translation.vector, s);
+                Isometry3::from_parts(Translation3::from(place), between(&a.rotation, &b.rotation, s))
+            }
+        };
+        let joints = |s: f64, near: &[f64; 6]| {
+            if motion.wrist {
                 let wrist = std::array::from_fn(|j| start[j + 3] + (end[j + 3] - start[j + 3]) * s);
-                self.with_wrist(motion, &tip.translation.vector, &near, wrist)
+                self.with_wrist(motion, &tip(s).translation.vector, near, wrist)
             } else {
-                let flange = flange_of(motion, &tip);
-                self.arm.nominal_nearest(&flange, &near)
-            };
-            match joints {
-                Some(q) if (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST) => near = q,
-                _ => break,
+                self.arm.nominal_nearest(&flange_of(motion, &tip(s)), near)
+            }
+        };
+        for k in 1..pieces {
+            let [from, s] = [k - 1, k].map(|k| k as f64 / pieces as f64);
+            match gone(&joints, [from, s], near, HALVINGS) {
+                Some(q) => near = q,
+                None => break,
             }
             out.push((s, near));
         }
@@ -287,6 +311,24 @@ impl<'a> Course<'a> {
         }
         ((at(&q) - place).norm() < 1e-6).then_some(q)
     }
+}
+
+/// The joints at the end of a piece of the way, from those at its start; none where a joint would have to leap. Next to a singularity
+/// joints are fast, and the piece is halved.
+fn gone(
+    joints: &dyn Fn(f64, &[f64; 6]) -> Option<[f64; 6]>,
+    piece: [f64; 2],
+    near: [f64; 6],
+    halvings: u32,
+) -> Option<[f64; 6]> {
+    let [from, to] = piece;
+    let steady = |q: &[f64; 6]| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST);
+    if let Some(q) = joints(to, &near).filter(steady) {
+        return Some(q);
+    }
+    let middle = 0.5 * (from + to);
+    let half = gone(joints, [from, middle], near, halvings.checked_sub(1)?)?;
+    gone(joints, [middle, to], half, halvings - 1)
 }
 
 /// Joints at a share of the way between two samples of it.

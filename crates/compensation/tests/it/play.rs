@@ -296,6 +296,30 @@ fn less_than_the_play_tells_no_side() {
     assert!(sigma(3) < 0.2 * sigma(0), "{}", sigma(3));
 }
 
+/// The class: a side that is told from joints that were guessed. Where no configuration is checked and nothing tells where the arm
+/// comes from, a joint may stand a whole turn elsewhere, and comes to where the next motion tells it from the other side.
+#[test]
+fn guessed_joints_tell_no_side() {
+    let arm = worn(3);
+    let sigma = |text: &str, k: usize| {
+        let (planned, _) = rewrite(text, &arm, &options(5.0, None));
+        planned.outcomes[k].sigma_mm.unwrap()
+    };
+    let checked = source();
+    let unchecked =
+        checked.replace("  MoveJ", "  ConfJ\\Off;\n  MoveJ").replacen("  MoveL", "  ConfJ\\On;\n  MoveL", 1);
+    assert!(unchecked.contains("ConfJ\\Off") && unchecked.contains("ConfJ\\On"));
+    // The first line is as long from where it really begins, and nobody knows from where.
+    assert!(
+        sigma(&checked, 1) < 0.7 * sigma(&unchecked, 1),
+        "{} {}",
+        sigma(&checked, 1),
+        sigma(&unchecked, 1)
+    );
+    assert!((sigma(&unchecked, 1) - sigma(&unchecked, 0)).abs() < 0.2 * sigma(&unchecked, 0));
+    assert!(sigma(&unchecked, 3) < 0.2 * sigma(&unchecked, 0), "{}", sigma(&unchecked, 3));
+}
+
 /// The class: motors and links are not told apart. Where a target that is corrected lies behind the one before by less than
 /// the play, the motor comes back by more than all of it, and to and fro in such steps every end is right.
 #[test]
