@@ -10,10 +10,10 @@ use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Joints;
 use truegrind::calibration::measurement::simulation::recipe::Recipe;
 use truegrind::compensation::cell::Cell;
-use truegrind::compensation::taught::{taught_frame, taught_tcp};
 use truegrind::compensation::compensate::{CompensateError, compensate};
 use truegrind::compensation::deviation::Status;
 use truegrind::compensation::rewrite::Options as Bounds;
+use truegrind::compensation::taught::{taught_frame, taught_tcp};
 use truegrind::papers::experiment::Experiment;
 use truegrind::programs::rapid::task_list;
 use truegrind::robots;
@@ -124,7 +124,7 @@ static LOOSE: LazyLock<Estimated> = LazyLock::new(|| {
 
 /// An arm for a program: each of the two in turn.
 fn arm_for(bytes: &[u8]) -> &'static Estimated {
-    if bytes.len() % 2 == 0 { &ARM } else { &LOOSE }
+    if bytes.len().is_multiple_of(2) { &ARM } else { &LOOSE }
 }
 
 /// The main job on any program: it ends, and no number that is written is other than finite.
@@ -241,7 +241,7 @@ static TAUGHT: LazyLock<String> = LazyLock::new(|| {
 /// A recipe that is taken, and its measurements where they are few.
 pub fn recipe(bytes: &[u8]) {
     let Ok(recipe) = Recipe::parse(&text(bytes), "fuzz.toml") else { return };
-    if recipe.check().is_ok() && bytes.len() % 4 == 0 {
+    if recipe.check().is_ok() && bytes.len().is_multiple_of(4) {
         let resolve = |name: &str| robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
         let _ = recipe.simulate(resolve);
     }

@@ -81,7 +81,7 @@ fn unescaped(line: &str) -> Vec<u8> {
     let mut out = Vec::new();
     let mut rest = line;
     while let Some(at) = rest.find('\\') {
-        out.extend_from_slice(rest[..at].as_bytes());
+        out.extend_from_slice(&rest.as_bytes()[..at]);
         rest = &rest[at + 1..];
         let plain = [("n", b'\n'), ("r", b'\r'), ("t", b'\t')];
         let hex = rest.strip_prefix("u{").and_then(|hex| hex.split_once('}'));

@@ -313,14 +313,12 @@ impl<'a> Course<'a> {
     }
 }
 
+/// The joints at a share of the way, next to others.
+type Reach<'a> = dyn Fn(f64, &[f64; 6]) -> Option<[f64; 6]> + 'a;
+
 /// The joints at the end of a piece of the way, from those at its start; none where a joint would have to leap. Next to a singularity
 /// joints are fast, and the piece is halved.
-fn gone(
-    joints: &dyn Fn(f64, &[f64; 6]) -> Option<[f64; 6]>,
-    piece: [f64; 2],
-    near: [f64; 6],
-    halvings: u32,
-) -> Option<[f64; 6]> {
+fn gone(joints: &Reach<'_>, piece: [f64; 2], near: [f64; 6], halvings: u32) -> Option<[f64; 6]> {
     let [from, to] = piece;
     let steady = |q: &[f64; 6]| (0..6).all(|j| (q[j] - near[j]).abs() < FARTHEST);
     if let Some(q) = joints(to, &near).filter(steady) {
