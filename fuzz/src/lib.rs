@@ -17,9 +17,10 @@ use truegrind::compensation::taught::{taught_frame, taught_tcp};
 use truegrind::papers::experiment::Experiment;
 use truegrind::programs::rapid::task_list;
 use truegrind::robots;
+use truegrind::robots::foreign::{Choice, read_any};
 use truegrind::surfaces::mesh::{Mesh, MeshOptions};
 
-use truegrind::calibration::measurement::import::{self, Options};
+use truegrind::calibration::measurement::import::{self, Clocks, Options};
 use truegrind::programs::diff::unified;
 use truegrind::programs::motion::{Mark, MotionKind, Role, TargetValue};
 use truegrind::programs::nc::setup::Setup;
@@ -206,6 +207,30 @@ pub fn robot(bytes: &[u8]) {
         let posed = robot.model.at_condition(&Condition::default());
         assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
     }
+}
+
+/// The file of an arm that others wrote, of each kind: one that is taken works.
+pub fn arm_file(bytes: &[u8]) {
+    for file in ["fuzz.urdf", "fuzz.csv", "fuzz.yaml", "fuzz.conf"] {
+        if let Ok(found) = read_any(&text(bytes), file, &Choice::default()) {
+            let posed = found.robot.model.at_condition(&Condition::default());
+            assert!(posed.forward(&Joints::zeros()).translation.vector.iter().all(|x| x.is_finite()));
+        }
+    }
+}
+
+/// A log of joints and the points of a tracker, above and below a line of dashes, joined by name and by time.
+pub fn points(bytes: &[u8]) {
+    let line = b"----\n";
+    let at = bytes.windows(line.len()).position(|window| window == line).unwrap_or(bytes.len() / 2);
+    let (log, rest) = bytes.split_at(at);
+    let points = rest.strip_prefix(line).unwrap_or(rest);
+    let (log, points, clocks) =
+        (("log.csv", log), ("points.txt", points), Clocks { within_s: 0.5, ahead_s: 0.0 });
+    let options = Options::default();
+    let both =
+        [import::joined(log, points, &options), import::joined_by_time(log, points, &clocks, &options)];
+    assert!(both.iter().flatten().all(|dataset| !dataset.rows.is_empty()));
 }
 
 /// A cell file that is taken, and the main job with it.

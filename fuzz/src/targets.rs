@@ -20,17 +20,25 @@ const PROGRAMS: usize = 6000;
 const TABLES: usize = 64_000;
 
 /// All targets.
-pub const TARGETS: [Target; 14] = [
+pub const TARGETS: [Target; 16] = [
     target("rapid", crate::rapid, &[("programs", &["mod", "modx", "prg", "sys"])], "rapid", PROGRAMS),
     target("nc", crate::nc, &[("programs", &["nc", "mpf", "ngc", "h"])], "nc", PROGRAMS),
     target("rapid-job", crate::rapid_job, &[("programs", &["mod", "modx", "prg", "sys"])], "rapid", PROGRAMS),
     target("nc-job", crate::nc_job, &[("programs", &["nc", "mpf", "ngc", "h"])], "nc", PROGRAMS),
-    target("csv", crate::csv, &[("tests/data", &["csv"])], "csv", PROGRAMS),
+    target("csv", crate::csv, &[("tests/data", &["csv"]), ("fuzz/corpus/csv", &["csv"])], "csv", PROGRAMS),
+    target("points", crate::points, &[("fuzz/corpus/points", &["txt"])], "csv", PROGRAMS),
     target("xlsx", crate::xlsx, &[("fuzz/corpus/xlsx", &["parts"])], "xlsx", TABLES),
     target("surface", crate::surface, &[("surfaces", &["toml"])], "surface", PROGRAMS),
     target("stl", crate::stl, &[("surfaces", &["stl"]), ("fuzz/corpus/stl", &["stl"])], "stl", PROGRAMS),
     target("model", crate::model, &[("fuzz/corpus/model", &["toml"])], "toml", TABLES),
     target("robot", crate::robot, &[("fuzz/corpus/robot", &["toml"])], "toml", PROGRAMS),
+    target(
+        "arm-file",
+        crate::arm_file,
+        &[("crates/arm/tests/data", &["urdf"]), ("fuzz/corpus/arm", &["csv", "conf", "yaml"])],
+        "arm",
+        PROGRAMS,
+    ),
     target("cell", crate::cell, &[("fuzz/corpus/cell", &["toml"])], "toml", PROGRAMS),
     target("recipe", crate::recipe, &[("tests/data", &["toml"])], "toml", PROGRAMS),
     target("experiment", crate::experiment, &[("experiments", &["toml"])], "toml", PROGRAMS),

@@ -282,7 +282,8 @@ fn told(robot: &Robot, notes: &[String]) -> Vec<String> {
     let ready = robot.model.at_condition(&still);
     let frames = ready.frames(&Joints::zeros());
     let flange = ready.forward(&Joints::zeros());
-    let place = flange.translation.vector;
+    // No sign before zero.
+    let place = flange.translation.vector.map(|mm| (mm * 1e3).round() / 1e3 + 0.0);
     let reach: f64 = robot.model.links[1..].iter().map(|link| link.a_mm.hypot(link.d_mm)).sum();
     let axes: Vec<String> = (0..6)
         .map(|i| {
