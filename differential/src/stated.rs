@@ -40,9 +40,10 @@ impl Stated {
         out
     }
 
-    /// Of a point at which the tool is turned as the way turns it, not as is told there: the path is right to what is said of it.
+    /// Of a point at which the tool is turned as the way turns it, not as is told there: the path is right to what is said of it, and
+    /// nothing is said where it begins under another tool or work object.
     pub fn of_the_way(mut self, row: Option<&Row>) -> Self {
-        self.mm += row.and_then(|row| row.bend_mm).unwrap_or(0.0);
+        self.mm += row.map_or(0.0, |row| row.bend_mm.unwrap_or(f64::INFINITY));
         self.rad = std::f64::consts::PI;
         self
     }

@@ -35,7 +35,9 @@ fn displacements_from_where_the_robot_stands_agree() {
 /// held to a tool that stands, off where the two touch; a corrected coordinate that comes in through another axis of a turned frame;
 /// a turn about the tool that a block states which is left; a work offset that a called program has set; sides of play told from
 /// guessed joints; a way so near to a singularity that joints are fast.
-const ONCE_WRONG: [(Dialect, u64); 49] = [
+const ONCE_WRONG: [(Dialect, u64); 51] = [
+    (Dialect::Rapid, 75_122_364),
+    (Dialect::LinuxCnc, 75_003_632),
     (Dialect::Rapid, 72_012_597),
     (Dialect::Rapid, 72_002_671),
     (Dialect::Rapid, 74_004_353),

@@ -259,6 +259,14 @@ impl<'s> Machine<'s> {
         self.tip = on;
     }
 
+    /// Another length counts: the axes stay where they are, and those that turn the tool keep their values.
+    pub fn measure(&mut self, tool: Option<String>) {
+        if self.tool != tool {
+            self.at = [None; 3];
+        }
+        self.tool = tool;
+    }
+
     /// Another tool; where its tip is the text does not tell.
     pub fn hold(&mut self, tool: Option<String>) {
         if self.tool != tool {

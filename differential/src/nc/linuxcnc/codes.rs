@@ -109,7 +109,7 @@ impl LinuxCnc<'_> {
 
     fn lengths_of_tools(&mut self, block: &Block) {
         if block.has(430) {
-            self.machine.hold(Some(match block.get('H') {
+            self.machine.measure(Some(match block.get('H') {
                 Some(number) if number != 0.0 => format!("T{number}"),
                 Some(_) => "T0".to_owned(),
                 None => self.spindle.clone(),
@@ -120,7 +120,7 @@ impl LinuxCnc<'_> {
             self.machine.lost();
         }
         if block.has(490) {
-            self.machine.hold(Some(self.spindle.clone()));
+            self.machine.measure(Some(self.spindle.clone()));
         }
     }
 
