@@ -306,19 +306,20 @@ fn too_narrow_bounds_say_what_failed() {
 }
 
 /// Boxes that stand between the poses: the arm goes round them over as many stops as it takes, and what lies behind a box is not
-/// chosen. The class: a plan that is refused although the arm could measure, for one pose or one way of many.
+/// chosen. The classes: a plan that is refused although the arm could measure, for one pose or one way of many; and a way that is
+/// called clear although a link enters a box between two places that were looked at.
 #[test]
 fn boxes_between_the_poses_are_gone_round() {
     let (frames, nominal) = (tracker(), nominal());
     let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    // Walls before and behind the arm.
     let boxes =
-        [[[250.0, -600.0, 0.0], [700.0, -250.0, 600.0]], [[-200.0, 200.0, 0.0], [350.0, 600.0, 450.0]]];
-    let mut stops = 0;
-    for seed in 0..4 {
-        let mut options = small();
-        (options.candidates, options.seed) = (600, seed);
-        options.bounds.space.boxes_mm = boxes.to_vec();
-        options.bounds.space.radius_mm = 48.0;
+        [[[150.0, -20.0, 0.0], [900.0, 20.0, 2000.0]], [[-900.0, -20.0, 0.0], [-150.0, 20.0, 2000.0]]];
+    let mut options = Options { poses: 15, candidates: 200, ..Options::default() };
+    options.bounds.space.boxes_mm = boxes.to_vec();
+    (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (48.0, options.visits.approach_rad);
+    for seed in 0..2 {
+        options.seed = seed;
         let found = plan(&wanted, &options).unwrap();
         assert_eq!(found.poses.len(), options.poses);
         for k in 1..found.rows.len() {
@@ -328,24 +329,20 @@ fn boxes_between_the_poses_are_gone_round() {
                 .chain(row.stops.iter().copied())
                 .chain([row.approach_from, to])
                 .collect();
-            stops = stops.max(row.stops.len());
             for way in places.windows(2) {
                 // Looked at elsewhere than the plan looks.
                 for share in (0..=150).map(|k| f64::from(k) / 150.0) {
                     let away = least_away(&nominal, &frames, &way[0].lerp(&way[1], share), &boxes);
-                    // Between two looks a link may come nearer by what it turns there.
-                    assert!(away > -12.0, "seed {seed}, row {k}: {away} mm");
+                    // By two millimetres at the most links come nearer than they are thick.
+                    assert!(away > -2.0, "seed {seed}, row {k}: {away} mm");
                 }
             }
         }
     }
-    assert!(stops > 2, "{stops}");
-    // Nothing hangs together with anything.
-    let mut options = small();
-    (options.poses, options.bounds.space.boxes_mm) = (200, boxes.to_vec());
-    options.bounds.space.radius_mm = 48.0;
+    // Neither side has as many as are asked for.
+    (options.poses, options.seed) = (150, 0);
     let error = plan(&wanted, &options).unwrap_err();
-    assert!(matches!(error, PlanError::NoWay { allowed: 300, found: 1..200, wanted: 200 }), "{error}");
+    assert!(matches!(error, PlanError::NoWay { allowed: 200, found: 50..150, wanted: 150 }), "{error}");
     assert!(error.to_string().contains("ask for fewer poses"), "{error}");
 }
 
