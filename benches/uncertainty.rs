@@ -346,6 +346,13 @@ fn main() {
     let mut numbers = std::env::args().skip(1).filter_map(|a| a.parse::<usize>().ok());
     let (arms, with) = (numbers.next().unwrap_or(60), numbers.next().unwrap_or(0));
     let cases: Vec<Case> = Case::all(arms, false).into_iter().chain(Case::all(with, true)).collect();
+    if let Some(folder) = std::env::var_os("TRUEGRIND_RECIPES") {
+        let folder = std::path::Path::new(&folder);
+        for case in &cases {
+            std::fs::write(folder.join(format!("{}.toml", case.seed)), case.recipe()).unwrap();
+        }
+        return;
+    }
     let outcomes: Vec<(Case, Option<Outcome>)> =
         cases.into_par_iter().map(|case| (case, outcome(&case))).collect();
     let mut groups: BTreeMap<String, Outcome> = BTreeMap::new();

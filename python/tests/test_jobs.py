@@ -113,6 +113,29 @@ def test_dask_writes_what_one_run_writes_and_does_nothing_twice(plant, expected,
     assert len(records()) == 2 * COUNT and len(found.rows()) == COUNT
 
 
+@pytest.mark.parametrize("verb", ["compensate", "deviation"])
+def test_tables_of_shares_are_one_table_to_another_reader(plant, run, verb):
+    """Every share leaves its table as Parquet without being asked; read by Arrow as one, they are what gathering writes."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    where = ["-o", "out"] if verb == "compensate" else ["--work", "out"]
+    for share in ("1/3", "2/3", "3/3"):
+        run(verb, "in", "--model", "arm.toml", *where, "--shard", share, "--resume")
+    run("gather", "out", "--parquet", "all.parquet", "--csv", "all.csv")
+    whole = parquet.read_table("all.parquet")
+    name = whole.column_names[0]
+    parts = [parquet.read_table(path) for path in sorted(Path("out/tables").iterdir())]
+    assert len(parts) == 3 and all(part.num_rows > 0 and part.schema == whole.schema for part in parts)
+    shares = [{row[name] for row in part.to_pylist()} for part in parts]
+    assert sum(map(len, shares)) == len(set.union(*shares))
+    # Rows keep their order within a program, and programs that of the run: a stable sort by name restores it.
+    order = list(dict.fromkeys(row[name] for row in whole.to_pylist()))
+    rows = [row for part in parts for row in part.to_pylist()]
+    assert sorted(rows, key=lambda row: order.index(row[name])) == whole.to_pylist()
+    # And what Arrow reads is what the table says in words.
+    text = Path("all.csv").read_text(encoding="utf-8").splitlines()
+    assert len(text) == whole.num_rows + 1 and text[0].split(",") == whole.column_names
+
+
 def test_a_worker_that_is_killed_in_the_middle_costs_nothing_but_time(plant, expected, client):
     from truegrind.dask import compensate_folder
 

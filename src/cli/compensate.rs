@@ -44,7 +44,7 @@ use super::naming;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
 use super::progress::Work;
-use super::shares::{Asked, Doing, Shares, Store, Written, each};
+use super::shares::{Asked, Doing, Shares, Store, Written, each, outputs_with};
 use super::terminal::{say, tell, tell_lines};
 
 /// What is written.
@@ -537,8 +537,8 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
         ));
     }
     let inputs = jobs.iter().flat_map(|job| &job.paths);
-    let shown =
-        Reports { outputs: &arguments.outputs, diff: arguments.diff.as_deref(), judging: shop.judging() };
+    let outputs = outputs_with(store, &arguments.shares, &arguments.outputs)?;
+    let shown = Reports { outputs: &outputs, diff: arguments.diff.as_deref(), judging: shop.judging() };
     shown.write(done, Batch::sparing(inputs), store.is_some())
 }
 

@@ -26,7 +26,7 @@ use super::inputs;
 use super::inputs::NamedModel;
 use super::outputs::Outputs;
 use super::programs::{self, Grouping, Job, Programs};
-use super::shares::{Asked, Doing, Kept, Shares, Store, each};
+use super::shares::{Asked, Doing, Kept, Shares, Store, each, outputs_with};
 use super::terminal::tell;
 
 /// Arguments of `deviation`.
@@ -144,7 +144,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     if store.is_none() {
         say_unused(found.iter().map(|found| &found.used), &cell, surface.as_ref());
     }
-    let shown = Reports { outputs: &arguments.outputs, is_part: store.is_some() };
+    let outputs = outputs_with(store.as_ref(), &arguments.shares, &arguments.outputs)?;
+    let shown = Reports { outputs: &outputs, is_part: store.is_some() };
     shown.write(found, Batch::sparing(&all), |batch, name, reports| {
         #[cfg(feature = "visual")]
         if let Some(path) = &arguments.outputs.rrd {

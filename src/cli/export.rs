@@ -9,7 +9,7 @@ use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::transfer::transfer;
 use truegrind::calibration::identification::register::starting_frames;
 use truegrind::calibration::identification::tolerance::Tolerance;
-use truegrind::robots::export::{Format, coupled_beyond, left_out, write};
+use truegrind::robots::export::{Format, angles, left_out, write};
 use truegrind::robots::foreign::{Choice, read_any};
 
 use super::ending::Ending;
@@ -91,10 +91,8 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
     };
     let text = write(bare, robot, format, &[]);
     let mut back = read_any(&text, name, &Choice::default())?.robot.model;
-    if coupled_beyond(bare, format) {
-        // The file's angles are those of the links: its user turns the controller's into them.
-        back.joint_map = bare.joint_map;
-    }
+    // Its user works out the file's angles from the controller's, as the notes say.
+    back.joint_map *= angles(bare, format);
     Ok(back)
 }
 

@@ -22,7 +22,7 @@ use super::inputs;
 use super::outputs::Outputs;
 use super::programs::{Job, found_below};
 use super::progress::Work;
-use super::shares::{Asked, Doing, Kept, Shares, Store, Written, each};
+use super::shares::{Asked, Doing, Kept, Shares, Store, Written, each, outputs_with};
 use super::terminal::tell;
 
 /// Whether many arms are asked for, and not one.
@@ -85,7 +85,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     let found: Vec<Found> = on_threads(arguments.common.threads, || each(store.as_ref(), &jobs, &doing))??;
     drop(work);
     let inputs = jobs.iter().flat_map(|job| &job.paths);
-    write(found, &arguments.outputs, Batch::sparing(inputs), store.is_some())
+    let outputs = outputs_with(store.as_ref(), &arguments.shares, &arguments.outputs)?;
+    write(found, &outputs, Batch::sparing(inputs), store.is_some())
 }
 
 /// The measurements that the command line names, those below folders among them, in the order of names.

@@ -1,7 +1,7 @@
 //! Runs that several jobs share, on one machine or many, and that go on where they were stopped: `--shard`, `--resume`.
 //!
 //! Jobs know nothing of each other but a folder. In it `run.json` lists all units, `done/KEY.json` is the record of one that is
-//! done, and `begun/` holds what was begun and did not end. Two jobs that do the same unit at the same time both come to
+//! done, and `begun/` holds what was begun and did not end; `tables/` has the table of each share. Two jobs that do the same unit at the same time both come to
 //! the same bytes, and whoever is last puts them over the same.
 //!
 //! A unit may take its whole process with it (memory, stack). The next job of the same units finds that one before it did not end,
@@ -21,18 +21,24 @@ use truegrind::units::share::Share;
 
 use super::defect::isolated;
 use super::files::{self, own};
+use super::outputs::Outputs;
 use super::programs::Job;
 use super::terminal::tell;
 
 /// How often a unit is begun before it is listed as one that kills whoever does it.
 const MOST_BEGUN: u32 = 3;
 
+/// Where the tables of the shares are, in the folder of the run, and how their names begin.
+const TABLES: &str = "tables";
+const TABLE: &str = "share-";
+
 /// Many inputs over several jobs; docs in README, examples in deploy/.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Several jobs, on one machine or many")]
 pub(super) struct Shares {
     /// Do one share of the programs or arms alone, I of N, from 1; names alone tell which. `truegrind gather` puts together what all
-    /// shares made.
+    /// shares made. The table of the share goes to tables/ in the folder of the run, as Parquet, where --parquet names no other
+    /// file.
     #[arg(long, value_name = "I/N", conflicts_with = "units")]
     shard: Option<Share>,
     /// Leave out what is done already with the same inputs, model, cell, options and version, as long as its outputs are as they were
@@ -187,6 +193,20 @@ impl Store {
         Ok(Some(store))
     }
 
+    /// Where the results of this job go: the table of a share to the folder of the run, where nobody names another file.
+    fn outputs(&self, shares: &Shares, asked: &Outputs) -> anyhow::Result<Outputs> {
+        let mut outputs = asked.clone();
+        if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &asked.parquet) {
+            let tables = self.work.join(TABLES);
+            files::make_folder(&tables)?;
+            // As wide as the last one's, so that their order by name is that of their numbers.
+            let wide = share.of.to_string().len();
+            let name = format!("{TABLE}{:0wide$}-of-{}.parquet", share.number, share.of);
+            outputs.parquet = Some(tables.join(name));
+        }
+        Ok(outputs)
+    }
+
     /// The store of a run that was begun: its folder, and the run.
     pub(super) fn of(work: &Path) -> anyhow::Result<(Self, Run)> {
         let path = work.join("run.json");
@@ -214,6 +234,8 @@ impl Store {
         if own::there(&path)?.as_deref() == Some(text.as_bytes()) {
             return Ok(());
         }
+        // Tables of other units, of another model or of another number of shares are none of this run.
+        own::gone_of(&self.work.join(TABLES), TABLE);
         own::put(&path, text.as_bytes())
     }
 
@@ -275,6 +297,15 @@ impl Store {
         let text = text.with_context(|| format!("{}: the record cannot be made", job.name()))?;
         own::put(&self.record_place(key), text.as_bytes())
     }
+}
+
+/// Where the results of a job go: what was asked for, and what a share keeps beside; see [`Store::outputs`].
+pub(super) fn outputs_with(
+    store: Option<&Store>,
+    shares: &Shares,
+    asked: &Outputs,
+) -> anyhow::Result<Outputs> {
+    store.map_or_else(|| Ok(asked.clone()), |store| store.outputs(shares, asked))
 }
 
 /// One job among those of a run.

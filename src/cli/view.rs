@@ -208,6 +208,7 @@ fn measurements(arguments: &Arguments, file: &Path) -> anyhow::Result<Recording>
         arm_is: &format!("{} as estimated in {name}", arm.robot),
         nominal: Some(&arm.nominal),
         meshes: &meshes(arguments.robot.as_deref())?,
+        planned: false,
         keep_out_mm: &[],
         answer: &[],
         frames: registered.as_ref(),

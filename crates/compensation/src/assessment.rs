@@ -26,8 +26,8 @@ pub(super) struct Assessment {
     pub(super) placements: Vec<ObjectPlacement>,
     /// One for each cut.
     pub(super) cuts: Vec<CutRisk>,
-    /// Probability that the cuts that are not left get worse, taken together; absent without cuts.
-    pub(super) chance: Option<f64>,
+    /// What each cut has a part in, taken together.
+    shares: Vec<Share>,
     /// The cut of each motion, as its place in `cuts`; empty without any.
     cut_of: Vec<Option<u32>>,
     /// The best registration of each cut, in the base; absent where the robot holds the part.
@@ -56,6 +56,18 @@ impl Assessment {
     /// Whether the shape of a motion's cut is corrected, and its place not.
     pub(super) fn shape_alone(&self, motion: u32) -> bool {
         self.place(motion).is_some_and(|place| self.cuts[place].judged == Placement::Shape)
+    }
+
+    /// Probability that these cuts get worse, taken together; absent without any.
+    pub(super) fn chance_of<'c>(
+        &self,
+        knowledge: &Estimated,
+        cuts: impl IntoIterator<Item = &'c CutRisk>,
+    ) -> Option<f64> {
+        let mut whole = Whole::of(knowledge);
+        let places = cuts.into_iter().filter_map(|cut| self.place(*cut.motions.first()?));
+        places.filter_map(|place| self.shares.get(place)).for_each(|share| whole.add(share));
+        whole.chance(knowledge)
     }
 
     fn place(&self, motion: u32) -> Option<usize> {
@@ -168,14 +180,10 @@ pub(super) fn assessed(
             Some((Judged { placement, points: off.len(), weight, carried }, judgement))
         })
         .collect();
-    let mut whole = Whole::of(knowledge);
     for ((motions, _), judged) in chosen.cuts.iter().zip(judged) {
         let Some((judged, judgement)) = judged else { continue };
         let chance = chance(judgement.square, &judgement.toward, knowledge, judged.points);
         let left = !(chance <= wanted.max_risk);
-        if !left {
-            whole.add(&judgement, &judged);
-        }
         let place = out.cuts.len() as u32;
         motions.iter().for_each(|m| out.cut_of[*m as usize] = Some(place));
         out.cuts.push(CutRisk {
@@ -186,10 +194,15 @@ pub(super) fn assessed(
             shape_sigma_mm: judgement.shape_sigma_mm,
             chance,
             left,
+            corrected: false,
         });
         out.registered.push(judged.carried);
+        out.shares.push(Share {
+            points: judged.weight * judged.points as f64,
+            square: judged.weight * judgement.square,
+            toward: judgement.toward * judged.weight,
+        });
     }
-    out.chance = whole.chance(knowledge);
     out
 }
 
@@ -202,26 +215,30 @@ struct Judged {
     carried: Option<Carried>,
 }
 
-/// All cuts together.
-struct Whole {
+/// What a cut weighs among others: points, |d|² (mm²), and Jᵀ d.
+#[derive(Debug, Clone)]
+struct Share {
     points: f64,
     square: f64,
     toward: DVector<f64>,
 }
 
+/// Cuts together.
+struct Whole(Share);
+
 impl Whole {
     fn of(knowledge: &Estimated) -> Self {
-        Self { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) }
+        Self(Share { points: 0.0, square: 0.0, toward: DVector::zeros(knowledge.order.len()) })
     }
 
-    fn add(&mut self, cut: &Judgement, judged: &Judged) {
-        self.points += judged.weight * judged.points as f64;
-        self.square += judged.weight * cut.square;
-        self.toward += &cut.toward * judged.weight;
+    fn add(&mut self, cut: &Share) {
+        self.0.points += cut.points;
+        self.0.square += cut.square;
+        self.0.toward += &cut.toward;
     }
 
     fn chance(&self, knowledge: &Estimated) -> Option<f64> {
-        (self.points > 0.0)
-            .then(|| chance(self.square, &self.toward, knowledge, self.points.round() as usize))
+        let Share { points, square, toward } = &self.0;
+        (*points > 0.0).then(|| chance(*square, toward, knowledge, points.round() as usize))
     }
 }

@@ -87,7 +87,16 @@ impl<'a> Targets<'a> {
         let mut plan = planned(&Job { listing, solved, stays: &stays, mountings, assessment, arms, options });
         plan.placements.clone_from(&assessment.placements);
         plan.cuts.clone_from(&assessment.cuts);
-        plan.chance_of_worse = assessment.chance;
+        let rewritten = |motion: &u32| {
+            let outcome = plan.outcomes.get(*motion as usize);
+            outcome.is_some_and(|outcome| matches!(outcome.status, Status::Changed | Status::Flagged))
+        };
+        for cut in &mut plan.cuts {
+            cut.corrected = cut.motions.iter().any(rewritten);
+        }
+        let corrected = plan.cuts.iter().filter(|cut| cut.corrected);
+        plan.chance_of_worse =
+            arms.knowledge.and_then(|knowledge| assessment.chance_of(knowledge, corrected));
         plan
     }
 

@@ -81,6 +81,7 @@ pub fn dataset_recording(
         arm_is: &format!("{} as estimated", estimated.robot),
         nominal: Some(&estimated.nominal),
         meshes,
+        planned: false,
         keep_out_mm: &[],
         answer: &[],
         frames: Some(&found.geometry.frames),
@@ -116,6 +117,7 @@ pub fn diagnosis_recording(
         arm_is: &format!("{} with everything found", found.estimated.robot),
         nominal: Some(&found.estimated.nominal),
         meshes,
+        planned: false,
         keep_out_mm: &[],
         answer: &[],
         frames: Some(&found.extended.frames),
@@ -262,6 +264,10 @@ fn sensor(store: &mut Store, scene: &MeasuredScene<'_>, touched: &[Point3<f64>])
             .with_radii([Radius::new_ui_points(1.5)]);
         return store.fixed("sensor/cable", &style);
     }
+    if scene.planned && frames.base_from_sensor == Pose::identity() {
+        // Where the tracker will stand is not stated.
+        return Ok(());
+    }
     let length = SENSOR_AXES * arm::length_mm(scene.arm);
     arm::still(store, "sensor/frame", &frames.base_from_sensor)?;
     store.fixed("sensor/frame", &TransformAxes3D::new(length as f32))?;
@@ -373,8 +379,11 @@ fn layout(
         space
     };
     let angles = rows.iter().flat_map(|r| r.joints.iter().map(|q| q.to_degrees()).collect::<Vec<_>>());
-    let joints =
-        View::curves("Logged joint angles [°] over rows", &["+ /joints/**"], curve::range(angles, 6));
+    let name = match scene.planned {
+        true => "Joint angles [°] over rows",
+        false => "Logged joint angles [°] over rows",
+    };
+    let joints = View::curves(name, &["+ /joints/**"], curve::range(angles, 6));
     let joints = Pane::View(joints);
     let curves = if residuals {
         let name = match scene.dataset.rows[0].reading {

@@ -4,6 +4,7 @@
 //!   [`space`]: what it must not enter;
 //! - [`rows`]: what a reading at a pose tells of every parameter;
 //! - [`design`]: which of the candidates to take;
+//! - `roads`: ways round what is kept out of;
 //! - [`schedule`]: repeats, both sides of approach, warm-up, and the order;
 //! - [`power`]: which effects the measurement can decide, and from which size on;
 //! - [`rival`]: what a diagnosis could not tell apart;
@@ -11,6 +12,7 @@
 
 mod blank;
 mod options;
+mod roads;
 mod wanted;
 pub mod candidate;
 pub mod sight;
@@ -31,9 +33,10 @@ use self::blank::blank;
 use self::candidate::{Candidate, Passed};
 use self::design::{Design, Index};
 use self::power::Decidable;
+use self::roads::Roads;
 use self::rows::Told;
-use self::schedule::Row;
-use self::space::Space;
+use self::schedule::{Row, Ways};
+use self::space::{Space, Watch};
 use truegrind_arm::model::{Joints, Model};
 use truegrind_arm::parameter::{Parameter, arm_parameters};
 use truegrind_calibration::identification::fit::frame_parameters;
@@ -96,16 +99,18 @@ pub enum PlanError {
         /// What the others failed.
         passed: Passed,
     },
-    /// No way from a pose to the next stays clear.
+    /// What is kept out of cuts the poses that are allowed into parts, and none of them is large enough.
     #[error(
-        "no way was found from pose {from} to pose {to} that keeps out of the boxes and above the floor: make the boxes to keep \
-         out of smaller, or plan with another --seed"
+        "the boxes to keep out of and the floor part the {allowed} poses that are allowed: at most {found} can be visited without \
+         entering them, expected at least {wanted}: make the boxes smaller, lower the floor, or ask for fewer poses (--poses)"
     )]
     NoWay {
-        /// The pose before, from 1.
-        from: usize,
-        /// The pose, from 1.
-        to: usize,
+        /// Poses that are allowed.
+        allowed: usize,
+        /// Those of the largest part that hangs together.
+        found: usize,
+        /// Needed.
+        wanted: usize,
     },
     /// The sensor is a cable of which no outlet is stated.
     #[error("a cable needs the place of its outlet: state where in the base it comes out")]
@@ -149,25 +154,62 @@ pub fn plan(wanted: &Wanted<'_>, options: &Options) -> Result<Plan, PlanError> {
         });
     }
     let parameters = parameters(wanted);
-    let visits = options.visits.asked(&options.questions);
-    // The rows that each candidate would give, with the effects in question beside the geometry.
-    let still = candidate::rows(&candidates);
-    let told = rows::told(wanted, &parameters, &still, &options.questions, options);
-    let design = Design { told: &told, index: options.index };
-    let chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
-    let geometry = Told { interest: Vec::new(), ..rows::told(wanted, &parameters, &still, &[], options) };
-    let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
-
-    let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
-    let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
-    let (poses, rows) = schedule::schedule(wanted, poses, &visits, &options.bounds, &known, options.seed)
-        .map_err(|(from, to)| PlanError::NoWay { from, to })?;
+    let watch = Watch::of(wanted, &options.bounds.space);
+    let laid = match laid(wanted, &parameters, &candidates, None, options)? {
+        Some(laid) => laid,
+        // Some of the poses lie behind a box: then only those count that hang together.
+        None => {
+            let roads = Roads::between(candidates.iter().map(|candidate| candidate.joints).collect(), &watch);
+            let together: Vec<Candidate> =
+                roads.largest().into_iter().map(|i| candidates[i].clone()).collect();
+            let parted = PlanError::NoWay {
+                allowed: candidates.len(),
+                found: together.len(),
+                wanted: options.poses.max(1),
+            };
+            if together.len() < options.poses.max(1) {
+                return Err(parted);
+            }
+            laid(wanted, &parameters, &together, Some(&roads), options)?.ok_or(parted)?
+        }
+    };
+    let Laid { poses, rows, quality } = laid;
     let measured = schedule::data(&rows, &poses);
     let final_told = rows::told(wanted, &parameters, &measured, &[], options);
     let sigmas = final_told.sigmas().ok_or(PlanError::NotFinite)?;
     let decidable = power::decidable(wanted, &parameters, &measured, options);
     let space = options.bounds.space.clone();
     Ok(Plan { poses, rows, parameters, sigmas, quality, passed, decidable, space })
+}
+
+/// Poses that were chosen, and the order of their rows.
+struct Laid {
+    poses: Vec<Candidate>,
+    rows: Vec<Row>,
+    quality: Quality,
+}
+
+/// Chooses among candidates and puts them in order; `None` where no way is found from one to the next. `roads`: along which ways.
+fn laid(
+    wanted: &Wanted<'_>,
+    parameters: &[Parameter],
+    candidates: &[Candidate],
+    roads: Option<&Roads>,
+    options: &Options,
+) -> Result<Option<Laid>, PlanError> {
+    let visits = options.visits.asked(&options.questions);
+    // The rows that each candidate would give, with the effects in question beside the geometry.
+    let still = candidate::rows(candidates);
+    let told = rows::told(wanted, parameters, &still, &options.questions, options);
+    let design = Design { told: &told, index: options.index };
+    let chosen = design.choose(options.poses).ok_or(PlanError::NotFinite)?;
+    let geometry = Told { interest: Vec::new(), ..rows::told(wanted, parameters, &still, &[], options) };
+    let quality = quality(&geometry, &chosen, options).ok_or(PlanError::NotFinite)?;
+    let poses: Vec<Candidate> = chosen.iter().map(|&i| candidates[i].clone()).collect();
+    let known: Vec<Joints> = candidates.iter().map(|candidate| candidate.joints).collect();
+    let ways = Ways { known: &known, roads };
+    let ordered = schedule::schedule(wanted, poses, &visits, &options.bounds, &ways, options.seed);
+    Ok(ordered.map(|(poses, rows)| Laid { poses, rows, quality }))
 }
 
 /// What is fitted: links, then frames.

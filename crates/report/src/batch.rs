@@ -268,7 +268,7 @@ fn read_table(rows: &[Row]) -> Table {
         let (Some(column), Some(folder)) = (place(key, &table), shared_folder(&names)) else { continue };
         for row in &mut table.rows {
             if let Cell::Text(name) = &mut row[column] {
-                *name = name.strip_prefix(folder).unwrap_or(name).to_owned();
+                *name = without(name, folder);
             }
         }
         table.notes.push(format!("{what} {folder}"));
@@ -281,6 +281,15 @@ fn read_table(rows: &[Row]) -> Table {
     }
     table.excerpt(ROWS)
 }
+
+/// Names of files without a folder that all begin with; those of a task stand in one cell.
+fn without(names: &str, folder: &str) -> String {
+    let short = |name: &'_ str| name.strip_prefix(folder).unwrap_or(name).to_owned();
+    names.split(BETWEEN).map(short).collect::<Vec<_>>().join(BETWEEN)
+}
+
+/// What stands between the files of a task.
+const BETWEEN: &str = ", ";
 
 /// The folder, with the stroke behind it, that all of several names begin with.
 fn shared_folder<'n>(names: &[&'n str]) -> Option<&'n str> {
@@ -347,30 +356,36 @@ fn verdict(rows: &[Row]) -> Verdict {
         (0, _) => Status::Warning,
         _ => Status::Bad,
     };
+    let first = |of: &str| match may_run {
+        0 => "none may run before you have looked at what was refused or flagged".to_owned(),
+        _ => {
+            format!(
+                "{may_run} {of} are rewritten and may run, look at what was refused or flagged before the rest does"
+            )
+        }
+    };
     let headline = match status {
         Status::NotEvaluated => "Nothing was rewritten".to_owned(),
         Status::Good => {
             format!("Every program was done; {may_run} of {} are rewritten and may run", rows.len())
         }
-        Status::Warning => format!(
-            "Every program was done; {may_run} of {} are rewritten and may run, look at what was refused or flagged before \
-             the others do",
-            rows.len()
-        ),
-        Status::Bad => format!(
-            "{} of {} programs could not be done; {may_run} of the others are rewritten and may run, look at what was refused \
-             or flagged before the rest does",
-            failed.len(),
-            rows.len()
-        ),
+        Status::Warning => format!("Every program was done; {}", first(&format!("of {}", rows.len()))),
+        Status::Bad => {
+            format!(
+                "{} of {} programs could not be done; {}",
+                failed.len(),
+                rows.len(),
+                first("of the others")
+            )
+        }
     };
     let mut reasons = vec![sum(rows)];
     let names: Vec<&str> = rows.iter().map(|row| row.file.as_str()).collect();
     let folder = shared_folder(&names).unwrap_or_default();
     let named = |row: &Row, words: &str| {
-        let file = row.file.strip_prefix(folder).unwrap_or(&row.file);
+        let file = without(&row.file, folder);
         // Many errors begin with the file's name.
-        match words.strip_prefix(file) {
+        match words.strip_prefix(file.as_str()) {
             Some(rest) if rest.starts_with(':') => words.to_owned(),
             _ => format!("{file}: {words}"),
         }

@@ -412,12 +412,17 @@ fn key_figures(reports: &[&PathReport]) -> Vec<KeyFigure> {
     let mut figures = Vec::new();
     let block = |report: &PathReport, side: Side| report.block(side);
     let mean = |report: &PathReport, side: Side| {
-        block(report, side).map_or_else(String::new, |b| format!(", mean |d| {:.3} mm", b.all.mean_absolute))
+        let along = if report.cut().any(|p| p.normal.is_some()) { " along the normal" } else { "" };
+        block(report, side)
+            .map_or_else(String::new, |b| format!(", mean |d| {:.3} mm{along}", b.all.mean_absolute))
     };
     let max = |report: &PathReport, side: Side| block(report, side).map(|block| block.all.max);
     if let Some(first) = reports.first() {
         let note = format!("as programmed{}", mean(first, BEFORE));
-        figures.push(KeyFigure::new("Largest before", max(first, BEFORE), 3, "mm").note(note));
+        // What is expected after has no sign along a surface: then what was before is told by its size too.
+        let sizes = || first.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
+        let before = first.expected_mm().and_then(|_| sizes()).or_else(|| max(first, BEFORE));
+        figures.push(KeyFigure::new("Largest before", before, 3, "mm").note(note));
     }
     for report in reports.iter().filter(|report| has(report, AFTER)).take(MODELS_IN_FIGURES) {
         let (label, after, note) = match report.after {

@@ -92,7 +92,7 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             cut.off_mm.into(),
             cut.sigma_mm.into(),
             (100.0 * cut.chance).into(),
-            if cut.left { "left as it is".into() } else { "corrected".into() },
+            fate(cut).into(),
         ]);
     }
     let more = order.len().saturating_sub(NAMED);
@@ -105,6 +105,16 @@ pub fn cut_table(plan: &Plan, listing: &Listing) -> Option<Table> {
             .to_owned(),
     );
     Some(table)
+}
+
+/// What became of a cut.
+fn fate(cut: &CutRisk) -> &'static str {
+    match (cut.corrected, cut.left) {
+        (true, _) => "corrected",
+        (false, true) => "left as it is",
+        // Why is said of its motions.
+        (false, false) => "stays for another reason",
+    }
 }
 
 fn lines(cut: &CutRisk, listing: &Listing) -> String {
@@ -152,7 +162,7 @@ pub fn expected_mm(plan: &Plan) -> Option<f64> {
 /// The chance that what is written gets worse, in words; `None` where nothing is known of it.
 pub fn chance(plan: &Plan) -> Option<String> {
     let all = percent_of(plan.chance_of_worse?);
-    let largest = plan.cuts.iter().filter(|cut| !cut.left).map(|cut| cut.chance).fold(0.0, f64::max);
+    let largest = plan.cuts.iter().filter(|cut| cut.corrected).map(|cut| cut.chance).fold(0.0, f64::max);
     Some(format!(
         "the probability that the corrected cuts are farther off than the cuts as they were is {all}, of any one of them {}",
         match percent_of(largest) {
@@ -188,7 +198,7 @@ pub fn json(plan: &Plan, listing: &Listing) -> [Value; 2] {
     let cuts = plan.cuts.iter().map(|cut| {
         json!({
             "lines": lines(cut, listing), "motions": cut.motions.len(), "judged": word(cut.judged), "off_mm": cut.off_mm,
-            "sigma_mm": cut.sigma_mm, "shape_sigma_mm": cut.shape_sigma_mm, "chance_of_worse": cut.chance, "left": cut.left,
+            "sigma_mm": cut.sigma_mm, "shape_sigma_mm": cut.shape_sigma_mm, "chance_of_worse": cut.chance, "left": cut.left, "corrected": cut.corrected,
         })
     });
     [placements.collect(), cuts.collect()]

@@ -46,3 +46,11 @@ pub(crate) fn there(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
 pub(crate) fn gone(path: &Path) {
     let _ = fs::remove_file(path);
 }
+
+/// Takes the files of a folder away whose names begin so. A folder that is not there has none.
+pub(crate) fn gone_of(folder: &Path, begins: &str) {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten();
+    for file in files.filter(|file| file.file_name().to_string_lossy().starts_with(begins)) {
+        gone(&file.path());
+    }
+}

@@ -73,7 +73,7 @@ fn made(at: &Path, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     while let Some(next) = open.pop() {
         for path in super::files(&next) {
             let below = path.strip_prefix(at).unwrap().to_path_buf();
-            let ours = ["done", "begun", "run.json"].map(|name| Path::new(folder).join(name));
+            let ours = ["done", "begun", "tables", "run.json"].map(|name| Path::new(folder).join(name));
             if path.is_dir() && !ours.contains(&below) {
                 open.push(path);
             } else if path.is_file() && !ours.contains(&below) {
@@ -165,6 +165,17 @@ fn shares_put_together_are_what_one_run_writes() {
         let (code, _, err) = truegrind(at, &job);
         assert!(code < 2, "{err}");
     }
+    if cfg!(feature = "parquet") {
+        let tables: BTreeSet<PathBuf> = super::files(&at.join("real/tables")).into_iter().collect();
+        let named = |k: u32| at.join(format!("real/tables/share-{k}-of-3.parquet"));
+        assert_eq!(tables, (1..=3).map(named).collect());
+        // The same as by name.
+        let own = ["--shard", "2/3", "--resume", "--parquet", "own.parquet", "--diff", "2.diff"];
+        let job = with(&COMPENSATE, &own);
+        let (code, _, err) = truegrind(at, &job);
+        assert!(code < 2, "{err}");
+        assert_eq!(fs::read(at.join("own.parquet")).unwrap(), fs::read(named(2)).unwrap());
+    }
     gathered_like(one.path(), &expected, at, "real", &["--diff", "all.diff"]);
     assert!(fs::read(one.path().join("all.diff")).unwrap() == fs::read(at.join("all.diff")).unwrap());
     assert_eq!(made(one.path(), "real"), made(at, "real"));
@@ -188,6 +199,34 @@ fn shares_put_together_are_what_one_run_writes() {
     let again = one_run(at, &with(&COMPENSATE, &["--resume", "--diff", "again.diff"]));
     assert_eq!(again, expected);
     gathered_like(one.path(), &expected, at, "real", &[]);
+}
+
+/// Tables of shares are those of the run as it is asked for now: another model or another number of shares leaves none of the last
+/// one's beside them, which whoever reads the folder as one table would count twice.
+#[cfg(feature = "parquet")]
+#[test]
+fn tables_of_another_run_do_not_stay_beside_those_of_this_one() {
+    let dir = plant();
+    let at = dir.path();
+    let names = || -> Vec<String> {
+        let files = super::files(&at.join("real/tables"));
+        let mut names: Vec<String> =
+            files.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    };
+    for (more, expected) in [
+        (&["--shard", "1/2"][..], &["share-1-of-2.parquet"][..]),
+        (&["--shard", "2/2"], &["share-1-of-2.parquet", "share-2-of-2.parquet"]),
+        (&["--shard", "02/10"], &["share-02-of-10.parquet"]),
+        (&["--shard", "2/10", "--tolerance", "0.07"], &["share-02-of-10.parquet"]),
+        (&["--shard", "1/10", "--tolerance", "0.07"], &["share-01-of-10.parquet", "share-02-of-10.parquet"]),
+        (&["--resume"], &[]),
+    ] {
+        let (code, _, err) = truegrind(at, &with(&COMPENSATE, more));
+        assert!(code < 2, "{err}");
+        assert_eq!(names(), expected, "{more:?}");
+    }
 }
 
 #[test]

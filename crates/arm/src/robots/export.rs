@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::condition::Condition;
 use crate::joints::Joints;
@@ -45,9 +45,7 @@ pub fn left_out(model: &Model, format: Format) -> Vec<String> {
             place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k
         ));
     }
-    if coupled_beyond(model, format) {
-        out.push("joints that turn several links are not held: angles are those of the links".to_owned());
-    }
+    out.extend(reckoned(model, format));
     if format == Format::UrYaml && model.limits.speed_rad_s.is_some() {
         out.push("ranges and speeds of joints are left out".to_owned());
     }
@@ -68,15 +66,53 @@ pub fn behind(model: &Model, format: Format) -> Pose {
     }
 }
 
-/// Whether the controller's joints turn links in a way that the format does not hold: its angles are those of the links then.
-pub fn coupled_beyond(model: &Model, format: Format) -> bool {
-    format != Format::Standard && format != Format::Modified && coupled(model)
+/// The angles of the joints of a file for the angles that the controller counts: what a format does not hold of signs and
+/// couplings has to be worked out by whoever moves the exported arm.
+pub fn angles(model: &Model, format: Format) -> Matrix6<f64> {
+    match format {
+        Format::Standard | Format::Modified => Matrix6::identity(),
+        Format::Urdf => Matrix6::from_diagonal(&signs(model)) * model.joint_map,
+        Format::UrYaml => model.joint_map,
+    }
 }
 
-/// Whether a controller's joint turns another link than its own, or turns it by more or less than one for one.
-fn coupled(model: &Model) -> bool {
-    let map = &model.joint_map;
-    (0..6).any(|i| (0..6).any(|j| if i == j { map[(i, j)].abs() != 1.0 } else { map[(i, j)] != 0.0 }))
+/// By which sign a joint of a URDF turns its link: so that a joint that turns nothing but its link counts as the controller does.
+fn signs(model: &Model) -> Vector6<f64> {
+    model.joint_map.diagonal().map(|turn| if turn < 0.0 { -1.0 } else { 1.0 })
+}
+
+/// Which joints of a file are not those of the controller, and what they are; `None` where all are.
+fn reckoned(model: &Model, format: Format) -> Option<String> {
+    let angles = angles(model, format);
+    let sum = |i: usize| {
+        let mut out = String::new();
+        for (j, turn) in angles.row(i).iter().enumerate().filter(|(_, turn)| **turn != 0.0) {
+            let sign = match (*turn < 0.0, out.is_empty()) {
+                (true, true) => "−",
+                (true, false) => " − ",
+                (false, true) => "",
+                (false, false) => " + ",
+            };
+            let times = if turn.abs() == 1.0 { String::new() } else { format!("{} ", turn.abs()) };
+            let _ = write!(out, "{sign}{times}J{}", j + 1);
+        }
+        if out.is_empty() { "0".to_owned() } else { out }
+    };
+    let own = Matrix6::<f64>::identity();
+    let others: Vec<String> = (0..6)
+        .filter(|i| angles.row(*i) != own.row(*i))
+        .map(|i| format!("joint {} = {}", i + 1, sum(i)))
+        .collect();
+    (!others.is_empty()).then(|| {
+        let ranges = match format {
+            Format::Urdf => "; their ranges are those of the sums",
+            _ => "",
+        };
+        format!(
+            "the file's angles are not all those of the controller (J1 to J6), and who moves the arm works them out: {}{ranges}",
+            others.join(", ")
+        )
+    })
 }
 
 /// The links of an arm in a format; `name` is the robot's, `notes` stand in it as comments.
@@ -120,11 +156,10 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
     }
     let _ = writeln!(out, "<robot name=\"{plain}\">\n  <link name=\"base_link\"/>");
     let frames = model.at_condition(&Condition::default()).frames(&Joints::zeros());
-    let places = places(model);
+    let (places, signs, ranges) = (places(model), signs(model), Ranges::of(model));
     let mut at = Pose::identity();
     for i in 0..6 {
         at *= places[i];
-        let sign = if model.joint_map[(i, i)] < 0.0 { -1 } else { 1 };
         let parent = if i == 0 { "base_link".to_owned() } else { format!("link_{i}") };
         let _ = write!(out, "  <link name=\"link_{}\"", i + 1);
         match &model.bodies {
@@ -141,15 +176,17 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
             }
             None => out.push_str("/>\n"),
         }
-        let (low, high) = (model.limits.min_rad[i], model.limits.max_rad[i]);
-        let speed = model.limits.speed_rad_s.map_or(0.0, |speed| speed[i]);
         let _ = writeln!(
             out,
             "  <joint name=\"joint_{n}\" type=\"revolute\">\n    <parent link=\"{parent}\"/>\n    <child link=\"link_{n}\"/>\n    \
              <origin {}/>\n    <axis xyz=\"0 0 {sign}\"/>\n    <limit lower=\"{low}\" upper=\"{high}\" velocity=\"{speed}\" \
              effort=\"0\"/>\n  </joint>",
             origin(&places[i]),
-            n = i + 1
+            n = i + 1,
+            sign = signs[i],
+            low = ranges.low_rad[i],
+            high = ranges.high_rad[i],
+            speed = ranges.speed_rad_s[i]
         );
     }
     let _ = writeln!(
@@ -159,6 +196,37 @@ fn urdf(model: &Model, name: &str, notes: &[String]) -> String {
         origin(&places[6])
     );
     out
+}
+
+/// Ranges and speeds of the joints of a URDF. Where one is a sum of the controller's, each of those may be anywhere in its own range.
+struct Ranges {
+    low_rad: [f64; 6],
+    high_rad: [f64; 6],
+    /// 0 where none are known.
+    speed_rad_s: [f64; 6],
+}
+
+impl Ranges {
+    fn of(model: &Model) -> Self {
+        let (angles, limits) = (angles(model, Format::Urdf), &model.limits);
+        let sum = |i: usize, of: &dyn Fn(usize, f64) -> f64| {
+            let row = angles.row(i);
+            let parts = row.iter().enumerate().filter(|(_, turn)| **turn != 0.0);
+            // A sum of one stays what it is, to the bit.
+            parts.map(|(j, turn)| turn.abs() * of(j, *turn)).reduce(|a, b| a + b).unwrap_or(0.0)
+        };
+        let end = |j: usize, lower: bool| match lower {
+            true => limits.min_rad[j],
+            false => -limits.max_rad[j],
+        };
+        Self {
+            low_rad: std::array::from_fn(|i| sum(i, &|j, turn| end(j, turn > 0.0))),
+            high_rad: std::array::from_fn(|i| sum(i, &|j, turn| -end(j, turn < 0.0))),
+            speed_rad_s: std::array::from_fn(|i| {
+                limits.speed_rad_s.map_or(0.0, |speed| sum(i, &|j, _| speed[j]))
+            }),
+        }
+    }
 }
 
 /// The frame at the end of a link, all joints at zero.

@@ -214,7 +214,7 @@ fn robot(
         published: Vec::new(),
     };
     let robot = Robot::new(sheet, file)?;
-    compared(&robot, &described, &laid.base, &map, file)?;
+    compared(&robot, &described, &laid, &map, file)?;
     Ok((robot, notes, visuals))
 }
 
@@ -241,19 +241,20 @@ const SAME_MM: f64 = 1e-6;
 fn compared(
     robot: &Robot,
     described: &Described,
-    base: &Pose,
+    laid: &axes::Laid,
     map: &Matrix6<f64>,
     file: &str,
 ) -> Result<(), RobotError> {
+    // By which our links turn for those of the file; what the controller's joints make of it is in the map alone.
     let mut plain = Matrix6::identity();
-    plain[(0, 0)] = robot.model.joint_map[(0, 0)].signum();
+    plain[(0, 0)] = laid.first_turn;
     let from_links = map.try_inverse().unwrap_or(plain) * plain;
     for joints in [
         Joints::zeros(),
         Joints::new(0.3, -0.4, 0.5, -0.6, 0.7, -0.8),
         Joints::new(-2.1, 0.9, -1.2, 1.7, -1.1, 2.9),
     ] {
-        let ours = base * robot.model.forward(&(from_links * joints), &Condition::default());
+        let ours = laid.base * robot.model.forward(&(from_links * joints), &Condition::default());
         let theirs = described.forward(&joints);
         let (translation, turn) = apart(&ours, &theirs);
         if !(translation.max(1000.0 * turn) <= SAME_MM) {

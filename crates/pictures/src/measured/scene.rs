@@ -29,6 +29,8 @@ pub struct MeasuredScene<'a> {
     pub nominal: Option<&'a Model>,
     /// Meshes that show the links, where a robot file names them; else links are bars.
     pub meshes: &'a [LinkMesh],
+    /// Whether the rows are still to be measured: poses as planned, and readings as expected.
+    pub planned: bool,
     /// Boxes that nothing shall enter: two corners each (mm, base).
     pub keep_out_mm: &'a [[[f64; 3]; 2]],
     /// The answer in words, where there is more to be said than the file's (Markdown, lines of a list).

@@ -40,7 +40,10 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> Stri
     if let Some(found) = scene.identification {
         parameters(&mut text, &found.parameters);
     }
-    text.push_str("\n## What is drawn\n\n- Grey arm: at the logged joints of the row.\n");
+    text.push_str(match scene.planned {
+        true => "\n## What is drawn\n\n- Grey arm: at the joints of the row.\n",
+        false => "\n## What is drawn\n\n- Grey arm: at the logged joints of the row.\n",
+    });
     if let Some(shape) = shape {
         let _ = writeln!(
             text,
@@ -52,7 +55,11 @@ pub(super) fn markdown(scene: &MeasuredScene<'_>, shape: Option<&Shape>) -> Stri
     if !scene.keep_out_mm.is_empty() {
         text.push_str("- Purple boxes: what nothing shall enter.\n");
     }
-    if scene.residuals.is_empty() {
+    if scene.planned {
+        text.push_str(
+            "- Points: where the touched point is to stand, all rows. Orange: the reading to be expected.\n",
+        );
+    } else if scene.residuals.is_empty() {
         text.push_str("- Points: where the flange stood, all rows.\n");
     } else {
         text.push_str(
@@ -135,7 +142,11 @@ fn errors(text: &mut String, found: &Identification) {
 
 /// Where the joints were, in the controller's angles.
 fn ranges(text: &mut String, scene: &MeasuredScene<'_>) {
-    text.push_str("\n## Joint ranges [°]\n\n| joint | measured | limits |\n|---|---:|---:|\n");
+    let _ = writeln!(
+        text,
+        "\n## Joint ranges [°]\n\n| joint | {} | limits |\n|---|---:|---:|",
+        if scene.planned { "planned" } else { "measured" }
+    );
     for joint in 0..6 {
         let angles = scene.dataset.rows.iter().map(|r| r.joints[joint].to_degrees());
         let (low, high) = angles

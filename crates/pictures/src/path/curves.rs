@@ -53,7 +53,7 @@ pub(super) fn draw(store: &mut Store, scene: &PathScene<'_>, plan: &Plan<'_>) ->
 
 /// The band in which one in three points is off by more, from the first report that has one.
 fn sigma(store: &mut Store, scene: &PathScene<'_>) -> Result<(), VisualError> {
-    let of = |r: &PathReport| over(r, |p| p.sigma_mm);
+    let of = |r: &PathReport| over(r, |p| sigma_of(r, p));
     let Some(sigma) = scene.reports.iter().map(of).find(|s| !s.is_empty()) else { return Ok(()) };
     let pen = |name| Pen { name, colour: SIGMA, width: 1.0 };
     curve(store, "deviation/size/sigma", AXIS, pen("predicted 1σ"), &sigma)?;
@@ -104,11 +104,19 @@ fn over(report: &PathReport, figure: impl Fn(&PathPoint) -> Option<f64>) -> Vec<
     report.points.iter().filter_map(at).collect()
 }
 
+/// The sigma of a point of the cut. On the way there the arm's place counts, also where the shape of the cut alone is corrected:
+/// its sigma would flatten the cut's.
+fn sigma_of(report: &PathReport, point: &PathPoint) -> Option<f64> {
+    let cuts = || report.points.iter().any(|point| point.cutting);
+    point.sigma_mm.filter(|_| point.cutting || !cuts())
+}
+
 /// From the lowest to the highest of what a plot shows, with room for its legend.
 fn range(scene: &PathScene<'_>, figure: Figure, with_sigma: bool, both_ways: bool) -> Option<[f64; 2]> {
     let points = || scene.reports.iter().flat_map(|r| &r.points);
     let deviations = points().flat_map(|p| [p.before, p.after]).flatten().filter_map(|d| figure(&d));
-    let sigmas = points().filter_map(|p| p.sigma_mm).filter(|_| with_sigma);
+    let sigmas = scene.reports.iter().flat_map(|r| r.points.iter().filter_map(|p| sigma_of(r, p)));
+    let sigmas = sigmas.filter(|_| with_sigma);
     let below = sigmas.clone().map(|s| -s).filter(|_| both_ways);
     let names = 1 + scene.reports.len() + if with_sigma { 1 + usize::from(both_ways) } else { 0 };
     curve::range(deviations.chain(sigmas).chain(below), names)
@@ -126,16 +134,20 @@ pub(super) fn panes(scene: &PathScene<'_>) -> Pane {
         let change = p.joints_after? - p.joints_before?;
         Some([change.min().to_degrees(), change.max().to_degrees()])
     });
+    let changes: Vec<f64> = changes.flatten().collect();
+    let changed = !changes.is_empty();
     let others = [
         view("Angle of the tool's deviation [°]", "deviation/angle", of_angle),
-        view("Change of the joints, after − before [°]", "joints/change", curve::range(changes.flatten(), 6)),
+        view("Change of the joints, after − before [°]", "joints/change", curve::range(changes, 6)),
     ];
+    // Joints that nothing changes have no curve.
+    let others = others.into_iter().take(if changed { 2 } else { 1 });
     if scene.reports.iter().any(has_normals) {
         let of_normal = range(scene, |d| d.normal_mm, true, true);
         let normal = view("Deviation along the normal [mm] over the path", "deviation/normal", of_normal);
         let second = Pane::Tabs(std::iter::once(size).chain(others).collect());
         Pane::Row(vec![(1.0, normal), (1.0, second)])
     } else {
-        Pane::Row(vec![(1.0, size), (1.0, Pane::Tabs(others.into_iter().rev().collect()))])
+        Pane::Row(vec![(1.0, size), (1.0, Pane::Tabs(others.rev().collect()))])
     }
 }

@@ -255,9 +255,24 @@ fn label(run: &[&PathPoint], status: &str) -> (Point3<f64>, String) {
     };
     let same = run.iter().all(|point| point.reason == first.reason);
     let which = if same { "" } else { " (the first)" };
-    let reason = first.reason.as_deref().map(|r| format!(": {r}{which}")).unwrap_or_default();
+    let reason = first.reason.as_deref().map(|r| format!(": {}{which}", short(r))).unwrap_or_default();
     (intended(middle), format!("{place} {status}{reason}"))
 }
+
+/// A reason as long as a label in a picture may be; the text beside it has the whole.
+fn short(reason: &str) -> String {
+    let mut out = String::new();
+    for word in reason.split_whitespace() {
+        if out.chars().count() + word.chars().count() >= LABEL {
+            return out + " …";
+        }
+        out.extend([if out.is_empty() { "" } else { " " }, word]);
+    }
+    out
+}
+
+/// Characters of a reason that a label shows.
+const LABEL: usize = 36;
 
 fn xyz(p: &Point3<f64>) -> [f32; 3] {
     [p.x as f32, p.y as f32, p.z as f32]

@@ -51,7 +51,7 @@ fn block(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
     for &k in &plan.befores {
         columns.push((plan.before_name(scene, k), scene.reports[k].block(|p| p.before)));
     }
-    for report in scene.reports {
+    for report in scene.reports.iter().filter(|report| rewritten(report)) {
         let left = if report.after == After::PredictedRemainder { " (remainder)" } else { "" };
         columns.push((format!("after · {}{left}", report.model), report.block(|p| p.after)));
     }
@@ -83,10 +83,16 @@ fn block(text: &mut String, scene: &PathScene<'_>, plan: &Plan<'_>) {
     text.push('\n');
 }
 
+/// Whether a report says anything of a path after a correction.
+fn rewritten(report: &PathReport) -> bool {
+    report.points.iter().any(|point| point.after.is_some())
+}
+
 /// What "after" is, and how far it may be trusted.
 fn meaning(text: &mut String, scene: &PathScene<'_>) {
     for report in scene.reports {
         let kind = match report.after {
+            _ if !rewritten(report) => "nothing is rewritten",
             After::PredictedRemainder => {
                 "*after* is the **predicted remainder** (rounding, interpolation, inverse kinematics), not what the arm will do"
             }

@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use super::blank::blank;
 use super::candidate::{Bounds, Candidate, FREE_MM, sensor_mm};
 use super::rival::{Question, asks};
+use super::roads::Roads;
 use super::sight::clearance_mm;
 use super::space::Watch;
 use super::wanted::Wanted;
@@ -116,16 +117,25 @@ pub struct Row {
     pub stops: Vec<Joints>,
 }
 
-/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited, or two poses, from 1,
-/// between which no way is clear.
+/// By which ways the arm goes from pose to pose where the straight one is not clear.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ways<'a> {
+    /// Places to stop at: one, or two.
+    pub(super) known: &'a [Joints],
+    /// What is gone along where those do not do.
+    pub(super) roads: Option<&'a Roads>,
+}
+
+/// Orders the poses and their visits. Hands back the poses in the order in which they are first visited; `None` where no way
+/// between two of them is found.
 pub(super) fn schedule(
     wanted: &Wanted<'_>,
     poses: Vec<Candidate>,
     visits: &Visits,
     bounds: &Bounds,
-    known: &[Joints],
+    ways: &Ways<'_>,
     seed: u64,
-) -> Result<(Vec<Candidate>, Vec<Row>), (usize, usize)> {
+) -> Option<(Vec<Candidate>, Vec<Row>)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x006f_7264_6572);
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.shuffle(&mut random);
@@ -187,15 +197,15 @@ pub(super) fn schedule(
     let mut rows: Vec<Row> = posed_rows.collect();
     for k in 1..rows.len() {
         let (from, to) = (poses[rows[k - 1].pose].joints, rows[k].approach_from);
-        let numbers = (rows[k - 1].pose + 1, rows[k].pose + 1);
-        let stops = watch.stops(&from, &to, known);
-        rows[k].stops = stops.ok_or(numbers)?;
+        let pose = &poses[rows[k].pose].joints;
+        let stops = watch.stops(&from, &to, ways.known);
+        rows[k].stops = stops.or_else(|| ways.roads?.stops(&watch, &from, pose, &to))?;
         let places: Vec<Joints> =
             std::iter::once(from).chain(rows[k].stops.iter().copied()).chain([to]).collect();
         let anchor = poses[rows[k].pose].anchor;
         rows[k].rough_way = !places.windows(2).all(|way| clear(wanted, bounds, &way[0], &way[1], anchor));
     }
-    Ok((poses, rows))
+    Some((poses, rows))
 }
 
 /// The same order with poses put off that are not reached clearly from the one before.

@@ -305,6 +305,67 @@ fn too_narrow_bounds_say_what_failed() {
     assert_eq!(plan(&wanted, &options), Err(PlanError::IndexOfQuestions));
 }
 
+/// Boxes that stand between the poses: the arm goes round them over as many stops as it takes, and what lies behind a box is not
+/// chosen. The classes: a plan that is refused although the arm could measure, for one pose or one way of many; and a way that is
+/// called clear although a link enters a box between two places that were looked at.
+#[test]
+fn boxes_between_the_poses_are_gone_round() {
+    let (frames, nominal) = (tracker(), nominal());
+    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    // Walls before and behind the arm.
+    let boxes =
+        [[[150.0, -20.0, 0.0], [900.0, 20.0, 2000.0]], [[-900.0, -20.0, 0.0], [-150.0, 20.0, 2000.0]]];
+    let mut options = Options { poses: 15, candidates: 200, ..Options::default() };
+    options.bounds.space.boxes_mm = boxes.to_vec();
+    (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (48.0, options.visits.approach_rad);
+    for seed in 0..2 {
+        options.seed = seed;
+        let found = plan(&wanted, &options).unwrap();
+        assert_eq!(found.poses.len(), options.poses);
+        for k in 1..found.rows.len() {
+            let row = &found.rows[k];
+            let (before, to) = (found.poses[found.rows[k - 1].pose].joints, found.poses[row.pose].joints);
+            let places: Vec<Joints> = std::iter::once(before)
+                .chain(row.stops.iter().copied())
+                .chain([row.approach_from, to])
+                .collect();
+            for way in places.windows(2) {
+                // Looked at elsewhere than the plan looks.
+                for share in (0..=150).map(|k| f64::from(k) / 150.0) {
+                    let away = least_away(&nominal, &frames, &way[0].lerp(&way[1], share), &boxes);
+                    // By two millimetres at the most links come nearer than they are thick.
+                    assert!(away > -2.0, "seed {seed}, row {k}: {away} mm");
+                }
+            }
+        }
+    }
+    // Neither side has as many as are asked for.
+    (options.poses, options.seed) = (150, 0);
+    let error = plan(&wanted, &options).unwrap_err();
+    assert!(matches!(error, PlanError::NoWay { allowed: 200, found: 50..150, wanted: 150 }), "{error}");
+    assert!(error.to_string().contains("ask for fewer poses"), "{error}");
+}
+
+/// How far the links stay from boxes beyond their radius, by points on their lines (mm); the wrist has half the radius.
+fn least_away(nominal: &Model, frames: &Frames, joints: &Joints, boxes: &[[[f64; 3]; 2]]) -> f64 {
+    let chain = nominal.at_condition(&Condition::default()).frames(joints);
+    let flange = nominal.forward(joints, &Condition::default());
+    let mut points: Vec<Vector3<f64>> = chain.origin.iter().map(|o| Vector3::from(*o)).collect();
+    points.push(flange.translation.vector);
+    points.push((flange * nalgebra::Point3::from(frames.flange_from_target.translation.vector)).coords);
+    let mut least = f64::INFINITY;
+    for (k, ends) in points.windows(2).enumerate().skip(1) {
+        for share in (0..=20).map(|k| f64::from(k) / 20.0) {
+            let p = ends[0].lerp(&ends[1], share);
+            for [low, high] in boxes {
+                let off = Vector3::from_fn(|i, _| (low[i] - p[i]).max(p[i] - high[i]).max(0.0)).norm();
+                least = least.min(off - if k < 4 { 48.0 } else { 24.0 });
+            }
+        }
+    }
+    least
+}
+
 #[test]
 fn segments_have_the_distance_of_their_closest_points() {
     let mut random = ChaCha8Rng::seed_from_u64(3);

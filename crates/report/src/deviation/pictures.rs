@@ -75,8 +75,11 @@ fn along(reports: &[&PathReport]) -> Figure {
                 .collect();
             let mut series = Series { ink, ..Series::line(name, points) };
             // The band belongs to the path that will be run: after, or before where nothing was rewritten.
-            if single && (after || !has(report, AFTER)) && kept.iter().any(|p| p.sigma_mm.is_some()) {
-                let sigmas: Vec<f64> = kept.iter().map(|p| p.sigma_mm.unwrap_or(0.0)).collect();
+            // On the way to a cut whose shape alone is corrected the arm's place counts, whose sigma would flatten the cut's.
+            let cuts = report.points.iter().any(|p| p.cutting);
+            let sigma = |p: &PathPoint| p.sigma_mm.filter(|_| p.cutting || !cuts);
+            if single && (after || !has(report, AFTER)) && kept.iter().any(|p| sigma(p).is_some()) {
+                let sigmas: Vec<f64> = kept.iter().map(|p| sigma(p).unwrap_or(0.0)).collect();
                 series = series.plus_minus(&sigmas);
                 if quantity(reports) != SIGNED {
                     // A size is never negative.
@@ -99,7 +102,7 @@ fn along(reports: &[&PathReport]) -> Figure {
     let mut caption = String::from("Deviation at each point of the path, approaches and links included.");
     if band {
         caption
-            .push_str(" The band is the predicted ±1σ of the model: where the real arm is expected to run.");
+            .push_str(" The band is the predicted ±1σ of the model along the cut: where the real arm is expected to run.");
     }
     for (under, over) in covered {
         caption.push_str(&format!(

@@ -4,7 +4,7 @@ use super::side::{AFTER, BEFORE, Side};
 use super::words::{decimals, meaning};
 use crate::document::Verdict;
 use crate::status::Status;
-use truegrind_compensation::deviation::{After, PathReport, Status as Fate};
+use truegrind_compensation::deviation::{PathReport, Status as Fate};
 
 /// A path that was judged: its largest deviation (mm) as programmed and as rewritten.
 type Judged<'a> = (&'a PathReport, f64, f64);
@@ -76,13 +76,13 @@ fn headline(reports: &[&PathReport], judged: &[Judged<'_>]) -> String {
             let worst = reports.iter().filter_map(|report| largest(report, BEFORE)).reduce(f64::max);
             format!("The path as it is deviates by up to {}; no rewritten path was judged", known(worst))
         }
-        [(report, before, after)]
-            if report.after == After::PredictedRemainder && report.sigma_rms_mm().is_some() =>
-        {
-            let sigma = report.sigma_rms_mm().unwrap_or(0.0);
+        [(report, ..)] if report.expected_mm().is_some() => {
+            // Sizes both: what is expected has no sign along a surface.
+            let before = report.cut().filter_map(|p| p.before.map(|d| d.norm_mm())).reduce(f64::max);
             format!(
-                "The largest deviation goes from {before:.3} mm to an expected {:.3} mm (1σ); held-out error of the model {}",
-                after.hypot(sigma),
+                "The largest deviation goes from {} to an expected {} (1σ); held-out error of the model {}",
+                known(before),
+                known(report.expected_mm()),
                 known(report.held_out_mm),
             )
         }

@@ -17,6 +17,9 @@ const SECTIONS_FOR_CONTENTS: usize = 4;
 /// A cell longer than this is a sentence.
 const SENTENCE: usize = 40;
 
+/// A column whose cells are no longer than this keeps them on one line.
+const SHORT: usize = 16;
+
 /// Rows from which a table scrolls inside the page.
 const ROWS_TO_SCROLL: usize = 24;
 
@@ -69,6 +72,10 @@ pub fn table(table: &Table) -> String {
             words && (0..table.rows.len()).any(|row| table.shown(row, column).chars().count() > SENTENCE)
         })
         .collect();
+    // A short word or a status is not broken, which would double the height of every row.
+    let short: Vec<bool> = (0..table.columns.len())
+        .map(|column| (0..table.rows.len()).all(|row| table.shown(row, column).chars().count() <= SHORT))
+        .collect();
     for row in 0..table.rows.len() {
         html.push_str("<tr>");
         for (index, column) in table.columns.iter().enumerate() {
@@ -78,7 +85,11 @@ pub fn table(table: &Table) -> String {
                 }
                 _ => escape(&table.shown(row, index)),
             };
-            let class = if sentences[index] { " class=\"words\"" } else { side(column.alignment()) };
+            let class = match column.alignment() {
+                Alignment::Left if sentences[index] => " class=\"words\"",
+                Alignment::Left if short[index] => " class=\"short\"",
+                other => side(other),
+            };
             html.push_str(&format!("<td{class}>{shown}</td>"));
         }
         html.push_str("</tr>\n");

@@ -106,8 +106,8 @@ fn a_table_in_html() {
     <caption>Parameters, &lt;raw&gt;</caption>
     <thead><tr><th scope="col">Name</th><th scope="col" class="number">Change <span class="unit">mm</span></th><th scope="col" class="number">Rows</th><th scope="col" class="number">Max <span class="unit">mm</span></th><th scope="col">State</th></tr></thead>
     <tbody>
-    <tr><td>a|1 &quot;x&quot;</td><td class="number">0.300 ± 0.013</td><td class="number">480</td><td class="number">-0.333</td><td><span class="status good"><span aria-hidden="true">✓</span> kept, as is</span></td></tr>
-    <tr><td>d_2</td><td class="number">–</td><td class="number">–</td><td class="number">–</td><td>–</td></tr>
+    <tr><td class="short">a|1 &quot;x&quot;</td><td class="number">0.300 ± 0.013</td><td class="number">480</td><td class="number">-0.333</td><td class="short"><span class="status good"><span aria-hidden="true">✓</span> kept, as is</span></td></tr>
+    <tr><td class="short">d_2</td><td class="number">–</td><td class="number">–</td><td class="number">–</td><td class="short">–</td></tr>
     </tbody>
     </table>
     </div>

@@ -19,8 +19,15 @@ use truegrind_math::se3::Pose;
 /// Below this sine of the angle between them two axes are taken by Hayati's form: 0.5°, as the check of data sheets has it.
 const PARALLEL: f64 = 0.0087;
 
-/// Axes that are closer than this meet (mm).
-const MEET_MM: f64 = 1e-9;
+/// Axes that are closer than this meet (mm). Every joint may be moved by so much, and all of them together stay a hundred times
+/// below the nanometre within which an arm agrees with its file; a product of transforms is off by less.
+const MEET_MM: f64 = 1e-11;
+
+/// A first axis that leans by less is upright (rad): ten picometres at the end of a metre.
+const SAME_RAD: f64 = 1e-14;
+
+/// What a place (mm) and an angle (°) have to be for the digits of [`Laid::note`] to show them.
+const SHOWN: [f64; 2] = [5e-4, 5e-5];
 
 /// Links, and where they were laid.
 #[derive(Debug, Clone)]
@@ -97,7 +104,7 @@ fn base((point, direction): &(Point3<f64>, UnitVector3<f64>)) -> (Pose, f64) {
     // Upright whichever way round the file counts joint 1.
     let turn = if direction.z < -1.0 + 1e-9 { -1.0 } else { 1.0 };
     let z = direction.into_inner() * turn;
-    let upright = (z - Vector3::z()).norm() < 1e-12;
+    let upright = (z - Vector3::z()).norm() < SAME_RAD;
     let foot = point - z * z.dot(&point.coords);
     let foot = if foot.coords.norm() < MEET_MM { Point3::origin() } else { foot };
     if upright {
@@ -204,12 +211,12 @@ impl Laid {
         if self.first_turn < 0.0 {
             parts.push("joint 1 turns clockwise seen from above".to_owned());
         }
-        if self.base != Pose::identity() {
-            let place = self.base.translation.vector;
-            let [roll, pitch, yaw] = {
-                let (r, p, y) = self.base.rotation.euler_angles();
-                [r, p, y].map(f64::to_degrees)
-            };
+        let place = self.base.translation.vector;
+        let [roll, pitch, yaw] = {
+            let (r, p, y) = self.base.rotation.euler_angles();
+            [r, p, y].map(f64::to_degrees)
+        };
+        if place.amax() >= SHOWN[0] || [roll, pitch, yaw].iter().any(|angle| angle.abs() >= SHOWN[1]) {
             parts.push(format!(
                 "axis 1 is not the z axis of the file's base: positions are those of a base on axis 1, which lies at \
                  ({:.3}, {:.3}, {:.3}) mm in the file's, turned by roll {roll:.4}°, pitch {pitch:.4}°, yaw {yaw:.4}°",

@@ -1,0 +1,129 @@
+//! Ways between poses where boxes stand between them: along poses that are clear of each other's way.
+//!
+//! Method: a probabilistic roadmap (Kavraki et al. 1996) over the candidates, whose joints are random and clear already; each is
+//! joined to the nearest ones that it reaches straight. What hangs together can be visited in any order; the rest is left out of the choice.
+//! Departures: near is counted in the first three joints, since the wrist seldom stands in its own way; the way that is found is
+//! shortened where a straight one is clear.
+
+use super::space::Watch;
+use truegrind_arm::model::Joints;
+
+/// Neighbours that each place is joined to, where the way is clear.
+const NEAREST: usize = 12;
+
+/// What a turn of the wrist counts of one of the first three joints.
+const WRIST: f64 = 0.2;
+
+/// Places, and the straight ways between them that are clear.
+#[derive(Debug)]
+pub(super) struct Roads {
+    places: Vec<Joints>,
+    /// For each place, the places that are reached, with the largest turn of a joint (rad).
+    ways: Vec<Vec<(usize, f64)>>,
+}
+
+impl Roads {
+    /// The ways between places that are clear themselves.
+    pub(super) fn between(places: Vec<Joints>, watch: &Watch<'_>) -> Self {
+        let mut ways: Vec<Vec<(usize, f64)>> = vec![Vec::new(); places.len()];
+        for (i, from) in places.iter().enumerate() {
+            let mut near: Vec<(usize, f64)> =
+                (0..places.len()).filter(|&j| j != i).map(|j| (j, apart(from, &places[j]))).collect();
+            near.sort_by(|a, b| a.1.total_cmp(&b.1));
+            near.truncate(NEAREST);
+            for (j, _) in near {
+                let known = ways[i].iter().any(|(other, _)| *other == j);
+                if !known && watch.way_is_clear(from, &places[j]) {
+                    let turn = (from - places[j]).amax();
+                    ways[i].push((j, turn));
+                    ways[j].push((i, turn));
+                }
+            }
+        }
+        Self { places, ways }
+    }
+
+    /// The places of the largest part that hangs together, in their order.
+    pub(super) fn largest(&self) -> Vec<usize> {
+        let mut part: Vec<Option<usize>> = vec![None; self.places.len()];
+        let mut best: Vec<usize> = Vec::new();
+        for start in 0..self.places.len() {
+            if part[start].is_some() {
+                continue;
+            }
+            part[start] = Some(start);
+            let (mut members, mut at) = (vec![start], 0);
+            while let Some(place) = members.get(at).copied() {
+                at += 1;
+                for (next, _) in &self.ways[place] {
+                    if part[*next].is_none() {
+                        part[*next] = Some(start);
+                        members.push(*next);
+                    }
+                }
+            }
+            if members.len() > best.len() {
+                best = members;
+            }
+        }
+        best.sort_unstable();
+        best
+    }
+
+    /// Stops between a place and where the approach to another begins. `None` where no way leads there.
+    pub(super) fn stops(
+        &self,
+        watch: &Watch<'_>,
+        from: &Joints,
+        to: &Joints,
+        approach: &Joints,
+    ) -> Option<Vec<Joints>> {
+        let place = |joints: &Joints| self.places.iter().position(|place| place == joints);
+        let mut all: Vec<Joints> =
+            self.shortest(place(from)?, place(to)?)?.into_iter().map(|place| self.places[place]).collect();
+        // The way from the pose to where its approach begins is clear.
+        all.push(*approach);
+        let (mut out, mut at) = (Vec::new(), 0);
+        while at + 1 < all.len() {
+            let next = (at + 2..all.len()).rev().find(|&next| watch.way_is_clear(&all[at], &all[next]));
+            at = next.unwrap_or(at + 1);
+            out.push(all[at]);
+        }
+        out.pop();
+        Some(out)
+    }
+
+    /// The places on the shortest way, both ends included (Dijkstra).
+    fn shortest(&self, from: usize, to: usize) -> Option<Vec<usize>> {
+        let count = self.places.len();
+        let (mut length, mut before) = (vec![f64::INFINITY; count], vec![from; count]);
+        let mut open = vec![true; count];
+        length[from] = 0.0;
+        loop {
+            let next = (0..count).filter(|&i| open[i]).min_by(|&a, &b| length[a].total_cmp(&length[b]))?;
+            if length[next].is_infinite() {
+                return None;
+            }
+            if next == to {
+                break;
+            }
+            open[next] = false;
+            for &(other, turn) in &self.ways[next] {
+                if length[next] + turn < length[other] {
+                    length[other] = length[next] + turn;
+                    before[other] = next;
+                }
+            }
+        }
+        let mut out = vec![to];
+        while let Some(last) = out.last().copied().filter(|last| *last != from) {
+            out.push(before[last]);
+        }
+        out.reverse();
+        Some(out)
+    }
+}
+
+fn apart(a: &Joints, b: &Joints) -> f64 {
+    (0..6).map(|j| (a[j] - b[j]).abs() * if j < 3 { 1.0 } else { WRIST }).sum()
+}
