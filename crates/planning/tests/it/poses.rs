@@ -309,14 +309,16 @@ fn too_narrow_bounds_say_what_failed() {
 /// chosen. The class: a plan that is refused although the arm could measure, for one pose or one way of many.
 #[test]
 fn boxes_between_the_poses_are_gone_round() {
-    let (frames, nominal) = (tracker(), nominal());
+    let (mut frames, nominal) = (tracker(), nominal());
+    frames.flange_from_target.translation.vector = Vector3::new(38.0, 12.0, 61.0);
     let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
     // Walls before and behind the arm.
     let boxes =
         [[[150.0, -20.0, 0.0], [900.0, 20.0, 2000.0]], [[-900.0, -20.0, 0.0], [-150.0, 20.0, 2000.0]]];
     let mut options = Options { poses: 15, candidates: 200, ..Options::default() };
     options.bounds.space.boxes_mm = boxes.to_vec();
-    (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (48.0, options.visits.approach_rad);
+    (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (60.0, options.visits.approach_rad);
+    options.bounds.space.floor_mm = Some(0.0);
     for seed in 0..2 {
         options.seed = seed;
         let found = plan(&wanted, &options).unwrap();
@@ -358,7 +360,7 @@ fn least_away(nominal: &Model, frames: &Frames, joints: &Joints, boxes: &[[[f64;
             let p = ends[0].lerp(&ends[1], share);
             for [low, high] in boxes {
                 let off = Vector3::from_fn(|i, _| (low[i] - p[i]).max(p[i] - high[i]).max(0.0)).norm();
-                least = least.min(off - if k < 4 { 48.0 } else { 24.0 });
+                least = least.min(off - if k < 4 { 60.0 } else { 30.0 });
             }
         }
     }
