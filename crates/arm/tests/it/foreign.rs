@@ -582,14 +582,17 @@ fn what_is_exported_comes_back() {
 /// angles as files write them, π with eleven digits, so that axes which are meant to meet do so by half a nanometre.
 #[test]
 fn what_is_tidied_away_does_not_add_up() {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    // As files write them, and not as they are.
+    let [pi, half] = [PI, FRAC_PI_2].map(|angle| (1e11 * angle).round() / 1e11);
     let steps: [([f64; 3], [f64; 3]); 7] = [
-        ([0.0, 0.0, 0.16], [0.0, 3.14159265359, 0.0]),
-        ([0.0, 0.0, -0.12], [-1.57079632679, 0.0, 3.14159265359]),
-        ([0.0, -0.4, 0.0], [0.0, 3.14159265359, 0.0]),
-        ([0.0, 0.21, -0.01], [-1.57079632679, 0.0, 3.14159265359]),
-        ([0.0, 0.0, -0.1], [1.57079632679, 0.0, 3.14159265359]),
-        ([0.0, 0.1, 0.0], [-1.57079632679, 0.0, 3.14159265359]),
-        ([0.0, 0.0, -0.16], [3.14159265359, 1.57079632679, 0.0]),
+        ([0.0, 0.0, 0.16], [0.0, pi, 0.0]),
+        ([0.0, 0.0, -0.12], [-half, 0.0, pi]),
+        ([0.0, -0.4, 0.0], [0.0, pi, 0.0]),
+        ([0.0, 0.21, -0.01], [-half, 0.0, pi]),
+        ([0.0, 0.0, -0.1], [half, 0.0, pi]),
+        ([0.0, 0.1, 0.0], [-half, 0.0, pi]),
+        ([0.0, 0.0, -0.16], [pi, half, 0.0]),
     ];
     let place = |(xyz, rpy): &([f64; 3], [f64; 3])| {
         let turn = UnitQuaternion::from_euler_angles(rpy[0], rpy[1], rpy[2]);

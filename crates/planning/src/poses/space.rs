@@ -29,32 +29,14 @@ pub(super) struct Watch<'a> {
     space: &'a Space,
     wanted: &'a Wanted<'a>,
     arm: PreparedModel<'a>,
-    /// How far a point of the arm moves at most for each rad of a controller's joint (mm).
-    levers_mm: [f64; 6],
 }
 
-/// Between two looks at a way the arm moves by at least this (mm): a link comes nearer than its radius by no more than half of it.
-const STEP_MM: f64 = 4.0;
+/// The largest step of a joint between two looks at a way (rad).
+const STEP_RAD: f64 = 0.05;
 
 impl<'a> Watch<'a> {
     pub(super) fn of(wanted: &'a Wanted<'a>, space: &'a Space) -> Self {
-        let arm = wanted.nominal.at_condition(&Condition::default());
-        let points = Self::points(wanted, &arm, &Joints::zeros());
-        // Behind each link's axis the arm is as long as its lines together.
-        let behind =
-            |link: usize| points[link..].windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
-        let turns = &wanted.nominal.joint_map;
-        let lever = |joint: usize| (0..6).map(|link| turns[(link, joint)].abs() * behind(link)).sum();
-        Self { space, wanted, levers_mm: std::array::from_fn(lever), arm }
-    }
-
-    /// The origins of the joint frames, the flange and the touched point.
-    fn points(wanted: &Wanted<'_>, arm: &PreparedModel<'_>, joints: &Joints) -> Vec<Vector3<f64>> {
-        let frames = arm.frames(joints);
-        let flange = frames.last() * wanted.nominal.flange;
-        let touched = flange * Point3::from(wanted.frames.flange_from_target.translation.vector);
-        let origins = frames.origin.iter().map(|origin| Vector3::from(*origin));
-        origins.chain([flange.translation.vector, touched.coords]).collect()
+        Self { space, wanted, arm: wanted.nominal.at_condition(&Condition::default()) }
     }
 
     /// Whether there is anything to look for.
@@ -64,31 +46,21 @@ impl<'a> Watch<'a> {
 
     /// Whether the arm stands clear with these joints.
     pub(super) fn stands_clear(&self, joints: &Joints) -> bool {
-        self.room_mm(joints) >= 0.0
-    }
-
-    /// At least how far the arm may move from here before a link is nearer than its radius (mm); negative where one is.
-    fn room_mm(&self, joints: &Joints) -> f64 {
         if !self.looks() {
-            return f64::INFINITY;
+            return true;
         }
-        let points = Self::points(self.wanted, &self.arm, joints);
-        let mut room = f64::INFINITY;
-        for segment in 1..points.len() - 1 {
-            let (a, b) = (&points[segment], &points[segment + 1]);
-            let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
+        let frames = self.arm.frames(joints);
+        let flange = frames.last() * self.wanted.nominal.flange;
+        let touched = flange * Point3::from(self.wanted.frames.flange_from_target.translation.vector);
+        let origins = frames.origin.iter().map(|origin| Vector3::from(*origin));
+        let points: Vec<Vector3<f64>> = origins.chain([flange.translation.vector, touched.coords]).collect();
+        let radius = |segment: usize| self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
+        (1..points.len() - 1).all(|segment| {
+            let (a, b, radius) = (&points[segment], &points[segment + 1], radius(segment));
             // The end of the column stands where it stands.
-            if let Some(floor) = self.space.floor_mm {
-                room = room.min(b.z - radius - floor);
-            }
-            for corners in &self.space.boxes_mm {
-                room = room.min(away(a, b, corners, radius));
-            }
-            if room < 0.0 {
-                break;
-            }
-        }
-        room
+            let above = self.space.floor_mm.is_none_or(|floor| b.z - radius >= floor);
+            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, radius))
+        })
     }
 
     /// Whether it stays clear while all joints run evenly from one place to another.
@@ -96,18 +68,8 @@ impl<'a> Watch<'a> {
         if !self.looks() {
             return true;
         }
-        // From each place as far as no link can come nearer than its radius (conservative advancement).
-        let whole_mm: f64 =
-            (to - from).iter().zip(self.levers_mm).map(|(turn, lever)| turn.abs() * lever).sum();
-        let mut share = 0.0;
-        while share < 1.0 {
-            let room = self.room_mm(&from.lerp(to, share));
-            if !(room >= 0.0) {
-                return false;
-            }
-            share += room.max(STEP_MM) / whole_mm.max(f64::MIN_POSITIVE);
-        }
-        self.stands_clear(to)
+        let steps = ((to - from).amax() / STEP_RAD).ceil().max(1.0);
+        (0..=steps as usize).all(|k| self.stands_clear(&from.lerp(to, k as f64 / steps)))
     }
 
     /// Whether a pose can be approached from these sides, and from the opposite ones.
@@ -160,11 +122,14 @@ const WRIST: usize = 4;
 const MOST_STOPS: usize = 200;
 const MOST_PAIRS: usize = 2000;
 
-/// At least how far a capsule is away from a box (mm), negative where it reaches into it. Most are told by their middles.
-fn away(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> f64 {
-    let middle = outside(&((a + b) * 0.5), corners) - radius;
-    let surely = middle - 0.5 * (b - a).norm();
-    if surely >= 0.0 || middle < 0.0 { surely } else { to_box(a, b, corners) - radius }
+/// Whether a capsule keeps off a box. Most are told by their middles.
+fn keeps_off(a: &Vector3<f64>, b: &Vector3<f64>, corners: &[[f64; 3]; 2], radius: f64) -> bool {
+    let middle = (a + b) * 0.5;
+    let away = outside(&middle, corners);
+    if away >= radius + 0.5 * (b - a).norm() {
+        return true;
+    }
+    away >= radius && to_box(a, b, corners) >= radius
 }
 
 /// Distance of a point from a box (mm), 0 inside.
