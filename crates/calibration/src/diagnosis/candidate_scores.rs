@@ -110,6 +110,10 @@ impl<'a> CandidateScores<'a> {
         if open {
             self.add_open(design, &mut out);
         }
+        // A joint that yields only in an arm that leans is no cause before another one shows that it does.
+        if !Cause::lean_is_seen(&self.fit.causes) {
+            out.retain(|s| !s.candidate.cause.needs_lean());
+        }
         for scored in &mut out {
             if self.fit.causes.iter().any(|c| c.same_story(&scored.candidate.cause)) {
                 scored.score.merit += CLOSER;

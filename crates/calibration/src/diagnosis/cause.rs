@@ -4,6 +4,7 @@ use crate::identification::tolerance::{Tolerance, effect_sigma};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use crate::measurement::sensor::form::Form;
 use truegrind_arm::effect::Effect;
+use truegrind_arm::model::Model;
 
 /// What may be wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,12 @@ pub enum Part {
 
 /// Knots of an error map over a turn: a smooth curve.
 pub const MAP_KNOTS: usize = 24;
+
+/// Cosine of the angle between two axes from which they are parallel.
+const PARALLEL: f64 = 0.99;
+
+/// Share of its square from which an error of two joints goes with one of sum and difference.
+const MOSTLY: f64 = 0.9;
 
 impl Cause {
     /// The contract name.
@@ -103,6 +110,42 @@ impl Cause {
             Cause::Measurement(Disturbance { kind: Kind::Form(form), .. }) => form.is_of_the_arm(),
             Cause::Measurement(_) => false,
         }
+    }
+
+    /// Whether weight does this only because the arm leans: gravity pulls along axes of the base that are none of its own.
+    pub fn leans(&self) -> bool {
+        let Cause::Arm(Effect::LumpedCompliance(load)) = self else { return false };
+        load.lump.iter().all(|lump| lump.axis.is_some())
+    }
+
+    /// Whether it says that the first joint yields because the arm leans. Its axis is that of the base, along which weight turns
+    /// nothing; in an arm that leans the joints behind it, which carry weight already, yield to that too.
+    pub fn needs_lean(&self) -> bool {
+        self.leans() && self.joints() == [0]
+    }
+
+    /// Whether another cause says that the arm leans.
+    pub fn lean_is_seen(causes: &[Self]) -> bool {
+        causes.iter().any(|cause| cause.leans() && !cause.needs_lean())
+    }
+
+    /// Whether it is an error of two neighbouring joints with parallel axes that goes with the angle in which weight turns: what a
+    /// spring does, or play whose flank follows the load, with a law that nobody has described.
+    pub fn goes_with_weight(&self, nominal: &Model) -> bool {
+        let Cause::Measurement(Disturbance { kind: Kind::Form(form), values, .. }) = self else {
+            return false;
+        };
+        let (Form::TwoJointGear { joint, other }, [a, b, c, d]) = (*form, values.as_slice()) else {
+            return false;
+        };
+        let (first, last) = (joint.min(other), joint.max(other));
+        let between = nominal.links[first].alpha_rad.cos();
+        if last != first + 1 || between.abs() < PARALLEL {
+            return false;
+        }
+        let (sum, difference) = (a * a + b * b, c * c + d * d);
+        let with_weight = if between > 0.0 { sum } else { difference };
+        with_weight > MOSTLY * (sum + difference)
     }
 
     /// Whether only the shape of it is known, not the law: a form.

@@ -226,12 +226,12 @@ impl Confirming<'_> {
             .collect()
     }
 
-    /// Sides that were taken from the order of the rows say nothing that a reading before rest does not say too: where that was
-    /// found, or where the joint went by steps of one size, so that side and step are the same.
+    /// Sides that were taken from the order of the rows say nothing that a reading before rest, or one that is late, does not say
+    /// too: where that was found, or where the joint went by steps of one size, so that side and step are the same.
     fn told_otherwise(&self, cause: &Cause) -> bool {
         let Cause::Arm(Effect::Backlash(backlash)) = cause else { return false };
-        self.sides_from_order
-            && (self.found.causes.iter().any(|c| c.name() == "unsettled") || self.steps_alike(backlash.joint))
+        let lags = self.found.causes.iter().any(|c| ["unsettled", "latency"].contains(&c.name()));
+        self.sides_from_order && (lags || self.steps_alike(backlash.joint))
     }
 
     /// Whether the steps of a joint, where it moved, are nearly of one size.

@@ -132,14 +132,30 @@ pub(super) fn mismatch_finding(
     })
 }
 
+/// Where a fault of which only the shape is known moves readings by this many times less than the farthest of them is off, that is
+/// no remainder of the fault.
+const REMAINDER: f64 = 6.0;
+
+/// Single readings far beyond the others, `off_mm` the farthest of them. `rough_mm` is what faults move readings by (RMS) of which only
+/// the shape is known: where their law is farthest off, readings look wild too.
 pub(super) fn outlier_finding(
     dataset: &Dataset,
     wild: &[(usize, f64)],
+    (off_mm, rough_mm): (f64, f64),
     after: &StageError,
 ) -> Option<Finding> {
     if wild.is_empty() {
         return None;
     }
+    let remainder = off_mm < REMAINDER * rough_mm;
+    let doubts = if remainder {
+        vec![format!(
+            "they are off by up to {off_mm:.3} mm where something of which only the shape is known moves readings by {rough_mm:.3} mm: they \
+             may be what its law leaves"
+        )]
+    } else {
+        Vec::new()
+    };
     let mut list: Vec<usize> = wild.iter().map(|(i, _)| dataset.rows[*i].number).collect();
     list.sort_unstable();
     Some(Finding {
@@ -149,7 +165,7 @@ pub(super) fn outlier_finding(
             list.len(),
             wild[0].1
         ),
-        confidence: Confidence::Identified,
+        confidence: if remainder { Confidence::Ambiguous } else { Confidence::Identified },
         rows: None,
         row_list: Some(list),
         joints: None,
@@ -160,7 +176,7 @@ pub(super) fn outlier_finding(
         non_centrality: None,
         gain: Gain { cv_rmse_before_mm: after.random.rmse, cv_rmse_after_mm: after.random.rmse },
         worth_mm: None,
-        doubts: Vec::new(),
+        doubts,
         sessions: Vec::new(),
         alternatives: Vec::new(),
         remedy: words::remedy("outliers").to_owned(),

@@ -80,6 +80,8 @@ pub struct Reduction {
 pub struct Linear {
     pub(super) observations: usize,
     pub(super) per: usize,
+    /// How many witnesses a row is, on average.
+    pub(super) witnesses: f64,
     /// Jᵀ, p × n.
     pub(super) rows: DMatrix<f64>,
     /// JᵀJ + Λ, once somebody asked for it.
@@ -189,6 +191,7 @@ impl Linear {
         Self {
             observations,
             per,
+            witnesses: fit.witnesses,
             rows: transposed,
             normal: OnceLock::new(),
             residual,
@@ -244,6 +247,7 @@ impl Linear {
         Self {
             observations: rows.ncols() / self.per.max(1),
             per: self.per,
+            witnesses: self.witnesses,
             rows,
             normal: OnceLock::new(),
             residual,

@@ -1,5 +1,7 @@
 //! The whole diagnosis of one data set.
 
+use super::cause::Cause;
+use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
 pub use super::options::Options;
@@ -111,8 +113,7 @@ pub fn diagnose(
     let (mut diagnosis, pictures) = summed_up(&search, &confirmed, told, robot, notes);
     diagnosis.poses_needed = needed;
     let of_all = thinned.is_none().then_some(&confirmed.outcome.discrepancy);
-    let written = written(&subject, &search.extended, &certain, of_all);
-    let written_stage = search.validation.stage(&written);
+    let (written, written_stage) = proven(&search, &certain, of_all);
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
     let (estimated, benefit) = estimated(&ground, robot, &written, &stages, &diagnosis, &search.set_aside);
@@ -129,6 +130,34 @@ pub fn diagnose(
         finding_of_cause,
         pictures,
     })
+}
+
+/// The arm for compensation, with its errors: its causes only where they are worth it on rows that were held out, at random and in
+/// blocks. Programs are moved by what is proven in this very model, not beside the causes that it leaves out.
+fn proven(
+    search: &Search<'_>,
+    certain: &[bool],
+    discrepancy: Option<&Discrepancy>,
+) -> (Extended, StageError) {
+    let subject = &search.ground.subject;
+    let of = |certain: &[bool]| {
+        let fit = written(subject, &search.extended, certain, discrepancy);
+        let errors = search.validation.stage(&fit);
+        (fit, errors)
+    };
+    let (fit, errors) = of(certain);
+    let of_the_arm = |cause: &Cause| matches!(cause, Cause::Arm(_));
+    let better =
+        |than: &StageError| errors.random.rmse < than.random.rmse && errors.blocks.rmse < than.blocks.rmse;
+    let arm_alone = fit.causes.iter().all(of_the_arm);
+    if !fit.causes.iter().any(of_the_arm) || arm_alone && better(&search.stages[1]) {
+        return (fit, errors);
+    }
+    let causes = &search.extended.causes;
+    let without: Vec<bool> =
+        certain.iter().zip(causes).map(|(sure, cause)| *sure && !of_the_arm(cause)).collect();
+    let plain = of(&without);
+    if better(&plain.1) { (fit, errors) } else { plain }
 }
 
 /// The diagnosis in the contract's terms, and a picture for each finding that has one.

@@ -253,7 +253,7 @@ impl Discrepancy {
         let columns = filter(&functions.columns, rho, numbers, linear.per);
         let design = filtered.design(dropped);
         let projected = design.project(&columns);
-        let freedom = design.rows() as f64 - filtered.spent(dropped);
+        let freedom = design.rows() as f64 * linear.witnesses - filtered.spent(dropped);
         let square = design.residual.norm_squared();
         let Variances { sizes, noise, evidence, coefficients } = marginal::variances(
             &projected.information,
@@ -299,6 +299,12 @@ impl Discrepancy {
     pub fn field_mm(&self) -> f64 {
         let fields = self.carried.iter().filter(|(group, _)| !group.in_time());
         fields.map(|(_, mm)| mm * mm).sum::<f64>().sqrt()
+    }
+
+    /// Growth of the arm in the course of the rows is worth so much (mm RMS).
+    pub fn growth_mm(&self) -> f64 {
+        let growth = self.carried.iter().find(|(group, _)| *group == Group::GrowthInTime);
+        growth.map_or(0.0, |(_, mm)| *mm)
     }
 
     /// The columns that follow the rows.

@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use super::cause::Cause;
 use super::newton::{self, Step};
+use super::repeated::Repeated;
 use crate::identification::calibration::{Calibration, Frames, Weight};
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
 use crate::identification::rounding;
@@ -71,6 +72,8 @@ pub struct Extended {
     pub sizes: Vec<f64>,
     /// Weights of the rows, Huber's not included.
     pub weights: Vec<Weight>,
+    /// How many witnesses a row is of what the model gets wrong, on average: fewer than one where poses were read again.
+    pub witnesses: f64,
     /// Standard deviation of a reading (mm), and of an orientation (rad).
     pub sigma: (f64, f64),
     /// What the solver said, with the covariance of the parameters; without it in the middle of a search.
@@ -206,6 +209,7 @@ pub(super) fn warm_fit(
     let mut sigma = near.map_or((0.1, 1e-3), |e| e.sigma);
     let mut robust_weight =
         near.filter(|e| e.robust_weight.len() == n).map_or_else(|| vec![1.0; n], |e| e.robust_weight.clone());
+    let repeated = Repeated::of(dataset);
     let mut round = 0;
     let unweighted = vec![Weight { per_mm: 1.0, per_rad: 1.0 }; n];
     let plain_task =
@@ -220,7 +224,7 @@ pub(super) fn warm_fit(
         nearby = matches!(gone, Gone::Step(_));
         (model, frames) = task.apply(&x);
         let plain = task.plain_residuals(&x);
-        let whitened = Whitened { base: &base, plain: &plain, per };
+        let whitened = Whitened { base: &base, plain: &plain, per, repeated: repeated.as_ref() };
         let of_lengths = whitened.spread(0..lengths);
         let of_angles = if angles > 0 { whitened.spread(lengths..per) } else { 1.0 };
         let sizes = whitened.sizes([lengths, angles], [of_lengths, of_angles]);
@@ -229,18 +233,16 @@ pub(super) fn warm_fit(
         let settled = (of_lengths - 1.0).abs() < 1e-2 && (of_angles - 1.0).abs() < 1e-2 && moved < 5e-2;
         if (settled && round > 1) || round >= ROUNDS {
             let spent = gone.spent(&priors);
-            let freedom_share = (((n * per) as f64 - spent) / (n * per) as f64).max(0.05);
-            let by_length = whitened.dispersion(0..lengths, &robust_weight, freedom_share);
-            let by_angle = if angles > 0 {
-                whitened.dispersion(lengths..per, &robust_weight, freedom_share)
-            } else {
-                1.0
-            };
+            let (by_length, length_witnesses) = whitened.deviations(0..lengths, &robust_weight, spent);
+            let (by_angle, angle_witnesses) = whitened.deviations(lengths..per, &robust_weight, spent);
+            let share = |count: usize| count as f64 / per as f64;
+            let witnesses = share(lengths) * length_witnesses + share(angles) * angle_witnesses;
             let weights: Vec<Weight> = base
                 .iter()
-                .map(|w| Weight {
-                    per_mm: (w.per_mm / by_length).min(FINEST.0.recip()),
-                    per_rad: (w.per_rad / by_angle).min(FINEST.1.recip()),
+                .zip(by_length.iter().zip(&by_angle))
+                .map(|(w, (length, angle))| Weight {
+                    per_mm: (w.per_mm / length).min(FINEST.0.recip()),
+                    per_rad: (w.per_rad / angle).min(FINEST.1.recip()),
                 })
                 .collect();
             let task = plain_task.reweighted(&with_robust_weights(&weights, &robust_weight));
@@ -256,6 +258,7 @@ pub(super) fn warm_fit(
                 robust_weight,
                 sizes,
                 weights,
+                witnesses,
                 sigma,
                 estimate,
                 task,
@@ -305,9 +308,18 @@ struct Whitened<'a> {
     plain: &'a [f64],
     /// Residuals of a row.
     per: usize,
+    /// Which rows are of one pose, where poses were read again.
+    repeated: Option<&'a Repeated>,
 }
 
 impl Whitened<'_> {
+    /// A residual of a row; nothing where it is no number.
+    fn scalar(&self, i: usize, c: usize) -> f64 {
+        let w = &self.base[i];
+        let value = self.plain[i * self.per + c] * if c < 3 { w.per_mm } else { w.per_rad };
+        if value.is_finite() { value } else { 0.0 }
+    }
+
     /// The sum of squares of some residuals of a row.
     fn squares(&self, i: usize, range: &Range<usize>) -> f64 {
         let w = &self.base[i];
@@ -339,6 +351,24 @@ impl Whitened<'_> {
             (0.5 * (a * a + b * b)).sqrt()
         };
         (0..self.base.len()).map(size).collect()
+    }
+
+    /// What each row deviates by, over what sensor and angles promise, when `spent` parameters are paid for, and how many witnesses
+    /// a row is: readings of one pose are fewer than they are many.
+    fn deviations(&self, range: Range<usize>, robust_weight: &[f64], spent: f64) -> (Vec<f64>, f64) {
+        let n = self.base.len();
+        if range.is_empty() {
+            return (vec![1.0; n], 1.0);
+        }
+        let scalars = (n * self.per) as f64;
+        let usual = self.dispersion(range.clone(), robust_weight, ((scalars - spent) / scalars).max(0.05));
+        let Some(repeated) = self.repeated else { return (vec![usual; n], 1.0) };
+        let share = range.len() as f64 / self.per as f64;
+        let parts = repeated.parts(&range, |i, c| self.scalar(i, c), robust_weight, share * spent);
+        let whole = parts.deviation().max(1e-6);
+        let counts = repeated.counts(&parts);
+        let witnesses = counts.iter().sum::<f64>() / n as f64;
+        (counts.into_iter().map(|counts| whole / counts.sqrt()).collect(), witnesses)
     }
 
     /// The scale under which the weighted squares have their degrees of freedom.

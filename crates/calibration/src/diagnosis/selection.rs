@@ -296,7 +296,8 @@ fn review(board: &CandidateScores<'_>, options: &Options, which: &[usize], how: 
             });
             let better = best
                 .filter(|best| !already(std::slice::from_ref(&current.causes[index]), &best.candidate.cause));
-            let carries = judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
+            let stands = !current.causes[index].needs_lean() || Cause::lean_is_seen(&others);
+            let carries = stands && judged.own.merit > 0.0 && judged.log_p <= options.alpha.ln();
             if better.is_some() || !carries {
                 let reduced = warm_fit(subject, &others, Freedom::All, Some(current));
                 let Some(better) = better else { return Review::Changed(Box::new(reduced)) };

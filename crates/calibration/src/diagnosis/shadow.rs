@@ -8,6 +8,7 @@
 use super::cause::{Cause, Part};
 use super::confirmation::Confirmation;
 use super::worth::Worth;
+use truegrind_arm::model::Model;
 
 /// What casts doubt.
 pub(super) struct Shadows<'a> {
@@ -16,7 +17,11 @@ pub(super) struct Shadows<'a> {
     /// How they came out.
     pub(super) confirmations: &'a [Confirmation],
     /// What they are worth.
-    pub(super) worth: &'a Worth,
+    pub(super) worth: &'a Worth<'a>,
+    /// The data sheet's arm.
+    pub(super) nominal: &'a Model,
+    /// Growth of the arm in the course of the rows that has no name (mm RMS).
+    pub(super) growth_mm: f64,
     /// What depends on the pose and has no name (mm RMS).
     pub(super) field_mm: f64,
     /// What is left beyond the noise that repeated poses show (mm RMS); 0 where it is little, or where that is not known.
@@ -55,6 +60,9 @@ impl Shadows<'_> {
         if all(&Cause::follows_warmth) {
             return self.of_other_warmth(causes, own).into_iter().collect();
         }
+        if all(&|cause| cause.rows().is_some()) {
+            return self.of_rough_form(own).into_iter().collect();
+        }
         if !all(&Cause::is_of_the_arm) {
             return if all(&Cause::is_roughly_described) {
                 self.of_other_sensor_fault(causes, own).into_iter().collect()
@@ -83,6 +91,12 @@ impl Shadows<'_> {
                 self.beyond_noise_mm
             ));
         }
+        if all(&|cause| cause.goes_with_weight(self.nominal)) {
+            out.push(
+                "it goes with the angle in which weight turns: a spring, or play, whose law is not known looks the same"
+                    .to_owned(),
+            );
+        }
         if smooth && let Some(joint) = self.remains_of(causes, own) {
             out.push(format!(
                 "it is small beside another cause of joint {}, and may be what the law of that leaves",
@@ -90,6 +104,23 @@ impl Shadows<'_> {
             ));
         }
         out
+    }
+
+    /// A shift in some of the rows beside a larger fault of which only the shape is known: rows in which the law of that is farthest
+    /// off look shifted.
+    fn of_rough_form(&self, own: f64) -> Option<String> {
+        let rough = |k: &usize| self.causes[*k].is_roughly_described() && self.confirmations[*k].is_there();
+        let larger = (0..self.causes.len()).filter(rough).find(|&k| own < self.worth.own_of(&[k]))?;
+        Some(format!(
+            "beside all else it explains {own:.4} mm, less than {}, of which only the shape is known, and may be a part of that",
+            self.causes[larger].name()
+        ))
+    }
+
+    /// What no law describes is worth, at most (mm): faults of which only the shape is known.
+    pub(super) fn roughly_described_mm(&self) -> f64 {
+        let rough = |k: &usize| self.causes[*k].is_roughly_described() && self.confirmations[*k].is_there();
+        (0..self.causes.len()).filter(rough).map(|k| self.worth.of(&[k])).fold(0.0, f64::max)
     }
 
     /// What the largest fault of the sensor that is only roughly described is worth, the arm's geometry left as it is (mm).
@@ -153,6 +184,12 @@ impl Shadows<'_> {
         let other: Vec<usize> = warm.filter(|&k| !first.moves_the_same(&self.causes[k])).collect();
         let theirs = self.worth.own_of(&other);
         let growth = other.iter().any(|&k| self.causes[k].is_of_the_arm());
+        // Growth that is there but could not be named speaks like growth that could.
+        let (theirs, growth) = if !first.is_of_the_arm() && !growth && self.growth_mm > 0.0 {
+            (theirs.hypot(self.growth_mm), true)
+        } else {
+            (theirs, growth)
+        };
         let share = match (first.is_of_the_arm(), growth) {
             (true, _) => GROWTH,
             (false, true) => 1.0 / GROWTH,

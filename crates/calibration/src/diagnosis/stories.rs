@@ -139,7 +139,7 @@ pub(super) fn rank(stories: &mut [Story]) {
 fn merge(
     stories: &mut Vec<Story>,
     of: impl Fn(&Story) -> bool,
-    worth: &Worth,
+    worth: &Worth<'_>,
     told: impl FnOnce(&[Story], f64) -> Finding,
 ) {
     let first = stories.iter().position(&of).unwrap_or(0);

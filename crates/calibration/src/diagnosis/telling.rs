@@ -50,6 +50,8 @@ pub(super) fn told(
         causes: &search.found.causes,
         confirmations: &outcome.confirmations,
         worth: &worth,
+        nominal: subject.nominal,
+        growth_mm: outcome.discrepancy.growth_mm(),
         field_mm: outcome.discrepancy.field_mm(),
         beyond_noise_mm: floor
             .map_or(0.0, |floor| beyond_noise_mm(stages[2].fitted.rmse, floor.sigma_mm, floor.freedom)),
@@ -75,10 +77,12 @@ pub(super) fn told(
         smoothed,
         floor_mm: noise_floor.0,
     };
+    let off_mm = off_mm(&search.extended, &search.wild);
+    let rough_mm = shadows.roughly_described_mm();
     let of_the_record = [
         rounding_finding(ground.dataset, prepared, subject, &search.geometric, stages),
         mismatch_finding(ground.dataset, prepared, &stages[2]),
-        outlier_finding(ground.dataset, &search.wild, &stages[2]),
+        outlier_finding(ground.dataset, &search.wild, (off_mm, rough_mm), &stages[2]),
         rest.finding(),
     ];
     let without_causes = of_the_record.into_iter().flatten();
@@ -90,6 +94,12 @@ pub(super) fn told(
     }));
     stories::rank(&mut stories);
     Told { stories, steps, extended, noise_floor, remaining: rest.sentence() }
+}
+
+/// How far the farthest of some rows is off (mm).
+fn off_mm(fit: &Extended, rows: &[(usize, f64)]) -> f64 {
+    let errors = fit.task.errors_mm(&fit.x);
+    rows.iter().filter_map(|(i, _)| errors.get(*i)).map(|e| e.abs()).fold(0.0, f64::max)
 }
 
 /// A finding for each accepted cause, the error with each added to `steps`.

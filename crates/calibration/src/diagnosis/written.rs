@@ -12,6 +12,7 @@ use super::extension::{Extended, Freedom, Subject, filled, fit};
 use crate::identification::prior_width::learned;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
+use truegrind_arm::parameter::Parameter;
 
 /// The fit whose arm is written, under the tolerances that its own rows tell (the wide ones of the search would leave what the
 /// data do not see farther from the data sheet than arms are). `certain` says it of each cause that was tried, and
@@ -50,13 +51,21 @@ fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {
     fit(subject, causes, Freedom::All, Some(near))
 }
 
-/// The fit with what wandered free beside it, by one step: it is small against what is linear.
+/// Standard deviations of its prior beyond which a link was not moved by what the rows say.
+const STRAYED: f64 = 6.0;
+
+/// The fit with what wandered free beside it, by one step: it is small against what is linear. Where it is not, and links that the
+/// rows do not tell from what wandered go astray, there is none.
 fn beside(subject: &Subject<'_>, fit: &Extended, wandered: &Discrepancy) -> Option<Extended> {
     let numbers: Vec<usize> = subject.observed.dataset.rows.iter().map(|r| r.number).collect();
     let linear = Linear::of(subject, fit);
     let whole = linear.beside(&wandered.in_time_columns()).filtered(0.0, &numbers, wandered.noise).whole();
     let (x, covariance) = whole.estimate(fit.x.len());
-    if !x.iter().all(|v| v.is_finite()) {
+    let strayed = |k: usize| {
+        let is_link = matches!(fit.parameters[k], Parameter::Link { .. });
+        is_link && !((x[k] - fit.priors[k].mean).abs() <= STRAYED * fit.priors[k].sigma)
+    };
+    if !x.iter().all(|v| v.is_finite()) || (0..x.len()).any(strayed) {
         return None;
     }
     let (model, frames) = fit.task.apply(&x);

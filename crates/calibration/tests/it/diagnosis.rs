@@ -7,5 +7,6 @@ mod simulator;
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod scenarios;
 mod certain;
+mod doubts;
 mod found;
 mod parts;
