@@ -3,8 +3,8 @@
 //! The way of a diagnosis:
 //!
 //! 1. [`rows`]: rounded angles are sharpened by the read-out, rows whose own columns contradict each other are noted.
-//! 2. [`extension`]: a robust fit of frames, links and the causes accepted so far, by steps of [`newton`] where one is nearby; `repeated` readings of a pose are one
-//!    witness of what the model gets wrong there.
+//! 2. [`extension`]: a robust fit of frames, links and the causes accepted so far, by steps of [`newton`] where one is
+//!    nearby; `repeated` readings of a pose are one witness of what the model gets wrong there.
 //! 3. [`design`]: that fit linearised and whitened, with frames, links and accepted causes projected off.
 //! 4. [`catalogue`]: every candidate cause as regressors; [`intervals`] finds the rows of shifts, [`lines`] the orders of
 //!    reducer lines.
