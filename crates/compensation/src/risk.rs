@@ -27,7 +27,7 @@ pub struct CutRisk {
     pub chance: f64,
     /// Whether it is left as it is for that.
     pub left: bool,
-    /// Whether it is rewritten, or with [`Cuts::Partial`](super::options::Cuts::Partial) a part of it: a cut of which no motion is
+    /// Whether it is rewritten, or with [`Cuts::Partial`](super::cut::Cuts::Partial) a part of it: a cut of which no motion is
     /// likely to get worse may stay for another reason, which its motions say.
     pub corrected: bool,
 }
