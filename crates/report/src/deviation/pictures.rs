@@ -90,7 +90,7 @@ fn along(reports: &[&PathReport]) -> Figure {
             series
         })
         .collect();
-    let covered = covered(&series);
+    let (series, alike) = told_apart(series);
     let graph = Graph {
         title: "Deviation along the path".to_owned(),
         x: Axis::new("path point", ""),
@@ -104,10 +104,9 @@ fn along(reports: &[&PathReport]) -> Figure {
         caption
             .push_str(" The band is the predicted ±1σ of the model along the cut: where the real arm is expected to run.");
     }
-    for (under, over) in covered {
-        caption.push_str(&format!(
-            " The curve \u{201c}{under}\u{201d} lies under \u{201c}{over}\u{201d}: the two agree."
-        ));
+    for (name, same) in alike {
+        caption
+            .push_str(&format!(" \u{201c}{name}\u{201d} is not drawn: it runs as \u{201c}{same}\u{201d}."));
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
@@ -118,8 +117,9 @@ fn along(reports: &[&PathReport]) -> Figure {
     Figure::new(graph.svg(), caption)
 }
 
-/// Curves that nobody sees because a later one runs over them: nowhere apart by more than a line's width.
-fn covered(series: &[Series]) -> Vec<(String, String)> {
+/// The curves that can be told apart, and those that cannot with the one that they run as: nowhere apart by more than a line's width,
+/// they would hide it.
+fn told_apart(series: Vec<Series>) -> (Vec<Series>, Vec<(String, String)>) {
     let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
     let (low, high) =
         heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
@@ -128,11 +128,15 @@ fn covered(series: &[Series]) -> Vec<(String, String)> {
         a.points.len() == b.points.len()
             && a.points.iter().zip(&b.points).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= line)
     };
-    let pairs = series.iter().enumerate().filter_map(|(k, under)| {
-        let over = series[k + 1..].iter().find(|over| agree(under, over))?;
-        Some((under.name.clone(), over.name.clone()))
-    });
-    pairs.collect()
+    let (mut drawn, mut alike): (Vec<Series>, Vec<(String, String)>) = (Vec::new(), Vec::new());
+    for one in series {
+        // One with a band has that to show.
+        match drawn.iter().find(|other| one.bounds.is_empty() && agree(other, &one)) {
+            Some(other) => alike.push((one.name, other.name.clone())),
+            None => drawn.push(one),
+        }
+    }
+    (drawn, alike)
 }
 
 fn frequency(reports: &[&PathReport]) -> Figure {
