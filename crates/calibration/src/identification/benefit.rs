@@ -440,12 +440,15 @@ pub fn lack(training: &Fitted, held: &Observed) -> f64 {
         &weights,
     );
     let (residuals, transposed) = task.linearised(x);
-    let known = covariance * &transposed;
-    let sum: f64 = residuals
-        .iter()
-        .enumerate()
-        .map(|(i, r)| r * r / (1.0 + transposed.column(i).dot(&known.column(i)).max(0.0)))
-        .sum();
+    let mut sum = 0.0;
+    // In pieces, as there may be a million rows.
+    for from in (0..residuals.len()).step_by(ROWS) {
+        let slopes = transposed.columns(from, ROWS.min(residuals.len() - from));
+        let known = covariance * slopes;
+        for (k, r) in residuals.iter().skip(from).take(slopes.ncols()).enumerate() {
+            sum += r * r / (1.0 + slopes.column(k).dot(&known.column(k)).max(0.0));
+        }
+    }
     let mean = sum / residuals.len() as f64;
     if mean.is_finite() { mean.max(1.0) } else { 1.0 }
 }
@@ -467,7 +470,7 @@ fn readings(fitted: &Fitted, dataset: &Dataset) -> Readings {
         let (mut residuals, mut jacobian) = (vec![0.0; n], vec![0.0; n * all]);
         task.jacobian(x, from * per..to * per, &mut residuals, &mut jacobian[..n * p]);
         for (i, row) in dataset.rows.iter().skip(from).take(to - from).enumerate() {
-            let weight = task.weight(from + i).per_mm;
+            let weight = task.per_mm(from + i);
             let seen = Vector3::from(placed(&row.reading)) - Vector3::from(middle);
             match dataset.sensor {
                 Sensor::Cable => jacobian[n * p + i] = weight * seen.x,

@@ -238,17 +238,19 @@ fn spreads(task: &Calibration, x: &[f64], shares: &[(f64, f64)], spent: f64) -> 
     let plain = task.plain_residuals(x);
     let rows = plain.len() as f64;
     let freedom_share = ((rows - spent) / rows).max(0.1);
-    let solve = |components: std::ops::Range<usize>, share: &dyn Fn(usize) -> f64, smallest: f64| {
-        let squares: Vec<(f64, f64)> = plain
-            .iter()
-            .enumerate()
-            .filter(|(i, r)| components.contains(&(i % per)) && r.is_finite())
-            .map(|(i, r)| (r * r, share(i / per)))
-            .collect();
-        let freedom = squares.len() as f64 * freedom_share;
-        let excess = |sigma: f64| squares.iter().map(|(r, s)| r / (sigma * sigma + s)).sum::<f64>() - freedom;
+    let solve = |components: std::ops::Range<usize>, share: fn(&(f64, f64)) -> f64, smallest: f64| {
+        // Squared residual and share; not kept, as there may be a million rows.
+        let squares = || {
+            plain.chunks_exact(per).zip(shares).flat_map(|(r, s)| {
+                let share = share(s);
+                r[components.clone()].iter().filter(|r| r.is_finite()).map(move |r| (r * r, share))
+            })
+        };
+        let count = squares().count();
+        let freedom = count as f64 * freedom_share;
+        let excess = |sigma: f64| squares().map(|(r, s)| r / (sigma * sigma + s)).sum::<f64>() - freedom;
         let (mut low, mut high) = (smallest.ln(), 1e4_f64.ln());
-        if squares.is_empty() || excess(smallest) <= 0.0 {
+        if count == 0 || excess(smallest) <= 0.0 {
             return smallest;
         }
         for _ in 0..60 {
@@ -258,8 +260,8 @@ fn spreads(task: &Calibration, x: &[f64], shares: &[(f64, f64)], spent: f64) -> 
         }
         high.exp()
     };
-    let mm = solve(0..per.min(3), &|i| shares[i].0, SMALLEST_SIGMA_MM);
-    let rad = if per > 3 { solve(3..per, &|i| shares[i].1, SMALLEST_SIGMA_RAD) } else { 1e-3 };
+    let mm = solve(0..per.min(3), |share| share.0, SMALLEST_SIGMA_MM);
+    let rad = if per > 3 { solve(3..per, |share| share.1, SMALLEST_SIGMA_RAD) } else { 1e-3 };
     (mm, rad)
 }
 

@@ -162,8 +162,10 @@ pub fn identify(
     // Before the fits, whose columns take room of their own.
     let repeats = split::noise_floor(&observed.dataset);
     let region = Region::of(observed.dataset.rows.iter().map(|row| &row.joints), 0.0);
-    let Split { train, test } = split(&observed.dataset);
-    let (fitted_rows, held_rows) = (observed.subset(&train), observed.subset(&test));
+    let (fitted_rows, held_rows) = {
+        let Split { train, test } = split(&observed.dataset);
+        (observed.subset(&train), observed.subset(&test))
+    };
     let sensing = frame_parameters(&observed.dataset);
     let everything = options.solver.parameters(nominal, &sensing);
     let stages = Stages { nominal, frames, sensing: &sensing, everything: &everything, options };
@@ -171,6 +173,8 @@ pub fn identify(
     let wrong =
         |rmse_mm| IdentifyError::WrongArm { file: dataset.file.clone(), robot: robot.to_owned(), rmse_mm };
     let trained = trained.map_err(wrong)?;
+    let lack = (!options.solver.literal).then(|| lack(&trained.training, &held_rows));
+    drop((fitted_rows, held_rows));
     // The model itself: all rows.
     tell("fitting all rows");
     let registered = stages.registered(&observed);
@@ -196,9 +200,8 @@ pub fn identify(
     };
     tell("judging what the model promises programs");
     let mut estimated = with_sigma_in_region(estimated, &geometry);
-    let lack = || lack(&trained.training, &held_rows);
-    let promised = || benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack());
-    let benefit = (!options.solver.literal).then(promised).flatten();
+    let benefit =
+        lack.and_then(|lack| benefit(&geometry, &observed.dataset, &estimated, &options.tolerance, lack));
     let case = Case {
         trained: &trained,
         geometry: &geometry,

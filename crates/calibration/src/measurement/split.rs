@@ -37,11 +37,15 @@ fn same_rad(data: &Dataset) -> f64 {
 /// log rounded to fixed steps, else to 0.003°) and the controller's read-out, where logged, does not tell them apart,
 /// as it may where angles are rounded coarsely.
 pub fn poses(data: &Dataset) -> Vec<Vec<usize>> {
-    let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (row, first) in first_rows(data).into_iter().enumerate() {
-        out.entry(first).or_default().push(row);
-    }
-    out.into_values().collect()
+    by_pose(data, |poses| poses.map(<[usize]>::to_vec).collect())
+}
+
+/// Hands the rows of each pose, as [`poses`] gives them, to `work`; they share one list, as there may be a million.
+fn by_pose<T>(data: &Dataset, work: impl FnOnce(&mut dyn Iterator<Item = &[usize]>) -> T) -> T {
+    let first = first_rows(data);
+    let mut rows: Vec<usize> = (0..data.rows.len()).collect();
+    rows.sort_by_key(|&row| first[row]);
+    work(&mut rows.chunk_by(|&a, &b| first[a] == first[b]))
 }
 
 /// The first row of the same pose, for each row.
@@ -129,15 +133,17 @@ fn told_apart(data: &Dataset, i: usize, j: usize) -> bool {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn random(data: &Dataset, held_out: f64, seed: u64) -> Split {
-    let poses = shuffled(poses(data), seed);
-    let wanted = (data.rows.len() as f64 * held_out.clamp(0.0, 1.0)).round() as usize;
-    let mut test = Vec::new();
-    let mut train = Vec::new();
-    for pose in poses {
-        // A group of repetitions that would overshoot by more than half of itself goes to the other side.
-        if 2 * test.len() + pose.len() <= 2 * wanted { test.extend(pose) } else { train.extend(pose) }
-    }
-    sorted(train, test)
+    let rows = data.rows.len();
+    let wanted = (rows as f64 * held_out.clamp(0.0, 1.0)).round() as usize;
+    by_pose(data, |poses| {
+        let (mut test, mut train) = (Vec::with_capacity(wanted), Vec::with_capacity(rows - wanted));
+        for pose in shuffled(poses.collect::<Vec<_>>(), seed) {
+            // A group of repetitions that would overshoot by more than half of itself goes to the other side.
+            let side = if 2 * test.len() + pose.len() <= 2 * wanted { &mut test } else { &mut train };
+            side.extend_from_slice(pose);
+        }
+        sorted(train, test)
+    })
 }
 
 /// k-fold cross-validation over random poses: k splits whose test rows cover every row once. `folds` above the number
@@ -252,7 +258,7 @@ pub fn blocks(data: &Dataset, blocks: usize) -> Vec<Split> {
         .collect()
 }
 
-fn shuffled(mut groups: Vec<Vec<usize>>, seed: u64) -> Vec<Vec<usize>> {
+fn shuffled<T>(mut groups: Vec<T>, seed: u64) -> Vec<T> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Fisher and Yates.
     for i in (1..groups.len()).rev() {
@@ -335,27 +341,26 @@ fn scattered(
     data: &Dataset,
     mut place: impl FnMut(&Row, bool) -> Option<Vector3<f64>>,
 ) -> Option<NoiseFloor> {
-    let first = first_rows(data);
-    let mut rows: Vec<usize> = (0..data.rows.len()).collect();
-    rows.sort_by_key(|&row| first[row]);
-    let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
-    for pose in rows.chunk_by(|&a, &b| first[a] == first[b]).filter(|pose| pose.len() > 1) {
-        let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
-        for &i in pose {
-            let row = &data.rows[i];
-            alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
+    by_pose(data, |poses| {
+        let (mut all, mut own, mut finest) = (Scatter::default(), Scatter::default(), f64::INFINITY);
+        for pose in poses.filter(|pose| pose.len() > 1) {
+            let mut alike: BTreeMap<(usize, [i8; 6]), Vec<usize>> = BTreeMap::new();
+            for &i in pose {
+                let row = &data.rows[i];
+                alike.entry((row.anchor, row.condition.approach)).or_default().push(i);
+            }
+            for rows in alike.into_values().filter(|rows| rows.len() > 1) {
+                let of = |(k, &i): (usize, &usize)| place(&data.rows[i], k == 0);
+                let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
+                all.add(&readings);
+                own.add(&different(&readings));
+                finest = finest.min(finest_mm(&readings));
+            }
         }
-        for rows in alike.into_values().filter(|rows| rows.len() > 1) {
-            let of = |(k, &i): (usize, &usize)| place(&data.rows[i], k == 0);
-            let readings: Vec<Vector3<f64>> = rows.iter().enumerate().filter_map(of).collect();
-            all.add(&readings);
-            own.add(&different(&readings));
-            finest = finest.min(finest_mm(&readings));
-        }
-    }
-    let (all, own) = (all.pooled()?, own.pooled());
-    let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest);
-    if copied { own } else { Some(all) }
+        let (all, own) = (all.pooled()?, own.pooled());
+        let copied = own.is_none_or(|own| own.sigma_mm > NO_CHANCE * finest);
+        if copied { own } else { Some(all) }
+    })
 }
 
 /// Scatter over the finest difference of readings from which two readings that are equal to the last digit are copies, not chance.

@@ -14,15 +14,35 @@ use truegrind_math::lanes::WIDTH;
 /// Rows from which their columns are made on all threads; fewer are not worth the call.
 const MANY_ROWS: usize = 8192;
 
+/// Rows from which only the angles are kept: their sines and cosines cost each pass some ten nanoseconds a row, and a hundred
+/// bytes a row if they are kept.
+const MANY_ANGLES: usize = 50_000;
+
+/// The joint angles of the rows (rad, of the mapped arm).
+#[derive(Debug, Clone)]
+pub(super) enum Angles {
+    /// Their sines and cosines.
+    Worked { sin: [Vec<f64>; 6], cos: [Vec<f64>; 6] },
+    /// The angles themselves, of very many rows.
+    Plain([Vec<f64>; 6]),
+}
+
+impl Default for Angles {
+    fn default() -> Self {
+        Self::Plain(Default::default())
+    }
+}
+
 /// Measured rows by columns, padded to whole lanes with rows of weight 0.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Columns {
-    pub(super) sin: [Vec<f64>; 6],
-    pub(super) cos: [Vec<f64>; 6],
+    pub(super) angles: Angles,
     /// Cable: length. Position: x, y, z. Pose: x, y, z and the nine entries of the rotation, column-major.
     pub(super) reading: Vec<Vec<f64>>,
     pub(super) per_mm: Vec<f64>,
+    /// Empty where the sensor reads no orientation.
     pub(super) per_rad: Vec<f64>,
+    /// The outlet of each row's cable; empty where there is but one.
     pub(super) anchor: Vec<u32>,
     /// Joint rotations that the starting model's effects add; empty without effects.
     pub(super) extra: Option<[Vec<f64>; 6]>,
@@ -70,12 +90,21 @@ impl Columns {
             return Self::default();
         }
         Self {
-            sin: std::array::from_fn(|j| picked(&self.sin[j])),
-            cos: std::array::from_fn(|j| picked(&self.cos[j])),
+            angles: match &self.angles {
+                Angles::Worked { sin, cos } => Angles::Worked {
+                    sin: std::array::from_fn(|j| picked(&sin[j])),
+                    cos: std::array::from_fn(|j| picked(&cos[j])),
+                },
+                Angles::Plain(angles) => Angles::Plain(std::array::from_fn(|j| picked(&angles[j]))),
+            },
             reading: self.reading.iter().map(|column| picked(column)).collect(),
             per_mm: weights(&self.per_mm),
-            per_rad: weights(&self.per_rad),
-            anchor: (0..padded).map(|i| self.anchor[row(i)]).collect(),
+            per_rad: if self.per_rad.is_empty() { Vec::new() } else { weights(&self.per_rad) },
+            anchor: if self.anchor.is_empty() {
+                Vec::new()
+            } else {
+                (0..padded).map(|i| self.anchor[row(i)]).collect()
+            },
             extra: self.extra.as_ref().map(|extra| std::array::from_fn(|j| picked(&extra[j]))),
             growth: picked(&self.growth),
             effects: self
@@ -133,13 +162,22 @@ impl Columns {
             })
             .collect();
         let weight = |i: usize| (i < n).then(|| weights[i]);
+        let angles = if n < MANY_ANGLES {
+            Angles::Worked {
+                sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
+                cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
+            }
+        } else {
+            Angles::Plain(std::array::from_fn(|j| column(&|i| mapped(i, j))))
+        };
+        let oriented = dataset.sensor == Sensor::Pose;
+        let several = dataset.sensor == Sensor::Cable && frames.outlets_mm.len() > 1;
         let mut out = Self {
-            sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
-            cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
+            angles,
             reading,
             per_mm: column(&|i| weight(i).map_or(0.0, |w| w.per_mm)),
-            per_rad: column(&|i| weight(i).map_or(0.0, |w| w.per_rad)),
-            anchor: (0..padded).map(|i| row(i).anchor as u32).collect(),
+            per_rad: if oriented { column(&|i| weight(i).map_or(0.0, |w| w.per_rad)) } else { Vec::new() },
+            anchor: if several { (0..padded).map(|i| row(i).anchor as u32).collect() } else { Vec::new() },
             ..Self::default()
         };
         let turned = frames.disturbances.iter().any(|d| d.kind.turns_joints());

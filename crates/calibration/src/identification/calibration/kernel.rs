@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::columns::Columns;
+use super::columns::{Angles, Columns};
 use super::task::Calibration;
 use crate::measurement::dataset::Sensor;
 use crate::measurement::sensor::disturbance::{Disturbance, Kind};
@@ -188,7 +188,16 @@ fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn frames<R: SinCos>(like: R, task: &Calibration, state: &State, at: usize) -> (Chain<R>, R) {
     let columns = &task.columns;
-    let (mut sin, mut cos) = (six(like, &columns.sin, at), six(like, &columns.cos, at));
+    let (mut sin, mut cos) = match &columns.angles {
+        Angles::Worked { sin, cos } => (six(like, sin, at), six(like, cos, at)),
+        Angles::Plain(angles) => {
+            let (mut sin, mut cos) = ([like; 6], [like; 6]);
+            for (j, angle) in six(like, angles, at).into_iter().enumerate() {
+                (sin[j], cos[j]) = sin_cos(angle);
+            }
+            (sin, cos)
+        }
+    };
     let mut scale = like.splat(1.0);
     if let Some(extra) = &columns.extra {
         let mut turn = six(like, extra, at);
@@ -267,6 +276,9 @@ fn sagging<R: Real>(away: &V<R>, length: R) -> R {
 /// One value of the row's cable, for each lane.
 #[inline(always)]
 fn of_anchor<R: Real>(like: R, task: &Calibration, at: usize, value: impl Fn(usize) -> f64) -> R {
+    if task.columns.anchor.is_empty() {
+        return like.splat(value(0));
+    }
     let mut lanes = [0.0; WIDTH];
     for (lane, anchor) in lanes.iter_mut().zip(&task.columns.anchor[at..at + R::ROWS]) {
         *lane = value(*anchor as usize);
@@ -468,7 +480,8 @@ fn space<R: SinCos>(
     out: &mut [f64],
 ) {
     let columns = &task.columns;
-    let (weight, turn_weight) = (like.load(&columns.per_mm, at), like.load(&columns.per_rad, at));
+    let weight = like.load(&columns.per_mm, at);
+    let turn_weight = if oriented { like.load(&columns.per_rad, at) } else { weight };
     let none = [like.splat(0.0); 3];
     let (frames, scale) = frames(like, task, state, at);
     let p = point(&frames, state, at);

@@ -56,7 +56,9 @@ impl Calibration {
     pub fn weighted(mut self, weights: &[Weight]) -> Self {
         for (i, w) in weights.iter().enumerate().take(self.rows) {
             self.columns.per_mm[i] = w.per_mm;
-            self.columns.per_rad[i] = w.per_rad;
+        }
+        for (per_rad, w) in self.columns.per_rad.iter_mut().take(self.rows).zip(weights) {
+            *per_rad = w.per_rad;
         }
         self
     }
@@ -74,12 +76,12 @@ impl Calibration {
         self.columns = Columns::default();
     }
 
-    /// Weight of a row.
+    /// Weight of a row's length or position [1/mm].
     ///
     /// # Panics
     /// Beyond the last row.
-    pub fn weight(&self, row: usize) -> Weight {
-        Weight { per_mm: self.columns.per_mm[row], per_rad: self.columns.per_rad[row] }
+    pub fn per_mm(&self, row: usize) -> f64 {
+        self.columns.per_mm[row]
     }
 
     /// What may move, in the order of x.
