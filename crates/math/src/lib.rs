@@ -2,6 +2,7 @@
 
 pub mod lanes;
 pub mod gram;
+pub mod axpy;
 pub mod se3;
 pub mod difference;
 pub mod statistics;

@@ -22,6 +22,7 @@ use crate::measurement::sensor::disturbance::sag_mm;
 use crate::measurement::split;
 use truegrind_arm::parameter::{LinkCoordinate, Parameter};
 use truegrind_estimation::problem::Problem;
+use truegrind_math::axpy::add_scaled;
 use truegrind_math::work::checkpoint;
 
 /// Slopes of the whitened residual by what candidates are made of, n each.
@@ -433,12 +434,12 @@ impl Design {
         let reached = sparse(columns)?;
         let mut shared = DMatrix::zeros(self.basis.nrows(), columns.ncols());
         let mut by_row: Vec<Vec<(usize, f64)>> = vec![Vec::new(); columns.nrows()];
+        let mut terms: Vec<(usize, f64)> = Vec::new();
         for (k, rows) in reached.iter().enumerate() {
-            let mut place = shared.column_mut(k);
-            for &s in rows {
-                place.axpy(columns[(s, k)], &self.basis.column(s), 1.0);
-                by_row[s].push((k, columns[(s, k)]));
-            }
+            terms.clear();
+            terms.extend(rows.iter().map(|&s| (s, columns[(s, k)])));
+            add_scaled(&terms, self.basis.as_slice(), shared.column_mut(k).as_mut_slice());
+            terms.iter().for_each(|&(s, value)| by_row[s].push((k, value)));
         }
         let mut square = DMatrix::zeros(columns.ncols(), columns.ncols());
         for (a, x) in by_row.iter().flat_map(|row| row.iter().map(move |x| (row, x))) {
@@ -459,14 +460,25 @@ impl Design {
 
     /// The same from the projection on the whole design of which this is a part.
     pub fn project_on(&self, whole: &Projected) -> Projected {
-        let mut out = whole.clone();
-        if let Some(reduction) = &self.reduction {
-            let back = product_of_transposed(&reduction.directions, &whole.shared);
-            out.information += gram(&back);
-            out.gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
-            out.given_back = Some(back);
-        }
-        out
+        let (gradient, information, given_back) = self.seen(whole);
+        Projected { gradient, information, shared: whole.shared.clone(), given_back }
+    }
+
+    /// Gradient and information alone, which is all that a score takes.
+    pub fn seen_on(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>) {
+        let (gradient, information, _) = self.seen(whole);
+        (gradient, information)
+    }
+
+    fn seen(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>, Option<DMatrix<f64>>) {
+        let (mut gradient, mut information) = (whole.gradient.clone(), whole.information.clone());
+        let Some(reduction) = &self.reduction else {
+            return (gradient, information, whole.given_back.clone());
+        };
+        let back = product_of_transposed(&reduction.directions, &whole.shared);
+        information += gram(&back);
+        gradient.gemv_tr(-1.0, &back, &reduction.moved, 1.0);
+        (gradient, information, Some(back))
     }
 
     /// What is left of columns when everything free has been fitted to them, n × k.

@@ -8,12 +8,14 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::algebra::gram;
 use super::design::Design;
+use truegrind_math::axpy::add_scaled;
 use truegrind_math::work::checkpoint;
 
 /// Rows of a shift, as indices of observations, both included, and its evidence.
@@ -90,18 +92,13 @@ struct Sums<'a> {
     products: Cow<'a, DMatrix<f64>>,
 }
 
-/// Adds the products of one observation with the rows of `basis` to `out`, k × rows of the basis.
-fn add_products(scaled: &DMatrix<f64>, basis: &DMatrix<f64>, per: usize, i: usize, out: &mut [f64]) {
-    let p = basis.nrows();
-    for (a, place) in out.chunks_exact_mut(p).enumerate() {
-        for s in i * per..(i + 1) * per {
-            let c = scaled[(s, a)];
-            if c != 0.0 {
-                for (to, q) in place.iter_mut().zip(basis.column(s).iter()) {
-                    *to += c * q;
-                }
-            }
-        }
+/// Adds the products of some scalar rows with the rows of `basis` to `out`, k × rows of the basis.
+fn add_products(scaled: &DMatrix<f64>, basis: &DMatrix<f64>, rows: Range<usize>, out: &mut [f64]) {
+    let mut terms: Vec<(usize, f64)> = Vec::with_capacity(rows.len());
+    for (a, sum) in out.chunks_exact_mut(basis.nrows()).enumerate() {
+        terms.clear();
+        terms.extend(rows.clone().map(|s| (s, scaled[(s, a)])).filter(|(_, c)| *c != 0.0));
+        add_scaled(&terms, basis.as_slice(), sum);
     }
 }
 
@@ -294,11 +291,10 @@ impl<'a> Sums<'a> {
                 (at, sum) = (near, prefix.clone());
             }
             let (shared, back) = sum.split_at_mut(self.strip.k * self.strip.shared.nrows());
-            for row in at..i {
-                add_products(&self.strip.scaled, &self.design.basis, self.design.per, row, shared);
-                if let Some(removed) = self.design.removed() {
-                    add_products(&self.strip.scaled, removed, self.design.per, row, back);
-                }
+            let rows = at * self.design.per..i * self.design.per;
+            add_products(&self.strip.scaled, &self.design.basis, rows.clone(), shared);
+            if let Some(removed) = self.design.removed() {
+                add_products(&self.strip.scaled, removed, rows, back);
             }
             known.insert(i, sum);
         }

@@ -13,8 +13,12 @@ use super::design::Design;
 use super::extension::Subject;
 use truegrind_arm::effect::Effect;
 use truegrind_arm::effect::harmonic::Harmonic;
+use truegrind_math::lanes::{AnyWidth, SinCos, WIDTH, vectorised};
 
-/// Orders 3 to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
+/// The lowest order that is tried.
+const LOWEST: usize = 3;
+
+/// Orders up to this are tried: twice the ratio of a strain-wave reducer of 1:160 is 320.
 pub const HIGHEST: usize = 330;
 
 /// A line's χ² from which a fine map is worth a try.
@@ -23,7 +27,8 @@ const STANDS_OUT: f64 = 25.0;
 /// Lines kept for each joint.
 const KEPT: usize = 2;
 
-/// A joint's angles on the turn, as the orders go by: (cosine, sine) of once and twice the angle.
+/// A joint's angles on the turn, as the orders go by: (cosine, sine) of once and twice the angle, filled up to whole blocks of
+/// rows.
 struct Turn {
     once: [Vec<f64>; 2],
     twice: [Vec<f64>; 2],
@@ -42,7 +47,12 @@ impl Turns {
             let (low, high) =
                 angles().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(a), h.max(a)));
             let both = |times: f64| {
-                [angles().map(|a| (times * a).cos()).collect(), angles().map(|a| (times * a).sin()).collect()]
+                let padded = |f: fn(f64) -> f64| {
+                    let mut out: Vec<f64> = angles().map(|a| f(times * a)).collect();
+                    out.resize(out.len().next_multiple_of(ROWS), 0.0);
+                    out
+                };
+                [padded(f64::cos), padded(f64::sin)]
             };
             (high - low > STILL_RAD).then(|| Turn { once: both(1.0), twice: both(2.0) })
         }))
@@ -51,39 +61,66 @@ impl Turns {
 
 /// The strongest lines of a joint: their χ² and orders.
 fn strongest(turn: &Turn, theta: &DVector<f64>, design: &Design) -> Vec<(f64, usize)> {
-    let (mut pull, mut weight) = (vec![0.0; design.observations], 0.0);
-    for (i, p) in pull.iter_mut().enumerate() {
+    let mut weight = 0.0;
+    let mut pull = vec![0.0; design.observations.next_multiple_of(ROWS)];
+    for (i, p) in pull.iter_mut().enumerate().take(design.observations) {
         for s in i * design.per..(i + 1) * design.per {
             *p += theta[s] * design.residual[s];
             weight += theta[s] * theta[s];
         }
     }
-    let [cosines, sines] = &turn.once;
-    let [mut cosine_of, mut sine_of] = turn.twice.clone();
-    let mut lines: Vec<(f64, usize)> = Vec::with_capacity(HIGHEST);
-    for order in 3..=HIGHEST {
-        // Sums side by side, which the compiler can keep in lanes.
-        let (mut by_sine, mut by_cosine) = ([0.0; LANES], [0.0; LANES]);
-        let places = sine_of.chunks_mut(LANES).zip(cosine_of.chunks_mut(LANES));
-        let turns = sines.chunks(LANES).zip(cosines.chunks(LANES)).zip(pull.chunks(LANES));
-        for ((sp, cp), ((s, c), a)) in places.zip(turns) {
-            for k in 0..a.len() {
-                let (sine, cosine) = (sp[k] * c[k] + cp[k] * s[k], cp[k] * c[k] - sp[k] * s[k]);
-                (sp[k], cp[k]) = (sine, cosine);
-                by_sine[k] += a[k] * sine;
-                by_cosine[k] += a[k] * cosine;
-            }
-        }
-        let (sine, cosine): (f64, f64) = (by_sine.iter().sum(), by_cosine.iter().sum());
-        lines.push((2.0 * (sine * sine + cosine * cosine) / weight.max(1e-300), order));
-    }
+    let sums = vectorised(Orders { turn, pull: &pull });
+    let of = |(order, [sine, cosine]): (usize, [f64; 2])| {
+        (2.0 * (sine * sine + cosine * cosine) / weight.max(1e-300), order)
+    };
+    let mut lines: Vec<(f64, usize)> = (LOWEST..=HIGHEST).zip(sums).map(of).collect();
     lines.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     lines.truncate(KEPT);
     lines
 }
 
-/// Sums that are kept side by side.
-const LANES: usize = 8;
+/// Σ aᵢ sin(n uᵢ) and Σ aᵢ cos(n uᵢ) of every order n. Each sum is eight sums, of every eighth row, so that it does not depend on
+/// how many rows a register holds.
+struct Orders<'a> {
+    turn: &'a Turn,
+    /// a, a multiple of [`ROWS`] of them.
+    pull: &'a [f64],
+}
+
+/// Rows that stay in registers while the orders go by.
+const ROWS: usize = 2 * WIDTH;
+
+impl AnyWidth for Orders<'_> {
+    type Output = Vec<[f64; 2]>;
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn run<R: SinCos>(self, like: R) -> Vec<[f64; 2]> {
+        let Self { turn: Turn { once: [cosines, sines], twice: [cosines_twice, sines_twice] }, pull } = self;
+        let mut sums = vec![[[0.0; WIDTH]; 2]; HIGHEST + 1 - LOWEST];
+        let registers = ROWS / R::ROWS;
+        for first in (0..pull.len()).step_by(ROWS) {
+            // As many as a block of rows needs of the widest kind; what is narrower needs more.
+            let (mut s, mut c, mut sp, mut cp, mut a) =
+                ([like; ROWS], [like; ROWS], [like; ROWS], [like; ROWS], [like; ROWS]);
+            for k in 0..registers {
+                let at = first + k * R::ROWS;
+                (s[k], c[k]) = (like.load(sines, at), like.load(cosines, at));
+                (sp[k], cp[k]) = (like.load(sines_twice, at), like.load(cosines_twice, at));
+                a[k] = like.load(pull, at);
+            }
+            for [by_sine, by_cosine] in &mut sums {
+                for k in 0..registers {
+                    let (sine, cosine) = (sp[k] * c[k] + cp[k] * s[k], cp[k] * c[k] - sp[k] * s[k]);
+                    (sp[k], cp[k]) = (sine, cosine);
+                    let lane = k * R::ROWS % WIDTH;
+                    (like.load(by_sine, lane) + a[k] * sine).store(by_sine, lane);
+                    (like.load(by_cosine, lane) + a[k] * cosine).store(by_cosine, lane);
+                }
+            }
+        }
+        sums.iter().map(|both| both.map(|lanes| lanes.iter().sum())).collect()
+    }
+}
 
 /// The strongest lines of every joint as candidates, and the joints in which lines within the reach of a fine map stand
 /// out, each with the place in [`FINE`] of the coarsest map that follows them.
@@ -113,7 +150,7 @@ pub fn candidates(
         .map(|(_, joint, order)| {
             let harmonic = Harmonic { joint, order: order as f64, sine_rad: 0.0, cosine_rad: 0.0 };
             Candidate {
-                tried: (HIGHEST - 2) as f64,
+                tried: (HIGHEST + 1 - LOWEST) as f64,
                 ..Candidate::arm(Effect::GearTransmission(harmonic), dataset, subject.nominal)
             }
         })
