@@ -157,7 +157,7 @@ impl Linear {
                 per_rad: w.per_rad * t.sqrt(),
             })
             .collect();
-        let task = Calibration::new(dataset, &fit.model, &fit.frames, &probes, &[], &weights);
+        let task = fit.task.beside(dataset, &fit.model, &fit.frames, &probes, &weights);
         let slopes = linearised(&task, &vec![0.0; probes.len()]).1;
         let column = |k: usize| slopes.row(k).transpose();
         let mut by_growth = DVector::zeros(rows);

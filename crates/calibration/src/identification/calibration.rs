@@ -11,7 +11,7 @@
 //!
 //! Shapes: x holds deviations from the starting values of [`Calibration::parameters_list`], so that the nominal arm is
 //! x = 0 and every prior has mean 0. Rows travel eight at a time in lanes; sines and cosines of the logged joints are
-//! taken once. One pass over n rows with 28 parameters costs some 1,200 n operations and reads 13 numbers a row.
+//! taken once, but for very many rows, where they are taken in each pass. One pass over n rows with 28 parameters costs some 1,200 n operations and reads 13 numbers a row.
 //! Checked against: numerical twins of every column in the tests.
 
 mod columns;

@@ -1,5 +1,7 @@
 //! Measured rows by columns, and what each effect and disturbance adds to them.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::forms::{self, rotations};
@@ -33,15 +35,48 @@ impl Default for Angles {
     }
 }
 
-/// Measured rows by columns, padded to whole lanes with rows of weight 0.
+/// Weights of the rows, padded to whole lanes with rows of weight 0. Apart from the columns, which fits to the same rows share.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Columns {
-    pub(super) angles: Angles,
-    /// Cable: length. Position: x, y, z. Pose: x, y, z and the nine entries of the rotation, column-major.
-    pub(super) reading: Vec<Vec<f64>>,
+pub(super) struct Weights {
     pub(super) per_mm: Vec<f64>,
     /// Empty where the sensor reads no orientation.
     pub(super) per_rad: Vec<f64>,
+}
+
+impl Weights {
+    /// One for each of so many rows.
+    pub(super) fn of(weights: &[Weight], rows: usize, sensor: Sensor) -> Self {
+        assert_eq!(weights.len(), rows, "one weight for each row");
+        let padded = |of: fn(&Weight) -> f64| {
+            let mut out = Vec::with_capacity(weights.len().next_multiple_of(WIDTH));
+            out.extend(weights.iter().map(of));
+            out.resize(weights.len().next_multiple_of(WIDTH), 0.0);
+            out
+        };
+        let per_rad = if sensor == Sensor::Pose { padded(|w| w.per_rad) } else { Vec::new() };
+        Self { per_mm: padded(|w| w.per_mm), per_rad }
+    }
+
+    /// Those of the rows at `rows`.
+    pub(super) fn subset(&self, rows: &[usize]) -> Self {
+        let picked = |all: &[f64]| -> Vec<f64> {
+            if all.is_empty() {
+                return Vec::new();
+            }
+            let mut out: Vec<f64> = rows.iter().map(|&row| all[row]).collect();
+            out.resize(rows.len().next_multiple_of(WIDTH), 0.0);
+            out
+        };
+        Self { per_mm: picked(&self.per_mm), per_rad: picked(&self.per_rad) }
+    }
+}
+
+/// Measured rows by columns, padded to whole lanes by the last row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Columns {
+    pub(super) angles: Arc<Angles>,
+    /// Cable: length. Position: x, y, z. Pose: x, y, z and the nine entries of the rotation, column-major.
+    pub(super) reading: Vec<Vec<f64>>,
     /// The outlet of each row's cable; empty where there is but one.
     pub(super) anchor: Vec<u32>,
     /// Joint rotations that the starting model's effects add; empty without effects.
@@ -83,23 +118,18 @@ impl Columns {
         let picked = |all: &[f64]| -> Vec<f64> {
             if all.is_empty() || n == 0 { Vec::new() } else { (0..padded).map(|i| all[row(i)]).collect() }
         };
-        let weights = |all: &[f64]| -> Vec<f64> {
-            (0..padded).map(|i| if i < n { all[row(i)] } else { 0.0 }).collect()
-        };
         if n == 0 {
             return Self::default();
         }
         Self {
-            angles: match &self.angles {
+            angles: Arc::new(match &*self.angles {
                 Angles::Worked { sin, cos } => Angles::Worked {
                     sin: std::array::from_fn(|j| picked(&sin[j])),
                     cos: std::array::from_fn(|j| picked(&cos[j])),
                 },
                 Angles::Plain(angles) => Angles::Plain(std::array::from_fn(|j| picked(&angles[j]))),
-            },
+            }),
             reading: self.reading.iter().map(|column| picked(column)).collect(),
-            per_mm: weights(&self.per_mm),
-            per_rad: if self.per_rad.is_empty() { Vec::new() } else { weights(&self.per_rad) },
             anchor: if self.anchor.is_empty() {
                 Vec::new()
             } else {
@@ -126,12 +156,13 @@ impl Columns {
         }
     }
 
+    /// Of the rows of a data set; `angles`: theirs, where they are known.
     pub(super) fn of(
         dataset: &Dataset,
         start: &Model,
         frames: &Frames,
         parameters: &[Parameter],
-        weights: &[Weight],
+        angles: Option<&Arc<Angles>>,
     ) -> Self {
         let n = dataset.rows.len();
         let padded = n.div_ceil(WIDTH) * WIDTH;
@@ -161,22 +192,20 @@ impl Columns {
                 })
             })
             .collect();
-        let weight = |i: usize| (i < n).then(|| weights[i]);
-        let angles = if n < MANY_ANGLES {
-            Angles::Worked {
-                sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
-                cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
+        let worked = || {
+            if n < MANY_ANGLES {
+                Angles::Worked {
+                    sin: std::array::from_fn(|j| column(&|i| mapped(i, j).sin())),
+                    cos: std::array::from_fn(|j| column(&|i| mapped(i, j).cos())),
+                }
+            } else {
+                Angles::Plain(std::array::from_fn(|j| column(&|i| mapped(i, j))))
             }
-        } else {
-            Angles::Plain(std::array::from_fn(|j| column(&|i| mapped(i, j))))
         };
-        let oriented = dataset.sensor == Sensor::Pose;
         let several = dataset.sensor == Sensor::Cable && frames.outlets_mm.len() > 1;
         let mut out = Self {
-            angles,
+            angles: angles.cloned().unwrap_or_else(|| Arc::new(worked())),
             reading,
-            per_mm: column(&|i| weight(i).map_or(0.0, |w| w.per_mm)),
-            per_rad: if oriented { column(&|i| weight(i).map_or(0.0, |w| w.per_rad)) } else { Vec::new() },
             anchor: if several { (0..padded).map(|i| row(i).anchor as u32).collect() } else { Vec::new() },
             ..Self::default()
         };

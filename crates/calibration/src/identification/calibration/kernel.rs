@@ -188,7 +188,7 @@ fn splat<R: Real>(like: R, v: &Vector3<f64>) -> V<R> {
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn frames<R: SinCos>(like: R, task: &Calibration, state: &State, at: usize) -> (Chain<R>, R) {
     let columns = &task.columns;
-    let (mut sin, mut cos) = match &columns.angles {
+    let (mut sin, mut cos) = match &*columns.angles {
         Angles::Worked { sin, cos } => (six(like, sin, at), six(like, cos, at)),
         Angles::Plain(angles) => {
             let (mut sin, mut cos) = ([like; 6], [like; 6]);
@@ -298,7 +298,7 @@ fn cable<R: SinCos>(
     place: usize,
     out: &mut [f64],
 ) {
-    let weight = like.load(&task.columns.per_mm, at);
+    let weight = like.load(&task.weights.per_mm, at);
     let (frames, scale) = frames(like, task, state, at);
     let p = point(&frames, state, at);
     let single = state.outlets.len() == 1;
@@ -480,8 +480,8 @@ fn space<R: SinCos>(
     out: &mut [f64],
 ) {
     let columns = &task.columns;
-    let weight = like.load(&columns.per_mm, at);
-    let turn_weight = if oriented { like.load(&columns.per_rad, at) } else { weight };
+    let weight = like.load(&task.weights.per_mm, at);
+    let turn_weight = if oriented { like.load(&task.weights.per_rad, at) } else { weight };
     let none = [like.splat(0.0); 3];
     let (frames, scale) = frames(like, task, state, at);
     let p = point(&frames, state, at);

@@ -1,6 +1,7 @@
 //! Passes over the rows: residuals, Jacobians and normal equations in blocks that do not depend on the number of threads.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -45,7 +46,7 @@ impl Calibration {
             self.scatter(&state, first..first + out.len() / per, Some(out), None);
             for (i, r) in out.iter_mut().enumerate() {
                 let (row, component) = (first + i / per, i % per);
-                let weight = if component < 3 { &self.columns.per_mm } else { &self.columns.per_rad }[row];
+                let weight = if component < 3 { &self.weights.per_mm } else { &self.weights.per_rad }[row];
                 *r /= weight;
             }
         });
@@ -132,7 +133,8 @@ impl Problem for Calibration {
             sensor: self.sensor,
             parameters: self.parameters.clone(),
             priors: self.priors.clone(),
-            columns: self.columns.subset(observations),
+            columns: Arc::new(self.columns.subset(observations)),
+            weights: self.weights.subset(observations),
             rows: observations.len(),
         }))
     }

@@ -1,8 +1,10 @@
 //! What a calibration is asked: a start, what may move, the rows and their weights.
 
+use std::sync::Arc;
+
 use nalgebra::Vector6;
 
-use super::columns::Columns;
+use super::columns::{Columns, Weights};
 use super::frames::{Frames, Weight};
 use crate::measurement::dataset::{Dataset, Sensor};
 use truegrind_arm::model::Model;
@@ -18,7 +20,8 @@ pub struct Calibration {
     pub(super) sensor: Sensor,
     pub(super) parameters: Vec<Parameter>,
     pub(super) priors: Vec<Prior>,
-    pub(super) columns: Columns,
+    pub(super) columns: Arc<Columns>,
+    pub(super) weights: Weights,
     pub(super) rows: usize,
 }
 
@@ -27,6 +30,9 @@ impl Calibration {
     ///
     /// `start` and `frames` are the starting values, `parameters` what may move, `priors` one for each parameter
     /// (mean in deviations from the start) or empty, `weights` one for each row of `dataset`.
+    ///
+    /// # Panics
+    /// Where there are not as many weights as rows.
     pub fn new(
         dataset: &Dataset,
         start: &Model,
@@ -35,14 +41,39 @@ impl Calibration {
         priors: &[Prior],
         weights: &[Weight],
     ) -> Self {
-        let columns = Columns::of(dataset, start, frames, parameters, weights);
+        let columns = Columns::of(dataset, start, frames, parameters, None);
+        Self::with(columns, dataset, (start, frames), parameters, priors, weights)
+    }
+
+    /// Another task of the same rows and without priors, which need not be turned into columns once more.
+    pub(crate) fn beside(
+        &self,
+        dataset: &Dataset,
+        start: &Model,
+        frames: &Frames,
+        parameters: &[Parameter],
+        weights: &[Weight],
+    ) -> Self {
+        let columns = Columns::of(dataset, start, frames, parameters, Some(&self.columns.angles));
+        Self::with(columns, dataset, (start, frames), parameters, &[], weights)
+    }
+
+    fn with(
+        columns: Columns,
+        dataset: &Dataset,
+        (start, frames): (&Model, &Frames),
+        parameters: &[Parameter],
+        priors: &[Prior],
+        weights: &[Weight],
+    ) -> Self {
         Self {
             start: start.clone(),
             frames: frames.clone(),
             sensor: dataset.sensor,
             parameters: parameters.to_vec(),
             priors: priors.to_vec(),
-            columns,
+            columns: Arc::new(columns),
+            weights: Weights::of(weights, dataset.rows.len(), dataset.sensor),
             rows: dataset.rows.len(),
         }
     }
@@ -54,12 +85,7 @@ impl Calibration {
 
     /// This task itself with other weights, one for each row.
     pub fn weighted(mut self, weights: &[Weight]) -> Self {
-        for (i, w) in weights.iter().enumerate().take(self.rows) {
-            self.columns.per_mm[i] = w.per_mm;
-        }
-        for (per_rad, w) in self.columns.per_rad.iter_mut().take(self.rows).zip(weights) {
-            *per_rad = w.per_rad;
-        }
+        self.weights = Weights::of(weights, self.rows, self.sensor);
         self
     }
 
@@ -73,7 +99,7 @@ impl Calibration {
     /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take a
     /// hundred and fifty bytes each.
     pub(crate) fn forget_rows(&mut self) {
-        self.columns = Columns::default();
+        (self.columns, self.weights) = (Arc::default(), Weights::default());
     }
 
     /// Weight of a row's length or position [1/mm].
@@ -81,7 +107,7 @@ impl Calibration {
     /// # Panics
     /// Beyond the last row.
     pub fn per_mm(&self, row: usize) -> f64 {
-        self.columns.per_mm[row]
+        self.weights.per_mm[row]
     }
 
     /// What may move, in the order of x.
