@@ -7,6 +7,7 @@
 //! 2004, with nuisance parameters projected off.
 
 use std::borrow::Cow;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -27,6 +28,13 @@ pub struct Interval {
     pub to: usize,
     /// Evidence as in `score`, trials not counted.
     pub evidence: f64,
+}
+
+impl Interval {
+    /// The order in which intervals are told: the best first, of equal ones the first.
+    fn before(&self, other: &Self) -> Ordering {
+        other.evidence.total_cmp(&self.evidence).then(self.from.cmp(&other.from)).then(self.to.cmp(&other.to))
+    }
 }
 
 /// Shortest interval: fewer rows are outliers, not a shift.
@@ -155,7 +163,7 @@ impl Strip {
         let n = self.n;
         let sums = Sums::of(self, design);
         let grid = self.cuts.len() - 1;
-        let mut coarse: Vec<Interval> = (0..grid)
+        let coarse: Vec<Vec<Interval>> = (0..grid)
             .into_par_iter()
             .map(|first| {
                 checkpoint();
@@ -170,21 +178,22 @@ impl Strip {
                 }
                 found
             })
-            .collect::<Vec<_>>()
-            .concat();
-        coarse.sort_by(|a, b| {
-            b.evidence.total_cmp(&a.evidence).then(a.from.cmp(&b.from)).then(a.to.cmp(&b.to))
-        });
+            .collect();
         let mut best: Vec<Interval> = Vec::new();
-        for interval in coarse {
-            if best.len() >= count {
-                break;
-            }
-            if best.iter().all(|b| overlap(b, &interval) < 0.5) {
-                let interval = if interval.evidence > FAINT { refined(&sums, interval) } else { interval };
-                if !best.contains(&interval) {
-                    best.push(interval);
-                }
+        let mut last: Option<Interval> = None;
+        while best.len() < count {
+            // The next one that shares few rows with those before; few are asked for, so they need not all be sorted.
+            let next = coarse
+                .iter()
+                .flatten()
+                .filter(|i| last.is_none_or(|last| last.before(i).is_lt()))
+                .filter(|i| best.iter().all(|b| overlap(b, i) < 0.5))
+                .min_by(|a, b| a.before(b));
+            let Some(next) = next.copied() else { break };
+            last = Some(next);
+            let next = if next.evidence > FAINT { refined(&sums, next) } else { next };
+            if !best.contains(&next) {
+                best.push(next);
             }
         }
         best

@@ -22,7 +22,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
-use faer::{MatMut, Par};
+use faer::{MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -397,6 +397,17 @@ fn of_many(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     Some(Cholesky::pack_dirty(matrix))
 }
 
+/// (L Lᵀ)⁻¹ of a large factor, in blocks: XᵀX with X = L⁻¹.
+fn inverse_of_many(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    let lower = factor.l_dirty();
+    let n = lower.nrows();
+    let mut x = DMatrix::identity(n, n);
+    let lower = MatRef::from_column_major_slice(lower.as_slice(), n, n);
+    let place = MatMut::from_column_major_slice_mut(x.as_mut_slice(), n, n);
+    faer::linalg::triangular_solve::solve_lower_triangular_in_place(lower, place, Par::Seq);
+    squared(&x)
+}
+
 struct Scaled {
     factor: Cholesky<f64, Dyn>,
     size: DVector<f64>,
@@ -408,7 +419,8 @@ impl Scaled {
     }
 
     fn inverse(&self) -> DMatrix<f64> {
-        let unit = self.factor.inverse();
+        let n = self.size.len();
+        let unit = if n > MANY { inverse_of_many(&self.factor) } else { self.factor.inverse() };
         DMatrix::from_fn(unit.nrows(), unit.ncols(), |i, j| unit[(i, j)] * self.size[i] * self.size[j])
     }
 }

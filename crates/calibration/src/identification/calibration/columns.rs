@@ -1,5 +1,6 @@
 //! Measured rows by columns, and what each effect and disturbance adds to them.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -12,6 +13,7 @@ use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Model;
 use truegrind_arm::parameter::Parameter;
 use truegrind_math::lanes::WIDTH;
+use truegrind_math::work::checkpoint;
 
 /// Rows from which their columns are made on all threads; fewer are not worth the call.
 const MANY_ROWS: usize = 8192;
@@ -270,54 +272,111 @@ impl Columns {
 
     fn add_effects(&mut self, dataset: &Dataset, start: &Model, parameters: &[Parameter], padded: usize) {
         let n = dataset.rows.len();
-        let mut extra: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; padded]);
-        let mut growth = vec![0.0; padded];
-        let free: Vec<(usize, usize, usize)> = parameters
+        let free: Vec<FreeEffect> = parameters
             .iter()
             .enumerate()
             .filter_map(|(place, p)| match *p {
-                Parameter::Effect { index, parameter } => Some((place, index, parameter)),
+                Parameter::Effect { index, parameter } => Some(FreeEffect { place, index, parameter }),
                 _ => None,
             })
             .collect();
-        let mut effects: Vec<EffectColumns> =
-            free.iter().map(|&(place, ..)| EffectColumns { place, ..EffectColumns::default() }).collect();
-        let still = Condition::default();
-        let mut posed = start.at_condition(&still);
-        for (i, row) in dataset.rows.iter().enumerate() {
+        let parts: Vec<OfEffects> = (0..n.div_ceil(PART_ROWS))
+            .into_par_iter()
+            .map(|part| {
+                checkpoint();
+                let first = part * PART_ROWS;
+                OfEffects::of(dataset, first..n.min(first + PART_ROWS), start, &free)
+            })
+            .collect();
+        // Padding repeats the last row, with weight 0; what an effect adds per unit is nothing there.
+        let joined = |of: &dyn Fn(&OfEffects) -> &[f64]| {
+            let mut out = Vec::with_capacity(padded);
+            parts.iter().for_each(|part| out.extend_from_slice(of(part)));
+            out.resize(padded, out.last().copied().unwrap_or(0.0));
+            out
+        };
+        let spread = |of: &dyn Fn(&OfEffects) -> Option<&[f64]>| {
+            parts.iter().any(|part| of(part).is_some()).then(|| {
+                let mut out = vec![0.0; padded];
+                for (place, part) in out.chunks_mut(PART_ROWS).zip(&parts) {
+                    if let Some(some) = of(part) {
+                        place[..some.len()].copy_from_slice(some);
+                    }
+                }
+                out
+            })
+        };
+        self.extra = Some(std::array::from_fn(|j| joined(&|part| &part.extra[j])));
+        self.growth = joined(&|part| &part.growth);
+        self.effects = free
+            .iter()
+            .enumerate()
+            .map(|(k, free)| EffectColumns {
+                place: free.place,
+                rotation: std::array::from_fn(|j| spread(&|part| part.effects[k].rotation[j].as_deref())),
+                growth: spread(&|part| part.effects[k].growth.as_deref()),
+            })
+            .collect();
+    }
+}
+
+/// Rows of which one thread works out the effects.
+const PART_ROWS: usize = 128;
+
+/// A free parameter of an effect.
+struct FreeEffect {
+    /// Position in x.
+    place: usize,
+    /// Effect of the starting model.
+    index: usize,
+    /// Which of its parameters.
+    parameter: usize,
+}
+
+/// What the effects of the starting model do in some rows.
+struct OfEffects {
+    extra: [Vec<f64>; 6],
+    growth: Vec<f64>,
+    effects: Vec<EffectColumns>,
+}
+
+impl OfEffects {
+    fn of(dataset: &Dataset, rows: Range<usize>, start: &Model, free: &[FreeEffect]) -> Self {
+        let n = rows.len();
+        let mut out = Self {
+            extra: std::array::from_fn(|_| vec![0.0; n]),
+            growth: vec![0.0; n],
+            effects: free
+                .iter()
+                .map(|free| EffectColumns { place: free.place, ..EffectColumns::default() })
+                .collect(),
+        };
+        let mut posed = start.at_condition(&Condition::default());
+        for (i, row) in rows.map(|row| &dataset.rows[row]).enumerate() {
             if posed.condition != *row.condition {
                 posed = start.at_condition(&row.condition);
             }
             let rotation = posed.rotations(&row.joints) - start.joint_map * row.joints;
             for j in 0..6 {
-                extra[j][i] = rotation[j];
+                out.extra[j][i] = rotation[j];
             }
-            growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
+            out.growth[i] = start.effects.iter().map(|e| e.growth(&row.condition)).sum();
             let mut at = (usize::MAX, Vec::new(), Vec::new());
-            for (columns, &(_, index, parameter)) in effects.iter_mut().zip(&free) {
-                if at.0 != index {
-                    let growth = start.effects[index].growth_regressors(&row.condition);
-                    at = (index, posed.effect_regressors(index, &row.joints), growth);
+            for (columns, free) in out.effects.iter_mut().zip(free) {
+                if at.0 != free.index {
+                    let growth = start.effects[free.index].growth_regressors(&row.condition);
+                    at = (free.index, posed.effect_regressors(free.index, &row.joints), growth);
                 }
-                let regressor = at.1[parameter];
+                let regressor = at.1[free.parameter];
                 for j in (0..6).filter(|&j| regressor[j] != 0.0) {
-                    columns.rotation[j].get_or_insert_with(|| vec![0.0; padded])[i] = regressor[j];
+                    columns.rotation[j].get_or_insert_with(|| vec![0.0; n])[i] = regressor[j];
                 }
-                let grown = at.2.get(parameter).copied().unwrap_or(0.0);
+                let grown = at.2.get(free.parameter).copied().unwrap_or(0.0);
                 if grown != 0.0 {
-                    columns.growth.get_or_insert_with(|| vec![0.0; padded])[i] = grown;
+                    columns.growth.get_or_insert_with(|| vec![0.0; n])[i] = grown;
                 }
             }
         }
-        // Padding repeats the last row, with weight 0.
-        for i in n..padded {
-            for column in &mut extra {
-                column[i] = column[n - 1];
-            }
-            growth[i] = growth[n - 1];
-        }
-        self.extra = Some(extra);
-        self.growth = growth;
-        self.effects = effects;
+        out
     }
 }
