@@ -198,11 +198,10 @@ fn scale_sentence(scale: &ScaleError, sensor: Sensor) -> String {
     };
     let (long, error) = if scale.value < 0.0 { ("short", -scale.value) } else { ("long", scale.value) };
     format!(
-        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {:.1} \
-         %){bent}: {}",
+        "a sensor that reads {:.3} ± {:.3} % too {long} explains the rows better than the links alone (probability {}){bent}: {}",
         100.0 * error,
         100.0 * scale.sigma,
-        100.0 * scale.probability,
+        percent_of(scale.probability),
         remedy(sensor)
     )
 }
