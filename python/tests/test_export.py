@@ -7,7 +7,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ import pytest
 import truegrind as tg
 
 from conftest import DATA
+from urdf import Urdf, turn
 
 SAME_MM = 1e-9
 
@@ -41,43 +41,6 @@ reflector_mm = [38.2, 12.6, 61.3]
 [noise]
 sigma_mm = 0.015
 """
-
-
-def turn(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotations about an axis by Rodrigues' formula, one for each angle."""
-    x, y, z = axis / np.linalg.norm(axis)
-    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = np.asarray(angle)[..., None, None]
-    return np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
-
-
-class Urdf:
-    """The chain of a description from its root to `tool0`: fixed transforms and axes."""
-
-    def __init__(self, text: str):
-        root = ElementTree.fromstring(text)
-        to = {joint.find("child").get("link"): joint for joint in root.findall("joint")}
-        self.joints, link = [], "tool0"
-        while link in to:
-            self.joints.insert(0, to[link])
-            link = to[link].find("parent").get("link")
-
-    def forward(self, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (mm) and rotations of the tip for rows of angles."""
-        place, rotation = np.zeros((len(q_rad), 3)), np.broadcast_to(np.eye(3), (len(q_rad), 3, 3))
-        angles = iter(q_rad.T)
-        for joint in self.joints:
-            xyz, rpy = (
-                np.array(joint.find("origin").get(key, "0 0 0").split(), dtype=float) for key in ("xyz", "rpy")
-            )
-            place = place + 1000 * rotation @ xyz
-            for axis, angle in zip(np.eye(3)[::-1], rpy[::-1], strict=True):
-                rotation = rotation @ turn(axis, angle)
-            if joint.get("type") != "fixed":
-                axis = np.array(joint.find("axis").get("xyz").split(), dtype=float)
-                rotation = rotation @ turn(axis, next(angles))
-        assert next(angles, None) is None
-        return place, rotation
 
 
 def links(model: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -93,6 +93,25 @@ def test_options_are_those_of_the_command_line(plant):
         _jobs.listed(_jobs.compensating("in", "arm.toml", "out", None, {"max_risk": 7}))
 
 
+def test_what_cannot_be_done_says_why(plant):
+    command = _jobs.compensating(["in/broken.pgf"], "arm.toml", "out", None, {})
+    (units,) = _jobs.chunks(_jobs.listed(command), 7)
+    _jobs.do(command, units)
+    with pytest.raises(tg.TruegrindError, match=r"none of 1 programs could be done(.|\n)*nowhere\.mod"):
+        _jobs.gathered(command, {})
+
+
+def test_without_a_client_jobs_are_started_from_this_process(plant, expected):
+    """No interpreter is started for what starts a process of the command line itself."""
+    pytest.importorskip("distributed")
+    from truegrind.dask import _client, compensate_folder
+
+    with _client(None, processes=False) as client:
+        assert set(client.run(os.getpid).values()) == {os.getpid()}
+        assert set(client.nthreads().values()) == {1}
+    same(expected, compensate_folder("in", "arm.toml", "out", **REPORTS, chunk=7))
+
+
 def test_dask_writes_what_one_run_writes_and_does_nothing_twice(plant, expected, client):
     from truegrind.dask import compensate_folder
 
@@ -185,6 +204,29 @@ if __name__ == "__main__":
     assert sum(after[name] != inode for name, inode in before.items()) <= 1
     found = _jobs.Gathered(True, "", "", {kind: Path(path) for kind, path in REPORTS.items()})
     same(expected, found)
+
+
+def test_ctrl_c_ends_what_was_started_and_the_next_call_does_the_rest(plant, expected):
+    pytest.importorskip("distributed")
+    script = """
+if __name__ == "__main__":
+    from truegrind.dask import compensate_folder
+    compensate_folder("in", "arm.toml", "out", chunk=20, csv="all.csv", json="all.json", html="all.html", md="all.md")
+"""
+    Path("job.py").write_text(script)
+    job = subprocess.Popen([sys.executable, "job.py"], start_new_session=True, stderr=subprocess.PIPE)
+    begin = time.monotonic()
+    while len(list(Path("out/done").glob("*.json"))) < 4:
+        assert job.poll() is None and time.monotonic() < begin + TIME_LIMIT_S
+        time.sleep(0.002)
+    # As a terminal does: everybody hears of it, and jobs before whoever called them.
+    os.killpg(job.pid, signal.SIGINT)
+    assert b"KeyboardInterrupt" in job.communicate(timeout=TIME_LIMIT_S)[1]
+    before = records()
+    assert len(before) < COUNT and not Path("all.csv").exists()
+    subprocess.run([sys.executable, "job.py"], check=True, timeout=TIME_LIMIT_S)
+    assert sum(records()[name] != inode for name, inode in before.items()) <= 1
+    same(expected, _jobs.Gathered(True, "", "", {kind: Path(path) for kind, path in REPORTS.items()}))
 
 
 def test_a_program_that_kills_whoever_does_it_is_listed(plant, client, binary, monkeypatch):

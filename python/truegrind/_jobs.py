@@ -12,10 +12,12 @@ import json
 import os
 import shutil
 import subprocess
+import threading
+import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from .errors import ArgumentError, TruegrindError
 
@@ -119,19 +121,60 @@ def chunks(units: Sequence[dict[str, Any]], size: int) -> Iterator[str]:
         yield json.dumps(list(units[start : start + size]))
 
 
-def do(command: Command, units: str) -> None:
+class Started:
+    """The processes that the jobs of one run have going, where the process that called the run does the jobs: when the call ends, by
+    Ctrl-C or an error, they end with it, and none is started again."""
+
+    of_run: ClassVar[dict[str, Started]] = {}
+    """By key; kept when the run is over, for jobs that begin too late."""
+
+    def __init__(self) -> None:
+        self.key = uuid.uuid4().hex
+        self.lock = threading.Lock()
+        self.going: set[subprocess.Popen[bytes]] = set()
+        self.called_off = False
+
+    def __enter__(self) -> Started:
+        self.of_run[self.key] = self
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self.lock:
+            self.called_off = True
+            for process in self.going:
+                process.terminate()
+
+    def go_on(self) -> None:
+        if self.called_off:
+            raise TruegrindError("the run was called off")
+
+    def run(self, arguments: list[str], given: bytes) -> subprocess.CompletedProcess[bytes]:
+        """:raises TruegrindError: the run was called off."""
+        with self.lock:
+            self.go_on()
+            pipe = subprocess.PIPE
+            process = subprocess.Popen(arguments, stdin=pipe, stdout=pipe, stderr=pipe)
+            self.going.add(process)
+        out, err = process.communicate(given)
+        with self.lock:
+            self.going.discard(process)
+            self.go_on()
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+
+def do(command: Command, units: str, run: str | None = None) -> None:
     """One job: does what of a chunk is not done yet. A process that dies is started again; the command line itself lists a unit that
     kills it every time.
 
     :param units: a list of units as JSON; see :func:`chunks`.
+    :param run: the key of what this process has :class:`Started`, where the job is done by the process that called the run.
     :raises TruegrindError: what the command line refuses.
     """
+    started = Started.of_run.get(run or "") or Started()
     idle = 0
     while True:
         before = _state(command)
-        done = subprocess.run(
-            command.arguments("--units", "-", "--resume", "--threads", "1"), input=units.encode(), capture_output=True
-        )
+        done = started.run(command.arguments("--units", "-", "--resume", "--threads", "1"), units.encode())
         if done.returncode >= 0:
             _checked(done)
             return
@@ -171,7 +214,9 @@ def gathered(command: Command, reports: Mapping[str, Any]) -> Gathered:
 def _checked(done: subprocess.CompletedProcess[bytes]) -> subprocess.CompletedProcess[bytes]:
     if done.returncode not in (0, 1):
         text = done.stderr.decode(errors="replace").strip()
-        raise TruegrindError(text.removeprefix("error: ") or f"the command line ended with {done.returncode}")
+        text = text.removeprefix("error: ") or f"the command line ended with {done.returncode}"
+        # Where nothing could be done the table says why of each.
+        raise TruegrindError("\n".join([text, *filter(None, [done.stdout.decode(errors="replace").strip()])]))
     return done
 
 

@@ -7,7 +7,8 @@
 >>> fleet = diagnose_many("measurements", "abb-irb-120", "models", html="fleet.html")     # doctest: +SKIP
 
 Needs ``pip install truegrind[dask]``, and the command line on every worker (on PATH, or named by TRUEGRIND). All workers see the
-folders under the same paths. Workers with one thread each are best: ``Client(threads_per_worker=1)``.
+folders under the same paths. Workers with one thread each are best: ``Client(threads_per_worker=1)``. Without a client jobs are started
+from this process, which is the cheapest on one machine: each is a process of the command line anyway.
 
 What is written is byte for byte what one run of the command line writes. A worker that dies, and a client that is started again, cost
 what they were doing at that moment: what is done is not done again, as long as inputs, model, cell, options and version are the same.
@@ -22,6 +23,7 @@ from os import PathLike
 from typing import Any
 
 import dask
+from dask.system import CPU_COUNT
 from distributed import Client, as_completed, get_client
 
 from . import _jobs, _power
@@ -45,15 +47,17 @@ _QUIET = {
 
 
 @contextmanager
-def _client(given: Client | None):
-    """The client that was given, else the current one, else one of this machine with one thread a worker."""
+def _client(given: Client | None, *, processes: bool):
+    """The client that was given, else the current one, else one of this machine with one thread a worker. ``processes``: each worker is
+    one. Jobs that start processes of their own need none around them, and are spared the start of interpreters with all of Dask."""
     if given is not None:
         yield given
         return
     try:
         yield get_client()
     except ValueError:
-        with dask.config.set(_QUIET), Client(threads_per_worker=1) as made:
+        local = {"n_workers": CPU_COUNT, "threads_per_worker": 1, "processes": processes, "dashboard_address": None}
+        with dask.config.set(_QUIET), Client(**local) as made:
             yield made
 
 
@@ -77,8 +81,8 @@ def _all(
 
 def _run(command: _jobs.Command, reports: Mapping[str, Any], client: Client | None, chunk: int, progress) -> Gathered:
     units = _jobs.listed(command)
-    with _client(client) as client:
-        *_, errors = _all(client, _Do(command), _jobs.chunks(units, chunk), progress)
+    with _client(client, processes=False) as client, _jobs.Started() as started:
+        *_, errors = _all(client, _Do(command, started.key), _jobs.chunks(units, chunk), progress)
     try:
         return _jobs.gathered(command, reports)
     except _jobs.TruegrindError as missing:
@@ -89,11 +93,11 @@ def _run(command: _jobs.Command, reports: Mapping[str, Any], client: Client | No
 class _Do:
     """A job as it travels."""
 
-    def __init__(self, command: _jobs.Command) -> None:
-        self.command = command
+    def __init__(self, command: _jobs.Command, run: str) -> None:
+        self.command, self.run = command, run
 
     def __call__(self, units: str) -> None:
-        _jobs.do(self.command, units)
+        _jobs.do(self.command, units, self.run)
 
 
 def compensate_folder(
@@ -183,7 +187,7 @@ def power_study(
     study = _power.study(recipes, robot, work, options)
     numbers = [int(seed) for seed in seeds]
     runs = [(name, seed) for name, *_ in study.recipes for seed in numbers]
-    with _client(client) as client:
+    with _client(client, processes=True) as client:
         *done, errors = _all(client, _Run(study), runs, progress)
     if errors:
         raise errors[0]

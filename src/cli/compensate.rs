@@ -561,10 +561,11 @@ fn file_to_file(shop: &Shop<'_>, job: &Job, programs: &Programs) -> anyhow::Resu
     if job.under.is_some() && job.paths.len() > 1 {
         done.row.file = job.name();
     }
-    let mut batch = Batch::sparing(programs.files.iter().map(|(path, _)| path));
+    let shared = shop.arguments.shares.on();
+    let mut batch = Batch::sparing(programs.files.iter().map(|(path, _)| path)).settled_later(shared);
     let made = std::mem::take(&mut done.written);
     let hash = |(path, bytes): &(PathBuf, Vec<u8>)| (path.clone(), sha256(bytes));
-    let written = if shop.arguments.shares.on() { made.iter().map(hash).collect() } else { Vec::new() };
+    let written = if shared { made.iter().map(hash).collect() } else { Vec::new() };
     add_made(&mut batch, made, true)?;
     batch.write()?;
     Ok((done, written))

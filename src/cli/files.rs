@@ -28,6 +28,7 @@ mod ledger;
 pub(super) mod own;
 mod pending;
 mod place;
+pub(super) mod settle;
 pub(super) mod witness;
 
 /// The bytes of a file: an input, which no output may overwrite from here on.
@@ -171,12 +172,20 @@ pub(super) fn name(path: &Path) -> String {
 pub(super) struct Batch {
     files: Vec<(PathBuf, Vec<u8>)>,
     inputs: Vec<PathBuf>,
+    settled_later: bool,
 }
 
 impl Batch {
     /// A batch that spares `inputs` too, beside all that was read.
     pub(super) fn sparing<P: AsRef<Path>>(inputs: impl IntoIterator<Item = P>) -> Self {
-        Self { files: Vec::new(), inputs: inputs.into_iter().map(|p| p.as_ref().to_path_buf()).collect() }
+        let inputs = inputs.into_iter().map(|p| p.as_ref().to_path_buf()).collect();
+        Self { files: Vec::new(), inputs, settled_later: false }
+    }
+
+    /// Leaves it to [`settle`] that new files get to the disk, for one who would notice that what a machine that went down left of them
+    /// is not what was written. What takes the place of another file is synced before all the same.
+    pub(super) fn settled_later(self, later: bool) -> Self {
+        Self { settled_later: later && settle::CAN, ..self }
     }
 
     /// Adds a file; `-` prints it to stdout when the batch is written.
@@ -199,7 +208,7 @@ impl Batch {
         let (mut ready, mut over, mut last) = (Vec::new(), Vec::new(), Vec::new());
         for (place, (_, bytes)) in places.iter().zip(&self.files) {
             let failed = || format!("{}: cannot be written; nothing was changed", place.named.display());
-            match written_beside(place, bytes).with_context(failed)? {
+            match written_beside(place, bytes, self.settled_later).with_context(failed)? {
                 Some(pending) => ready.push((place, pending)),
                 None if matches!(place.kind, Kind::Over(_)) => {
                     over.push((place, bytes, InPlace::open(&place.path).with_context(failed)?));
@@ -252,15 +261,16 @@ fn incomplete(failed: &Place, what: &str, done: &[&Place], all: &[Place]) -> Str
     )
 }
 
-/// The file beside its place, on the disk; `None` where it is sent, printed, or written where it stands.
-fn written_beside(place: &Place, bytes: &[u8]) -> std::io::Result<Option<Pending>> {
+/// The file beside its place, on the disk; `None` where it is sent, printed, or written where it stands. `later`: a new file gets to the
+/// disk later.
+fn written_beside(place: &Place, bytes: &[u8], later: bool) -> std::io::Result<Option<Pending>> {
     let over = match &place.kind {
         Kind::Stdout | Kind::Stream => return Ok(None),
         Kind::Over(meta) if names(meta) > 1 => return Ok(None),
         Kind::Over(meta) => Some(meta),
         Kind::New => None,
     };
-    match Pending::write(place.path.clone(), &parent(&place.path), over, bytes) {
+    match Pending::write(place.path.clone(), &parent(&place.path), over, bytes, later) {
         Err(error) if over.is_some() && error.kind() == std::io::ErrorKind::PermissionDenied => Ok(None),
         done => done.map(Some),
     }

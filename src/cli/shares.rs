@@ -2,7 +2,8 @@
 //!
 //! Jobs know nothing of each other but a folder. In it `run.json` lists all units, `done/KEY.json` is the record of one that is
 //! done, and `begun/` holds what was begun and did not end; `tables/` has the table of each share. Two jobs that do the same unit at the same time both come to
-//! the same bytes, and whoever is last puts them over the same.
+//! the same bytes, and whoever is last puts them over the same. New outputs and records get to the disk together when a job ends: one
+//! that a crash of the machine tore before is not as its record says, and is made again.
 //!
 //! A unit may take its whole process with it (memory, stack). The next job of the same units finds that one before it did not end,
 //! and from then on notes each unit that it begins. One that is begun and not ended is left to the end and done alone, so that it
@@ -20,6 +21,7 @@ use truegrind::units::run::{self, Run, Unit};
 use truegrind::units::share::Share;
 
 use super::defect::isolated;
+use super::files::settle::settle;
 use super::files::{self, own};
 use super::outputs::Outputs;
 use super::programs::Job;
@@ -138,6 +140,7 @@ where
         None => here.done_or_do(job, doing, true)?.ok_or_else(|| anyhow!("{}: left out", job.name())),
     });
     let done = each.collect::<anyhow::Result<Vec<_>>>()?;
+    store.folders.iter().try_for_each(|folder| settle(folder))?;
     own::gone(&here.note);
     Ok(done)
 }
@@ -148,6 +151,8 @@ pub(super) struct Store {
     work: PathBuf,
     run: String,
     resume: bool,
+    /// Where a job writes.
+    folders: Vec<PathBuf>,
 }
 
 /// What makes a run.
@@ -178,7 +183,9 @@ impl Store {
         for folder in ["done", "begun"] {
             files::make_folder(&work.join(folder))?;
         }
-        let store = Self { work: work.to_path_buf(), run, resume: shares.resume };
+        let mut folders = vec![work.to_path_buf()];
+        folders.extend(asked.output.filter(|output| *output != work).map(Path::to_path_buf));
+        let store = Self { work: work.to_path_buf(), run, resume: shares.resume, folders };
         if shares.units.is_none() {
             store.list(shares, asked, jobs)?;
         }
@@ -217,7 +224,9 @@ impl Store {
             )
         })?;
         let run = Run::from_bytes(&bytes).map_err(|error| anyhow!("{}: {error}", path.display()))?;
-        Ok((Self { work: work.to_path_buf(), run: run.run.clone(), resume: true }, run))
+        let store =
+            Self { work: work.to_path_buf(), run: run.run.clone(), resume: true, folders: Vec::new() };
+        Ok((store, run))
     }
 
     fn list(&self, shares: &Shares, asked: &Asked<'_>, jobs: &[Job]) -> anyhow::Result<()> {

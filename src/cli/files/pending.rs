@@ -27,7 +27,7 @@ enum Written {
 
 impl Pending {
     /// Writes `bytes` to the disk, in the folder of `place`. A file that replaces another gets its permissions and owner; a
-    /// new one gets what the system gives to new files (`umask`).
+    /// new one gets what the system gives to new files (`umask`), and is not waited for where it is settled `later`.
     ///
     /// # Errors
     /// [`io::ErrorKind::PermissionDenied`] where the folder takes no new file, or a new file cannot have the old one's owner.
@@ -36,6 +36,7 @@ impl Pending {
         folder: &Path,
         over: Option<&Metadata>,
         bytes: &[u8],
+        later: bool,
     ) -> io::Result<Self> {
         let mut file = Written::new(folder, over.is_none())?;
         ledger::note_made(folder, &file.handle().metadata()?);
@@ -43,7 +44,9 @@ impl Pending {
             like(file.handle(), old)?;
         }
         file.handle().write_all(bytes)?;
-        file.handle().sync_all()?;
+        if over.is_some() || !later {
+            file.handle().sync_all()?;
+        }
         Ok(Self { file, place })
     }
 
