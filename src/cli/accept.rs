@@ -13,7 +13,7 @@ use super::ending::Ending;
 use super::files::{self, Batch};
 use super::identify::{DataArguments, PointsArguments, read};
 use super::inputs::{self, NamedModel};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, Pages};
 use super::progress::Work;
 use super::stated::StatedArguments;
 use super::terminal::tell;
@@ -58,16 +58,14 @@ pub(super) struct Arguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
-    outputs: Outputs,
+    pages: Pages,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    if arguments.outputs.rrd.is_some() {
-        bail!("--rrd: an acceptance has no recording; `truegrind identify DATA --rrd` draws the same rows");
-    }
+    let outputs = Outputs::from(&arguments.pages);
     let mut given: Vec<&Path> = vec![&arguments.data, &arguments.model];
     given.extend(arguments.points.points.as_deref());
-    Batch::check(&given, &arguments.outputs.files())?;
+    Batch::check(&given, &outputs.files())?;
     let serials = arguments.serial.iter().map(|text| serial(text)).collect::<anyhow::Result<Vec<_>>>()?;
     let named = inputs::model(&arguments.model.to_string_lossy())?;
     let NamedModel::Estimated { name, arm, .. } = &named else {
@@ -105,9 +103,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         frames_stated: options.frames.is_some(),
         seed: options.seed,
     };
-    arguments.outputs.print(&view::summary(&found, &dataset, arm))?;
+    outputs.print(&view::summary(&found, &dataset, arm))?;
     let mut batch = Batch::sparing(given);
-    arguments.outputs.add_made(
+    outputs.add_made(
         &mut batch,
         || view::document(&found, &dataset, arm, &said),
         || view::row_table(&found),

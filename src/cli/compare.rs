@@ -5,10 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use truegrind::arm::model::Model;
-#[cfg(feature = "visual")]
-use truegrind::calibration::identification::register::starting_frames;
-#[cfg(feature = "visual")]
-use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::Dataset;
 use truegrind::papers::experiment::{Experiment, Kind};
 use truegrind::papers::grinding::Actual;
@@ -138,7 +134,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
             dataset,
             nominal,
             actual: measured.actual.as_ref(),
-            frames: &starting_frames(dataset, nominal, &Tolerance::default(), true)?,
             robot: arguments.robot.as_deref().unwrap_or(&measured.robot),
         };
         batch.add(path, super::recording::comparison(&compared, &summary)?);

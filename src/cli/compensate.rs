@@ -264,7 +264,7 @@ impl Arguments {
 
     /// Whether something that is asked for, or kept, shows the motions of each of many programs.
     fn shows_motions(&self) -> bool {
-        self.outputs.json.is_some() || self.keeps_all()
+        self.outputs.pages.json.is_some() || self.keeps_all()
     }
 
     /// Every option that has a part in what is written, in words. What has none is taken out by name, so that one that comes anew
@@ -514,7 +514,7 @@ fn many(shop: &Shop<'_>, jobs: &[Job], store: Option<&Store>) -> anyhow::Result<
         read: |job: &Job| Programs::read(&job.paths),
         content: Programs::content,
         work: |job: &Job, programs: Programs| file_to_file(shop, job, &programs),
-        whole: arguments.outputs.json.is_some(),
+        whole: arguments.outputs.pages.json.is_some(),
     };
     let done: Vec<Done> = on_threads(arguments.common.threads, || each(store, jobs, &doing))??;
     drop(work);

@@ -16,7 +16,7 @@ use truegrind::units::share::Share;
 use super::computation::on_threads;
 use super::ending::Ending;
 use super::files::{self, Batch};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, Pages};
 use super::programs::{Job, Programs};
 use super::shares::{Kept, Store};
 use super::{corrected, deviation, fleet};
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     threads: Option<usize>,
     #[command(flatten)]
-    outputs: Outputs,
+    pages: Pages,
 }
 
 /// What became of a unit.
@@ -46,9 +46,7 @@ enum State<T> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
-    if arguments.outputs.rrd.is_some() {
-        bail!("--rrd shows one program or arm: name one to the verb itself");
-    }
+    let outputs = Outputs::from(&arguments.pages);
     let (store, run) = Store::of(&arguments.work)?;
     if run.version != env!("CARGO_PKG_VERSION") {
         bail!(
@@ -63,18 +61,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
     }
     let jobs: Vec<Job> = run.units.iter().map(Job::of_unit).collect();
     let inputs: Vec<&Path> = jobs.iter().flat_map(|job| &job.paths).map(PathBuf::as_path).collect();
-    let mut targets = arguments.outputs.files();
+    let mut targets = outputs.files();
     targets.extend(arguments.diff.as_deref());
     Batch::check(&inputs, &targets)?;
     let here = Here { arguments, store: &store, run: &run, jobs: &jobs };
     let batch = || Batch::sparing(inputs.iter());
     match run.verb.as_str() {
         "compensate" => {
-            let records = here.records(arguments.outputs.json.is_some(), programs)?;
-            corrected::gathered(records, &run.context, &arguments.outputs, arguments.diff.as_deref(), batch())
+            let records = here.records(outputs.pages.json.is_some(), programs)?;
+            corrected::gathered(records, &run.context, &outputs, arguments.diff.as_deref(), batch())
         }
-        "deviation" => deviation::gathered(here.records(true, programs)?, &arguments.outputs, batch()),
-        "diagnose" => fleet::gathered(here.records(true, tables)?, &arguments.outputs, batch()),
+        "deviation" => deviation::gathered(here.records(true, programs)?, &outputs, batch()),
+        "diagnose" => fleet::gathered(here.records(true, tables)?, &outputs, batch()),
         verb => bail!("{}: a run of `{verb}`, which is not known", arguments.work.display()),
     }
 }

@@ -1,4 +1,4 @@
-//! The outputs that every verb offers: --json, --csv, --parquet, --md, --html, --rrd.
+//! The outputs that every verb offers: --json, --csv, --parquet, --md, --html; and --rrd where there is an arm to be drawn.
 
 use std::path::{Path, PathBuf};
 
@@ -10,9 +10,9 @@ use truegrind::report::table::Table;
 use super::files::{Batch, is_stdout};
 use super::terminal::{say, tell_lines, width};
 
-/// Where results go beside the terminal. Without a file name a result goes to stdout.
+/// Tables and pages. Without a file name one goes to stdout.
 #[derive(Debug, Clone, Default, Args)]
-pub(super) struct Outputs {
+pub(super) struct Pages {
     /// JSON.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) json: Option<PathBuf>,
@@ -28,6 +28,13 @@ pub(super) struct Outputs {
     /// Self-contained HTML page with plots.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub(super) html: Option<PathBuf>,
+}
+
+/// Where results go beside the terminal.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct Outputs {
+    #[command(flatten)]
+    pub(super) pages: Pages,
     /// Rerun recording.
     #[arg(long, value_name = "FILE")]
     #[cfg_attr(not(feature = "visual"), arg(value_parser = no_recordings))]
@@ -41,18 +48,24 @@ fn no_recordings(_: &str) -> Result<PathBuf, String> {
         .to_owned())
 }
 
+/// The outputs of a verb that makes no recording.
+impl From<&Pages> for Outputs {
+    fn from(pages: &Pages) -> Self {
+        Self { pages: pages.clone(), rrd: None }
+    }
+}
+
 impl Outputs {
     /// All files named.
     pub(super) fn files(&self) -> Vec<&Path> {
-        [&self.json, &self.csv, &self.parquet, &self.md, &self.html, &self.rrd]
-            .into_iter()
-            .filter_map(|p| p.as_deref())
-            .collect()
+        let Pages { json, csv, parquet, md, html } = &self.pages;
+        [json, csv, parquet, md, html, &self.rrd].into_iter().filter_map(|p| p.as_deref()).collect()
     }
 
     /// Whether any output shows the points of a path.
     pub(super) fn of_points(&self) -> bool {
-        [&self.csv, &self.parquet, &self.md, &self.html, &self.rrd].into_iter().any(Option::is_some)
+        let Pages { json: _, csv, parquet, md, html } = &self.pages;
+        [csv, parquet, md, html, &self.rrd].into_iter().any(Option::is_some)
     }
 
     /// Whether stdout is taken by one of the outputs, so that the summary goes to stderr.
@@ -68,26 +81,27 @@ impl Outputs {
         table: impl FnOnce() -> Table,
         json: impl FnOnce() -> serde_json::Value,
     ) -> anyhow::Result<()> {
-        if let Some(path) = &self.json {
+        let Pages { json: of_json, csv, parquet: of_parquet, md, html } = &self.pages;
+        if let Some(path) = of_json {
             batch.add(path, format::json::text(&json())?);
         }
-        if self.csv.is_some() || self.parquet.is_some() {
+        if csv.is_some() || of_parquet.is_some() {
             let table = table();
-            if let Some(path) = &self.csv {
+            if let Some(path) = csv {
                 batch.add(path, format::csv::table(&table));
             }
-            if let Some(path) = &self.parquet {
+            if let Some(path) = of_parquet {
                 batch.add(path, parquet(&table)?);
             }
         }
-        if self.md.is_none() && self.html.is_none() {
+        if md.is_none() && html.is_none() {
             return Ok(());
         }
         let page = page();
-        if let Some(path) = &self.md {
+        if let Some(path) = md {
             batch.add(path, format::markdown::document(&page));
         }
-        if let Some(path) = &self.html {
+        if let Some(path) = html {
             batch.add(path, format::html::document(&page));
         }
         Ok(())

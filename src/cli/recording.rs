@@ -10,6 +10,8 @@ use truegrind::calibration::diagnosis::diagnose::Diagnosed;
 use truegrind::calibration::identification::calibration::Frames;
 use truegrind::calibration::identification::fit::errors_on;
 use truegrind::calibration::identification::identify::{Identification, observe};
+use truegrind::calibration::identification::register::register;
+use truegrind::calibration::identification::tolerance::Tolerance;
 use truegrind::calibration::measurement::dataset::{Dataset, Row};
 use truegrind::calibration::tracking::{Alarm, Tracker};
 use truegrind::compensation::deviation::PathReport;
@@ -202,14 +204,14 @@ pub(super) struct Compared<'a> {
     pub(super) nominal: &'a Model,
     /// The arm that the rows were simulated on, where they were.
     pub(super) actual: Option<&'a Model>,
-    pub(super) frames: &'a Frames,
     pub(super) robot: &'a str,
 }
 
 /// The recording of an experiment, as a file: the arm and the sensor at the rows that the methods were given, and the answer.
 pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Result<Vec<u8>> {
     let observed = observe(of.dataset, of.nominal, true).0;
-    let errors = errors_on(&observed, of.nominal, of.frames);
+    let frames = register(&observed, of.nominal, &Tolerance::default())?.fitted.frames;
+    let errors = errors_on(&observed, of.nominal, &frames);
     let registered = Residuals {
         stage: "frames registered, links nominal: what the methods begin with".to_owned(),
         rows: of.dataset.rows.iter().map(|row| row.number).zip(errors).collect(),
@@ -235,7 +237,7 @@ pub(super) fn comparison(of: &Compared<'_>, summary: &Document) -> anyhow::Resul
         planned: false,
         keep_out_mm: &[],
         answer: &answer,
-        frames: Some(of.frames),
+        frames: Some(&frames),
         residuals: &[registered],
         held_out: &[],
         set_aside: &[],

@@ -203,13 +203,13 @@ impl Store {
     /// Where the results of this job go: the table of a share to the folder of the run, where nobody names another file.
     fn outputs(&self, shares: &Shares, asked: &Outputs) -> anyhow::Result<Outputs> {
         let mut outputs = asked.clone();
-        if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &asked.parquet) {
+        if let (true, Some(share), None) = (cfg!(feature = "parquet"), shares.shard, &asked.pages.parquet) {
             let tables = self.work.join(TABLES);
             files::make_folder(&tables)?;
             // As wide as the last one's, so that their order by name is that of their numbers.
             let wide = share.of.to_string().len();
             let name = format!("{TABLE}{:0wide$}-of-{}.parquet", share.number, share.of);
-            outputs.parquet = Some(tables.join(name));
+            outputs.pages.parquet = Some(tables.join(name));
         }
         Ok(outputs)
     }

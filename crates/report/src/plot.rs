@@ -21,6 +21,7 @@
 //! assert!(graph.svg().contains(">RMSE [mm]</text>"));
 //! ```
 
+mod alike;
 mod axis;
 mod letters;
 mod canvas;
@@ -36,6 +37,7 @@ mod color_bar;
 mod plan;
 mod strip;
 
+pub use alike::told_apart;
 pub use axis::Axis;
 pub use bars::{BarGroup, Bars};
 pub use graph::{Graph, Mark, Reference, Series, Span};

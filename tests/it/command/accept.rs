@@ -61,7 +61,6 @@ fn a_model_is_accepted_by_poses_of_its_own() {
         ),
         (vec!["1", "--sensor-uncertainty-angle", "200"], "the uncertainty of the sensor's orientation 200"),
         (vec!["1", "--serial", "arm"], "expected WHAT=TEXT"),
-        (vec!["1", "--rrd", "a.rrd"], "--rrd"),
     ] {
         let (code, _, err) = accept("later.csv", &more);
         assert!(code == 2 && err.contains(expected), "{more:?}: {err}");

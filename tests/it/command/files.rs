@@ -91,7 +91,6 @@ fn verbs() -> Vec<Verb> {
                 "--outlet",
                 "--cable-zero",
                 "--touched-point",
-                "--rrd",
                 "--seed",
                 "--threads",
             ],
@@ -334,7 +333,7 @@ fn verbs() -> Vec<Verb> {
             inputs: &["a.mod"],
             outputs: &["--diff", "--json", "--csv", "--parquet", "--md", "--html"],
             needs: &[],
-            others: &["--threads", "--rrd"],
+            others: &["--threads"],
         },
         Verb {
             base: &[

@@ -7,6 +7,7 @@ mod tables;
 use self::figures::{curves, error_bars, rows, time_bars};
 use self::tables::{convergence, cost, errors, parameter_table, verdict, verdict_table};
 use super::study::{held_out, registered};
+use super::words::reservations;
 use crate::protocol::Study;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_report::document::{Block, Document, KeyFigure};
@@ -18,34 +19,40 @@ pub(super) use self::tables::times;
 
 /// Terminal.
 pub(super) fn summary(page: &mut Document, study: &Study) {
-    head(page, study);
-    page.push(errors(study));
-    page.push(verdict_table(study));
     page.push(verdict(study));
+    page.push(key_figures(study));
+    page.push(errors(study));
+    page.push(notes(study));
+    page.push(verdict_table(study));
+    page.push(Block::List(reservations(study)));
     page.push(convergence(study));
     page.push(cost(study));
 }
 
 /// Page; `timings`: with the measured seconds.
 pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
-    head(page, study);
     page.push(verdict(study));
+    page.push(key_figures(study));
     page.push(errors(study));
+    page.push(notes(study));
     page.heading(2, "Errors");
     page.figure(
         error_bars(study),
         "Held-out errors, mean over the cases; whiskers are one standard deviation over the cases. The mean of |e| is \
          what the papers call STD. A method that diverged in any case has no bar.",
     );
-    for picture in rows(study) {
+    for (picture, not_drawn) in rows(study) {
         page.figure(
             picture,
-            "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
-             Methods that diverged in any case are left out.",
+            format!(
+                "Held-out rows of the first case in the order of the file; BC has its frames registered, links nominal. \
+                 Methods that diverged in any case are left out.{not_drawn}"
+            ),
         );
     }
     page.heading(2, "Which differences are real");
     page.push(verdict_table(study));
+    page.push(Block::List(reservations(study)));
     page.push(convergence(study));
     page.heading(2, "Convergence and cost");
     page.figure(
@@ -82,7 +89,8 @@ pub(super) fn page(page: &mut Document, study: &Study, timings: bool) {
     }
 }
 
-fn head(page: &mut Document, study: &Study) {
+/// What is to be known of the figures beside each other.
+fn notes(study: &Study) -> Block {
     let mut notes = Vec::new();
     if study.reduced {
         notes.push(format!(
@@ -100,7 +108,10 @@ fn head(page: &mut Document, study: &Study) {
         );
     }
     notes.extend(study.experiment.caveats.iter().cloned());
-    page.push(Block::List(notes));
+    Block::List(notes)
+}
+
+fn key_figures(study: &Study) -> Vec<KeyFigure> {
     let rmse = |errors: &[ErrorSummary]| spread(&errors.iter().map(|e| e.rmse).collect::<Vec<_>>());
     let best = study
         .results
@@ -123,5 +134,5 @@ fn head(page: &mut Document, study: &Study) {
     } else {
         "repeated poses, else the rounding of angles"
     }));
-    page.push(figures);
+    figures
 }

@@ -52,13 +52,31 @@ pub(super) fn headline(study: &Study) -> String {
     )
 }
 
-/// What follows from the comparisons, what the paper has, which method costs least, and what limits them all.
-pub(super) fn sentences(study: &Study) -> Vec<String> {
+/// Which differences there are, what the paper has, which method costs least, and what they do not mean.
+pub(super) fn answer(study: &Study) -> Vec<String> {
     let judgement = &study.judgement;
     let reference = &judgement.reference;
     let mut out: Vec<String> =
         judgement.comparisons.iter().filter_map(|c| of_difference(study, c, reference)).collect();
-    out.extend(same_optimum(study));
+    out.extend(papers_order(study));
+    out.extend(cheapest(study));
+    out.extend(treatments(study));
+    if !judgement.can_be_significant {
+        out.push(format!(
+            "With {} cases and {} comparisons no difference could be significant at 5 %, whatever the figures.",
+            judgement.cases,
+            judgement.comparisons.len()
+        ));
+    }
+    out
+}
+
+/// What is to be known of the comparisons: methods that end alike, that were stopped, that could not be told apart, and what limits the
+/// tests.
+pub(super) fn reservations(study: &Study) -> Vec<String> {
+    let judgement = &study.judgement;
+    let reference = &judgement.reference;
+    let mut out = same_optimum(study);
     out.extend(diverged(study));
     let unsure = |c: &&Comparison| c.conclusion == Conclusion::NotSignificant;
     let (by_ranks, alike): (Vec<&Comparison>, Vec<&Comparison>) =
@@ -79,16 +97,6 @@ pub(super) fn sentences(study: &Study) -> Vec<String> {
         ));
     }
     out.extend(once_converged(study));
-    out.extend(papers_order(study));
-    out.extend(cheapest(study));
-    out.extend(treatments(study));
-    if !judgement.can_be_significant {
-        out.push(format!(
-            "With {} cases and {} comparisons no difference could be significant at 5 %, whatever the figures.",
-            judgement.cases,
-            judgement.comparisons.len()
-        ));
-    }
     out.push(
         "All cases draw their rows from one file, so they are not independent: the signed-rank test takes them as if \
          they were, the t test is corrected for it, and a difference counts only where both find it after Holm's \
@@ -274,12 +282,11 @@ fn of_difference(study: &Study, comparison: &Comparison, reference: &str) -> Opt
         _ => return None,
     };
     Some(format!(
-        "{} leaves {} mm less than {}, in {in_cases} of {} cases: {}.",
+        "{} leaves {} mm less than {}, in {in_cases} of {} cases.",
         name_of(study, better),
         mm(mean),
         name_of(study, worse),
         study.cases.len(),
-        tests(test)
     ))
 }
 

@@ -3,6 +3,10 @@
 //! Links are capsules: the lines between the origins of neighbouring joint frames, to the flange and on to the touched
 //! point, with one radius; from the wrist on with half of it. The first of them, the column on the base, never moves and
 //! is left out.
+//!
+//! A way is clear as a whole, and not at single looks at it: what runs on a link, from a place on the way to another, moves by no more
+//! than each joint turns times how far the link can be from its axis. So a look clears as much of the way as the room that it finds
+//! allows, and where that is too little the way is halved.
 
 use nalgebra::{Point3, Vector3};
 
@@ -29,14 +33,48 @@ pub(super) struct Watch<'a> {
     space: &'a Space,
     wanted: &'a Wanted<'a>,
     arm: PreparedModel<'a>,
+    /// How far the ends of the segments can be from the axis of each joint that moves them (mm).
+    levers_mm: [[f64; 6]; ENDS],
 }
 
-/// The largest step of a joint between two looks at a way (rad).
-const STEP_RAD: f64 = 0.05;
+/// Ends of segments: base, ends of the links, flange, touched point.
+const ENDS: usize = 9;
+
+/// Moving less than this between two looks tells nothing more: a way that comes so near to what is stated counts as blocked (mm).
+const FINEST_MM: f64 = 0.2;
 
 impl<'a> Watch<'a> {
     pub(super) fn of(wanted: &'a Wanted<'a>, space: &'a Space) -> Self {
-        Self { space, wanted, arm: wanted.nominal.at_condition(&Condition::default()) }
+        let arm = wanted.nominal.at_condition(&Condition::default());
+        let levers_mm = [[0.0; 6]; ENDS];
+        let mut out = Self { space, wanted, arm, levers_mm };
+        out.levers_mm = out.levers();
+        out
+    }
+
+    /// How far each end can be from each axis. The end of the link behind a joint keeps its distance from the axis, and what comes after
+    /// that link is no farther from its end than along all links between.
+    fn levers(&self) -> [[f64; 6]; ENDS] {
+        let still = Joints::zeros();
+        let (ends, frames) = (self.ends(&still), self.arm.frames(&still));
+        let from_axis = |joint: usize, end: usize| {
+            (ends[end] - ends[joint]).cross(&Vector3::from(frames.z[joint])).norm()
+        };
+        std::array::from_fn(|end| {
+            std::array::from_fn(|joint| {
+                let link = joint + 1;
+                if end < link {
+                    return 0.0;
+                }
+                // Flange and touched point ride on the last link.
+                let rides = end.min(LINKS);
+                if rides == link {
+                    return from_axis(joint, end);
+                }
+                let along: f64 = (link..rides).map(|k| (ends[k + 1] - ends[k]).norm()).sum();
+                from_axis(joint, link) + along + (ends[end] - ends[rides]).norm()
+            })
+        })
     }
 
     /// Whether there is anything to look for.
@@ -44,22 +82,33 @@ impl<'a> Watch<'a> {
         self.space.floor_mm.is_some() || !self.space.boxes_mm.is_empty()
     }
 
-    /// Whether the arm stands clear with these joints.
-    pub(super) fn stands_clear(&self, joints: &Joints) -> bool {
-        if !self.looks() {
-            return true;
-        }
+    /// Base, ends of the links, flange and touched point (mm).
+    fn ends(&self, joints: &Joints) -> [Vector3<f64>; ENDS] {
         let frames = self.arm.frames(joints);
         let flange = frames.last() * self.wanted.nominal.flange;
         let touched = flange * Point3::from(self.wanted.frames.flange_from_target.translation.vector);
-        let origins = frames.origin.iter().map(|origin| Vector3::from(*origin));
-        let points: Vec<Vector3<f64>> = origins.chain([flange.translation.vector, touched.coords]).collect();
-        let radius = |segment: usize| self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
-        (1..points.len() - 1).all(|segment| {
-            let (a, b, radius) = (&points[segment], &points[segment + 1], radius(segment));
+        std::array::from_fn(|end| match end {
+            FLANGE => flange.translation.vector,
+            TOUCHED => touched.coords,
+            link => Vector3::from(frames.origin[link]),
+        })
+    }
+
+    /// Whether the arm stands clear with these joints.
+    pub(super) fn stands_clear(&self, joints: &Joints) -> bool {
+        !self.looks() || self.has_room(&self.ends(joints), &[0.0; ENDS])
+    }
+
+    /// Whether all that moves has room about it: the radius of the link, and as much more as its ends may move (mm).
+    fn has_room(&self, ends: &[Vector3<f64>; ENDS], moved_mm: &[f64; ENDS]) -> bool {
+        (1..ENDS - 1).all(|segment| {
+            let (a, b) = (&ends[segment], &ends[segment + 1]);
+            let radius = self.space.radius_mm * if segment < WRIST { 1.0 } else { 0.5 };
+            // A point between two ends moves no more than the one that moves most.
+            let room = radius + moved_mm[segment].max(moved_mm[segment + 1]);
             // The end of the column stands where it stands.
-            let above = self.space.floor_mm.is_none_or(|floor| b.z - radius >= floor);
-            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, radius))
+            let above = self.space.floor_mm.is_none_or(|floor| b.z - radius - moved_mm[segment + 1] >= floor);
+            above && self.space.boxes_mm.iter().all(|corners| keeps_off(a, b, corners, room))
         })
     }
 
@@ -68,8 +117,23 @@ impl<'a> Watch<'a> {
         if !self.looks() {
             return true;
         }
-        let steps = ((to - from).amax() / STEP_RAD).ceil().max(1.0);
-        (0..=steps as usize).all(|k| self.stands_clear(&from.lerp(to, k as f64 / steps)))
+        let turns = self.wanted.nominal.joint_map * (to - from);
+        let moved =
+            |levers: &[f64; 6]| levers.iter().zip(&turns).map(|(lever, turn)| lever * turn.abs()).sum();
+        self.stretch_is_clear(from, to, &self.levers_mm.each_ref().map(moved))
+    }
+
+    /// The same of a stretch on which the ends of the segments move by no more than `moved_mm`.
+    fn stretch_is_clear(&self, from: &Joints, to: &Joints, moved_mm: &[f64; ENDS]) -> bool {
+        let middle = from.lerp(to, 0.5);
+        let (ends, half) = (self.ends(&middle), moved_mm.map(|moved| 0.5 * moved));
+        if self.has_room(&ends, &half) {
+            return true;
+        }
+        half.iter().any(|half| *half > FINEST_MM)
+            && self.has_room(&ends, &[0.0; ENDS])
+            && self.stretch_is_clear(from, &middle, &half)
+            && self.stretch_is_clear(&middle, to, &half)
     }
 
     /// Whether a pose can be approached from these sides, and from the opposite ones.
@@ -114,6 +178,13 @@ impl<'a> Watch<'a> {
         found.map(|(first, second)| vec![*first, *second])
     }
 }
+
+/// Links, the last of which carries the flange.
+const LINKS: usize = 6;
+
+/// Where flange and touched point stand among the ends.
+const FLANGE: usize = 7;
+const TOUCHED: usize = 8;
 
 /// The first segment of the wrist.
 const WRIST: usize = 4;

@@ -323,22 +323,8 @@ fn boxes_between_the_poses_are_gone_round() {
         options.seed = seed;
         let found = plan(&wanted, &options).unwrap();
         assert_eq!(found.poses.len(), options.poses);
-        for k in 1..found.rows.len() {
-            let row = &found.rows[k];
-            let (before, to) = (found.poses[found.rows[k - 1].pose].joints, found.poses[row.pose].joints);
-            let places: Vec<Joints> = std::iter::once(before)
-                .chain(row.stops.iter().copied())
-                .chain([row.approach_from, to])
-                .collect();
-            for way in places.windows(2) {
-                // Looked at elsewhere than the plan looks.
-                for share in (0..=150).map(|k| f64::from(k) / 150.0) {
-                    let away = least_away(&nominal, &frames, &way[0].lerp(&way[1], share), &boxes);
-                    // Between two looks, 0.05 rad apart, a link comes nearer by up to half of what the arm turns there.
-                    assert!(away > -0.025 * 650.0, "seed {seed}, row {k}: {away} mm");
-                }
-            }
-        }
+        let away = least_on_the_way(&wanted, &found, &boxes, 60.0);
+        assert!(away >= 0.0, "seed {seed}: {away} mm");
     }
     // Neither side has as many as are asked for.
     (options.poses, options.seed) = (150, 0);
@@ -347,8 +333,43 @@ fn boxes_between_the_poses_are_gone_round() {
     assert!(error.to_string().contains("ask for fewer poses"), "{error}");
 }
 
-/// How far the links stay from boxes beyond their radius, by points on their lines (mm); the wrist has half the radius.
-fn least_away(nominal: &Model, frames: &Frames, joints: &Joints, boxes: &[[[f64; 3]; 2]]) -> f64 {
+/// Sheets that links of four millimetres could pass between two looks at their way. The class: a way that is called clear although
+/// the arm goes through what is stated.
+#[test]
+fn thin_sheets_are_not_passed_between_two_looks() {
+    let (mut frames, nominal) = (tracker(), nominal());
+    frames.flange_from_target.translation.vector = Vector3::new(38.0, 12.0, 61.0);
+    let wanted = Wanted { nominal: &nominal, sensor: Sensor::Position, frames: &frames };
+    let boxes = [[[350.0, -0.5, 0.0], [900.0, 0.5, 2000.0]], [[-0.5, 350.0, 0.0], [0.5, 900.0, 2000.0]]];
+    let mut options = Options { poses: 15, candidates: 100, ..Options::default() };
+    options.bounds.space.boxes_mm = boxes.to_vec();
+    (options.bounds.space.radius_mm, options.bounds.space.approach_rad) = (4.0, options.visits.approach_rad);
+    let found = plan(&wanted, &options).unwrap();
+    let away = least_on_the_way(&wanted, &found, &boxes, 4.0);
+    assert!(away >= 0.0, "{away} mm");
+}
+
+/// How far the links stay from boxes beyond their radius on all ways of a plan (mm), looked at elsewhere than the plan looks.
+fn least_on_the_way(wanted: &Wanted<'_>, found: &Plan, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
+    let mut least = f64::INFINITY;
+    for k in 1..found.rows.len() {
+        let row = &found.rows[k];
+        let (before, to) = (found.poses[found.rows[k - 1].pose].joints, found.poses[row.pose].joints);
+        let places: Vec<Joints> =
+            std::iter::once(before).chain(row.stops.iter().copied()).chain([row.approach_from, to]).collect();
+        for way in places.windows(2) {
+            for share in (0..=150).map(|k| f64::from(k) / 150.0) {
+                let joints = way[0].lerp(&way[1], share);
+                least = least.min(least_away(wanted, &joints, boxes, radius_mm));
+            }
+        }
+    }
+    least
+}
+
+/// The same where the arm stands, by points on the lines of its links; the wrist has half the radius.
+fn least_away(wanted: &Wanted<'_>, joints: &Joints, boxes: &[[[f64; 3]; 2]], radius_mm: f64) -> f64 {
+    let Wanted { nominal, frames, .. } = *wanted;
     let chain = nominal.at_condition(&Condition::default()).frames(joints);
     let flange = nominal.forward(joints, &Condition::default());
     let mut points: Vec<Vector3<f64>> = chain.origin.iter().map(|o| Vector3::from(*o)).collect();
@@ -360,7 +381,7 @@ fn least_away(nominal: &Model, frames: &Frames, joints: &Joints, boxes: &[[[f64;
             let p = ends[0].lerp(&ends[1], share);
             for [low, high] in boxes {
                 let off = Vector3::from_fn(|i, _| (low[i] - p[i]).max(p[i] - high[i]).max(0.0)).norm();
-                least = least.min(off - if k < 4 { 60.0 } else { 30.0 });
+                least = least.min(off - if k < 4 { radius_mm } else { 0.5 * radius_mm });
             }
         }
     }

@@ -1,10 +1,13 @@
 //! Pictures of a path: its deviation along the way, how often each size occurs, and where on the part.
 
+use std::collections::BTreeSet;
+
 use super::side::{AFTER, BEFORE, Side, has, intended};
 use super::words::meaning;
 use crate::document::Figure;
 use crate::plot::{
     Axis, ColorMap, Graph, HeatStrip, Histogram, Ink, PlanPath, PlanView, Sample, Series, Span, Strip,
+    told_apart,
 };
 use truegrind_compensation::deviation::{PathPoint, PathReport, Status};
 
@@ -90,7 +93,8 @@ fn along(reports: &[&PathReport]) -> Figure {
             series
         })
         .collect();
-    let (series, alike) = told_apart(series);
+    let passing = passing(reports);
+    let (series, alike) = told_apart(series, |x| !passing.contains(&x.to_bits()));
     let graph = Graph {
         title: "Deviation along the path".to_owned(),
         x: Axis::new("path point", ""),
@@ -105,8 +109,9 @@ fn along(reports: &[&PathReport]) -> Figure {
             .push_str(" The band is the predicted ±1σ of the model along the cut: where the real arm is expected to run.");
     }
     for (name, same) in alike {
-        caption
-            .push_str(&format!(" \u{201c}{name}\u{201d} is not drawn: it runs as \u{201c}{same}\u{201d}."));
+        caption.push_str(&format!(
+            " \u{201c}{name}\u{201d} is not drawn: along the cut it runs as \u{201c}{same}\u{201d}."
+        ));
     }
     if !graph.spans.is_empty() {
         caption.push_str(" Shaded: points that were refused, flagged or left.");
@@ -117,26 +122,11 @@ fn along(reports: &[&PathReport]) -> Figure {
     Figure::new(graph.svg(), caption)
 }
 
-/// The curves that can be told apart, and those that cannot with the one that they run as: nowhere apart by more than a line's width,
-/// they would hide it.
-fn told_apart(series: Vec<Series>) -> (Vec<Series>, Vec<(String, String)>) {
-    let heights = || series.iter().flat_map(|s| &s.points).map(|p| p[1]).filter(|y| y.is_finite());
-    let (low, high) =
-        heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
-    let line = 0.005 * (high - low);
-    let agree = |a: &Series, b: &Series| {
-        a.points.len() == b.points.len()
-            && a.points.iter().zip(&b.points).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= line)
-    };
-    let (mut drawn, mut alike): (Vec<Series>, Vec<(String, String)>) = (Vec::new(), Vec::new());
-    for one in series {
-        // One with a band has that to show.
-        match drawn.iter().find(|other| one.bounds.is_empty() && agree(other, &one)) {
-            Some(other) => alike.push((one.name, other.name.clone())),
-            None => drawn.push(one),
-        }
-    }
-    (drawn, alike)
+/// Points on the way to a cut, by their place; none of a path without a cut.
+fn passing(reports: &[&PathReport]) -> BTreeSet<u64> {
+    let points = || reports.iter().flat_map(|report| &report.points);
+    let cuts = points().any(|point| point.cutting);
+    points().filter(|point| cuts && !point.cutting).map(|point| (point.index as f64).to_bits()).collect()
 }
 
 fn frequency(reports: &[&PathReport]) -> Figure {

@@ -147,6 +147,7 @@ pub(crate) fn json(study: &Study) -> Value {
             json!({ "id": table.id, "parameters": rows })
         })
         .collect();
+    let sentences = [words::answer(study), words::reservations(study)].concat();
     json!({
         "protocol": study.methods.protocol,
         "rows": study.rows,
@@ -156,7 +157,7 @@ pub(crate) fn json(study: &Study) -> Value {
         "before": { "paper": study.methods.before, "cases": study.cases },
         "methods": methods,
         "verdict": study.judgement,
-        "sentences": words::sentences(study),
+        "sentences": sentences,
         "parameters": parameters,
     })
 }

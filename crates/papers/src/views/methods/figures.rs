@@ -4,7 +4,7 @@ use crate::experiment::Treatment;
 use crate::protocol::{MethodResult, Study};
 use crate::views::study::{held_out, seconds};
 use truegrind_report::number::Precision;
-use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series};
+use truegrind_report::plot::{Axis, BarGroup, Bars, Graph, Ink, Reference, Series, told_apart};
 use truegrind_report::repeated;
 
 /// A method that diverged has no bar: it would be the only one to be seen.
@@ -27,33 +27,48 @@ pub(super) fn time_bars(study: &Study) -> String {
 /// Most methods of one picture of rows: more lines cannot be told apart.
 const PANEL: usize = 4;
 
-/// Figure 7 of the papers: the held-out rows of the first case, each picture with the start beside a few methods.
-pub(super) fn rows(study: &Study) -> Vec<String> {
-    let registered = study.cases.first().map_or(&[][..], |c| c.registered_errors_mm.as_slice());
-    let (printed, sound): (Vec<_>, Vec<_>) = study
-        .results
-        .iter()
-        .filter(|r| !diverged(r))
-        .filter_map(|r| Some((r, r.outcomes.first()?)))
-        .partition(|(r, _)| r.treatment == Treatment::Printed);
-    let panels = printed.chunks(PANEL).chain(sound.chunks(PANEL));
-    panels
-        .map(|panel| {
-            let start = Series::line("BC", numbered(registered)).ink(Ink::Text);
-            let each = panel.iter().zip([Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple]);
-            let each = each.map(|((r, o), ink)| Series::line(&r.method.id, numbered(&o.errors_mm)).ink(ink));
-            let ids: Vec<&str> = panel.iter().map(|(r, _)| r.method.id.as_str()).collect();
-            Graph {
-                title: format!("Errors of the held-out rows, first case: {}", ids.join(", ")),
-                x: Axis::new("held-out row", ""),
-                y: Axis::new("error", "mm"),
-                series: std::iter::once(start).chain(each).collect(),
-                references: vec![Reference::Horizontal(0.0, String::new())],
-                ..Graph::default()
-            }
-            .svg()
-        })
+/// Figure 7 of the papers: the held-out rows of the first case, each picture with the start beside a few methods, and the words of
+/// what is not drawn in it.
+pub(super) fn rows(study: &Study) -> Vec<(String, String)> {
+    [Treatment::Printed, Treatment::Sound]
+        .into_iter()
+        .flat_map(|treatment| rows_of(study, treatment))
         .collect()
+}
+
+fn rows_of(study: &Study, treatment: Treatment) -> Vec<(String, String)> {
+    let registered = study.cases.first().map_or(&[][..], |c| c.registered_errors_mm.as_slice());
+    let results = study.results.iter().filter(|r| r.treatment == treatment && !diverged(r));
+    let lines =
+        results.filter_map(|r| Some(Series::line(&r.method.id, numbered(&r.outcomes.first()?.errors_mm))));
+    let start = Series::line("BC", numbered(registered)).ink(Ink::Text);
+    let (mut drawn, alike) = told_apart(std::iter::once(start).chain(lines).collect(), |_| true);
+    let start = drawn.remove(0);
+    let pictures = drawn.chunks(PANEL).map(|panel| {
+        let each = panel.iter().cloned().zip([Ink::Vermilion, Ink::Blue, Ink::Green, Ink::Purple]);
+        let ids: Vec<&str> = panel.iter().map(|line| line.name.as_str()).collect();
+        let picture = Graph {
+            title: format!("Errors of the held-out rows, first case: {}", ids.join(", ")),
+            x: Axis::new("held-out row", ""),
+            y: Axis::new("error", "mm"),
+            series: std::iter::once(start.clone()).chain(each.map(|(line, ink)| line.ink(ink))).collect(),
+            references: vec![Reference::Horizontal(0.0, String::new())],
+            ..Graph::default()
+        };
+        (picture.svg(), std::iter::once("BC").chain(ids).map(|id| running_as(id, &alike)).collect())
+    });
+    pictures.collect()
+}
+
+/// Methods that are not drawn, since they run as this one.
+fn running_as(id: &str, alike: &[(String, String)]) -> String {
+    let names: Vec<&str> =
+        alike.iter().filter(|(_, same)| same == id).map(|(name, _)| name.as_str()).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [one] => format!(" {one} is not drawn: it runs as {id}."),
+        many => format!(" {} are not drawn: they run as {id}.", many.join(", ")),
+    }
 }
 
 fn diverged(result: &MethodResult) -> bool {

@@ -101,7 +101,7 @@ pub(super) fn verdict_table(study: &Study) -> Table {
 }
 
 pub(super) fn verdict(study: &Study) -> Verdict {
-    Verdict::new(Status::Good, words::headline(study), words::sentences(study))
+    Verdict::new(Status::Good, words::headline(study), words::answer(study))
 }
 
 /// What each least-squares method finds when nothing stops it.
