@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
+use truegrind::arm::effect::Effect;
 use truegrind::arm::estimated::Estimated;
 use truegrind::arm::model::Model;
 use truegrind::calibration::diagnosis::transfer::transfer;
@@ -79,7 +80,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Ending> {
         tell(format_args!("note: {note}"));
     }
     // What is not the arm that was identified is flagged.
-    Ok(if arm.model.effects.is_empty() { Ending::Done } else { Ending::Flagged })
+    Ok(if is_of_links_alone(&arm.model) { Ending::Done } else { Ending::Flagged })
+}
+
+/// Whether all that moves the arm is in its links.
+fn is_of_links_alone(arm: &Model) -> bool {
+    arm.effects.iter().all(Effect::is_still)
 }
 
 /// The arm as whoever reads the file has it.
@@ -99,7 +105,7 @@ fn read_back(bare: &Model, robot: &str, format: Format) -> anyhow::Result<Model>
 /// What the model file says of the error of its links.
 fn known(arm: &Estimated) -> String {
     let error = arm.geometry.held_out.rmse;
-    if arm.model.effects.is_empty() {
+    if is_of_links_alone(&arm.model) {
         format!(
             "held-out error of these links: {error:.4} mm RMS; all that the model holds of the arm is in them"
         )

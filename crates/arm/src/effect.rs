@@ -105,6 +105,11 @@ impl Effect {
         each!(self, e => e.parameters())
     }
 
+    /// Whether all its parameters are 0: it moves nothing, and stands there for what it may be.
+    pub fn is_still(&self) -> bool {
+        self.parameters().iter().all(|parameter| parameter.value == 0.0)
+    }
+
     /// Sets parameter `index` of [`Effect::parameters`].
     pub fn set(&mut self, index: usize, value: f64) {
         each!(self, e => e.set(index, value))

@@ -111,7 +111,7 @@ pub struct Estimated {
     pub robot: String,
     /// What the controller computes with.
     pub nominal: Model,
-    /// The arm as estimated.
+    /// The arm as estimated. Effects that were found and are in doubt stand in it at size 0, for the covariance.
     pub model: Model,
     /// Everything that was identified, of the arm first.
     pub parameters: Vec<EstimatedParameter>,

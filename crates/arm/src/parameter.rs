@@ -97,6 +97,11 @@ impl Parameter {
     pub fn is_of_arm(&self) -> bool {
         matches!(self, Parameter::Link { .. } | Parameter::Effect { .. })
     }
+
+    /// Whether the number belongs to an effect or a disturbance.
+    pub fn is_of_a_cause(&self) -> bool {
+        matches!(self, Parameter::Effect { .. } | Parameter::Disturbance { .. })
+    }
 }
 
 impl fmt::Display for Parameter {

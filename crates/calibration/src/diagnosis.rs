@@ -41,6 +41,7 @@ mod shadow;
 mod stories;
 mod something_else;
 mod written;
+mod in_doubt;
 mod contract;
 pub mod newton;
 mod repeated;

@@ -9,6 +9,11 @@ use truegrind_arm::inverse::Inverse;
 use truegrind_arm::model::Model;
 use truegrind_programs::motion::Listing;
 
+/// Whether an effect moves the arm by what it carries.
+pub(super) fn yields(effect: &Effect) -> bool {
+    effect.needs_torque() && !effect.is_still()
+}
+
 /// The two arms and their inverses, shared by all targets.
 pub(super) struct Arms<'a> {
     pub(super) nominal: Inverse<'a>,
@@ -38,7 +43,7 @@ impl<'a> Arms<'a> {
     /// What the arm carries at each motion, where the program says so and the arm yields under it; empty elsewhere.
     pub(super) fn loads(&self, listing: &Listing, loads: Option<&Loads>) -> Vec<Option<Load>> {
         let model = self.estimated.arm().model;
-        let Some(loads) = loads.filter(|_| model.effects.iter().any(Effect::needs_torque)) else {
+        let Some(loads) = loads.filter(|_| model.effects.iter().any(yields)) else {
             return Vec::new();
         };
         let motions = listing.motions.iter().enumerate();

@@ -75,7 +75,8 @@ pub fn compensate(
     let mut targets = Targets::of(listing, arm, cell, options);
     let mut refused: BTreeMap<u32, Why> = BTreeMap::new();
     let mut round = 0;
-    let play = arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)));
+    let play =
+        arm.model.effects.iter().any(|effect| matches!(effect, Effect::Backlash(_)) && !effect.is_still());
     loop {
         let mut planned = targets.plan(&refused);
         let rewritten = program.rewrite(&planned.changes, &rewrite)?;

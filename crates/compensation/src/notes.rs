@@ -1,6 +1,6 @@
 //! What a plan says beside its motions: what was not looked at or taken on trust, what backlash and loads mean here.
 
-use super::arms::Arms;
+use super::arms::{Arms, yields};
 use super::options::Options;
 use super::solved::SolvedTargets;
 use truegrind_arm::effect::Effect;
@@ -25,6 +25,19 @@ pub(super) fn play_note(arms: &Arms<'_>, solved: &SolvedTargets) -> Option<Strin
         "backlash ({}): the side from which each joint comes follows from the program's own motion{unknown}",
         plays.join(", ")
     ))
+}
+
+/// What may be wrong with the arm besides what is corrected.
+pub(super) fn doubt_note(arms: &Arms<'_>) -> Option<String> {
+    let still = arms.estimated.arm().model.effects.iter().filter(|effect| effect.is_still());
+    let named: Vec<String> = still
+        .map(|effect| match effect.joint() {
+            Some(joint) => format!("{} of joint {}", effect.name(), joint + 1),
+            None => effect.name().to_owned(),
+        })
+        .collect();
+    (!named.is_empty())
+        .then(|| format!("in doubt, so not corrected for, but counted in every σ: {}", named.join(", ")))
 }
 
 /// What was not looked at, or taken on trust, and where.
@@ -95,8 +108,8 @@ fn lines_of(listing: &Listing, motions: &[u32]) -> Option<String> {
 /// What was taken for the load of the arm.
 pub(super) fn load_notes(listing: &Listing, arms: &Arms<'_>, options: &Options) -> Vec<String> {
     let model = arms.estimated.arm().model;
-    let yields = model.effects.iter().any(Effect::needs_torque);
-    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)));
+    let yields = model.effects.iter().any(yields);
+    let lumped = model.effects.iter().any(|e| matches!(e, Effect::LumpedCompliance(_)) && !e.is_still());
     let Some(loads) = options.loads.as_ref().filter(|_| yields || lumped) else { return Vec::new() };
     let mut out = Vec::new();
     let motions = || listing.motions.iter().enumerate().filter(|(_, m)| m.left.is_none() && m.tool.is_some());

@@ -21,7 +21,7 @@ use super::deviation::{PathPoint, Status};
 use super::effort;
 use super::mounting::Mounting;
 use super::mountings::Mountings;
-use super::notes::{load_notes, open_notes, play_note};
+use super::notes::{doubt_note, load_notes, open_notes, play_note};
 use super::options::may_change;
 use super::passage::{Passage, corner};
 use super::placement::{Commanded, Wanted};
@@ -182,6 +182,7 @@ fn planned(job: &Job<'_>) -> Plan {
     });
     let mut notes = mountings.notes();
     notes.extend(play_note(arms, solved));
+    notes.extend(doubt_note(arms));
     notes.extend(load_notes(listing, arms, options));
     let unchecked: Vec<u32> = portions.iter().flat_map(|portion| portion.unchecked.iter().copied()).collect();
     notes.extend(open_notes(listing, solved, &unchecked));

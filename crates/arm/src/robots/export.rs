@@ -29,8 +29,9 @@ const UR: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2",
 /// What of an arm the format does not hold, one sentence each.
 pub fn left_out(model: &Model, format: Format) -> Vec<String> {
     let mut out = Vec::new();
-    if !model.effects.is_empty() {
-        let names: Vec<&str> = model.effects.iter().map(|effect| effect.name()).collect();
+    let acting = model.effects.iter().filter(|effect| !effect.is_still());
+    let names: Vec<&str> = acting.map(|effect| effect.name()).collect();
+    if !names.is_empty() {
         out.push(format!("effects beyond rigid links are left out: {}", names.join(", ")));
     }
     if format != Format::Urdf && model.bodies.is_some() {

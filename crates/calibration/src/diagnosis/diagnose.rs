@@ -4,16 +4,18 @@ use super::cause::Cause;
 use super::discrepancy::Discrepancy;
 use super::extension::{Extended, Subject};
 use super::finding::{DiagnoseError, Diagnosis, Fits, RangeNoise, SCHEMA, Source, Stage};
+use super::in_doubt;
 pub use super::options::Options;
 use super::picture::Picture;
 use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::search::{Confirmed, Ground, Search};
+use super::selection::already;
 use super::stories;
 use super::telling::{self, Told};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::written;
+use super::written::{kept, written};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
@@ -114,9 +116,11 @@ pub fn diagnose(
     diagnosis.poses_needed = needed;
     let of_all = thinned.is_none().then_some(&confirmed.outcome.discrepancy);
     let (written, written_stage) = proven(&search, &certain, of_all);
+    let handed = handed_on(&search, &written, of_all);
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
-    let (estimated, benefit) = estimated(&ground, robot, &written, &stages, &diagnosis, &search.set_aside);
+    let fits = [&written, handed.as_ref().unwrap_or(&written)].map(Fitted::from);
+    let (estimated, benefit) = estimated(&ground, robot, &fits, &stages, &diagnosis, &search.set_aside);
     diagnosis.verdict = Some(estimated.verdict.clone());
     let (geometric, set_aside) = (search.geometric, search.set_aside);
     Ok(Diagnosed {
@@ -141,7 +145,7 @@ fn proven(
 ) -> (Extended, StageError) {
     let subject = &search.ground.subject;
     let of = |certain: &[bool]| {
-        let fit = written(subject, &search.extended, certain, discrepancy);
+        let fit = written(subject, &search.extended, &kept(&search.extended, certain), discrepancy);
         let errors = search.validation.stage(&fit);
         (fit, errors)
     };
@@ -158,6 +162,15 @@ fn proven(
         certain.iter().zip(causes).map(|(sure, cause)| *sure && !of_the_arm(cause)).collect();
     let plain = of(&without);
     if better(&plain.1) { (fit, errors) } else { plain }
+}
+
+/// The written arm with what was found of the arm beside it; `None` where all of that is written.
+fn handed_on(search: &Search<'_>, fit: &Extended, discrepancy: Option<&Discrepancy>) -> Option<Extended> {
+    let all = in_doubt::all(&search.extended.causes, &search.accepted);
+    let missing = |cause: &Cause| matches!(cause, Cause::Arm(_)) && !already(&fit.causes, cause);
+    all.iter()
+        .any(missing)
+        .then(|| in_doubt::beside(fit, written(&search.ground.subject, &search.extended, &all, discrepancy)))
 }
 
 /// The diagnosis in the contract's terms, and a picture for each finding that has one.
@@ -264,25 +277,23 @@ fn stage(errors: &StageError) -> Stage {
     }
 }
 
-/// The arm for compensation, and what it promises programs.
+/// The arm for compensation, and what it promises programs: the fit that is written, and the same as it is handed on.
 fn estimated(
     ground: &Ground<'_>,
     robot: &str,
-    extended: &Extended,
+    [fitted, handed]: &[Fitted; 2],
     stages: &[StageError; 3],
     diagnosis: &Diagnosis,
     set_aside: &[usize],
 ) -> (Estimated, Option<Benefit>) {
     let Ground { dataset, prepared, subject, options, .. } = ground;
     let nominal_arm = subject.nominal;
-    let fitted = Fitted::from(extended);
-    let parameters = parameter_table(&fitted, nominal_arm);
-    let order = arm_of(&fitted);
+    let order = arm_of(handed);
     let estimated = Estimated {
         robot: robot.to_owned(),
         nominal: nominal_arm.clone(),
-        model: extended.model.clone(),
-        covariance: arm_covariance(&fitted),
+        model: handed.model.clone(),
+        covariance: arm_covariance(handed),
         order,
         provenance: Provenance {
             file: dataset.file.clone(),
@@ -296,10 +307,9 @@ fn estimated(
             sharpened: prepared.readout_fusion.is_ok(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         },
-        parameters: parameters
-            .iter()
+        parameters: parameter_table(handed, nominal_arm)
+            .into_iter()
             .filter(|p| p.name.starts_with("link") || p.name.starts_with("effect"))
-            .cloned()
             .collect(),
         registered: StageErrors { fitted: stages[0].fitted, held_out: stages[0].random },
         geometry: StageErrors { fitted: stages[2].fitted, held_out: stages[2].random },
@@ -308,12 +318,13 @@ fn estimated(
         region: Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0),
         condition: mean_condition(dataset),
     };
-    let mut estimated = with_sigma_in_region(estimated, &fitted);
+    let mut estimated = with_sigma_in_region(estimated, handed);
     let rows = &subject.observed.dataset;
     // Links and what the model promises are held against the tolerance of arms, not against the wide priors of a diagnosis.
     let plausible = Tolerance::default();
-    let benefit = benefit(&fitted, rows, &estimated, &plausible, lack(&fitted, rows, &stages[2]));
-    estimated.verdict = judge(&fitted, rows.sensor, benefit.as_ref(), &parameters, stages, &options.limits);
+    let benefit = benefit(fitted, rows, &estimated, &plausible, lack(fitted, rows, &stages[2]));
+    let parameters = parameter_table(fitted, nominal_arm);
+    estimated.verdict = judge(fitted, rows.sensor, benefit.as_ref(), &parameters, stages, &options.limits);
     (estimated, benefit)
 }
 

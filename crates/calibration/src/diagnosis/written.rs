@@ -1,7 +1,8 @@
 //! The arm that is handed on to compensation: geometry and the causes of the arm that are identified, beside what the
 //! measurement suffered.
 //!
-//! A cause of the arm that is not certain moves real programs, so it stays out; geometry takes what it can of it. What wandered
+//! A cause of the arm that is not certain moves real programs, so it stays out; geometry takes what it can of it, and the covariance
+//! says what is missing (`in_doubt`). What wandered
 //! while the rows were taken is fitted beside the arm and left behind, whatever it was: it widens the arm's covariance and no
 //! longer bends its links.
 
@@ -14,31 +15,35 @@ use crate::identification::tolerance::Tolerance;
 use crate::measurement::sensor::disturbance::Kind;
 use truegrind_arm::parameter::Parameter;
 
-/// The fit whose arm is written, under the tolerances that its own rows tell (the wide ones of the search would leave what the
-/// data do not see farther from the data sheet than arms are). `certain` says it of each cause that was tried, and
-/// `discrepancy` is that of the same rows.
+/// The causes of a fit that are written or left behind with the measurement: of the arm those that are certain, as `certain` says
+/// of each that was tried.
+pub(super) fn kept(extended: &Extended, certain: &[bool]) -> Vec<Cause> {
+    let causes = extended.causes.iter().enumerate();
+    let kept = causes.filter(|&(k, cause)| match cause {
+        Cause::Measurement(_) => !is_beyond_an_arm(cause),
+        Cause::Arm(_) => certain.get(k) != Some(&false),
+    });
+    kept.map(|(_, cause)| cause.clone()).collect()
+}
+
+/// Whether a cause is of the arm, and yet none that a model of it can carry.
+pub(super) fn is_beyond_an_arm(cause: &Cause) -> bool {
+    matches!(cause, Cause::Measurement(d) if matches!(d.kind, Kind::Form(form) if form.is_of_the_arm()))
+}
+
+/// The fit with these causes as its arm is written, under the tolerances that its own rows tell (the wide ones of the search would
+/// leave what the data do not see farther from the data sheet than arms are). It starts near `extended`, and `discrepancy` is that of
+/// the same rows.
 pub(super) fn written(
     subject: &Subject<'_>,
     extended: &Extended,
-    certain: &[bool],
+    causes: &[Cause],
     discrepancy: Option<&Discrepancy>,
 ) -> Extended {
-    let kept: Vec<Cause> = extended
-        .causes
-        .iter()
-        .enumerate()
-        .filter(|&(k, cause)| match cause {
-            // What no arm can carry is left to what it can.
-            Cause::Measurement(d) => !matches!(d.kind, Kind::Form(form) if form.is_of_the_arm()),
-            Cause::Arm(_) => certain.get(k) != Some(&false),
-        })
-        .map(|(_, cause)| cause.clone())
-        .collect();
     // Readings that resemble those before them may do so for what the model gets wrong along the way: freed of that, the rows
     // would say little of the arm's lengths.
     let wandered = discrepancy.filter(|d| d.in_time() && d.correlation == 0.0);
-    let kept =
-        if kept.len() == extended.causes.len() { extended.clone() } else { refit(subject, &kept, extended) };
+    let kept = if causes == extended.causes { extended.clone() } else { refit(subject, causes, extended) };
     let wide = subject.tolerance;
     let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
     let tolerance = learned(&catalogue, &kept.parameters, &kept.priors, &kept.estimate);

@@ -520,7 +520,7 @@ fn moved(fitted: &Fitted, estimated: &Estimated) -> Option<DMatrix<f64>> {
         return None;
     }
     list.extend((0..6).map(Parameter::SensorFrame).chain((0..3).map(Parameter::Target)));
-    let posed = estimated.model.at_condition(&estimated.condition);
+    let posed = fitted.model.at_condition(&estimated.condition);
     let target =
         Pose::from_parts(fitted.frames.flange_from_target.translation, nalgebra::UnitQuaternion::identity());
     let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };

@@ -9,4 +9,5 @@ pub(crate) mod scenarios;
 mod certain;
 mod doubts;
 mod found;
+mod in_doubt;
 mod parts;

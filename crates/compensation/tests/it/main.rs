@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod cut;
+mod in_doubt;
 mod path;
 mod payload;
 mod placement;

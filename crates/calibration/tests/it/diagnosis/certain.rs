@@ -169,8 +169,9 @@ fn what_is_not_certain_does_not_move_programs() {
             .iter()
             .any(|f| f.effect == effect.name() && f.joints == effect.joint().map(|j| vec![j + 1]))
     };
-    let written = &found.estimated.model.effects;
-    assert!(written.iter().all(sure), "{written:?}");
+    // What is in doubt stands there at size 0.
+    let written: Vec<&Effect> = found.estimated.model.effects.iter().filter(|e| !e.is_still()).collect();
+    assert!(written.iter().all(|e| sure(e)), "{written:?}");
     assert!(written.iter().any(|e| e.joint() == Some(2)), "the gear is certain: {written:?}");
 }
 

@@ -1,0 +1,130 @@
+//! What was found and is not certain: it moves nothing, and the covariance of the written arm says what it may be.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use truegrind_arm::condition::Condition;
+use truegrind_arm::effect::Effect;
+use truegrind_arm::estimated::Estimated;
+use truegrind_arm::model::{Joints, Model};
+use truegrind_arm::parameter::Parameter;
+use truegrind_calibration::diagnosis::cause::Cause;
+use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
+use truegrind_calibration::diagnosis::finding::Confidence;
+use truegrind_calibration::identification::start::starts;
+use truegrind_calibration::measurement::import;
+use truegrind_calibration::measurement::simulation::recipe::Recipe;
+use truegrind_math::se3::Pose;
+
+/// An IRB 120 whose second joint yields and whose first gear is eccentric, measured by a tracker, and what was found of it.
+fn diagnosed(
+    [seed, of_arm, count]: [u64; 3],
+    made: [f64; 3],
+    causes: [f64; 2],
+    noise_mm: f64,
+) -> (Model, Diagnosed) {
+    let ([length, twist, zero], [compliance, sine]) = (made, causes);
+    let recipe = format!(
+        "robot = \"abb-irb-120\"\nseed = {seed}\n[arm.random]\nseed = {of_arm}\na_mm = {length}\nd_mm = {length}\n\
+         alpha_deg = {twist}\nbeta_deg = {twist}\ntheta_deg = {zero}\n\
+         [[arm.effect]]\neffect = \"joint-compliance\"\njoint = 1\ncompliance_rad_per_nm = {compliance}\n\
+         [[arm.effect]]\neffect = \"gear-eccentricity\"\njoint = 0\norder = 1.0\nsine_rad = {sine}\ncosine_rad = {}\n\
+         [poses]\nkind = \"random\"\ncount = {count}\nmin_deg = [-90.0, -50.0, -60.0, -120.0, -100.0, -150.0]\n\
+         max_deg = [90.0, 60.0, 50.0, 120.0, 100.0, 150.0]\n[sensor]\nkind = \"position\"\n\
+         frame = {{ position_mm = [2310.5, -640.2, 512.7], wxyz = [0.12, 0.02, -0.03, 0.99] }}\n\
+         reflector_mm = [38.2, 12.6, 61.3]\n[noise]\nsigma_mm = {noise_mm}\njoints_deg = 0.0005\n",
+        0.6 * sine
+    );
+    let load = |name: &str| truegrind_arm::robots::load(name).map(|r| r.model).map_err(|e| e.to_string());
+    let simulation = Recipe::parse(&recipe, "case").unwrap().simulate(load).unwrap();
+    let rows = import::read("case.csv", simulation.csv.as_bytes(), &import::Options::default()).unwrap();
+    let frames = starts(&rows, &simulation.nominal).unwrap();
+    let found = diagnose(&rows, "abb-irb-120", &simulation.nominal, &frames[0], &Options::default(), &|_| {})
+        .unwrap();
+    (simulation.actual, found)
+}
+
+/// Displacements of points, of which their rigid motions are taken away.
+fn shape(points: &[Vector3<f64>]) -> DMatrix<f64> {
+    let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let mut motions = DMatrix::zeros(3 * points.len(), 6);
+    for (k, point) in points.iter().enumerate() {
+        motions.view_mut((3 * k, 0), (3, 3)).copy_from(&Matrix3::identity());
+        motions.view_mut((3 * k, 3), (3, 3)).copy_from(&((centre - point) / 100.0).cross_matrix());
+    }
+    let basis = motions.svd(true, false).u.unwrap();
+    DMatrix::identity(3 * points.len(), 3 * points.len()) - &basis * basis.transpose()
+}
+
+/// Root mean square of the true errors of the shape over their σ, axis by axis, at the tool over the measured region.
+fn errors_in_sigma(estimated: &Estimated, actual: &Model) -> f64 {
+    let (still, tool) = (Condition::default(), Pose::translation(20.0, -10.0, 150.0));
+    let (known, real) = (estimated.model.at_condition(&still), actual.at_condition(&still));
+    let poses: Vec<Joints> = estimated
+        .region
+        .samples_deg
+        .iter()
+        .take(40)
+        .map(|q| Joints::from_fn(|i, _| q[i].to_radians()))
+        .collect();
+    let at = |arm: &truegrind_arm::model::PreparedModel<'_>, q: &Joints| {
+        (arm.forward(q) * tool).translation.vector
+    };
+    let places: Vec<Vector3<f64>> = poses.iter().map(|q| at(&known, q)).collect();
+    let off: Vec<f64> =
+        poses.iter().zip(&places).flat_map(|(q, place)| (place - at(&real, q)).as_slice().to_vec()).collect();
+    let mut jacobian = DMatrix::zeros(3 * poses.len(), estimated.order.len());
+    for (k, q) in poses.iter().enumerate() {
+        jacobian.rows_mut(3 * k, 3).copy_from(&estimated.position_jacobian(&known, q, &tool));
+    }
+    let shape = shape(&places);
+    let (off, jacobian) = (&shape * DVector::from_vec(off), &shape * jacobian);
+    let covariance = &jacobian * &estimated.covariance * jacobian.transpose();
+    let square = |k: usize| off[k] * off[k] / covariance[(k, k)];
+    ((0..off.len()).map(square).sum::<f64>() / off.len() as f64).sqrt()
+}
+
+/// The standard deviations of the parameters of an effect of the written arm.
+fn sigmas(estimated: &Estimated, index: usize) -> Vec<f64> {
+    let of_it = |p: &Parameter| matches!(p, Parameter::Effect { index: i, .. } if *i == index);
+    let places = (0..estimated.order.len()).filter(|&k| of_it(&estimated.order[k]));
+    places.map(|k| estimated.covariance[(k, k)].sqrt()).collect()
+}
+
+#[test]
+fn a_cause_in_doubt_moves_nothing_and_stands_in_the_covariance() {
+    let (actual, found) =
+        diagnosed([700_012, 1_600_005, 125], [0.1131, 0.14136, 0.22537], [2.549e-5, 2.131e-4], 0.0307);
+    let gear = |effect: &Effect| matches!(effect, Effect::GearEccentricity(h) if h.joint == 0);
+    let doubted = found.diagnosis.findings.iter().find(|f| f.effect == "gear-eccentricity").unwrap();
+    assert_eq!(doubted.confidence, Confidence::Ambiguous);
+    let effects = &found.estimated.model.effects;
+    let acting: Vec<&str> = effects.iter().filter(|e| !e.is_still()).map(Effect::name).collect();
+    assert_eq!(acting, ["joint-compliance"]);
+    let index = effects.iter().position(gear).unwrap();
+    assert!(effects[index].is_still());
+    // What it was found to be is within what it may be.
+    let size = found.extended.causes.iter().find_map(|cause| match cause {
+        Cause::Arm(effect) if gear(effect) => Some(cause.values()),
+        _ => None,
+    });
+    let sigmas = sigmas(&found.estimated, index);
+    for (sigma, size) in sigmas.iter().zip(size.unwrap()) {
+        assert!(*sigma >= 0.9 * size.abs() && *sigma < 4.0 * size.abs() + 1e-4, "{sigma} of {size}");
+    }
+    let z = errors_in_sigma(&found.estimated, &actual);
+    assert!((0.4..1.25).contains(&z), "{z}");
+}
+
+/// An error of two joints is none that an arm carries; what an arm could have in its place stands for it.
+#[test]
+fn what_no_arm_carries_is_stood_for_by_its_best_rival() {
+    let (_, found) =
+        diagnosed([700_010, 1_600_003, 213], [0.18158, 0.14311, 0.05917], [1.0716e-5, 3.7655e-4], 0.06764);
+    assert!(found.diagnosis.findings.iter().any(|f| f.effect == "gear-two-joints"));
+    let effects = &found.estimated.model.effects;
+    let gear = |effect: &Effect| matches!(effect, Effect::GearEccentricity(h) if h.joint == 0);
+    let index = effects.iter().position(gear).unwrap();
+    assert!(effects[index].is_still());
+    // It may be as large as it is.
+    let sigmas = sigmas(&found.estimated, index);
+    assert!(sigmas[0] > 0.5 * 3.7655e-4 && sigmas[0] < 2.0 * 3.7655e-4, "{sigmas:?}");
+}
