@@ -178,6 +178,17 @@ def test_a_worker_that_is_killed_in_the_middle_costs_nothing_but_time(plant, exp
     same(expected, found)
 
 
+def begun(script, count, stderr):
+    """A process of its own session that runs job.py, once so many units are done."""
+    Path("job.py").write_text(script)
+    job = subprocess.Popen([sys.executable, "job.py"], start_new_session=True, stderr=stderr)
+    begin = time.monotonic()
+    while len(list(Path("out/done").glob("*.json"))) < count:
+        assert job.poll() is None and time.monotonic() < begin + TIME_LIMIT_S
+        time.sleep(0.002)
+    return job
+
+
 def test_a_client_that_is_killed_and_started_again_does_only_the_rest(plant, expected):
     pytest.importorskip("distributed")
     script = """
@@ -187,12 +198,7 @@ if __name__ == "__main__":
     with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
         compensate_folder("in", "arm.toml", "out", client=client, chunk=4, csv="all.csv", json="all.json", html="all.html", md="all.md")
 """
-    Path("job.py").write_text(script)
-    first = subprocess.Popen([sys.executable, "job.py"], start_new_session=True, stderr=subprocess.DEVNULL)
-    begin = time.monotonic()
-    while len(list(Path("out/done").glob("*.json"))) < 9:
-        assert first.poll() is None and time.monotonic() < begin + TIME_LIMIT_S
-        time.sleep(0.005)
+    first = begun(script, 9, stderr=subprocess.DEVNULL)
     # With all its workers, as a machine that goes down.
     os.killpg(first.pid, signal.SIGKILL)
     first.wait()
@@ -213,12 +219,7 @@ if __name__ == "__main__":
     from truegrind.dask import compensate_folder
     compensate_folder("in", "arm.toml", "out", chunk=20, csv="all.csv", json="all.json", html="all.html", md="all.md")
 """
-    Path("job.py").write_text(script)
-    job = subprocess.Popen([sys.executable, "job.py"], start_new_session=True, stderr=subprocess.PIPE)
-    begin = time.monotonic()
-    while len(list(Path("out/done").glob("*.json"))) < 4:
-        assert job.poll() is None and time.monotonic() < begin + TIME_LIMIT_S
-        time.sleep(0.002)
+    job = begun(script, 4, stderr=subprocess.PIPE)
     # As a terminal does: everybody hears of it, and jobs before whoever called them.
     os.killpg(job.pid, signal.SIGINT)
     assert b"KeyboardInterrupt" in job.communicate(timeout=TIME_LIMIT_S)[1]

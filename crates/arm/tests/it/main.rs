@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 mod arms;
+mod axpy;
 mod robots;
 mod files;
 mod batch;

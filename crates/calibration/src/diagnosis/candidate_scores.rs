@@ -15,7 +15,7 @@ use super::design::{Design, FullDesign, Linear, Projected};
 use super::extension::{Extended, Subject};
 use super::intervals::{self, Strip};
 use super::lines;
-use super::score::{score_projected, score_seen};
+use super::score::{score_from, score_projected};
 use crate::measurement::sensor::disturbance::{Course, Disturbance, Kind};
 use truegrind_arm::effect::Effect;
 use truegrind_math::work::checkpoint;
@@ -34,7 +34,8 @@ impl Entry {
 
     fn scored(&self, design: &Design) -> Scored {
         let sizes = self.candidate.cause.sizes();
-        let score = score_seen(design.seen_on(&self.projected), &sizes, self.candidate.tried);
+        let score =
+            score_from(design.gradient_and_information(&self.projected), &sizes, self.candidate.tried);
         Scored { candidate: Arc::clone(&self.candidate), score }
     }
 }

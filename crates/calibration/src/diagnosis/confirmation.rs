@@ -28,7 +28,7 @@ use super::discrepancy::{Discrepancy, Functions};
 use super::extension::{Extended, Subject};
 use super::halves::halves;
 use super::intervals::Strip;
-use super::score::{Score, log_p_of, score_columns, score_projected, score_seen};
+use super::score::{Score, log_p_of, score_columns, score_from, score_projected};
 use super::selection::{Accepted, Options, already};
 use crate::measurement::sensor::disturbance::{Course, Disturbance};
 use truegrind_arm::effect::Effect;
@@ -367,7 +367,7 @@ impl<'a> Half<'a> {
                 let design = whole.without(&self.confirming.places(&dropped));
                 let accepted = &self.confirming.accepted[k];
                 let sizes = tried.candidate.cause.sizes();
-                let score = score_seen(design.seen_on(projected), &sizes, accepted.tried);
+                let score = score_from(design.gradient_and_information(projected), &sizes, accepted.tried);
                 let before = &accepted.own.estimate;
                 let lambda = |v: &DVector<f64>| (v.transpose() * &score.information * v)[0].max(0.0);
                 if lambda(before) < TELLING {

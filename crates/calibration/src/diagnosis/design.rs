@@ -460,17 +460,17 @@ impl Design {
 
     /// The same from the projection on the whole design of which this is a part.
     pub fn project_on(&self, whole: &Projected) -> Projected {
-        let (gradient, information, given_back) = self.seen(whole);
+        let (gradient, information, given_back) = self.reduced(whole);
         Projected { gradient, information, shared: whole.shared.clone(), given_back }
     }
 
-    /// Gradient and information alone, which is all that a score takes.
-    pub fn seen_on(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>) {
-        let (gradient, information, _) = self.seen(whole);
+    /// Gradient (k) and information (k × k) of that alone, which is all that a score takes: the rest is large to copy.
+    pub fn gradient_and_information(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>) {
+        let (gradient, information, _) = self.reduced(whole);
         (gradient, information)
     }
 
-    fn seen(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>, Option<DMatrix<f64>>) {
+    fn reduced(&self, whole: &Projected) -> (DVector<f64>, DMatrix<f64>, Option<DMatrix<f64>>) {
         let (mut gradient, mut information) = (whole.gradient.clone(), whole.information.clone());
         let Some(reduction) = &self.reduction else {
             return (gradient, information, whole.given_back.clone());

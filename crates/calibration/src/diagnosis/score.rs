@@ -63,17 +63,17 @@ pub fn score_columns(design: &Design, columns: &DMatrix<f64>, sizes: &[f64], tri
 
 /// Scores columns whose projection is known.
 pub fn score_projected(projected: &Projected, sizes: &[f64], tried: f64) -> Score {
-    score_seen((projected.gradient.clone(), projected.information.clone()), sizes, tried)
+    score_from((projected.gradient.clone(), projected.information.clone()), sizes, tried)
 }
 
-/// Scores columns of which gradient and information are known.
-pub fn score_seen(
-    (seen_gradient, seen_information): (DVector<f64>, DMatrix<f64>),
+/// Scores columns by their gradient (k) and information (k × k), projected, in the units of their parameters.
+pub fn score_from(
+    (plain_gradient, plain_information): (DVector<f64>, DMatrix<f64>),
     sizes: &[f64],
     tried: f64,
 ) -> Score {
     let k = sizes.len();
-    let (information, gradient) = in_sizes(&seen_information, &seen_gradient, sizes);
+    let (information, gradient) = in_sizes(&plain_information, &plain_gradient, sizes);
     let nothing = |information: DMatrix<f64>| Score {
         gain: 0.0,
         evidence: 0.0,
@@ -83,14 +83,14 @@ pub fn score_seen(
         gradient: DVector::zeros(k),
     };
     let Some(factor) = (&information + DMatrix::identity(k, k)).cholesky() else {
-        return nothing(seen_information);
+        return nothing(plain_information);
     };
     let step = factor.solve(&gradient);
     let gain = gradient.dot(&step);
     let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let evidence = gain - log_det;
     if !evidence.is_finite() {
-        return nothing(seen_information);
+        return nothing(plain_information);
     }
     let merit = evidence - 2.0 * tried.ln();
     Score {
@@ -98,8 +98,8 @@ pub fn score_seen(
         evidence,
         merit,
         estimate: DVector::from_iterator(k, step.iter().zip(sizes).map(|(step, size)| -(size * step))),
-        information: seen_information,
-        gradient: seen_gradient,
+        information: plain_information,
+        gradient: plain_gradient,
     }
 }
 

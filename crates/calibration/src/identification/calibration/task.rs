@@ -96,8 +96,8 @@ impl Calibration {
         self
     }
 
-    /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take a
-    /// hundred and fifty bytes each.
+    /// Lets go of the rows, of which only the number is kept: a fit that is done needs them no longer, and they take up
+    /// to a hundred and fifty bytes each.
     pub(crate) fn forget_rows(&mut self) {
         (self.columns, self.weights) = (Arc::default(), Weights::default());
     }

@@ -298,6 +298,29 @@ fn a_thinned_task_has_the_rows_that_were_chosen() {
     }
 }
 
+/// Of very many rows the angles are kept and not their sines: a row says the same among them as among few, and so does a choice
+/// of them.
+#[test]
+fn a_row_among_very_many_is_the_same_as_among_few() {
+    const MANY: usize = 50_003;
+    let (few, many) = (task_with(Sensor::Position, 13, false), task_with(Sensor::Position, MANY, false));
+    let x = vec![1e-5; few.parameters()];
+    let rows = few.rows();
+    let of = |task: &dyn Problem| {
+        let (mut r, mut j) = (vec![0.0; rows], vec![0.0; rows * x.len()]);
+        task.jacobian(&x, 0..rows, &mut r, &mut j);
+        r.into_iter().chain(j).collect::<Vec<_>>()
+    };
+    let wanted = of(&few);
+    let chosen: Vec<usize> = (0..13).chain([MANY - 1]).collect();
+    let thinned = many.thinned(&chosen).unwrap();
+    for found in [of(&many), of(&*thinned)] {
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!((found - wanted).abs() < 1e-11 * (1.0 + wanted.abs()), "{found} instead of {wanted}");
+        }
+    }
+}
+
 #[test]
 fn residuals_equal_the_plain_forward_map() {
     let data = dataset(Sensor::Position, 11, 7);
