@@ -64,37 +64,40 @@ impl Links {
     }
 }
 
-/// Each way in which links can lie on their flanks or in the middle, in words, with how far the tip on the flange is then
-/// from where it shall be (mm, rad).
+/// Each way in which links can lie on their flanks or in the middle, in words, with how far off (mm, rad) the flange is then.
 fn every_flank<'a>(
     arm: &'a Arm,
     q: &'a [f64; 6],
     at: &'a Circumstance,
-    flange: &'a Pose,
-    tool: &'a Pose,
+    off: &'a dyn Fn(&Pose) -> (f64, f64),
 ) -> impl Iterator<Item = (String, (f64, f64))> + 'a {
     let sides = |code: usize| std::array::from_fn(|j| (code / 3usize.pow(j as u32) % 3) as i32 - 1);
     let all =
         (0..729).map(sides).filter(|sides: &[i32; 6]| (0..6).all(|j| sides[j] == 0 || arm.play[j] != 0.0));
     all.map(move |sides| {
         let behind = std::array::from_fn(|j| 0.5 * arm.play[j] * f64::from(sides[j]));
-        let reached = arm.actual_forward(q, &Circumstance { behind, ..*at }) * tool;
+        let reached = arm.actual_forward(q, &Circumstance { behind, ..*at });
         let word = |j: usize| match (arm.play[j] == 0.0, sides[j]) {
             (true, _) => '.',
             (_, -1) => '-',
             (_, 1) => '+',
             _ => '0',
         };
-        ((0..6).map(word).collect(), difference(&reached, &(flange * tool)))
+        ((0..6).map(word).collect(), off(&reached))
     })
 }
 
 /// How far a turn counts beside a place (mm per rad).
 const LEVER_MM: f64 = 1000.0;
 
-fn best(arm: &Arm, q: &[f64; 6], at: &Circumstance, flange: &Pose, tool: &Pose) -> (String, (f64, f64)) {
+fn best(
+    arm: &Arm,
+    q: &[f64; 6],
+    at: &Circumstance,
+    off: &dyn Fn(&Pose) -> (f64, f64),
+) -> (String, (f64, f64)) {
     let size = |off: (f64, f64)| off.0 + LEVER_MM * off.1;
-    every_flank(arm, q, at, flange, tool)
+    every_flank(arm, q, at, off)
         .min_by(|a, b| size(a.1).total_cmp(&size(b.1)))
         .unwrap_or((String::new(), (f64::INFINITY, f64::INFINITY)))
 }
@@ -102,12 +105,17 @@ fn best(arm: &Arm, q: &[f64; 6], at: &Circumstance, flange: &Pose, tool: &Pose) 
 /// The flanks on which links would have to lie for the flange to stand where it shall, the nearest of all, in words: what
 /// a correction was worked out for.
 pub fn meant_flanks(arm: &Arm, q: &[f64; 6], at: &Circumstance, flange: &Pose) -> String {
-    best(arm, q, at, flange, &Pose::identity()).0
+    best(arm, q, at, &|reached| difference(reached, flange)).0
 }
 
-/// How far the tip is from where it shall be with the links as suits it best (mm, rad).
-pub fn meant_links(arm: &Arm, q: &[f64; 6], at: &Circumstance, flange: &Pose, tool: &Pose) -> (f64, f64) {
-    best(arm, q, at, flange, tool).1
+/// How far off (mm, rad), as `off` tells it of a flange, the arm is with the links as suits it best.
+pub fn meant_links(
+    arm: &Arm,
+    q: &[f64; 6],
+    at: &Circumstance,
+    off: &dyn Fn(&Pose) -> (f64, f64),
+) -> (f64, f64) {
+    best(arm, q, at, off).1
 }
 
 #[cfg(test)]

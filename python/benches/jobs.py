@@ -36,6 +36,36 @@ if __name__ == "__main__":
 """
 
 
+# The same, and what was spent from the moment on at which the workers stood.
+STEADY = """
+import resource
+
+def spent():
+    both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in both)
+
+if __name__ == "__main__":
+    import time
+    from pathlib import Path
+    from distributed import Client
+    from truegrind.dask import compensate_folder
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+        # Workers are children of this process and not counted there before they end.
+        all_of_it = lambda: spent() + sum(client.run(spent).values())
+        before, begin = all_of_it(), time.monotonic()
+        compensate_folder("in", "arm.toml", "out", csv="all.csv", client=client)
+        Path("spent").write_text(f"{all_of_it() - before} {time.monotonic() - begin}")
+"""
+
+QUIET = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "500ms",
+    "DASK_DISTRIBUTED__ADMIN__TICK__CYCLE": "5s",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
+}
+"""Dask's settings of ``truegrind.dask.QUIET``, as the environment states them."""
+
+
 def program(number: int) -> str:
     """Targets in front of the arm, axis 1 in the quarter that the configurations state; as in ``benches/batch.rs``."""
     lines = [f"MODULE Path{number}", "  PROC main()"]
@@ -49,10 +79,12 @@ def program(number: int) -> str:
     return "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""])
 
 
-def timed(commands: list[list[str]], at: Path) -> tuple[float, float]:
-    """Processor time and clock time of commands that run side by side, and of those after them."""
+def timed(commands: list[list[str]], at: Path, more: dict[str, str] | None = None) -> tuple[float, float]:
+    """Processor time and clock time of commands that run side by side; ``more``: what their environment has besides."""
+    environment = {**os.environ, **(more or {})}
     begin, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    running = [subprocess.Popen(command, cwd=at, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) for command in commands]
+    said_to = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    running = [subprocess.Popen(command, cwd=at, env=environment, **said_to) for command in commands]
     for one in running:
         _, said = one.communicate()
         if one.returncode not in (0, 1):
@@ -75,19 +107,25 @@ def main() -> None:
     timed([[binary, "identify", cable, "--robot", "abb-irb-120", "-o", "arm.toml"]], at)
     base = [binary, "compensate", "in", "--model", "arm.toml", "-o", "out"]
     shares = [[*base, "--shard", f"{share}/2", "--resume", "--brief-records", "--threads", "1"] for share in (1, 2)]
-    for name, script in (("alone.py", ALONE), ("workers.py", WORKERS)):
+    for name, script in (("alone.py", ALONE), ("workers.py", WORKERS), ("steady.py", STEADY)):
         (at / name).write_text(script, encoding="utf-8")
     ways = {
         "one run": [[[*base, "--csv", "all.csv"]]],
         "two shares": [shares, [[binary, "gather", "out", "--csv", "all.csv"]]],
         "Dask": [[[sys.executable, "alone.py"]]],
         "Dask, two processes": [[[sys.executable, "workers.py"]]],
+        "the same, quiet": [[[sys.executable, "workers.py"]]],
+        "the work alone": [[[sys.executable, "steady.py"]]],
+        "the work alone, quiet": [[[sys.executable, "steady.py"]]],
     }
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
     written: set[bytes] = set()
     for number in range(rounds):
         for name, steps in ways.items():
-            parts = [timed(commands, at) for commands in steps]
+            parts = [timed(commands, at, QUIET if name.endswith("quiet") else None) for commands in steps]
+            if name.startswith("the work alone"):
+                cpu, clock = map(float, (at / "spent").read_text().split())
+                parts = [(cpu, clock)]
             found[name].append((sum(cpu for cpu, _ in parts), sum(clock for _, clock in parts)))
             written.add((at / "all.csv").read_bytes())
             (at / "all.csv").unlink()
@@ -98,7 +136,7 @@ def main() -> None:
     for name, times in found.items():
         cpu, clock = median(cpu for cpu, _ in times), median(clock for _, clock in times)
         each = " ".join(f"{cpu:.2f}/{clock:.2f}" for cpu, clock in times)
-        print(f"{name:20} {cpu:7.2f} {clock:7.2f}  {100 * (cpu / plain - 1):+5.0f} %   ({each})")
+        print(f"{name:22} {cpu:7.2f} {clock:7.2f}  {100 * (cpu / plain - 1):+5.0f} %   ({each})")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ import pytest
 
 import truegrind as tg
 
+from plant import fill, of_one_run
+
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "tests" / "data"
 PROGRAMS = ROOT / "programs"
@@ -46,7 +48,7 @@ def binary() -> Path:
     pytest.skip("no binary to compare with: build it with `cargo build`, or name it by TRUEGRIND")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def run(binary: Path):
     """Runs the command line and hands back what it printed."""
 
@@ -56,3 +58,18 @@ def run(binary: Path):
         return done.stdout
 
     return run
+
+
+@pytest.fixture
+def plant(tmp_path, binary, model, monkeypatch) -> Path:
+    """A folder with programs and a model; the tests work in it."""
+    fill(tmp_path, PROGRAMS, model)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TRUEGRIND", str(binary))
+    return tmp_path
+
+
+@pytest.fixture
+def expected(plant, run) -> dict[str, bytes]:
+    """What one run writes: reports and programs."""
+    return of_one_run(run)

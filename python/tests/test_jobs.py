@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -18,44 +17,9 @@ import truegrind as tg
 from truegrind import _jobs, _power
 
 from conftest import DATA, PROGRAMS
+from plant import COUNT, REPORTS, same
 
-COUNT = 40
 TIME_LIMIT_S = 120
-
-
-@pytest.fixture
-def plant(tmp_path, binary, model, monkeypatch) -> Path:
-    """A folder with programs, one of which cannot be done, and two models; the tests work in it."""
-    (tmp_path / "in" / "nc").mkdir(parents=True)
-    text = (PROGRAMS / "circles.mod").read_text(encoding="utf-8")
-    for number in range(COUNT - 2):
-        (tmp_path / "in" / f"p{number:03}.mod").write_text(f"! {number}\n{text}", encoding="utf-8")
-    shutil.copy(PROGRAMS / "fanuc.nc", tmp_path / "in" / "nc")
-    (tmp_path / "in" / "broken.pgf").write_text("<Program><Module>nowhere.mod</Module></Program>")
-    model.save(tmp_path / "arm.toml", allow_doubtful=True)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("TRUEGRIND", str(binary))
-    return tmp_path
-
-
-@pytest.fixture
-def expected(plant, run) -> dict[str, bytes]:
-    """What one run writes: reports and programs."""
-    kinds = ["csv", "json", "html", "md"]
-    run("compensate", "in", "--model", "arm.toml", "-o", "out", *(f"--{kind}=one.{kind}" for kind in kinds))
-    written = {path.name: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()}
-    shutil.rmtree("out")
-    return {kind: Path(f"one.{kind}").read_bytes() for kind in kinds} | written
-
-
-REPORTS = {kind: f"all.{kind}" for kind in ("csv", "json", "html", "md")}
-
-
-def same(expected: dict[str, bytes], found: _jobs.Gathered) -> None:
-    for kind, path in found.reports.items():
-        assert path.read_bytes() == expected[kind], kind
-    for path in Path("out").rglob("*.mod"):
-        assert path.read_bytes() == expected[path.name], path
 
 
 def records() -> dict[str, int]:
@@ -110,6 +74,17 @@ def test_without_a_client_jobs_are_started_from_this_process(plant, expected):
         assert set(client.run(os.getpid).values()) == {os.getpid()}
         assert set(client.nthreads().values()) == {1}
     same(expected, compensate_folder("in", "arm.toml", "out", **REPORTS, chunk=7))
+
+
+def test_workers_are_told_not_to_look_at_themselves():
+    distributed = pytest.importorskip("distributed")
+    import dask
+
+    from truegrind.dask import QUIET
+
+    with dask.config.set(QUIET), distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+        (found,) = client.run(lambda: {name: dask.config.get(name) for name in QUIET}).values()
+    assert found == QUIET
 
 
 def test_dask_writes_what_one_run_writes_and_does_nothing_twice(plant, expected, client):
@@ -282,16 +257,3 @@ def test_a_power_study_counts_what_was_named(plant, client):
     assert (named["named"], named["identified"], named["runs"], named["failed"]) == (3, 3, 4, 1)
     assert nothing["effect"] is None and nothing["named"] == 1
     assert named["share_low"] == pytest.approx(0.3006, abs=1e-4) and named["share_high"] == pytest.approx(0.9544, abs=1e-4)
-
-
-def test_ray_writes_what_one_run_writes(plant, expected):
-    ray = pytest.importorskip("ray")
-    from truegrind.ray import compensate_folder
-
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    try:
-        found = compensate_folder("in", "arm.toml", "out", reports=REPORTS, chunk=10)
-    finally:
-        ray.shutdown()
-    same(expected, found)
-    assert json.loads(found.reports["json"].read_text())["totals"]["programs"] == COUNT

@@ -10,10 +10,23 @@ from . import _jobs
 from ._jobs import CHUNK, Gathered
 
 
+RETRIES = 5
+"""As often Ray tries a chunk again whose worker died."""
+
+
 def _run(command: _jobs.Command, reports: dict[str, Any], chunk: int) -> Gathered:
-    do = ray.remote(num_cpus=1, max_retries=5)(_jobs.do)
-    ray.get([do.remote(command, units) for units in _jobs.chunks(_jobs.listed(command), chunk)])
-    return _jobs.gathered(command, reports)
+    do = ray.remote(num_cpus=1, max_retries=RETRIES)(_jobs.do)
+    errors = []
+    for job in [do.remote(command, units) for units in _jobs.chunks(_jobs.listed(command), chunk)]:
+        try:
+            ray.get(job)
+        except ray.exceptions.RayError as error:
+            errors.append(error)
+    try:
+        return _jobs.gathered(command, reports)
+    except _jobs.TruegrindError as missing:
+        # Why is in the jobs, what in the folder.
+        raise missing from (errors[0] if errors else None)
 
 
 def compensate_folder(programs, model, output, *, reports=None, chunk=CHUNK, work=None, **options) -> Gathered:

@@ -112,7 +112,7 @@ fn known(arm: &Estimated) -> String {
     } else {
         format!(
             "held-out error of these links alone: not evaluated; that of the whole model is {error:.4} mm RMS and counts the effects; \
-             --data FILE states it"
+             measurements given with the option data state it"
         )
     }
 }

@@ -4,31 +4,34 @@
 //! (five folds), or the frame is stated and nothing is fitted. The decision is the one for a measured value with an expanded
 //! uncertainty U (ISO 14253-1: k = 2): accepted where the largest error and U lie within the tolerance together, refused
 //! where the largest error exceeds it by more than U, open between them. Pose accuracy and repeatability (ISO 9283: thirty
-//! cycles at five poses) are worked out only where so many cycles were measured.
+//! cycles at five poses) are worked out only where so many cycles were measured, path accuracy and repeatability (ten cycles) only
+//! of rows that say where on a path they were read. Those rows count for nothing else: the arm was moving.
 
 pub mod decision;
+mod error;
 pub mod orientation;
+pub mod path;
 
 use nalgebra::Vector3;
-use thiserror::Error;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::model::Model;
-use truegrind_math::se3::Pose;
 use truegrind_math::statistics::ErrorSummary;
 use truegrind_math::work::tell;
 
 use self::orientation::Orientation;
+use self::path::{PathFound, seen};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Observed, errors_on};
 use crate::identification::identify::observe;
 use crate::identification::register::register;
 use crate::identification::start::NoStart;
 use crate::identification::tolerance::Tolerance;
-use crate::measurement::dataset::{Dataset, Reading, Sensor};
+use crate::measurement::dataset::{Dataset, Sensor};
 use crate::measurement::split::{Split, folds, noise_floor, noise_floor_rad, poses};
 
 pub use self::decision::{Decision, FEWEST_POSES, Uncertainty};
+pub use self::error::AcceptError;
 
 /// Poses and cycles at each for pose accuracy and repeatability (ISO 9283).
 pub const ISO_POSES: usize = 5;
@@ -54,40 +57,6 @@ pub struct Options {
     pub frames: Option<Frames>,
     /// Seed of the folds.
     pub seed: u64,
-}
-
-/// Why nothing can be said at all.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum AcceptError {
-    /// The tolerance or the uncertainty is no length.
-    #[error("{name} {found}: expected a length above 0 in mm")]
-    Length {
-        /// Which.
-        name: &'static str,
-        /// What was found.
-        found: f64,
-    },
-    /// The tolerance or the uncertainty of the orientation is no angle.
-    #[error("{name} {found}: expected an angle above 0° and up to 180°")]
-    Angle {
-        /// Which.
-        name: &'static str,
-        /// What was found (°).
-        found: f64,
-    },
-    /// The rows of the fit.
-    #[error(
-        "{file}: these are the rows that the model was fitted to: an acceptance needs poses that were measured for it, at least \
-         {FEWEST_POSES}"
-    )]
-    RowsOfTheFit {
-        /// The file.
-        file: String,
-    },
-    /// The frames cannot be found.
-    #[error(transparent)]
-    NoStart(#[from] NoStart),
 }
 
 /// Pose accuracy and repeatability, the largest over the poses (mm).
@@ -132,6 +101,8 @@ pub struct Acceptance {
     pub cycles: Option<Cycles>,
     /// Most readings of one pose.
     pub most_cycles: usize,
+    /// The paths that were measured; none from a cable, which sees no position.
+    pub paths: Vec<PathFound>,
     /// Smallest and largest of time (h), temperature (°C) and payload (kg), where logged.
     pub conditions: [Option<[f64; 2]>; 3],
 }
@@ -162,7 +133,10 @@ pub fn accept(
     if is_of_the_fit(dataset, estimated) {
         return Err(AcceptError::RowsOfTheFit { file: dataset.file.clone() });
     }
-    let (observed, _) = observe(dataset, &estimated.nominal, true);
+    let (all, _) = observe(dataset, &estimated.nominal, true);
+    let observed = at_rest(&all)?;
+    let paths = paths(&all, &observed, &estimated.model, options)?;
+    let dataset = &observed.dataset;
     tell("judging the arm of the data sheet");
     let [nominal, nominal_rad] = errors(&observed, &estimated.nominal, options)?;
     tell("judging the estimated arm");
@@ -200,6 +174,7 @@ pub fn accept(
         orientation_asked: options.tolerance_rad.is_some(),
         cycles: cycles(&observed, &groups, &estimated.model, options)?,
         most_cycles: groups.iter().map(Vec::len).max().unwrap_or(0),
+        paths,
         conditions: [
             range(dataset, |condition| condition.time_h),
             range(dataset, |condition| condition.temperature_c),
@@ -264,6 +239,38 @@ fn range(dataset: &Dataset, value: fn(&Condition) -> Option<f64>) -> Option<[f64
     })
 }
 
+/// The rows at which the arm stood.
+fn at_rest(observed: &Observed) -> Result<Observed, AcceptError> {
+    let rows = &observed.dataset.rows;
+    let at_rest: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].path().is_none()).collect();
+    match at_rest.len() {
+        0 => Err(AcceptError::PathsAlone { file: observed.dataset.file.clone() }),
+        count if count == rows.len() => Ok(observed.clone()),
+        _ => Ok(observed.subset(&at_rest)),
+    }
+}
+
+/// Path accuracy and repeatability, where paths were measured by a sensor that sees positions.
+fn paths(
+    all: &Observed,
+    at_rest: &Observed,
+    model: &Model,
+    options: &Options,
+) -> Result<Vec<PathFound>, AcceptError> {
+    if all.dataset.sensor == Sensor::Cable || all.dataset.rows.len() == at_rest.dataset.rows.len() {
+        return Ok(Vec::new());
+    }
+    path::found(all, model, &frames(at_rest, model, options)?)
+}
+
+/// Those that were stated, or that fit the rows best.
+fn frames(observed: &Observed, model: &Model, options: &Options) -> Result<Frames, NoStart> {
+    match &options.frames {
+        Some(frames) => Ok(frames.clone()),
+        None => Ok(register(observed, model, &Tolerance::default())?.fitted.frames),
+    }
+}
+
 /// ISO 9283 at the poses with enough cycles, where there are enough of them and the sensor sees positions.
 fn cycles(
     observed: &Observed,
@@ -275,10 +282,7 @@ fn cycles(
     if enough.len() < ISO_POSES || observed.dataset.sensor == Sensor::Cable {
         return Ok(None);
     }
-    let frames = match &options.frames {
-        Some(frames) => frames.clone(),
-        None => register(observed, model, &Tolerance::default())?.fitted.frames,
-    };
+    let frames = frames(observed, model, options)?;
     let mut out = Cycles {
         poses: enough.len(),
         cycles: enough.iter().map(|rows| rows.len()).min().unwrap_or(0),
@@ -298,14 +302,4 @@ fn cycles(
         out.repeatability_mm = out.repeatability_mm.max(repeatability);
     }
     Ok(Some(out))
-}
-
-/// Where a row saw the target, in the base (mm).
-fn seen(observed: &Observed, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
-    let place = match &observed.dataset.rows[row].reading {
-        Reading::Cable(_) => return None,
-        Reading::Position(place) => *place,
-        Reading::Pose(pose) => pose.translation.vector,
-    };
-    Some((base_from_sensor * nalgebra::Point3::from(place)).coords)
 }

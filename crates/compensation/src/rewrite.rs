@@ -306,7 +306,8 @@ impl<'a> Job<'a> {
         out
     }
 
-    /// The path to the end of a motion; `None` where it is not one between two corrected ends in one work object.
+    /// The path to the end of a motion, as one of its tool in its work object; `None` where it is not one between two corrected
+    /// ends.
     fn path(&self, index: usize) -> Option<Path<'a>> {
         let motion = &self.listing.motions[index];
         if !matches!(motion.kind, MotionKind::Linear | MotionKind::Circular | MotionKind::Joint) {
@@ -326,7 +327,8 @@ impl<'a> Job<'a> {
         let from = ends_of(before, targets, self.mountings)?;
         let to = ends_of(motion, self.solved.of(index), self.mountings)?;
         let way = self.solved.way(index, to.place);
-        (from.index == to.index).then_some(Path { from, to, way })
+        let from = if from.index == to.index { from } else { from.under(&to) };
+        Some(Path { from, to, way })
     }
 
     /// How far the corner at the start of a motion leaves the intended one, where the robot rounds it. `last`: the way of
@@ -343,6 +345,10 @@ impl<'a> Job<'a> {
         let previous = motion.previous? as usize;
         let before = &self.listing.motions[previous];
         let zone_mm = self.listing.zone(before)?.value.as_ref().ok().filter(|zone| !zone.fine)?.tcp_mm;
+        // How a corner goes on under another tool or work object is not told.
+        if self.solved.of(previous).last()?.as_ref().ok()?.mounted != point.index {
+            return None;
+        }
         if before.kind == MotionKind::Linear && motion.kind == MotionKind::Linear {
             // Nearly all lines go on nearly straight: that is told by three points.
             let first = self.solved.of(before.previous? as usize).last()?.as_ref().ok()?;

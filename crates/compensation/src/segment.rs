@@ -36,6 +36,21 @@ pub(super) struct Ends<'a> {
     pub(super) external: Option<&'a [Option<f64>; 6]>,
 }
 
+impl<'a> Ends<'a> {
+    /// The same place of the flange for the tool and in the work object of `other`, as told and as meant. The controller goes
+    /// from there on a path of that tool in that object.
+    pub(super) fn under(self, other: &Ends<'a>) -> Self {
+        let (old, new) = (self.mounted, other.mounted);
+        Ends {
+            mounted: new,
+            index: other.index,
+            meant: new.real.target_of(&old.real.flange_for(&self.meant)),
+            told: new.told.target_of(&old.told.flange_for(&self.told)),
+            ..self
+        }
+    }
+}
+
 impl Way {
     /// At which shares of the way from `start` a joint has a play to take up, or the load is another: under which
     /// condition the arm comes there, and under which it goes on.

@@ -8,6 +8,7 @@ use super::status::Status;
 use super::table::{Cell, Column, Table};
 use truegrind_arm::estimated::Estimated;
 use truegrind_calibration::acceptance::orientation::Orientation;
+use truegrind_calibration::acceptance::path::{PATH_CYCLES, PATH_POINTS, PathFound};
 use truegrind_calibration::acceptance::{
     Acceptance, Decision, FEWEST_POSES, ISO_CYCLES, ISO_POSES, Uncertainty,
 };
@@ -54,7 +55,7 @@ pub fn document(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, sa
         blocks: vec![row_table(found).excerpt(300).into()],
     });
     page.heading(2, "Where this came from");
-    page.push(provenance(found, dataset, estimated, said));
+    page.push(provenance(dataset, estimated, said));
     page
 }
 
@@ -66,7 +67,7 @@ pub fn summary(found: &Acceptance, dataset: &Dataset, estimated: &Estimated) -> 
     page.push(Block::KeyFigures(figures(found)));
     page.push(table(found, dataset.sensor));
     page.push(orientation_table(found));
-    page.push(iso(found, dataset.sensor));
+    page.push(iso(found, dataset));
     page
 }
 
@@ -284,18 +285,18 @@ pub fn row_table(found: &Acceptance) -> Table {
     table
 }
 
-/// Pose accuracy, repeatability and path accuracy, or why there are none.
-fn iso(found: &Acceptance, sensor: Sensor) -> Table {
+/// Accuracy and repeatability of poses and paths, or why there are none.
+fn iso(found: &Acceptance, dataset: &Dataset) -> Table {
     let mut table = Table::new(
         "ISO 9283",
         vec![
             Column::text("figure", "Figure"),
-            Column::number("value_mm", "Largest over the poses", "mm", 4),
+            Column::number("value_mm", "Largest over poses or path", "mm", 4),
             Column::text("remark", "Remark"),
         ],
     );
-    let missing = || match sensor {
-        Sensor::Cable => "not evaluated: a cable sees no position".to_owned(),
+    let missing = || match dataset.sensor {
+        Sensor::Cable => NO_POSITION.to_owned(),
         _ => format!(
             "not evaluated: {ISO_CYCLES} cycles at {ISO_POSES} poses are asked for, at most {} of one pose were measured",
             found.most_cycles
@@ -311,8 +312,47 @@ fn iso(found: &Acceptance, sensor: Sensor) -> Table {
     };
     table.push(["pose accuracy AP, under the model".into(), accuracy, remark.as_str().into()]);
     table.push(["pose repeatability RP".into(), repeatability, remark.as_str().into()]);
-    table.push(["path accuracy AT".into(), Cell::Missing, "not evaluated: no path was measured".into()]);
+    if found.paths.is_empty() {
+        let remark = if dataset.sensor == Sensor::Cable { NO_POSITION.to_owned() } else { no_path() };
+        for figure in ["path accuracy AT, under the model", "path repeatability RT"] {
+            table.push([figure.into(), Cell::Missing, remark.as_str().into()]);
+        }
+    }
+    found.paths.iter().for_each(|path| iso_of_path(path, &mut table));
     table
+}
+
+const NO_POSITION: &str = "not evaluated: a cable sees no position";
+
+fn no_path() -> String {
+    format!(
+        "not evaluated: no path was measured (columns path, cycle and sample; {PATH_CYCLES} cycles of at least {PATH_POINTS} sampling \
+         points)"
+    )
+}
+
+/// Path accuracy and repeatability of one path, or what is missing for them.
+fn iso_of_path(found: &PathFound, table: &mut Table) {
+    let PathFound { path, cycles, points, .. } = found;
+    let left_out = match found.left_out {
+        0 => String::new(),
+        count => format!(", {count} left out that not every cycle has and passes"),
+    };
+    let what = format!("path {path}: {cycles} cycles, {points} sampling points{left_out}");
+    let remark = if *points < PATH_POINTS {
+        format!("not evaluated: at least {PATH_POINTS} sampling points are asked for ({what})")
+    } else if *cycles < PATH_CYCLES {
+        format!("not evaluated: {PATH_CYCLES} cycles are asked for ({what})")
+    } else {
+        what
+    };
+    let accuracy = found.accuracy_mm();
+    if let Some(deviation) = found.deviation_mm.filter(|_| accuracy.is_none()) {
+        let remark = format!("path {path}: mean of {cycles} cycles");
+        table.push(["largest deviation of the path".into(), deviation.into(), remark.into()]);
+    }
+    table.push(["path accuracy AT, under the model".into(), accuracy.into(), remark.as_str().into()]);
+    table.push(["path repeatability RT".into(), found.repeatability_mm.into(), remark.as_str().into()]);
 }
 
 fn circumstances(found: &Acceptance, estimated: &Estimated) -> Table {
@@ -354,6 +394,13 @@ fn method(found: &Acceptance, said: &Statement) -> Vec<String> {
         found.uncertainty_mm
     );
     let mut method = vec![frames, rule];
+    if !found.paths.is_empty() {
+        method.push(
+            "Rows that were read on a path count for its accuracy and repeatability alone, at planes normal to the path at each \
+             sampling point. The commanded path is where the model says that the arm stands at the logged joints."
+                .to_owned(),
+        );
+    }
     if let Some(turns) = found.orientation.as_ref().filter(|turns| turns.tolerance_rad.is_some()) {
         method.push(format!(
             "The orientation is judged by the same rule, at the same poses, with an uncertainty of {:.4}°; both have to hold.",
@@ -406,14 +453,14 @@ fn turns_by_row(turns: &Orientation) -> String {
     .svg()
 }
 
-fn provenance(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Provenance {
+fn provenance(dataset: &Dataset, estimated: &Estimated, said: &Statement) -> Provenance {
     let mut page = Provenance { seed: Some(said.seed), ..Provenance::here() };
     let known = |hash: &str| Some(hash.to_owned()).filter(|hash| !hash.is_empty());
     page.sources.push(Source {
         name: dataset.file.clone(),
         role: "Measurements".to_owned(),
         sha256: known(&dataset.sha256),
-        rows: Some(found.rows),
+        rows: Some(dataset.rows.len()),
     });
     if let Some((name, hash)) = &said.model {
         page.sources.push(Source {
@@ -478,6 +525,10 @@ pub fn json(found: &Acceptance, dataset: &Dataset, estimated: &Estimated, said: 
         "iso_9283": found.cycles.map(|cycles| json!({
             "poses": cycles.poses, "cycles": cycles.cycles, "ap_mm": cycles.accuracy_mm, "rp_mm": cycles.repeatability_mm,
         })),
+        "iso_9283_paths": found.paths.iter().map(|path| json!({
+            "path": path.path, "cycles": path.cycles, "points": path.points, "points_left_out": path.left_out,
+            "deviation_mm": path.deviation_mm, "at_mm": path.accuracy_mm(), "rt_mm": path.repeatability_mm,
+        })).collect::<Vec<_>>(),
         "conditions": { "time_h": time_h, "temperature_c": temperature_c, "payload_kg": payload_kg },
         "serials": serials,
         "measurements": { "file": dataset.file, "sha256": dataset.sha256 },

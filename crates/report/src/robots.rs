@@ -234,8 +234,8 @@ pub fn document(robot: &Robot) -> Document {
     if let Some(flange) = &sheet.flange {
         page.paragraph(format!(
             "The flange lies in the last link frame at ({}) mm, turned by the quaternion ({}), w first.",
-            list(&flange.position_mm),
-            list(&flange.quaternion_wxyz)
+            list(&flange.position_mm.map(without_dust)),
+            list(&flange.quaternion_wxyz.map(without_dust))
         ));
     }
     page.heading(2, "Joints");
@@ -360,6 +360,11 @@ fn untitled(table: Table) -> Table {
 
 fn words(text: &str) -> Cell {
     if text.is_empty() { Cell::Missing } else { text.into() }
+}
+
+/// What arithmetic leaves of a zero is shown as one: a billionth of a millimetre is nobody's measure.
+fn without_dust(value: f64) -> f64 {
+    if value.abs() < 1e-9 { 0.0 } else { value }
 }
 
 fn list(values: &[f64]) -> String {

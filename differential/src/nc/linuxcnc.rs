@@ -5,6 +5,8 @@ mod flow;
 
 use std::collections::HashMap;
 
+use nalgebra::UnitQuaternion;
+
 use super::formula::value;
 use super::machine::{Event, Machine};
 use super::setting::{Pose, Setting};
@@ -55,6 +57,10 @@ pub(super) struct LinuxCnc<'s> {
     /// Whether each IF has taken a branch, by its label.
     taken: HashMap<String, bool>,
     pub frames: HashMap<String, Pose>,
+    /// How offsets are turned about Z of which it is not known where they lie.
+    pub unplaced: HashMap<String, UnitQuaternion<f64>>,
+    /// Offsets of rotary axes (°), where they are not 0.
+    pub rotary: HashMap<String, [f64; 3]>,
     pub frame: String,
     /// The zero of G92 and G52 (mm).
     pub shift: [Option<f64>; 3],
@@ -82,6 +88,8 @@ impl<'s> LinuxCnc<'s> {
             repeats: HashMap::new(),
             taken: HashMap::new(),
             frames,
+            unplaced: HashMap::new(),
+            rotary: HashMap::new(),
             frame: "G54".to_owned(),
             shift: [Some(0.0); 3],
             kept_shift: [Some(0.0); 3],

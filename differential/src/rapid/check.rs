@@ -379,7 +379,8 @@ impl Comparison<'_> {
             return;
         }
         // Behind a motion at which the controller stops the program runs no further until somebody moves the arm.
-        let best = || meant_links(arm, joints, &at, intended, &tip);
+        let beside = |flange: &Pose| difference(&(flange * tip), &(intended * tip));
+        let best = || meant_links(arm, joints, &at, &beside);
         if told.adrift && within(best(), &stated) {
             self.tally.open += 1;
             return;
@@ -388,7 +389,7 @@ impl Comparison<'_> {
         let any_way = || {
             let all = arm.nominal_inverse(&told.flange, None);
             let near = all.iter().filter_map(|q| arm.nominal_nearest(&now.flange, q)).collect::<Vec<_>>();
-            near.iter().any(|q| within(meant_links(arm, q, &at, intended, &tip), &stated))
+            near.iter().any(|q| within(meant_links(arm, q, &at, &beside), &stated))
         };
         if row.is_some_and(|row| row.guessed) && any_way() {
             self.tally.guessed += 1;

@@ -1,21 +1,26 @@
 //! The acceptance of a model as a user asks for it, and the empty table to begin with.
 
 use std::fs;
+use std::path::Path;
 
 use super::{folder, truegrind};
 
 const RECIPE: &str = include_str!("../../data/irb120-tracker.toml");
 const ROWS: &str = include_str!("../../data/irb120-tracker.csv");
 
+/// `poses.csv`, and `later.csv` of the same arm on another day.
+fn measured_twice(at: &Path) {
+    fs::write(at.join("poses.csv"), ROWS).unwrap();
+    fs::write(at.join("later.toml"), RECIPE.replace("seed = 121", "seed = 122")).unwrap();
+    let (code, _, err) = truegrind(at, &["simulate", "later.toml", "-o", "later.csv"]);
+    assert_eq!(code, 0, "{err}");
+}
+
 #[test]
 fn a_model_is_accepted_by_poses_of_its_own() {
     let dir = folder();
     let at = dir.path();
-    fs::write(at.join("poses.csv"), ROWS).unwrap();
-    // The same arm on another day.
-    fs::write(at.join("later.toml"), RECIPE.replace("seed = 121", "seed = 122")).unwrap();
-    let (code, _, err) = truegrind(at, &["simulate", "later.toml", "-o", "later.csv"]);
-    assert_eq!(code, 0, "{err}");
+    measured_twice(at);
     let (code, _, err) = truegrind(
         at,
         &["diagnose", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml", "--allow-doubtful"],
@@ -136,6 +141,80 @@ fn the_orientation_is_told_and_judged_where_that_is_asked_for() {
     let (code, out, _) = accept("places.csv", &["--tolerance-angle", "1"]);
     let headline = "[not evaluated] Not evaluated: a tolerance of the orientation was stated, and the sensor saw no orientation";
     assert!(code == 1 && on_one_line(&out).contains(headline), "{out}");
+}
+
+/// Ten cycles of a path beside the poses of the acceptance: path accuracy and repeatability are evaluated, else what is missing is said.
+#[test]
+fn a_measured_path_is_evaluated() {
+    let dir = folder();
+    let at = dir.path();
+    measured_twice(at);
+    let identify =
+        ["identify", "poses.csv", "--robot", "abb-irb-120", "-o", "model.toml", "--allow-doubtful"];
+    let (code, _, err) = truegrind(at, &identify);
+    assert!(code < 2, "{err}");
+    let later = fs::read_to_string(at.join("later.csv")).unwrap();
+    let (header, poses) = later.split_once('\n').unwrap();
+    let columns: Vec<&str> = header.split(',').collect();
+    let x = columns.iter().position(|name| *name == "measured_x").unwrap();
+    // A "path" over ten of the poses: what a tracker saw there, in each cycle 0.02 mm to one side or the other.
+    let table = |cycles: usize, points: usize| {
+        let mut text = format!("{header},path,cycle,sample\n");
+        poses.lines().skip(points).for_each(|line| text += &format!("{line},,,\n"));
+        for cycle in 0..cycles {
+            for (sample, line) in poses.lines().take(points).enumerate() {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                let seen: f64 = cells[x].parse().unwrap();
+                cells[x] = format!("{:.4}", seen + 0.02 * [-1.0, 1.0][cycle % 2]);
+                text += &format!("{},edge,{},{sample}\n", cells.join(","), cycle + 1);
+            }
+        }
+        fs::write(at.join("cycles.csv"), text).unwrap();
+    };
+    let accept = || {
+        let arguments =
+            ["accept", "cycles.csv", "--model", "model.toml", "--tolerance", "1", "--json", "page.json"];
+        let (code, out, err) = truegrind(at, &arguments);
+        let json = fs::read(at.join("page.json")).unwrap_or_default();
+        let found: serde_json::Value = serde_json::from_slice(&json).unwrap_or_default();
+        (code, out.split_whitespace().collect::<Vec<_>>().join(" "), err, found)
+    };
+    table(10, 10);
+    let (code, out, err, found) = accept();
+    assert!(code == 0 && out.contains("190 poses in 190 rows"), "{out}{err}");
+    assert!(out.contains("path edge: 10 cycles, 10 sampling points"), "{out}");
+    let of = &found["iso_9283_paths"][0];
+    assert_eq!((&of["path"], &of["cycles"], &of["points"]), (&"edge".into(), &10.into(), &10.into()));
+    let [accuracy, repeatability] = ["at_mm", "rt_mm"].map(|name| of[name].as_f64().unwrap());
+    assert!((0.001..1.0).contains(&accuracy), "{accuracy}");
+    // Each cycle lies 0.02 mm beside the mean; this way turns sharply at its points, whose planes are met obliquely.
+    assert!((0.005..0.2).contains(&repeatability), "{repeatability}");
+    table(4, 10);
+    let (code, out, _, found) = accept();
+    assert!(
+        code == 0 && out.contains("not evaluated: 10 cycles are asked for (path edge: 4 cycles"),
+        "{out}"
+    );
+    assert!(out.contains("largest deviation of the path") && found["iso_9283_paths"][0]["at_mm"].is_null());
+    // What is wrong is told by its place.
+    for (from, to, expected) in [
+        (",edge,1,3\n", ",edge,0,3\n", "column cycle: found `0`; expected the number of a cycle, from 1"),
+        (",edge,1,3\n", ",edge,1,3.5\n", "column sample: found `3.5`"),
+        (",edge,1,3\n", ",,1,3\n", "column path: found an empty cell; expected the name of a path"),
+        (",edge,1,3\n", ",edge,1,2\n", "both are sampling point 2 of cycle 1 of path edge"),
+    ] {
+        table(4, 10);
+        let text = fs::read_to_string(at.join("cycles.csv")).unwrap();
+        fs::write(at.join("cycles.csv"), text.replacen(from, to, 1)).unwrap();
+        let (code, out, err, _) = accept();
+        assert!(code == 2 && err.contains(expected), "{out}{err}");
+    }
+    // Two of the three columns are no path, and that is said.
+    table(4, 10);
+    let text = fs::read_to_string(at.join("cycles.csv")).unwrap();
+    fs::write(at.join("cycles.csv"), text.replacen(",cycle,", ",run,", 1)).unwrap();
+    let (_, _, err, _) = accept();
+    assert!(err.contains("cycle is missing, and the rows are read as poses"), "{err}");
 }
 
 #[test]

@@ -535,5 +535,5 @@ fn the_commands_of_the_deployment_examples_are_understood() {
         }
         assert!(!is_example || seen > known_before, "{}: no command is found in it", path.display());
     }
-    assert_eq!(seen, 6);
+    assert_eq!(seen, 7);
 }

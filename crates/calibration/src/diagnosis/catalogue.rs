@@ -413,13 +413,22 @@ fn drum(dataset: &Dataset) -> Form {
     Form::Drum { from_mm: low.min(high).max(0.0).floor() as u32, to_mm: high.ceil() as u32 }
 }
 
+/// Late readings, their delay counted from the middle of the times that were logged.
+fn latency(dataset: &Dataset) -> Form {
+    let times = dataset.rows.iter().filter_map(|row| row.condition.time_h).filter(|t| t.is_finite());
+    let (first, last) =
+        times.fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t| (first.min(t), last.max(t)));
+    let middle_s = 0.5 * (first + last) * 3600.0;
+    Form::Latency { middle_s: if middle_s.is_finite() { middle_s.round() as i64 } else { 0 } }
+}
+
 /// Forms that the columns allow, with the variants tried of each.
 fn forms(dataset: &Dataset, columns: &Columns) -> Vec<(Form, f64)> {
     let mut out = Vec::new();
     let has =
         |rate: bool| dataset.rows.iter().any(|r| r.motion().is_some_and(|m| !rate || m.rate_per_h.is_some()));
     if has(true) {
-        out.push((Form::Latency, 1.0));
+        out.push((latency(dataset), 1.0));
     } else if has(false) {
         out.extend([(Form::LastStep, 2.0), (Form::SlowReading, 2.0)]);
     }

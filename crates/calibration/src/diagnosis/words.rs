@@ -171,14 +171,17 @@ fn of_form(form: Form, parameters: &[FoundParameter]) -> String {
     let value = found(parameters, 0);
     let joint = form.joints().first().map_or(0, |j| j + 1);
     match form {
-        Form::Latency => format!(
+        Form::Latency { .. } => format!(
             "the reading and the angles of a row are {:.1} ms apart while the arm moves",
             1e3 * value.abs()
         ),
         Form::LastStep => {
+            let share = |k: usize| found(parameters, k).abs();
+            let most = (0..parameters.len()).max_by(|&a, &b| share(a).total_cmp(&share(b))).unwrap_or(0);
             format!(
-                "readings were taken before the arm stood still: {:.2} % of the last step was still to come",
-                100.0 * value.abs()
+                "readings were taken before the arm stood still: up to {:.2} % of the last step was still to come (joint {})",
+                100.0 * share(most),
+                most + 1
             )
         }
         Form::SlowReading => format!(

@@ -5,7 +5,7 @@ mod rows;
 
 use serde::{Deserialize, Serialize};
 
-pub use self::row::{Extra, Motion, Reading, Row};
+pub use self::row::{Extra, Motion, PathPoint, Reading, Row};
 pub use self::rows::{Iter, Rows};
 
 /// What the sensor tells of a pose.

@@ -2,7 +2,8 @@
 //!
 //! Columns are found by header name, in any order: `q1…q6` logged joint angles (deg); one sensor, `L` (mm) or
 //! `measured_x, measured_y, measured_z` (mm) (with `measured_qw … measured_qz` a full pose); optional `x, y, z` (mm),
-//! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor`. Other columns are kept as text.
+//! `t` (h), `session`, `temperature` [°C], `payload` (kg), `approach1…6`, `anchor`, and `path, cycle, sample` of rows that were read
+//! on a path. Other columns are kept as text.
 //! Tables of RoboDK and DELMIA are told by their content (see the notes of the dataset).
 //! CSV may be separated by comma, semicolon or tab; with semicolon or tab a decimal comma is understood. Of a
 //! workbook the first sheet that has the columns is read, or the one named.

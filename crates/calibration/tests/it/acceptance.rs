@@ -1,5 +1,7 @@
 //! Acceptance by poses that a model was not fitted to.
 
+mod path;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;

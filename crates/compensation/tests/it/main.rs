@@ -3,6 +3,7 @@
 // A test that cannot go on panics.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
+mod change;
 mod cut;
 mod in_doubt;
 mod path;

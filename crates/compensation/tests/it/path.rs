@@ -24,10 +24,15 @@ use truegrind_programs::rewrite::RewriteOptions;
 
 use super::{estimated, nominal, perturbed};
 
-const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+pub(super) const EXT: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
 fn module(body: &str) -> String {
-    format!("MODULE M\n PROC main()\n{body} ENDPROC\nENDMODULE\n")
+    module_with("", body)
+}
+
+/// A module with data of its own.
+pub(super) fn module_with(data: &str, body: &str) -> String {
+    format!("MODULE M\n{data} PROC main()\n{body} ENDPROC\nENDMODULE\n")
 }
 
 /// `[position, tool down, configuration]`.
@@ -39,7 +44,7 @@ fn down(x: f64, y: f64, z: f64) -> String {
     )
 }
 
-fn known(actual: &Model) -> Estimated {
+pub(super) fn known(actual: &Model) -> Estimated {
     let mut known = estimated(actual.clone(), &[Joints::zeros()]);
     // Everywhere is measured: these tests are about the path.
     (known.region.min_deg, known.region.max_deg) = ([-400.0; 6], [400.0; 6]);
@@ -47,7 +52,7 @@ fn known(actual: &Model) -> Estimated {
     known
 }
 
-fn rewrite(source: &str, known: &Estimated, options: &Options) -> (Plan, String) {
+pub(super) fn rewrite(source: &str, known: &Estimated, options: &Options) -> (Plan, String) {
     let task = Task::read(&[("p.mod", source.as_bytes())]);
     let planned = plan(&task.listing, known, &Cell::default(), options);
     let rewritten = task.rewrite(&planned.changes, &RewriteOptions::default()).unwrap();

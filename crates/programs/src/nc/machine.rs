@@ -124,6 +124,10 @@ pub(super) struct Assigned {
     lost: Map<String, ()>,
     /// Whether any other may have been set too.
     all: bool,
+    /// Those with offsets of rotary axes, which no place and no turn about Z takes back.
+    rotary: Map<String, ()>,
+    /// Whether any other may have them too.
+    all_rotary: bool,
 }
 
 impl Assigned {
@@ -142,10 +146,26 @@ impl Assigned {
         self.by_name.insert(name, frame);
     }
 
+    /// Whether a name has, or may have, offsets of rotary axes.
+    pub(super) fn is_rotary(&self, name: &str) -> bool {
+        self.all_rotary || self.rotary.contains_key(&name.to_ascii_uppercase())
+    }
+
+    /// The program says whether a name has offsets of rotary axes.
+    pub(super) fn set_rotary(&mut self, name: &str, rotary: bool) {
+        let name = name.to_ascii_uppercase();
+        if rotary {
+            self.rotary.insert(name, ());
+        } else {
+            self.rotary.remove(&name);
+        }
+    }
+
     /// Any of them may have been set to anything.
     pub(super) fn lose_all(&mut self) {
         self.by_name = Map::new();
         self.all = true;
+        self.all_rotary = true;
     }
 
     /// What holds where the way may have gone either way.
@@ -156,14 +176,35 @@ impl Assigned {
         self.by_name = self.by_name.joined(&other.by_name, &agree);
         self.lost = self.lost.joined(&other.lost, &|_, _| Some(()));
         self.all |= other.all;
+        self.rotary = self.rotary.joined(&other.rotary, &|_, _| Some(()));
+        self.all_rotary |= other.all_rotary;
     }
 
     /// What holds where the way may have come from anywhere in the file: all that has been set, unless any is set `elsewhere` too.
-    fn forget(&mut self, elsewhere: bool) {
+    /// The same of offsets of rotary axes.
+    fn forget(&mut self, elsewhere: bool, rotary: bool) {
         if elsewhere {
+            let was = self.all_rotary;
             self.lose_all();
+            self.all_rotary = was || rotary;
         }
     }
+}
+
+/// What a file gives values.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Assigns {
+    /// Work offsets.
+    pub(super) frames: bool,
+    /// Work offsets of rotary axes.
+    pub(super) rotary: bool,
+    /// Tools.
+    pub(super) tools: bool,
+}
+
+impl Assigns {
+    /// Anything.
+    pub(super) const ALL: Assigns = Assigns { frames: true, rotary: true, tools: true };
 }
 
 /// What variables hold; a copy shares it.
@@ -383,12 +424,12 @@ impl State {
 
     /// A place that can be reached from elsewhere: what the text before says holds no more, but for groups that the
     /// whole file sets to one thing only.
-    pub(super) fn forget(&mut self, constant: u32, (frames, tools): (bool, bool)) {
+    pub(super) fn forget(&mut self, constant: u32, assigns: Assigns) {
         let flow = Err(Reason::UnknownFlow);
         self.mode = Mode::Lost(Reason::UnknownFlow);
         self.before_cycle = self.mode;
-        self.frames.forget(frames);
-        self.tools.forget(tools);
+        self.frames.forget(assigns.frames, assigns.rotary);
+        self.tools.forget(assigns.tools, false);
         self.next_tool = None;
         self.kept = None;
         self.position = [flow; 3];

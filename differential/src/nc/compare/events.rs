@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::Pair;
-use super::follow::{Follower, plane_of};
+use super::follow::{Follower, off, plane_of};
 use crate::arm::{Pose, difference};
 use crate::nc::arc::axes;
 use crate::nc::machine::{Event, Move, Say};
@@ -144,13 +144,9 @@ impl Judge<'_> {
         };
         self.tally.corrected += 1;
         self.most = self.most.max(difference(&wanted, &given).0);
-        let (mm, mut rad) = difference(&real, &wanted);
+        // TX TY TZ tell the axis of the tool and no turn about it.
         let axis_alone = self.pair.dialect == Dialect::Heidenhain && old.angles == [None; 3];
-        if axis_alone {
-            // TX TY TZ tell the axis of the tool and no turn about it.
-            let axis = nalgebra::Vector3::z();
-            rad = (real.rotation * axis).angle(&(wanted.rotation * axis));
-        }
+        let (mm, rad) = off(&real, &wanted, axis_alone);
         let stated = Stated::of(Some(row), &self.pair.case.arm, false);
         let written = |mm: f64, rad: f64| mm <= WRITTEN_MM && rad <= WRITTEN_RAD;
         let right = |mm: f64, rad: f64| mm <= WRITTEN_MM + stated.mm && rad <= WRITTEN_RAD + stated.rad;
@@ -162,6 +158,8 @@ impl Judge<'_> {
             if ways.iter().any(|&(mm, rad)| right(mm, rad)) {
                 self.tally.corrected -= 1;
                 self.tally.open += 1;
+                // What begins here begins that far off.
+                self.open_before = mm;
                 return;
             }
             let before = self.arm.at(&wanted, &tool).map_or(0.0, |pose| difference(&pose, &wanted).0);

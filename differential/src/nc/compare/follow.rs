@@ -1,10 +1,10 @@
 //! What the arm does along a run: the controller's joints, where the links are, and where the tip really is.
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Translation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::arm::{Circumstance, Pose};
+use crate::arm::{Circumstance, Pose, difference};
 use crate::model::Case;
 use crate::nc::machine::{Mode, Move};
 use crate::play::{Links, meant_flanks, meant_links};
@@ -59,55 +59,51 @@ impl<'c> Follower<'c> {
             self.lost();
             return None;
         };
-        let back = tool.inverse();
-        let Some(joints) = self.solve(&(pose * back), &self.last) else {
+        let near = self.follow(done, &tool).unwrap_or(self.last);
+        let Some(joints) = self.solve(&(pose * tool.inverse()), &near) else {
             self.lost();
             return None;
         };
-        if self.links.have_play() || done.arc.is_some() {
-            self.follow(done, &joints, &tool);
-        }
+        self.links.go(&joints);
         self.joints = Some(joints);
         self.last = joints;
         Some(self.real(&joints) * tool)
     }
 
-    /// Takes the links along the way.
-    fn follow(&mut self, done: &Move, end: &[f64; 6], tool: &Pose) {
-        let back = tool.inverse();
-        let on_path = self.straight_rapids || done.mode != Mode::Rapid;
-        // Where the tip is told to be before, whether the words that led there still hold or not.
-        let start = self
-            .joints
-            .zip(done.chain)
-            .map(|(joints, chain)| chain.inverse() * self.case.arm.nominal_forward(&joints) * tool);
-        match self.joints {
-            None => self.links.lose(),
-            Some(mut near) if on_path => {
-                if done.arc.is_some() {
-                    self.tips.push((0.0, self.real(&near) * tool));
-                }
-                for k in 1..PIECES {
-                    let share = f64::from(k) / f64::from(PIECES);
-                    let pose = start.and_then(|start| between(done, &start, share));
-                    let Some(joints) = pose.and_then(|pose| self.solve(&(pose * back), &near)) else {
-                        // Of the way to it nothing is told.
-                        self.links.lose();
-                        self.tips.clear();
-                        break;
-                    };
-                    near = joints;
-                    self.links.go(&joints);
-                    if done.arc.is_some() {
-                        let behind = self.links.behind(&joints);
-                        let at = Circumstance { behind, ..Circumstance::default() };
-                        self.tips.push((share, self.case.arm.actual_forward(&joints, &at) * tool));
-                    }
-                }
-            }
-            Some(_) => {}
+    /// Takes the links along the way; the joints just before its end, none where the motion does not go along one or the arm
+    /// cannot. An arm that goes along a path keeps to its branch, however near another one is in joints.
+    fn follow(&mut self, done: &Move, tool: &Pose) -> Option<[f64; 6]> {
+        let Some(mut near) = self.joints else {
+            self.links.lose();
+            return None;
+        };
+        if !self.straight_rapids && done.mode == Mode::Rapid {
+            return None;
         }
-        self.links.go(end);
+        let back = tool.inverse();
+        // Where the tip is told to be before, whether the words that led there still hold or not.
+        let start = done.chain.map(|chain| chain.inverse() * self.case.arm.nominal_forward(&near) * tool);
+        if done.arc.is_some() {
+            self.tips.push((0.0, self.real(&near) * tool));
+        }
+        for k in 1..PIECES {
+            let share = f64::from(k) / f64::from(PIECES);
+            let pose = start.and_then(|start| between(done, &start, share));
+            let Some(joints) = pose.and_then(|pose| self.solve(&(pose * back), &near)) else {
+                // Of the way to it nothing is told.
+                self.links.lose();
+                self.tips.clear();
+                return None;
+            };
+            near = joints;
+            self.links.go(&joints);
+            if done.arc.is_some() {
+                let behind = self.links.behind(&joints);
+                let at = Circumstance { behind, ..Circumstance::default() };
+                self.tips.push((share, self.case.arm.actual_forward(&joints, &at) * tool));
+            }
+        }
+        Some(near)
     }
 
     /// On which flanks the links lie, in words.
@@ -150,19 +146,13 @@ impl<'c> Follower<'c> {
 
     /// How far the tip would really be from where it shall for a told pose (mm, rad) in each of the ways in which the arm can
     /// stand at the pose that was meant, with the links on the flanks that suit it best. A program says no configuration:
-    /// which of them the arm stands in is not told where it begins or goes on from what is not followed. Where only the axis of the
-    /// tool is told (`axis_alone`), how it is turned about that does not count.
+    /// which of them the arm stands in is not told where it begins or goes on from what is not followed. `axis_alone`: see [`off`].
     pub fn every_way(&self, meant: &Pose, told: &Pose, tool: &Pose, axis_alone: bool) -> Vec<(f64, f64)> {
         let back = tool.inverse();
         let all = self.case.arm.nominal_inverse(&(meant * back), None);
         let near = all.iter().filter_map(|joints| self.solve(&(told * back), joints));
-        let at = Circumstance::default();
-        let as_turned = |q: &[f64; 6]| {
-            let turn = meant.rotation.inverse() * (self.case.arm.actual_forward(q, &at) * tool).rotation;
-            let about = if axis_alone { 2.0 * turn.k.atan2(turn.w) } else { 0.0 };
-            meant * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about)
-        };
-        near.map(|q| meant_links(&self.case.arm, &q, &at, &(as_turned(&q) * back), tool)).collect()
+        let off = |flange: &Pose| off(&(flange * tool), meant, axis_alone);
+        near.map(|q| meant_links(&self.case.arm, &q, &Circumstance::default(), &off)).collect()
     }
 
     /// Where the tip would really be for a told pose, with the links before their motors as they are.
@@ -176,6 +166,14 @@ impl<'c> Follower<'c> {
         let circumstance = Circumstance { behind, ..Circumstance::default() };
         self.case.arm.actual_forward(joints, &circumstance)
     }
+}
+
+/// How far a tip is from where it shall be (mm, rad); where only the axis of the tool is told (`axis_alone`), how it is turned
+/// about that does not count.
+pub fn off(real: &Pose, wanted: &Pose, axis_alone: bool) -> (f64, f64) {
+    let (mm, rad) = difference(real, wanted);
+    let axis = Vector3::z();
+    (mm, if axis_alone { (real.rotation * axis).angle(&(wanted.rotation * axis)) } else { rad })
 }
 
 /// Where the tip is told to be part of the way along a motion that begins at `start`, in the coordinates of the program.

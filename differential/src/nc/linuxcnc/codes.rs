@@ -10,7 +10,9 @@ const AXES: [char; 3] = ['X', 'Y', 'Z'];
 
 impl LinuxCnc<'_> {
     pub fn recount(&mut self) {
-        let frame = self.frames.get(&self.frame).copied();
+        // How offsets of rotary axes turn A, B and C is not followed.
+        let straight = self.rotary.get(&self.frame).is_none_or(|angles| *angles == [0.0; 3]);
+        let frame = self.frames.get(&self.frame).copied().filter(|_| straight);
         let [x, y, z] = self.shift;
         let chain = frame.zip(x).zip(y).zip(z).map(|(((frame, x), y), z)| frame * Pose::translation(x, y, z));
         self.machine.recount(chain);
@@ -211,18 +213,10 @@ impl LinuxCnc<'_> {
         };
         match block.get('L').map(|l| l.round() as i32) {
             Some(2) => {
-                let Some(frame) = self.frames.get_mut(&name) else { return };
-                let mut at: [f64; 3] = frame.translation.vector.into();
-                for (axis, place) in places.iter().enumerate() {
-                    at[axis] = place.unwrap_or(at[axis]);
-                }
-                // R turns about Z.
-                *frame = match block.get('R') {
-                    Some(turn) => plain(at, [0.0, 0.0, turn]),
-                    None => Pose::from_parts(at.into(), frame.rotation),
-                };
-                if block.words.iter().any(|(letter, _)| "ABC".contains(*letter)) {
-                    self.frames.remove(&name);
+                self.set_place(block, places, &name);
+                let rotary = self.rotary.entry(name.clone()).or_insert([0.0; 3]);
+                for (angle, letter) in rotary.iter_mut().zip(['A', 'B', 'C']) {
+                    *angle = block.get(letter).unwrap_or(*angle);
                 }
             }
             Some(20) => {
@@ -236,13 +230,34 @@ impl LinuxCnc<'_> {
                             std::array::from_fn(|axis| places[axis].map_or(0.0, |place| at[axis] - place));
                         *frame *= Pose::translation(by[0], by[1], by[2]);
                     }
-                    _ => drop(self.frames.remove(&name)),
+                    _ => {
+                        let gone = self.frames.remove(&name);
+                        self.unplaced.extend(gone.map(|frame| (name.clone(), frame.rotation)));
+                    }
                 }
             }
             _ => {}
         }
         if name == self.frame {
             self.recount();
+        }
+    }
+
+    /// Where an offset lies, and how it is turned about Z (R).
+    fn set_place(&mut self, block: &Block, places: [Option<f64>; 3], name: &str) {
+        let known = self.frames.get(name).map(|frame| frame.translation.vector);
+        let Some(rotation) = self.frames.get(name).map(|f| f.rotation).or(self.unplaced.get(name).copied())
+        else {
+            return;
+        };
+        let rotation = block.get('R').map_or(rotation, |turn| plain([0.0; 3], [0.0, 0.0, turn]).rotation);
+        let at: [Option<f64>; 3] = std::array::from_fn(|axis| places[axis].or(known.map(|at| at[axis])));
+        match at {
+            [Some(x), Some(y), Some(z)] => {
+                self.unplaced.remove(name);
+                self.frames.insert(name.to_owned(), Pose::from_parts([x, y, z].into(), rotation));
+            }
+            _ => drop(self.unplaced.insert(name.to_owned(), rotation)),
         }
     }
 

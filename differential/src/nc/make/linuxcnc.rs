@@ -122,10 +122,14 @@ fn change(m: &mut Maker) -> Vec<String> {
             one(format!("G52 {x} {z}"))
         }
         11 if m.features.presets && m.chance(0.4) => one("G10 L20 P1 X5 Y0".into()),
+        11 if m.features.presets && m.chance(0.1) => {
+            let (number, axis) = (m.pick(&[1, 2, 3]), m.pick(&["A", "B", "C"]));
+            one(format!("G10 L2 P{number} {axis}{}", m.pick(&[0, 5])))
+        }
         11 => {
             // A frame that is told whole lies where others do.
             let [x, y, z] = m.centre;
-            let (number, turn) = (m.pick(&[1, 2, 3]), m.pick(&["", " R180", " R165"]));
+            let (number, turn) = (m.pick(&[1, 2, 3]), m.pick(&["", " R180", " R165", " R180 A0 B0 C0"]));
             let (x, y, z) = (m.axis("X", x + 5.0), m.axis("Y", y), m.axis("Z", z + 10.0));
             one(format!("G10 L2 P{number} {x} {y} {z}{turn}"))
         }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::frames::Frames;
-use crate::measurement::dataset::{Dataset, Motion, Reading, Row, Sensor};
+use crate::measurement::dataset::{Dataset, Reading, Row, Sensor};
 use crate::measurement::sensor::disturbance::Kind;
 use crate::measurement::sensor::form::{Form, second_degree};
 use truegrind_arm::condition::Condition;
@@ -19,14 +19,24 @@ const HOUR_S: f64 = 3600.0;
 fn of_form(form: Form, dataset: &Dataset, model: &Model) -> Vec<[Option<Vec<f64>>; 6]> {
     let rows = &dataset.rows;
     let none = || -> [Option<Vec<f64>>; 6] { Default::default() };
-    let of_motion = |value: &dyn Fn(&Motion, usize) -> f64| {
-        vec![std::array::from_fn(|j| {
-            Some(rows.iter().map(|r| r.motion().map_or(0.0, |m| value(m, j))).collect())
-        })]
-    };
     match form {
-        Form::Latency => of_motion(&|m, j| m.rate_per_h.map_or(0.0, |rate| rate[j] / HOUR_S)),
-        Form::LastStep => of_motion(&|m, j| -m.step[j]),
+        Form::Latency { middle_s } => {
+            let rate =
+                |r: &Row, j: usize| r.motion().and_then(|m| m.rate_per_h).map_or(0.0, |q| q[j] / HOUR_S);
+            let middle_h = middle_s as f64 / HOUR_S;
+            let hours = |r: &Row| r.condition.time_h.map_or(0.0, |t| t - middle_h);
+            let times = |by: &dyn Fn(&Row) -> f64| -> [Option<Vec<f64>>; 6] {
+                std::array::from_fn(|j| Some(rows.iter().map(|r| rate(r, j) * by(r)).collect()))
+            };
+            vec![times(&|_| 1.0), times(&hours)]
+        }
+        Form::LastStep => (0..6)
+            .map(|joint| {
+                let mut out = none();
+                out[joint] = Some(rows.iter().map(|r| r.motion().map_or(0.0, |m| -m.step[joint])).collect());
+                out
+            })
+            .collect(),
         Form::Stiffness { joint } => {
             let torques = torques(dataset, model);
             [2, 3]

@@ -28,6 +28,17 @@ pub struct Motion {
     pub rate_per_h: Option<Joints>,
 }
 
+/// Where on a measured path a row stands. The same path is run several times, in cycles, and read at the same sampling points in each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PathPoint {
+    /// Which path.
+    pub path: String,
+    /// Which run of it, from 1.
+    pub cycle: u32,
+    /// Which sampling point, counted along the path.
+    pub sample: u32,
+}
+
 /// What only some rows have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Extra {
@@ -37,6 +48,8 @@ pub struct Extra {
     pub motion: Option<Motion>,
     /// Session label, where logged.
     pub session: Option<String>,
+    /// The place on a path, where the row was read on one.
+    pub path: Option<Box<PathPoint>>,
     /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), as text, up to the last one that holds something.
     pub other: Vec<String>,
 }
@@ -84,6 +97,11 @@ impl Row {
     /// Session label, where logged.
     pub fn session(&self) -> Option<&str> {
         self.extra.as_ref()?.session.as_deref()
+    }
+
+    /// The place on a path, where the row was read on one.
+    pub fn path(&self) -> Option<&PathPoint> {
+        self.extra.as_ref()?.path.as_deref()
     }
 
     /// Cells of [`Dataset::other_columns`](super::Dataset::other_columns), up to the last one that holds something.

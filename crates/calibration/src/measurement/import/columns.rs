@@ -11,6 +11,9 @@ pub(super) const POSITION: [&str; 3] = ["measured_x", "measured_y", "measured_z"
 /// The measured orientation, beside the point.
 pub(super) const QUATERNION: [&str; 4] = ["measured_qw", "measured_qx", "measured_qy", "measured_qz"];
 
+/// Where on a path a row was read.
+pub(super) const PATH: [&str; 3] = ["path", "cycle", "sample"];
+
 /// Where the columns are.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Columns {
@@ -36,6 +39,8 @@ pub(super) struct Columns {
     pub(super) approach: [Option<usize>; 6],
     /// anchor.
     pub(super) anchor: Option<usize>,
+    /// path, cycle, sample, where all three are there.
+    pub(super) path: Option<[usize; 3]>,
     /// Columns that are only kept.
     pub(super) other: Vec<(String, usize)>,
     /// What a reader should know.
@@ -63,7 +68,9 @@ impl Columns {
         let is_known = |name: &str| is_known(name, letter);
         let by_name = by_name(&named, letter, &place)?;
         let get = |name: &str| by_name.get(name).copied();
-        let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_known(n)).collect();
+        let path = path_columns(&named, &get, &place)?;
+        let is_used = |name: &str| is_known(name) || path.is_some() && PATH.contains(&name);
+        let unused: Vec<&str> = by_name.keys().copied().filter(|n| !is_used(n)).collect();
 
         let missing: Vec<String> = (1..=6)
             .map(|j| format!("{letter}{j}"))
@@ -89,12 +96,13 @@ impl Columns {
             }
         };
         let approach = std::array::from_fn(|j| get(&format!("approach{}", j + 1)));
+        notes.extend(part_of_path(&get, path));
         for name in &unused {
             if let Some(expected) = OPTIONAL.iter().copied().find(|o| get(o).is_none() && is_near(name, o)) {
                 notes.push(format!("column `{name}` is not used; did you mean {expected}?"));
             }
         }
-        let other: Vec<(String, usize)> = named.iter().filter(|(n, _)| !is_known(n)).cloned().collect();
+        let other: Vec<(String, usize)> = named.iter().filter(|(n, _)| !is_used(n)).cloned().collect();
         if !other.is_empty() {
             let names: Vec<String> = other.iter().map(|(n, _)| format!("`{n}`")).collect();
             notes.push(format!("columns kept but not used: {}", names.join(", ")));
@@ -113,10 +121,38 @@ impl Columns {
             session: get("session"),
             approach,
             anchor: get("anchor"),
+            path,
             other,
             notes,
         })
     }
+}
+
+/// Where a row stands on a path. Other programs call columns of theirs so, therefore these are ours only together.
+fn path_columns(
+    named: &[(String, usize)],
+    get: &dyn Fn(&str) -> Option<usize>,
+    place: &Place,
+) -> Result<Option<[usize; 3]>, ImportError> {
+    let [Some(path), Some(cycle), Some(sample)] = PATH.map(get) else { return Ok(None) };
+    match PATH.into_iter().find(|name| named.iter().filter(|(found, _)| found == name).count() > 1) {
+        None => Ok(Some([path, cycle, sample])),
+        Some(doubled) => Err(ImportError::DuplicateColumn {
+            place: Place { column: Some(doubled.into()), ..place.clone() },
+        }),
+    }
+}
+
+/// What to say where two of the three columns are there.
+fn part_of_path(get: &dyn Fn(&str) -> Option<usize>, path: Option<[usize; 3]>) -> Option<String> {
+    let missing: Vec<&str> = PATH.into_iter().filter(|name| get(name).is_none()).collect();
+    let [missing] = missing[..] else { return None };
+    path.is_none().then(|| {
+        format!(
+            "rows of a path need the columns {}; {missing} is missing, and the rows are read as poses",
+            PATH.join(", ")
+        )
+    })
 }
 
 /// The columns by their names. No column that is used stands there twice, and no joint is beyond the sixth.

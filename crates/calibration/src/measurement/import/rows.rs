@@ -11,7 +11,7 @@ use super::columns::Columns;
 use super::error::{ImportError, Place};
 use super::options::Options;
 use super::rounding;
-use crate::measurement::dataset::{Dataset, Extra, Reading, Row, Sensor};
+use crate::measurement::dataset::{Dataset, Extra, PathPoint, Reading, Row, Sensor};
 use truegrind_arm::condition::Condition;
 use truegrind_arm::model::Joints;
 use truegrind_math::se3::Pose;
@@ -261,6 +261,7 @@ impl Reader<'_> {
             readout_mm,
             motion: None,
             session: columns.session.map(text).filter(|s| !s.is_empty()),
+            path: self.path(line, columns)?.map(Box::new),
             other: columns.other[..kept].iter().map(|(_, i)| text(*i)).collect(),
         };
         let extra = (extra != Extra::default()).then(|| Box::new(extra));
@@ -286,6 +287,41 @@ impl Reader<'_> {
             // The columns were chosen for the sensor: one, three or seven.
             _ => return Err(ImportError::Empty { place: self.place() }),
         })
+    }
+
+    /// Where on a path the row was read; `None` where the arm stood still.
+    fn path(&self, line: &Line, columns: &Columns) -> Result<Option<PathPoint>, ImportError> {
+        let Some([path, cycle, sample]) = columns.path else { return Ok(None) };
+        let is_empty = |column: usize| line.cells.get(column).is_none_or(Cell::is_empty);
+        if [path, cycle, sample].into_iter().all(is_empty) {
+            return Ok(None);
+        }
+        if is_empty(path) {
+            let remedy = "name it, or leave path, cycle and sample empty where the arm stood still";
+            return Err(self.wrong(line, path, "the name of a path", remedy));
+        }
+        let count = |column: usize, least: f64, expected, remedy| {
+            let value = self.number(line, column)?;
+            if value < least || value.fract() != 0.0 || value > f64::from(u32::MAX) {
+                return Err(self.wrong(line, column, expected, remedy));
+            }
+            Ok(value as u32)
+        };
+        Ok(Some(PathPoint {
+            path: line.cells.get(path).map(Cell::to_string).unwrap_or_default(),
+            cycle: count(
+                cycle,
+                1.0,
+                "the number of a cycle, from 1",
+                "count how often the path was run: 1, 2, 3, …",
+            )?,
+            sample: count(
+                sample,
+                0.0,
+                "the number of a sampling point",
+                "count the sampling points along the path, alike in each cycle",
+            )?,
+        }))
     }
 
     /// From which side each joint came.

@@ -11,9 +11,13 @@ use nalgebra::Vector3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Form {
-    /// The reading belongs to the pose a time τ later or earlier: δq = τ q̇.
-    Latency,
-    /// The arm has not settled: a share of the last step is still to be made.
+    /// The reading belongs to the pose a time τ later or earlier: δq = τ q̇. Two clocks drift apart: τ = τ₀ + κ (t − t₀).
+    Latency {
+        /// t₀, the middle of the measurement (s), so that τ₀ is what the readings are late by on the whole wherever the clock of the rows
+        /// begins. It belongs to the form, as the lengths of a drum do.
+        middle_s: i64,
+    },
+    /// The arm has not settled: a share of its last step is still to be made by each joint. Drives settle each at its own pace.
     LastStep,
     /// The reading has not settled: a share of the way from the last one is still to be made.
     SlowReading,
@@ -61,7 +65,7 @@ impl Form {
     /// The contract name.
     pub fn name(self) -> &'static str {
         match self {
-            Form::Latency => "latency",
+            Form::Latency { .. } => "latency",
             Form::LastStep | Form::SlowReading => "unsettled",
             Form::Stiffness { .. } => "joint-stiffness",
             Form::TwoJointGear { .. } => "gear-two-joints",
@@ -88,7 +92,10 @@ impl Form {
 
     /// Whether it turns joints; the others shift the sensor.
     pub fn turns(self) -> bool {
-        matches!(self, Form::Latency | Form::LastStep | Form::Stiffness { .. } | Form::TwoJointGear { .. })
+        matches!(
+            self,
+            Form::Latency { .. } | Form::LastStep | Form::Stiffness { .. } | Form::TwoJointGear { .. }
+        )
     }
 
     /// Name and unit of each parameter.
@@ -97,8 +104,15 @@ impl Form {
             names.iter().map(|name| ((*name).to_owned(), unit)).collect::<Vec<_>>()
         };
         match self {
-            Form::Latency => listed(&["delay"], "s"),
-            Form::LastStep | Form::SlowReading => listed(&["share of the last step"], "1"),
+            Form::Latency { .. } => {
+                let mut out = listed(&["delay"], "s");
+                out.extend(listed(&["its change by the hour"], "s/h"));
+                out
+            }
+            Form::LastStep => {
+                (1..=6).map(|joint| (format!("share of the last step of joint {joint}"), "1")).collect()
+            }
+            Form::SlowReading => listed(&["share of the last step"], "1"),
             Form::Stiffness { .. } => {
                 let mut out = listed(&["square of the torque"], "rad/(N m)²");
                 out.extend(listed(&["cube of the torque"], "rad/(N m)³"));
@@ -133,7 +147,8 @@ impl Form {
     /// Standard deviation of a parameter before anything was measured, in its unit.
     pub fn size(self, parameter: usize) -> f64 {
         match self {
-            Form::Latency => 0.03,
+            // Clocks that nobody set together are tenths of a second apart, and their rates by some 100 ppm (0.36 s/h).
+            Form::Latency { .. } => 0.3,
             Form::LastStep | Form::SlowReading => 1e-3,
             // Beside a compliance of 1e-5 rad/(N m): as much again at some 30 N m of a kilogram's torque.
             Form::Stiffness { .. } => [1e-6, 1e-7][parameter.min(1)],

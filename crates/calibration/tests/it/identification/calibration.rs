@@ -127,7 +127,7 @@ fn disturbances(sensor: Sensor) -> Vec<Disturbance> {
         Sensor::Cable => [Form::Pulley, Form::Drum { from_mm: 500, to_mm: 1200 }],
         _ => [Form::Refraction, Form::Nest { second: true }],
     };
-    let of_motion = [Form::Latency, Form::LastStep, Form::SlowReading];
+    let of_motion = [Form::Latency { middle_s: 900 }, Form::LastStep, Form::SlowReading];
     let forms = of_pose.into_iter().chain(of_sensor).chain(of_motion);
     kinds.extend(forms.map(|form| (Kind::Form(form), Course::Always)));
     // A form that does not go as far in each row.
@@ -229,6 +229,39 @@ fn every_column_has_a_numerical_twin() {
             let size = twin.column(k).amax().max(1e-3);
             let gap = (analytic.column(k) - twin.column(k)).amax() / size;
             assert!(gap < loose(parameter), "{sensor:?} {parameter}: relative gap {gap:e}");
+        }
+    }
+}
+
+/// A clock that counts from midnight, or from years ago, makes of late readings what one that counts from the first row does.
+#[test]
+fn late_readings_do_not_hang_on_where_the_clock_begins() {
+    let arm = Model { effects: Vec::new(), ..arm() };
+    let residuals = |begins_h: i32| {
+        let mut data = dataset(Sensor::Position, 9, 7);
+        for row in &mut data.rows {
+            let time_h = row.condition.time_h.map(|t| t + f64::from(begins_h));
+            row.condition = Condition { time_h, ..*row.condition }.into();
+        }
+        let form = Form::Latency { middle_s: 900 + 3600 * i64::from(begins_h) };
+        let mut late = Disturbance::new(Kind::Form(form), Course::Always);
+        late.values = vec![0.05, 0.2];
+        let frames = Frames { disturbances: vec![late], ..Frames::at_origin(0) };
+        let list = [
+            Parameter::Disturbance { index: 0, parameter: 0 },
+            Parameter::Disturbance { index: 0, parameter: 1 },
+        ];
+        let task =
+            Calibration::new(&data, &arm, &frames, &list, &[], &[Weight { per_mm: 1.0, per_rad: 1.0 }; 9]);
+        let mut out = vec![0.0; task.rows()];
+        task.residuals(&[0.05, 0.2], 0..out.len(), &mut out);
+        out
+    };
+    let early = residuals(0);
+    assert!(early.iter().any(|r| r.abs() > 1e-3));
+    for begins_h in [14, 490_000] {
+        for (late, early) in residuals(begins_h).iter().zip(&early) {
+            assert!((late - early).abs() < 1e-6, "{late} and {early}");
         }
     }
 }

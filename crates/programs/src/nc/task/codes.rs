@@ -198,7 +198,8 @@ impl Lister<'_, '_> {
     /// Every work offset is or may be changed to what the text does not tell.
     pub(super) fn frames_assigned(&mut self) {
         self.state.frames.lose_all();
-        self.found.assigns.0 |= self.anywhere_else();
+        self.found.assigns.frames |= self.anywhere_else();
+        self.found.assigns.rotary |= self.anywhere_else();
         self.frame_index = None;
         self.lose_all();
     }

@@ -2,7 +2,7 @@
 
 use super::super::dialect::Dialect;
 use super::super::expression::{Worth, literal};
-use super::super::machine::{GROUPS, Group, Mode};
+use super::super::machine::{Assigns, GROUPS, Group, Mode};
 use super::super::syntax::Belongs;
 use super::super::token::Token;
 use super::found::key;
@@ -54,7 +54,7 @@ impl Lister<'_, '_> {
         self.branched = true;
         self.found.forgotten += 1;
         let siemens = self.dialect == Dialect::Siemens;
-        let (mut constant, mut assigns) = (0, (true, true));
+        let (mut constant, mut assigns) = (0, Assigns::ALL);
         if let Some(whole) = &self.whole {
             assigns = whole.assigns;
             for group in 0..GROUPS as usize {
@@ -157,7 +157,7 @@ impl Lister<'_, '_> {
 
     /// The begin of a file that others call: everything is as they have left it.
     pub(super) fn enter(&mut self) {
-        self.state.forget(0, (false, false));
+        self.state.forget(0, Assigns::default());
         self.state.next_tool = Some("T?".to_owned());
         self.events.push(Event::Join);
     }

@@ -151,8 +151,17 @@ impl Lister<'_, '_> {
             5061..=5070 | 5161..=5190 | 1200..=5000 | 5391.. if linux => {}
             5211..=5219 if linux => self.doubt(Group::Shift, Reason::Variable),
             5220 if linux => self.doubt(Group::Frame, Reason::Variable),
-            5221..=5340 => self.offset_is(&format!("G{}", 54 + (number - 5221) / 20), None),
-            5341..=5390 if linux => self.offset_is(&format!("G59.{}", (number - 5341) / 20 + 1), None),
+            5221..=5390 if linux || number <= 5340 => {
+                let name = match (number - 5221) / 20 {
+                    frame @ 0..=5 => format!("G{}", 54 + frame),
+                    frame => format!("G59.{}", frame - 5),
+                };
+                // X Y Z A B C, and the turn about Z of LinuxCNC as the tenth; other axes are none of the robot's.
+                if matches!((number - 5221) % 20, 3..=5) {
+                    self.has_rotary(&name, true);
+                }
+                self.offset_is(&name, None);
+            }
             2500..=2999 | 5201..=5220 | 7001..=7999 | 14001..=19999 | 20001..=29999 => self.frames_assigned(),
             2001..=2499 | 10001..=13999 => self.tools_assigned(),
             _ => {

@@ -1,6 +1,6 @@
 //! What a file sets, group by group: what is set to one thing only is known wherever ways meet.
 
-use super::super::machine::{GROUPS, Group};
+use super::super::machine::{Assigns, GROUPS, Group};
 
 /// What a file sets, group by group.
 #[derive(Debug, Clone, Default)]
@@ -9,8 +9,8 @@ pub(super) struct Found {
     pub(super) value: [Option<u64>; GROUPS as usize],
     /// Groups that are set to more than one thing, one bit each.
     pub(super) several: u32,
-    /// Whether work offsets and tools are set after ways have parted, or where they may.
-    pub(super) assigns: (bool, bool),
+    /// What is given values after ways have parted, or where they may.
+    pub(super) assigns: Assigns,
     /// Whether origins are set (G92).
     pub(super) presets: bool,
     /// How often the way has parted.

@@ -174,7 +174,7 @@ impl Lister<'_, '_> {
                 frame
             });
             self.state.tools.set(&tool, frame);
-            self.found.assigns.1 |= self.anywhere_else();
+            self.found.assigns.tools |= self.anywhere_else();
             self.tool_index.clear();
             if open {
                 self.lose_position();
@@ -207,7 +207,7 @@ impl Lister<'_, '_> {
     /// The program gives a work offset a value, or one that is not known.
     pub(super) fn assign_frame(&mut self, name: &str, frame: Option<Frame>) {
         self.state.frames.set(name, frame);
-        self.found.assigns.0 |= self.anywhere_else();
+        self.found.assigns.frames |= self.anywhere_else();
         self.frame_index = None;
     }
 
@@ -289,7 +289,12 @@ impl Lister<'_, '_> {
                 self.held_here(super::named_axes(said));
                 let here = p.filter(|p| linux && *p == 0.0).and_then(|_| self.frame_that_holds());
                 match p.and_then(named).filter(|_| linux).or(here) {
-                    Some(name) => self.offset_is(&name, None),
+                    Some(name) => {
+                        if said.abc.iter().any(Option::is_some) {
+                            self.has_rotary(&name, true);
+                        }
+                        self.offset_is(&name, None);
+                    }
                     None => self.frames_assigned(),
                 }
             }
@@ -330,10 +335,16 @@ impl Lister<'_, '_> {
                 (Err(_), _) => good = false,
             }
         }
-        // Offsets of rotary axes turn what A, B and C mean.
-        good &= said.abc.iter().flatten().all(|&index| self.number(&said.words[index]) == Some(0.0));
         let distance = if self.dialect == Dialect::LinuxCnc { 0 } else { 1 << Group::Distance as u32 };
         good &= self.state.doubt(distance | 1 << Group::Unit as u32).is_none();
+        // Offsets of rotary axes turn what A, B and C mean; they stay until each is said to be 0.
+        let zero = |index: usize| self.number(&said.words[index]) == Some(0.0);
+        if !said.abc.iter().flatten().all(|&index| zero(index)) {
+            self.has_rotary(name, true);
+        } else if absolute && said.abc.iter().all(Option::is_some) {
+            self.has_rotary(name, false);
+        }
+        good &= !self.state.frames.is_rotary(name);
         match said.radius.map(|index| self.number(&said.words[index])) {
             // The turn of the work frame about z (LinuxCNC).
             Some(Some(turn)) => {
@@ -344,6 +355,12 @@ impl Lister<'_, '_> {
             None => {}
         }
         self.offset_is(name, good.then_some(frame));
+    }
+
+    /// Whether a work offset has offsets of rotary axes, which its value does not say.
+    pub(super) fn has_rotary(&mut self, name: &str, rotary: bool) {
+        self.state.frames.set_rotary(name, rotary);
+        self.found.assigns.rotary |= rotary && self.anywhere_else();
     }
 
     /// A work offset gets a value; where it is the one that holds, the tool stands elsewhere in it now.

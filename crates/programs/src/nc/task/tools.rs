@@ -64,7 +64,7 @@ impl Lister<'_, '_> {
         }
         let name = self.state.tool_name(self.dialect);
         self.state.tools.set(&name, None);
-        self.found.assigns.1 |= self.anywhere_else();
+        self.found.assigns.tools |= self.anywhere_else();
         self.tool_index.clear();
         self.lose_position();
     }
@@ -72,7 +72,7 @@ impl Lister<'_, '_> {
     /// Every tool is or may be changed.
     pub(super) fn tools_assigned(&mut self) {
         self.state.tools.lose_all();
-        self.found.assigns.1 |= self.anywhere_else();
+        self.found.assigns.tools |= self.anywhere_else();
         self.tool_index.clear();
         self.lose_position();
     }

@@ -1,0 +1,190 @@
+//! Path accuracy and path repeatability (ISO 9283, positions) of the paths that were measured.
+//!
+//! Method. A plane stands at each of the m sampling points x_ci of the commanded path, normal to it, and the attained path j of n meets
+//! it at x_ij:
+//!
+//! > x̄_i = Σ_j x_ij / n, AT = max_i |x̄_i − x_ci|, l_ij = |x_ij − x̄_i|, RT = max_i (l̄_i + 3 S_i), S_i² = Σ_j (l_ij − l̄_i)² / (n − 1)
+//!
+//! So a reading that came a little earlier or later along the path counts for nothing.
+//! Shapes. Rows with path, cycle and sample; the sampling points are those that every cycle has. At least ten cycles are asked for. A
+//! reading may be early or late by a twentieth of the path, and one point more.
+//! Source and departures. ISO 9283:1998, path characteristics. The commanded path is where the model says that the target is at the
+//! logged joints, in the mean over the cycles, as pose accuracy is stated under the model; its direction at a point is the mean of
+//! those from and to its neighbours; between two readings a path is straight, and its first and last piece go on for their own
+//! length. A point that some cycle does not pass is left out and counted.
+//! Checked against. A path whose figures are worked out by hand (`tests/it/acceptance/path.rs`).
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use nalgebra::{Point3, Vector3};
+use truegrind_arm::model::Model;
+use truegrind_math::se3::Pose;
+use truegrind_math::statistics::{ErrorSummary, largest};
+
+use super::error::AcceptError;
+use crate::identification::calibration::Frames;
+use crate::identification::fit::Observed;
+use crate::measurement::dataset::Reading;
+
+/// Cycles of a path for path accuracy and repeatability (ISO 9283).
+pub const PATH_CYCLES: usize = 10;
+/// Fewest sampling points that make a path.
+pub const PATH_POINTS: usize = 3;
+
+/// What was found of one path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathFound {
+    /// Its name.
+    pub path: String,
+    /// How often it was run.
+    pub cycles: usize,
+    /// Sampling points that every cycle has and passes.
+    pub points: usize,
+    /// Those that were left out, since some cycle has them not or does not pass them.
+    pub left_out: usize,
+    /// The largest way from the commanded path to the barycentre of the attained ones (mm); the path accuracy where there are
+    /// [`PATH_CYCLES`] cycles. `None` for fewer than [`PATH_POINTS`] points.
+    pub deviation_mm: Option<f64>,
+    /// The path repeatability (mm), where there are [`PATH_CYCLES`] cycles.
+    pub repeatability_mm: Option<f64>,
+}
+
+impl PathFound {
+    /// The path accuracy (mm), where there are enough cycles.
+    pub fn accuracy_mm(&self) -> Option<f64> {
+        self.deviation_mm.filter(|_| self.cycles >= PATH_CYCLES)
+    }
+}
+
+type Place = Vector3<f64>;
+
+/// The rows of one path: by cycle, and there by sampling point.
+type Cycles = BTreeMap<u32, BTreeMap<u32, usize>>;
+
+/// Every path of the rows, in the order in which they come.
+pub(super) fn found(
+    observed: &Observed,
+    model: &Model,
+    frames: &Frames,
+) -> Result<Vec<PathFound>, AcceptError> {
+    let mut names: Vec<&str> = Vec::new();
+    let mut paths: Vec<Cycles> = Vec::new();
+    for (at, row) in observed.dataset.rows.iter().enumerate() {
+        let Some(point) = row.path() else { continue };
+        let which = names.iter().position(|name| *name == point.path).unwrap_or_else(|| {
+            names.push(&point.path);
+            paths.push(Cycles::new());
+            names.len() - 1
+        });
+        let before = paths[which].entry(point.cycle).or_default().insert(point.sample, at);
+        if let Some(before) = before {
+            let first = observed.dataset.rows[before].number;
+            let file = observed.dataset.file.clone();
+            return Err(AcceptError::PointTwice { file, rows: [first, row.number], point: point.clone() });
+        }
+    }
+    Ok(names.iter().zip(&paths).map(|(name, cycles)| one(name, cycles, observed, model, frames)).collect())
+}
+
+fn one(name: &str, cycles: &Cycles, observed: &Observed, model: &Model, frames: &Frames) -> PathFound {
+    let all: BTreeSet<u32> = cycles.values().flat_map(BTreeMap::keys).copied().collect();
+    let shared: Vec<u32> =
+        all.iter().copied().filter(|sample| cycles.values().all(|rows| rows.contains_key(sample))).collect();
+    let commanded: Vec<Place> = shared
+        .iter()
+        .map(|sample| {
+            let places = cycles.values().map(|rows| {
+                let row = &observed.dataset.rows[rows[sample]];
+                let flange = model.at_condition(&row.condition).forward(&row.joints);
+                (flange * frames.flange_from_target).translation.vector
+            });
+            places.sum::<Place>() / cycles.len() as f64
+        })
+        .collect();
+    let attained: Vec<Vec<Place>> = cycles
+        .values()
+        .map(|rows| {
+            let place = |sample| seen(observed, rows[sample], &frames.base_from_sensor);
+            shared.iter().filter_map(place).collect()
+        })
+        .collect();
+    let measures = characteristics(&commanded, &attained);
+    let enough = measures.len() >= PATH_POINTS;
+    PathFound {
+        path: name.to_owned(),
+        cycles: cycles.len(),
+        points: measures.len(),
+        left_out: all.len() - measures.len(),
+        deviation_mm: enough.then(|| largest(measures.iter().map(|point| point.deviation_mm))),
+        repeatability_mm: (enough && cycles.len() >= PATH_CYCLES)
+            .then(|| largest(measures.iter().map(|point| point.repeatability_mm))),
+    }
+}
+
+/// A sampling point under all cycles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passed {
+    /// From the commanded point to the barycentre of where the cycles passed its plane (mm).
+    pub deviation_mm: f64,
+    /// Mean distance from the barycentre and three standard deviations of it (mm).
+    pub repeatability_mm: f64,
+}
+
+/// The points of a commanded path whose normal plane every attained path passes (mm). Readings of the attained paths belong to the
+/// points at the same places.
+pub fn characteristics(commanded: &[Place], attained: &[Vec<Place>]) -> Vec<Passed> {
+    let reach = 1 + commanded.len() / 20;
+    let at = |point: usize| {
+        let along = direction(commanded, point)?;
+        let near = point.saturating_sub(reach + 1)..point + reach + 1;
+        let passed: Vec<Place> = attained
+            .iter()
+            .map(|path| passing(path, near.clone(), &commanded[point], &along))
+            .collect::<Option<_>>()?;
+        let barycentre = passed.iter().sum::<Place>() / passed.len() as f64;
+        let distances = ErrorSummary::of(passed.iter().map(|place| (place - barycentre).norm()));
+        Some(Passed {
+            deviation_mm: (barycentre - commanded[point]).norm(),
+            repeatability_mm: distances.mean + 3.0 * distances.standard_deviation,
+        })
+    };
+    (0..commanded.len()).filter_map(at).collect()
+}
+
+/// Where a path goes at one of its points: between its directions from and to the neighbours, so that both climb through the plane
+/// however unlike their lengths. `None` where it turns back or stands.
+fn direction(path: &[Place], point: usize) -> Option<Place> {
+    let piece = |from: usize| (path.get(from + 1)? - path[from]).try_normalize(f64::EPSILON);
+    let here = [point.checked_sub(1).and_then(piece), piece(point)];
+    here.into_iter().flatten().sum::<Place>().try_normalize(1e-6)
+}
+
+/// Where a path passes the plane through a point normal to `along`, in that direction, on one of the pieces `near`; the passage
+/// nearest to the point.
+fn passing(path: &[Place], near: Range<usize>, point: &Place, along: &Place) -> Option<Place> {
+    let last = path.len().checked_sub(2)?;
+    let passages = (near.start..near.end.min(last + 1)).filter_map(|k| {
+        let [from, to] = [path[k], path[k + 1]];
+        let height = (from - point).dot(along);
+        let climb = (to - from).dot(along);
+        if climb.is_nan() || climb <= 0.0 {
+            return None;
+        }
+        // The ends go on for their own length.
+        let (least, most) = (if k == 0 { -1.0 } else { 0.0 }, if k == last { 2.0 } else { 1.0 });
+        let share = -height / climb;
+        (least..=most).contains(&share).then(|| from + (to - from) * share)
+    });
+    passages.min_by(|a, b| (a - point).norm().total_cmp(&(b - point).norm()))
+}
+
+/// Where a row saw the target, in the base (mm).
+pub(super) fn seen(observed: &Observed, row: usize, base_from_sensor: &Pose) -> Option<Vector3<f64>> {
+    let place = match &observed.dataset.rows[row].reading {
+        Reading::Cable(_) => return None,
+        Reading::Position(place) => *place,
+        Reading::Pose(pose) => pose.translation.vector,
+    };
+    Some((base_from_sensor * Point3::from(place)).coords)
+}
