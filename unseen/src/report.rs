@@ -104,13 +104,15 @@ pub fn line(index: usize, outcome: &Outcome) -> String {
             let _ = write!(out, ": refused: {why}");
         }
         Ok(marks) => {
-            let [_, geometry, model] = marks.distances;
+            let [_, geometry, identified, model] = marks.distances;
             let _ = write!(
                 out,
-                ": {:.1} s, arm {:.4} → {:.4} mm{}, held out/fresh {:.2}{}",
+                ": {:.1} s, arm {:.4} (identify {:.4}) → {:.4} mm ± {:.4}{}, held out/fresh {:.2}{}",
                 marks.seconds,
                 geometry.shape,
+                identified.shape,
                 model.shape,
+                marks.shape_sigma_mm.unwrap_or(f64::NAN),
                 if marks.worse()[0] { " WORSE" } else { "" },
                 marks.held_out_mm / marks.fresh_mm,
                 match marks.written {
@@ -225,7 +227,7 @@ fn row(name: &str, of: &[&Outcome]) -> String {
         percent(count(&|m| m.written == Written::Yes), marks.len()),
         number(middle(&|m| m.distances[0].shape), 4),
         number(middle(&|m| m.distances[1].shape), 4),
-        number(middle(&|m| m.distances[2].shape), 4),
+        number(middle(&|m| m.distances[3].shape), 4),
         percent(count(&|m| m.worse()[1]), marks.len()),
         [0.25, 0.5, 0.75].map(|q| number(quantile(&ratios, q), 2)).join(" "),
         percent(ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count(), ratios.len()),
@@ -252,6 +254,8 @@ fn marks_in_words(of: &[&Outcome]) -> String {
     let over = |k: usize| marks.iter().map(|m| m.fresh_over_noise[k]).collect::<Vec<f64>>();
     let near = |ratios: &[f64]| ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count();
     let written = |m: &Marks| m.written == Written::Yes;
+    let said = marks.iter().filter(|m| written(m));
+    let said: Vec<f64> = said.filter_map(|m| Some(m.distances[3].shape / m.shape_sigma_mm?)).collect();
     let quartiles = |v: &[f64]| [0.25, 0.5, 0.75].map(|q| number(quantile(v, q), 3)).join(", ");
     let percent_worse = 100.0 * (WORSE - 1.0);
     [
@@ -265,6 +269,8 @@ fn marks_in_words(of: &[&Outcome]) -> String {
         format!("arm's model worse in shape than geometry alone by more than {percent_worse:.0} %: {}", bounded(count(&|m| m.worse()[0]), n)),
         format!("  as it stands: {}", bounded(count(&|m| m.worse()[1]), n)),
         format!("  of those that -o writes, in shape: {}", bounded(count(&|m| written(m) && m.worse()[0]), count(&written))),
+        format!("  the same beside geometry as identify writes it: {}", bounded(count(&|m| written(m) && m.worse_than_identify()), count(&written))),
+        format!("error of shape over what a written model file says of it: median {}, nine in ten below {}", number(quantile(&said, 0.5), 2), number(quantile(&said, 0.9), 2)),
         format!("  not written but with --allow-doubtful: {}, not at all: {}", bounded(count(&|m| m.written == Written::Doubtful), n), bounded(count(&|m| m.written == Written::No), n)),
         format!("held-out error over that of fresh rows, quartiles: random folds {} (within 10 %: {})", quartiles(&held), bounded(near(&held), n)),
         format!("  blocks {} (within 10 %: {})", quartiles(&on_blocks), bounded(near(&on_blocks), n)),

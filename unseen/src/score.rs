@@ -50,8 +50,10 @@ pub struct Marks {
     pub findings: Vec<Marked>,
     /// What becomes of the model.
     pub written: Written,
-    /// Data sheet, geometry, and the model file on clean fresh poses.
-    pub distances: [Distance; 3],
+    /// Data sheet, geometry alone as the diagnosis and as `identify` have it, and the model file on clean fresh poses.
+    pub distances: [Distance; 4],
+    /// What the model file says of its shape on those poses (standard deviation, mm).
+    pub shape_sigma_mm: Option<f64>,
     /// Held-out error of the report, random folds (mm).
     pub held_out_mm: f64,
     /// Held-out error of the report, blocks (mm).
@@ -104,9 +106,15 @@ impl Marks {
         self.findings.iter().any(|m| m.mark == Mark::True)
     }
 
-    /// Whether the model file's arm has a worse shape than geometry alone, and whether it stands worse.
+    /// Whether the model file's arm has a worse shape than geometry alone as `identify` writes it.
+    pub fn worse_than_identify(&self) -> bool {
+        let [_, _, identified, model] = self.distances;
+        model.shape > WORSE * identified.shape
+    }
+
+    /// Whether the model file's arm has a worse shape than geometry alone as the diagnosis has it, and whether it stands worse.
     pub fn worse(&self) -> [bool; 2] {
-        let [_, geometry, model] = self.distances;
+        let [_, geometry, _, model] = self.distances;
         [model.shape > WORSE * geometry.shape, model.as_is > WORSE * geometry.as_is]
     }
 }
@@ -152,6 +160,7 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
         findings: findings.collect(),
         written: reply.written,
         distances: distances(case, reply),
+        shape_sigma_mm: reply.shape_sigma_mm(&case.clean(), &case.sensor.target.translation.vector),
         held_out_mm: reply.held_out_mm,
         blocks_mm: reply.held_out_blocks_mm,
         fresh_mm,
@@ -160,10 +169,10 @@ pub fn marks(case: &Case, reply: &Reply) -> Result<Marks, String> {
     })
 }
 
-fn distances(case: &Case, reply: &Reply) -> [Distance; 3] {
+fn distances(case: &Case, reply: &Reply) -> [Distance; 4] {
     let visits = case.clean();
     let truth: Vec<Pose> = visits.iter().map(|v| case.hidden.clean_flange(&case.arm, v)).collect();
-    [Which::Sheet, Which::Geometry, Which::Written].map(|which| {
+    [Which::Sheet, Which::Geometry, Which::Identified, Which::Written].map(|which| {
         let model: Vec<Pose> = visits.iter().map(|v| reply.flange(which, v)).collect();
         distance(&truth, &model, &case.sensor.target.translation.vector)
     })

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use serde_json::Value;
 use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::{Estimated, Judgement};
@@ -11,14 +11,17 @@ use truegrind_arm::robots;
 use truegrind_calibration::diagnosis::diagnose::{Diagnosed, Options, diagnose};
 use truegrind_calibration::diagnosis::rows::prepare;
 use truegrind_calibration::identification::fit::errors_on;
+use truegrind_calibration::identification::identify::{self, identify};
 use truegrind_calibration::identification::register::starting_frames;
 use truegrind_calibration::measurement::convention::AngleConvention;
 use truegrind_calibration::measurement::dataset::Dataset;
 use truegrind_calibration::measurement::import;
 use truegrind_calibration::measurement::plausibility::{Evidence, plausibility};
+use truegrind_calibration::measurement::split;
 
 use crate::arms::{Angles, Pose};
 use crate::designs::Visit;
+use crate::shape::shape_sigma;
 
 /// A finding, as the JSON has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +54,10 @@ pub enum Written {
 pub enum Which {
     /// The data sheet's.
     Sheet,
-    /// Geometry alone.
+    /// Geometry alone, as the diagnosis has it before it looks for causes.
     Geometry,
+    /// Geometry alone, as `identify` writes it from the same rows.
+    Identified,
     /// The model file's.
     Written,
 }
@@ -76,6 +81,7 @@ pub struct Reply {
     pub seconds: f64,
     sheet: Model,
     model: Model,
+    identified: Option<Model>,
     found: Diagnosed,
     convention: AngleConvention,
 }
@@ -129,6 +135,9 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
     let found = found.map_err(|error| error.to_string())?;
     let file = found.estimated.to_toml().map_err(|error| error.to_string())?;
     let seconds = start.elapsed().as_secs_f64();
+    let identify_options = identify::Options::default();
+    let share = |rows: &Dataset| split::random(rows, identify_options.held_out, identify_options.seed);
+    let identified = identify(&rows, name, &robot.model, &frames, &share, &identify_options);
     let written = match found.estimated.verdict.status {
         Judgement::Fail => Written::No,
         Judgement::Doubtful => Written::Doubtful,
@@ -149,6 +158,7 @@ fn answer(text: &str, robot: &str) -> Result<Reply, String> {
         seconds,
         sheet: robot.model,
         model: read.model,
+        identified: identified.ok().map(|done| done.estimated.model),
         found,
         convention,
     })
@@ -194,15 +204,25 @@ impl Reply {
         let model = match which {
             Which::Sheet => &self.sheet,
             Which::Geometry => &self.found.geometric.model,
+            Which::Identified => self.identified.as_ref().unwrap_or(&self.sheet),
             Which::Written => &self.model,
         };
-        let condition = Condition {
-            time_h: Some(visit.hours),
-            approach: sides(&visit.q, &visit.before),
-            ..Condition::default()
-        };
-        let pose = model.forward(&Vector6::from(visit.q), &condition);
+        let pose = model.forward(&Vector6::from(visit.q), &condition(visit));
         Pose::from_parts(pose.translation, pose.rotation)
+    }
+
+    /// Standard deviation that the model file states of the shape at visits, for a point on the flange (mm).
+    pub fn shape_sigma_mm(&self, visits: &[Visit], point: &Vector3<f64>) -> Option<f64> {
+        let poses: Vec<Pose> = visits.iter().map(|visit| self.flange(Which::Written, visit)).collect();
+        let file = &self.found.estimated;
+        let tool = Pose::from_parts((*point).into(), nalgebra::UnitQuaternion::identity());
+        let slope = |visit: &Visit| {
+            let condition = condition(visit);
+            let arm = self.model.at_condition(&condition);
+            file.position_jacobian(&arm, &Vector6::from(visit.q), &tool)
+        };
+        let slopes: Vec<_> = visits.iter().map(slope).collect();
+        shape_sigma(&poses, point, &slopes, &file.covariance)
     }
 
     /// What geometry alone and the extended model, each with its frames and causes of the measurement, get wrong on fresh rows of
@@ -225,6 +245,10 @@ impl Reply {
             (sum / count).sqrt()
         }))
     }
+}
+
+fn condition(visit: &Visit) -> Condition {
+    Condition { time_h: Some(visit.hours), approach: sides(&visit.q, &visit.before), ..Condition::default() }
 }
 
 /// From which side each joint came, as the condition of a pose has it: −1 from below.

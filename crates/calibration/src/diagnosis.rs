@@ -20,7 +20,7 @@
 //!    is identified only if it wins beside those and comes back in [`halves`] of the rows.
 //! 10. `stories`: one finding for each story, ranked by what it is `worth`, in doubt where it may be a part of something larger
 //!     (`shadow`); `something_else`: what is left; `written`: the arm
-//!     for compensation.
+//!     for compensation, where `sensor_causes` says beside which causes of the measurement.
 //! 11. [`finding`], `account` and [`words`]: the result, in the contract's terms and in a technician's.
 //!
 //! Products and factors of large matrices are in `algebra`.
@@ -42,6 +42,7 @@ mod stories;
 mod something_else;
 mod written;
 mod in_doubt;
+mod sensor_causes;
 mod contract;
 pub mod newton;
 mod repeated;

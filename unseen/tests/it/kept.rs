@@ -53,3 +53,10 @@ fn poses_that_are_read_again_prove_no_gear() {
     assert_eq!(false_names(&marks), Vec::<&str>::new());
     assert!(!marks.worse()[0], "{:?}", marks.distances);
 }
+
+/// Readings taken before the arm was at rest are told, and yet too little speaks for a better arm beside them: it was 30 % worse.
+#[test]
+fn a_weak_fault_of_the_readings_bends_no_arm() {
+    let marks = outcome(&Case::draw(223, Kind::Unsettled, 0, Limits::default())).marks.unwrap();
+    assert!(marks.told() && !marks.worse()[0] && !marks.worse_than_identify(), "{:?}", marks.distances);
+}

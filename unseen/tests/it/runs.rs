@@ -50,7 +50,7 @@ fn clean_rows_have_no_true_name_and_fresh_rows_show_the_held_out_error() {
     let sigma = case.sensor.sigma_mm * (case.sensor.lengths() as f64).sqrt();
     // The rows are few: noise and what it does to the fit.
     assert!(marks.fresh_mm > 0.9 * sigma && marks.fresh_mm < 2.0 * sigma, "{} {sigma}", marks.fresh_mm);
-    let [sheet, geometry, _] = marks.distances;
+    let [sheet, geometry, _, _] = marks.distances;
     assert!(geometry.shape < 0.3 * sheet.shape, "{geometry:?} {sheet:?}");
     assert!(false_of(&marks) <= marks.findings.len());
 }
@@ -71,7 +71,7 @@ fn without_a_cause_the_written_arm_has_the_shape_of_geometrys() {
             reply.findings.is_empty().then(|| marks(&case, &reply).unwrap())
         })
         .unwrap();
-    let [_, geometry, model] = case.distances;
+    let [_, geometry, _, model] = case.distances;
     // Under narrower tolerances than those of the search, which the rows themselves tell: what the rows see hardly moves.
     assert!(
         (geometry.shape - model.shape).abs() < 0.05 * geometry.shape,

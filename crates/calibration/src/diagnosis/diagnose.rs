@@ -11,11 +11,12 @@ use super::remaining;
 use super::rows::{Prepared, prepare};
 use super::search::{Confirmed, Ground, Search};
 use super::selection::already;
+use super::sensor_causes::{self, chance_worse};
 use super::stories;
 use super::telling::{self, Told};
 use super::testability::not_testable;
 use super::validation::{StageError, nominal};
-use super::written::{kept, written};
+use super::written::{kept, wandered, written};
 use crate::identification::benefit::{Benefit, benefit};
 use crate::identification::calibration::Frames;
 use crate::identification::fit::{Fitted, Observed, frame_parameters};
@@ -115,7 +116,16 @@ pub fn diagnose(
     let (mut diagnosis, pictures) = summed_up(&search, &confirmed, told, robot, notes);
     diagnosis.poses_needed = needed;
     let of_all = thinned.is_none().then_some(&confirmed.outcome.discrepancy);
-    let (written, written_stage) = proven(&search, &certain, of_all);
+    let proven = proven(&search, &certain, of_all);
+    let ((written, written_stage), chance) = undisturbed(&search, proven, of_all);
+    diagnosis.notes.extend(chance.map(|chance| {
+        format!(
+            "the arm is written as fitted without the causes of the measurement: beside them its shape would be worse with a \
+             probability of {:.0} %, where {:.0} % is allowed",
+            100.0 * chance,
+            100.0 * sensor_causes::MOST
+        )
+    }));
     let handed = handed_on(&search, &written, of_all);
     let [before, geometry, _] = search.stages;
     let stages = [before, geometry, written_stage];
@@ -164,10 +174,35 @@ fn proven(
     if better(&plain.1) { (fit, errors) } else { plain }
 }
 
-/// The written arm with what was found of the arm beside it; `None` where all of that is written.
+/// The arm that is proven, or, with the reason, the same fitted without the causes of the measurement, where too little speaks for a
+/// better arm beside them.
+fn undisturbed(
+    search: &Search<'_>,
+    proven: (Extended, StageError),
+    discrepancy: Option<&Discrepancy>,
+) -> ((Extended, StageError), Option<f64>) {
+    let of_the_arm: Vec<Cause> =
+        proven.0.causes.iter().filter(|cause| matches!(cause, Cause::Arm(_))).cloned().collect();
+    if of_the_arm.len() == proven.0.causes.len() && wandered(discrepancy).is_none() {
+        return (proven, None);
+    }
+    let Ground { dataset, subject, .. } = search.ground;
+    let without = written(subject, &search.extended, &of_the_arm, None);
+    let samples = Region::of(subject.observed.dataset.rows.iter().map(|row| &row.joints), 0.0).samples_deg;
+    let beside = in_doubt::beside(&without, proven.0.clone());
+    match chance_worse(&proven.0, &beside, &mean_condition(dataset), &samples) {
+        Some(chance) if chance > sensor_causes::MOST => {
+            let errors = search.validation.stage(&without);
+            ((without, errors), Some(chance))
+        }
+        _ => (proven, None),
+    }
+}
+
+/// The written arm with what was found beside it; `None` where all of that is written.
 fn handed_on(search: &Search<'_>, fit: &Extended, discrepancy: Option<&Discrepancy>) -> Option<Extended> {
     let all = in_doubt::all(&search.extended.causes, &search.accepted);
-    let missing = |cause: &Cause| matches!(cause, Cause::Arm(_)) && !already(&fit.causes, cause);
+    let missing = |cause: &Cause| !already(&fit.causes, cause);
     all.iter()
         .any(missing)
         .then(|| in_doubt::beside(fit, written(&search.ground.subject, &search.extended, &all, discrepancy)))

@@ -40,9 +40,7 @@ pub(super) fn written(
     causes: &[Cause],
     discrepancy: Option<&Discrepancy>,
 ) -> Extended {
-    // Readings that resemble those before them may do so for what the model gets wrong along the way: freed of that, the rows
-    // would say little of the arm's lengths.
-    let wandered = discrepancy.filter(|d| d.in_time() && d.correlation == 0.0);
+    let wandered = wandered(discrepancy);
     let kept = if causes == extended.causes { extended.clone() } else { refit(subject, causes, extended) };
     let wide = subject.tolerance;
     let catalogue = Tolerance { frame_mm: wide.frame_mm, frame_rad: wide.frame_rad, ..Tolerance::default() };
@@ -50,6 +48,12 @@ pub(super) fn written(
     let held = refit(&Subject { tolerance: &tolerance, ..*subject }, &kept.causes, &kept);
     let written = wandered.and_then(|wandered| beside(subject, &held, wandered)).unwrap_or(held);
     written.whole(&Subject { tolerance: &tolerance, ..*subject })
+}
+
+/// What wandered while the rows were taken, where there is such a thing. Readings that resemble those before them may do so for what the
+/// model gets wrong along the way: freed of that, the rows would say little of the arm's lengths.
+pub(super) fn wandered(discrepancy: Option<&Discrepancy>) -> Option<&Discrepancy> {
+    discrepancy.filter(|d| d.in_time() && d.correlation == 0.0)
 }
 
 fn refit(subject: &Subject<'_>, causes: &[Cause], near: &Extended) -> Extended {

@@ -33,6 +33,7 @@ use crate::identification::rounding;
 use crate::identification::tolerance::Tolerance;
 use crate::measurement::dataset::{Dataset, Reading, Sensor};
 use crate::measurement::sensor::disturbance::{Course, Kind};
+use truegrind_arm::condition::Condition;
 use truegrind_arm::estimated::Estimated;
 use truegrind_arm::jacobian::{Ends, parameter_jacobian};
 use truegrind_arm::model::Joints;
@@ -127,7 +128,7 @@ pub fn benefit(
     tolerance: &Tolerance,
     lack: f64,
 ) -> Option<Benefit> {
-    let moved = moved(fitted, estimated)?;
+    let moved = shape_weights(fitted, &estimated.condition, &estimated.region.samples_deg)?;
     let mut readings = readings(fitted, dataset);
     readings.within_the_arm(fitted, tolerance)?;
     let x = DVector::from_column_slice(&fitted.estimate.x);
@@ -363,7 +364,7 @@ impl Belief {
 }
 
 /// Probability of a standard normal number below `value`.
-fn below(value: f64) -> f64 {
+pub(crate) fn below(value: f64) -> f64 {
     let tail = 0.5 * normal_two_sided(value);
     if value < 0.0 { tail } else { 1.0 - tail }
 }
@@ -525,8 +526,13 @@ fn middle(dataset: &Dataset) -> [f64; 3] {
     sum
 }
 
-/// M for the parameters of the fit: rows and columns of the measurement's own are zero.
-fn moved(fitted: &Fitted, estimated: &Estimated) -> Option<DMatrix<f64>> {
+/// M for the parameters of the fit, at `condition` over the region of these poses (°): rows and columns of the measurement's own are
+/// zero. δᵀ M δ is the mean square by which a change δ of the parameters moves the target, apart from motions of base and target (mm²).
+pub(crate) fn shape_weights(
+    fitted: &Fitted,
+    condition: &Condition,
+    samples_deg: &[[f64; 6]],
+) -> Option<DMatrix<f64>> {
     let places: Vec<usize> =
         fitted.parameters.iter().enumerate().filter(|(_, p)| p.is_of_arm()).map(|(k, _)| k).collect();
     let mut list: Vec<Parameter> = places.iter().map(|&k| fitted.parameters[k]).collect();
@@ -535,11 +541,11 @@ fn moved(fitted: &Fitted, estimated: &Estimated) -> Option<DMatrix<f64>> {
         return None;
     }
     list.extend((0..6).map(Parameter::SensorFrame).chain((0..3).map(Parameter::Target)));
-    let posed = fitted.model.at_condition(&estimated.condition);
+    let posed = fitted.model.at_condition(condition);
     let target =
         Pose::from_parts(fitted.frames.flange_from_target.translation, nalgebra::UnitQuaternion::identity());
     let ends = Ends { world_from_base: [0.0; 6], flange_from_tool: vector_from_pose(&target) };
-    let poses = inside(&estimated.region.samples_deg);
+    let poses = inside(samples_deg);
     let mut stack = DMatrix::zeros(3 * poses.len(), list.len());
     for (k, q) in poses.iter().enumerate() {
         let twists = parameter_jacobian(&ends, &posed, q, &list);
