@@ -311,6 +311,8 @@ fn finish(
         let real = real(&w.start);
         let meant = w.start.meant;
         let in_object = |reached: &Pose| Deviation::between(&meant, reached, &Pose::identity(), None);
+        let deviations =
+            [w.reached_before, real.target_of(&reached_after[k])].map(|reached| in_object(&reached));
         let in_play_mm = acting.in_play_mm(w.place, &w.after, &tools[k]);
         let (conf, margins) = branches[k];
         let mut solved = Solved {
@@ -319,11 +321,11 @@ fn finish(
             before: w.start.joints,
             after: w.after,
             told: told[k],
-            conf_before: w.start.conf,
+            cfx_before: w.start.cfx,
             conf,
             margins: [w.start.margins, margins],
-            deviation_before: in_object(&w.reached_before),
-            deviation_after: in_object(&real.target_of(&reached_after[k])),
+            off_mm: deviations.map(|deviation| deviation.norm_mm()),
+            deviations: options.points.then(|| Box::new(deviations)),
             sigma_mm: absolute[k].unwrap_or(0.0).hypot(in_play_mm),
             shape_sigma_mm: of_shape[k]
                 .or_else(|| assessment.sigma_of_cut_mm(cut_of(w)))
@@ -332,15 +334,14 @@ fn finish(
             place: w.place,
             guess: w.start.guess,
             outside: arms.knowledge.and_then(|k| k.region.outside_near(&w.after, &mut near)),
-            singularity: w.singularity,
             forbidden: None,
         };
-        solved.forbidden = forbidden(&solved, arms, options).or_else(|| {
+        solved.forbidden = forbidden(&solved, w.singularity, arms, options).or_else(|| {
             let told = &mountings.list[solved.mounted].told;
             let flanges = [told.flange_for(&meant), told_flanges[k]];
             let stated = if joint_form(w) { None } else { stated(&asked[w.index]) };
             let replay = Replay { flanges, heard: &heard[k], joints: &last[k], stated };
-            at_target(&solved, &replay, arms, options)
+            at_target(&solved, w.singularity, &replay, arms, options)
         });
         out[w.index] = Ok(solved);
     }

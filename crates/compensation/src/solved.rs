@@ -24,17 +24,19 @@ pub(super) struct Solved {
     pub(super) before: Joints,
     pub(super) after: Joints,
     pub(super) told: Pose,
-    pub(super) conf_before: Configuration,
+    /// The branch before.
+    pub(super) cfx_before: i32,
     pub(super) conf: Configuration,
-    pub(super) deviation_before: Deviation,
-    pub(super) deviation_after: Deviation,
+    /// How far the tool is off before and after (mm).
+    pub(super) off_mm: [f64; 2],
+    /// The same with its direction and the turn; only where points are asked for.
+    pub(super) deviations: Option<Box<[Deviation; 2]>>,
     pub(super) sigma_mm: f64,
     /// The same of the shape of its cut, after the best rigid registration; absent outside cuts.
     pub(super) shape_sigma_mm: Option<f64>,
     /// What of either comes from joints whose side is not known (mm).
     pub(super) in_play_mm: f64,
     pub(super) outside: Option<Outside>,
-    pub(super) singularity: f64,
     /// [`Inverse::branch_margins`](truegrind_arm::inverse::Inverse::branch_margins) of the nominal arm, before and after.
     pub(super) margins: [[f64; 3]; 2],
     /// Why it must not be written.
@@ -57,7 +59,7 @@ impl Solved {
             mounted: self.mounted,
             meant: self.meant,
             joints: self.before,
-            conf: self.conf_before,
+            cfx: self.cfx_before,
             margins: self.margins[0],
             guess: self.guess,
         }
